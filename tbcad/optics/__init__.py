@@ -1,0 +1,1 @@
+"""Numbers only: the geometry and optics of the turtleback reflector (numpy, scipy)."""

@@ -1,0 +1,240 @@
+"""Cells: the part of each mirror's sphere that no other covers, bounded by circular arcs."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tbcad.optics.surfaces import Surfaces
+from tbcad.optics.triangulation import Boundary, half_edges, radical_planes, settle
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# Corners nearer to each other than this are one: far below any maker's means, far above rounding.
+MERGED_MM = 1e-4
+
+
+@dataclass(frozen=True)
+class Cells:
+    """All cells of one camera's mirrors as one planar graph on shared corners (DESIGN.md 4).
+
+    Faces are the m mirrors, then the seam and the foot plane. Every corner is where three faces
+    meet; where four cells meet in one point two corners coincide.
+
+    Attributes:
+        surfaces: the m mirrors and the two planes.
+        boundary: indices of the planes.
+        triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
+        corners: points, mm, (t, 3).
+    """
+
+    surfaces: Surfaces
+    boundary: Boundary
+    triangles: Ints
+    corners: Floats
+
+    @property
+    def mirrors(self) -> int:
+        """Number of mirrors m."""
+        return self.boundary.seam
+
+    def mirrored(self) -> "Cells":
+        """The other camera's cells: mirror image in the plane x = 0."""
+        flip = np.array([-1.0, 1.0, 1.0])
+        return Cells(
+            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * flip
+        )
+
+    @cached_property
+    def arcs(self) -> "Arcs":
+        """The arcs between cells, one for each pair of faces that touch."""
+        return arcs_of(self)
+
+    @cached_property
+    def rings(self) -> tuple[Ints, Ints]:
+        """Arcs round each mirror, counter-clockwise from outside.
+
+        Returns:
+            Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell
+            follows it from start to end, 2 a + 1 where it goes back along it.
+        """
+        ends, twin = half_edges(self.triangles)
+        first = np.zeros(self.mirrors, dtype=np.int64)
+        first[ends[::-1, 0][ends[::-1, 0] < self.mirrors]] = (
+            len(ends) - 1 - np.flatnonzero(ends[::-1, 0] < self.mirrors)
+        )
+        degree = np.bincount(ends[:, 0], minlength=self.mirrors)[: self.mirrors]
+        around = [first]
+        for _ in range(int(degree.max()) - 1):
+            before = around[-1] // 3 * 3 + (around[-1] + 2) % 3
+            around.append(twin[before])
+        table = np.stack(around, axis=1)
+        sides = self.arcs.side_of_half_edge[table]
+        listed = (np.arange(table.shape[1]) < degree[:, None]) & (sides >= 0)
+        return np.concatenate([[0], np.cumsum(listed.sum(axis=1))]), sides[listed]
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Circular arcs as rational quadratic curves, which hold straight lines too, over e arcs.
+
+    Attributes:
+        left: face that has the arc counter-clockwise (from outside) from start to end, (e,).
+        right: the other face, (e,).
+        start: corner indices, (e,).
+        end: corner indices, (e,).
+        points: start, control and end points, mm, (e, 3, 3).
+        weight: weight of the control point, the cosine of half the arc's angle, (e,).
+        side_of_half_edge: for each directed edge of the dual triangulation 2 a or 2 a + 1 for
+            arc a forward or back; -1 between the two planes and where corners were merged.
+    """
+
+    left: Ints
+    right: Ints
+    start: Ints
+    end: Ints
+    points: Floats
+    weight: Floats
+    side_of_half_edge: Ints
+
+    def __len__(self) -> int:
+        return len(self.left)
+
+    @property
+    def faces(self) -> Ints:
+        """The two faces at each arc, (e, 2)."""
+        return np.column_stack([self.left, self.right])
+
+    @property
+    def length(self) -> Floats:
+        """Distance of each arc's ends, mm, (e,)."""
+        result: Floats = np.linalg.norm(self.points[:, 2] - self.points[:, 0], axis=1)
+        return result
+
+    def at(self, arc: Ints, t: Floats) -> Floats:
+        """Points (..., 3) on arcs (...) at parameters t (...) in [0, 1]."""
+        basis = np.stack([(1 - t) ** 2, 2 * t * (1 - t) * self.weight[arc], t**2], axis=-1)
+        weighted = np.einsum("...k,...kx->...x", basis, self.points[arc])
+        result: Floats = weighted / basis.sum(axis=-1)[..., None]
+        return result
+
+
+def arcs_of(cells: Cells) -> Arcs:
+    """Arcs in closed form from the corners and the faces' gradients there.
+
+    Corners nearer to each other than MERGED_MM become one, which no maker could tell apart.
+    """
+    ends, twin = half_edges(cells.triangles)
+    edge = np.flatnonzero((np.arange(len(ends)) < twin) & (ends.min(axis=1) < cells.mirrors))
+    between = np.column_stack([twin[edge] // 3, edge // 3])
+    gap = np.linalg.norm(np.diff(cells.corners[between], axis=1)[:, 0], axis=1)
+    between = _merged(between, gap < MERGED_MM, len(cells.corners))
+    edge, (start, end) = edge[gap >= MERGED_MM], between[gap >= MERGED_MM].T
+    side = np.full(len(ends), -1)
+    side[edge] = 2 * np.arange(len(edge))
+    side[twin[edge]] = side[edge] + 1
+    left, right = ends[edge].T
+    points, weight = _curves(cells.surfaces, left, right, cells.corners[start], cells.corners[end])
+    return Arcs(left, right, start, end, points, weight, side)
+
+
+def _merged(between: Ints, short: Bools, corners: int) -> Ints:
+    """Corner indices with those joined by short arcs replaced by the first of them."""
+    if not short.any():
+        return between
+    graph = coo_array((np.ones(short.sum()), between[short].T), shape=(corners, corners))
+    _, group = connected_components(graph, directed=False)
+    _, first = np.unique(group, return_index=True)
+    result: Ints = first[group][between]
+    return result
+
+
+def _curves(
+    surfaces: Surfaces, left: Ints, right: Ints, start: Floats, end: Floats
+) -> tuple[Floats, Floats]:
+    """Control polygon (e, 3, 3) and weight (e,) of the arc the two faces have in common."""
+    swap = surfaces.curvature[right] > surfaces.curvature[left]
+    p, q = np.where(swap, right, left), np.where(swap, left, right)
+    plane, _ = radical_planes(surfaces, p, q)
+    plane /= np.linalg.norm(plane, axis=1, keepdims=True)
+    chord = end - start
+    half = np.linalg.norm(chord, axis=1) / 2
+    tilt = np.einsum("ex,ex->e", surfaces.gradient(p, start), plane)
+    sine = half * surfaces.curvature[p] / np.sqrt(1 - tilt**2)
+    cosine = np.sqrt(1 - sine**2)
+    middle = (start + end) / 2
+    along = np.divide(chord, 2 * half[:, None], out=np.zeros_like(chord), where=half[:, None] > 0)
+    outward = np.cross(plane, along)
+    outward *= np.sign(np.einsum("ex,ex->e", outward, surfaces.gradient(p, middle)))[:, None]
+    control = middle + (half * sine / cosine)[:, None] * outward
+    return np.stack([start, control, end], axis=1), cosine
+
+
+def cells_of(surfaces: Surfaces, boundary: Boundary, triangles: Ints) -> Cells:
+    """Cells of mirrors, from a dual triangulation that is right or nearly so.
+
+    Raises:
+        UnsettledError: when the mirrors bound no proper cells.
+    """
+    settled, corners = settle(surfaces, triangles, boundary.seam)
+    return Cells(surfaces, boundary, settled, corners)
+
+
+def areas(cells: Cells) -> Floats:
+    """Areas of the cells in closed form, mm^2, (m,).
+
+    A spherical polygon of small-circle arcs by Gauss and Bonnet: the area over r^2 is 2 pi less
+    the exterior angles at the corners and the integrals of geodesic curvature along the arcs.
+    Cells of planar mirrors are plane polygons, as all their neighbours are planar.
+    """
+    offsets, sides = cells.rings
+    arc, back = sides // 2, sides % 2
+    points = cells.arcs.points[arc]
+    points[back == 1] = points[back == 1][:, ::-1]
+    mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
+    planar = np.all(cells.surfaces.curvature == 0)
+    part = _plane_part if planar else _sphere_part
+    total = np.add.reduceat(part(cells, mirror, arc, points, offsets), offsets[:-1])
+    if planar:
+        return total
+    return (2 * np.pi - total) / cells.surfaces.curvature[: cells.mirrors] ** 2
+
+
+def _plane_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets: Ints) -> Floats:
+    del arc, offsets
+    from_apex = points - cells.surfaces.apex[mirror][:, None]
+    normal = cells.surfaces.normal[mirror]
+    doubled = np.einsum("sx,sx->s", np.cross(from_apex[:, 0], from_apex[:, 2]), normal)
+    result: Floats = -doubled / 2
+    return result
+
+
+def _sphere_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets: Ints) -> Floats:
+    """Exterior angle after each side and geodesic curvature along it, seen from outside."""
+    surfaces = cells.surfaces
+    outside = -surfaces.gradient(mirror, points[:, 2])
+    tangents = np.diff(points, axis=1)
+    tangents /= np.linalg.norm(tangents, axis=2, keepdims=True)
+    following = np.arange(len(arc)) + 1
+    following[offsets[1:] - 1] = offsets[:-1]
+    before, after = tangents[:, 1], tangents[following, 0]
+    angle = np.arctan2(
+        np.einsum("sx,sx->s", np.cross(before, after), outside),
+        np.einsum("sx,sx->s", before, after),
+    )
+    # Geodesic curvature of a circle of angular radius b is cot b / r; with the turn of the
+    # tangent 2 asin(sin half angle) its integral is that turn times cos b.
+    start, control, end = points[:, 0], points[:, 1], points[:, 2]
+    bend = np.cross(control - start, end - control)
+    turn = 2 * np.arctan2(
+        np.linalg.norm(control - (start + end) / 2, axis=1), np.linalg.norm(end - start, axis=1) / 2
+    )
+    size = np.linalg.norm(bend, axis=1)
+    axis = np.divide(bend, size[:, None], out=np.zeros_like(bend), where=size[:, None] > 0)
+    result: Floats = angle + turn * np.einsum("sx,sx->s", axis, outside)
+    return result

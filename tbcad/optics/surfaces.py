@@ -1,0 +1,94 @@
+"""Mirror surfaces as one implicit form that covers spheres and planes alike.
+
+A point x is on the light's side of mirror i where f_i(x) > 0 with
+
+    f(x) = N . (x - P) + (k / 2) |x - P|^2
+
+for apex P, inward unit normal N and curvature k = 1 / r. A plane is k = 0, so no radius is ever
+infinite. For k > 0, 2 r f is the power of x with respect to the sphere.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Mirror surfaces (and bounding planes) as arrays over m of them.
+
+    Attributes:
+        apex: points P on the surfaces, mm, (m, 3).
+        normal: unit normals N at the apices toward the light, (m, 3).
+        curvature: k = 1 / r >= 0, 1/mm, (m,).
+    """
+
+    apex: Floats
+    normal: Floats
+    curvature: Floats
+
+    def __len__(self) -> int:
+        return len(self.curvature)
+
+    @property
+    def gradient_at_origin(self) -> Floats:
+        """Gradient g of f(x) = (k/2) |x|^2 + g . x + h, (m, 3)."""
+        return self.normal - self.curvature[:, None] * self.apex
+
+    @property
+    def value_at_origin(self) -> Floats:
+        """Constant h of f(x) = (k/2) |x|^2 + g . x + h, (m,)."""
+        squared = np.einsum("mx,mx->m", self.apex, self.apex)
+        return self.curvature / 2 * squared - np.einsum("mx,mx->m", self.normal, self.apex)
+
+    @property
+    def radius(self) -> Floats:
+        """Radii, mm, (m,); NaN for planes."""
+        return np.divide(1, self.curvature, out=np.full(len(self), np.nan), where=self.curvature > 0)
+
+    @property
+    def centre(self) -> Floats:
+        """Sphere centres C = P - r N, mm, (m, 3); NaN for planes."""
+        return self.apex - self.radius[:, None] * self.normal
+
+    def value(self, i: Ints, x: Floats) -> Floats:
+        """f_i at the points x (..., 3), for indices i (...)."""
+        away = x - self.apex[i]
+        squared = np.einsum("...x,...x->...", away, away)
+        return np.einsum("...x,...x->...", self.normal[i], away) + self.curvature[i] / 2 * squared
+
+    def gradient(self, i: Ints, x: Floats) -> Floats:
+        """Gradient of f_i at x (..., 3); on the surface itself the unit normal toward the light."""
+        return self.normal[i] + self.curvature[i][..., None] * (x - self.apex[i])
+
+    def with_curvature(self, curvature: Floats) -> "Surfaces":
+        """The same poses with other curvatures (m,)."""
+        return Surfaces(self.apex, self.normal, curvature)
+
+    def offset(self, distance: float) -> "Surfaces":
+        """Parallel surfaces, moved by distance (mm) along the normals: centres stay, radii grow."""
+        apex = self.apex + distance * self.normal
+        curvature = self.curvature / (1 + distance * self.curvature)
+        return Surfaces(apex, self.normal, curvature)
+
+    def mirrored(self) -> "Surfaces":
+        """The surfaces of the other camera: mirror image in the plane x = 0."""
+        flip = np.array([-1.0, 1.0, 1.0])
+        return Surfaces(self.apex * flip, self.normal * flip, self.curvature)
+
+    def joined(self, other: "Surfaces") -> "Surfaces":
+        """These surfaces followed by the other ones."""
+        pairs = zip(self._arrays(), other._arrays(), strict=True)
+        return Surfaces(*(np.concatenate(pair) for pair in pairs))
+
+    def _arrays(self) -> tuple[Floats, Floats, Floats]:
+        return self.apex, self.normal, self.curvature
+
+
+def planes(points: Floats, normals: Floats) -> Surfaces:
+    """Planes through points (k, 3) with unit normals (k, 3)."""
+    return Surfaces(np.asarray(points, float), np.asarray(normals, float), np.zeros(len(points)))
