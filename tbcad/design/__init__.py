@@ -1,0 +1,1 @@
+"""What to build: the spec, and the mirrors that follow from it."""

@@ -1,0 +1,136 @@
+"""What is said when a design is refused: one line with what, where, what is allowed, what next."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from difflib import SequenceMatcher
+from typing import Any, Literal, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from tbcad.errors import InputError
+
+_LONGEST_VALUE = 60
+_LEAST_LIKENESS = 0.6
+_ORDER = {Gt: "above", Ge: "from", Lt: "below", Le: "to"}
+
+
+class SpecError(InputError, ValueError):
+    """A design that cannot be read or built; its text is one line."""
+
+
+def one_line(text: str) -> str:
+    """Return text with line breaks and control characters made visible or dropped."""
+    return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
+
+
+def shown(value: object) -> str:
+    """Return a value as short text of one line."""
+    try:
+        text = one_line(repr(value))
+    except ValueError:  # Python refuses to write integers of more than 4300 digits
+        text = "a number of thousands of digits"
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+
+
+def fields(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """Yield every dotted key of a model with its field, sections before their keys."""
+    for name, field in model.model_fields.items():
+        key = prefix + (field.alias or name)
+        yield key, field
+        if section := section_of(field):
+            yield from fields(section, key + ".")
+
+
+def section_of(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the model of a field that is a section, None for a key."""
+    kind = field.annotation
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def allowed(kind: Any, limits: Iterable[object] = ()) -> str:
+    """Return in words what a type and its limits allow."""
+    if get_origin(kind) is tuple:
+        return "[" + ", ".join(_allowed_item(item) for item in get_args(kind)) + "]"
+    if get_origin(kind) is Literal:
+        return " or ".join(str(choice) for choice in get_args(kind))
+    words = {int: "a whole number", float: "a number", bool: "true or false", str: "text"}
+    return " ".join([words.get(kind, "a table"), *_limits(limits)])
+
+
+def _allowed_item(item: Any) -> str:
+    kind, *metadata = get_args(item) or (item,)
+    return allowed(kind, [limit for field in metadata for limit in field.metadata])
+
+
+def _limits(limits: Iterable[object]) -> Iterator[str]:
+    for limit in limits:
+        if word := _ORDER.get(type(limit)):
+            yield f"{word} {getattr(limit, type(limit).__name__.lower()):g}"
+        elif pattern := getattr(limit, "pattern", None):
+            yield f"that matches {pattern}"
+
+
+def nearest(key: str, known: Iterable[str]) -> str | None:
+    """Return the known dotted key most like a given one, None if all are far from it."""
+    likeness, best = max((_likeness(key, other), other) for other in known)
+    return best if likeness >= _LEAST_LIKENESS else None
+
+
+def _likeness(key: str, other: str) -> float:
+    leaf, other_leaf = key.rpartition(".")[2], other.rpartition(".")[2]
+    whole = SequenceMatcher(None, key, other).ratio()
+    # A key in the wrong section is still the key that was meant.
+    return max(whole, 0.95 * SequenceMatcher(None, leaf, other_leaf).ratio())
+
+
+def unknown_key(where: str, key: str, model: type[BaseModel]) -> SpecError:
+    """Return the error for a key that does not exist, or is a section where a key must be."""
+    known = [name for name, _ in fields(model)]
+    if key in known:
+        return SpecError(f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}")
+    likely = nearest(key, known)
+    hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(_siblings(key, known))
+    return SpecError(one_line(f"{where}: unknown key {key}: {hint}"))
+
+
+def _siblings(key: str, known: list[str]) -> list[str]:
+    return _inside(key.rpartition(".")[0], known) or _inside("", known)
+
+
+def _inside(section: str, known: list[str]) -> list[str]:
+    return [key for key in known if key.rpartition(".")[0] == section]
+
+
+def refused(
+    error: ValidationError, model: type[BaseModel], file: str, options: Collection[str] = ()
+) -> SpecError:
+    """Return the first fault of a validation as one line, and how many more there are.
+
+    Args:
+        error: what pydantic found.
+        model: the model that refused.
+        file: where the design came from.
+        options: dotted keys that options have set.
+    """
+    first, *others = error.errors(include_url=False)
+    key = ".".join(part for part in first["loc"] if isinstance(part, str))
+    more = f" (and {len(others)} more)" if others else ""
+    if first["type"] == "value_error":
+        where = f"{file} with options" if options else file
+        return SpecError(one_line(f"{where}: {key and key + ': '}{first['ctx']['error']}{more}"))
+    where = "option" if key in options else file
+    if first["type"] == "extra_forbidden":
+        return SpecError(f"{unknown_key(where, key, model)}{more}")
+    return SpecError(one_line(f"{where}: {_fault(first, key, model)}{more}"))
+
+
+def _fault(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
+    field = dict(fields(model))[key]
+    entry = "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
+    what = "missing" if first["type"] == "missing" else shown(first["input"])
+    may = allowed(field.annotation, field.metadata)
+    return f"{key}{entry} is {what}, allowed is {may}: change it"
