@@ -1,0 +1,1 @@
+"""Solids: the only package that uses the CAD kernel to build shapes."""
