@@ -14,6 +14,7 @@ from tbcad.optics.ellipsoid import Ellipsoid
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.optics.triangulation import bounded
+from tbcad.optics.vectors import MIRROR
 from tbcad.optics.view import View, turned_to
 
 Floats = NDArray[np.float64]
@@ -76,13 +77,12 @@ class Half:
 
     def mirrored(self) -> "Half":
         """The other camera's half."""
-        flip = np.array([-1.0, 1.0, 1.0])
         return replace(
             self,
             camera="b",
             view=self.view.mirrored(),
-            ellipsoid=Ellipsoid(self.ellipsoid.pinhole * flip, self.ellipsoid.semi_minor),
-            u=self.u * flip,
+            ellipsoid=Ellipsoid(self.ellipsoid.pinhole * MIRROR, self.ellipsoid.semi_minor),
+            u=self.u * MIRROR,
             azimuth=-self.azimuth,
             cells=self.cells.mirrored(),
             body=self.body.mirrored(),

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from tbcad.design.errors import SpecError, fields, one_line, refused, section_of, unknown_key
+from tbcad.design.errors import SpecError, fields, refused, section_of, unknown_key
 
 _LARGEST_FILE = 1_000_000  # bytes; a design is a few thousand
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
@@ -84,7 +84,7 @@ class Mirrors(Section):
     margin_mm: float = Field(0.5, ge=0, le=20)
     """Coverage added to the capture diameter as the target of rule traced."""
     max_radius_widths: float = Field(30.0, ge=5, le=1000)
-    """Largest radius, in half widths l of the mirror: one that needs less curvature is nearly flat."""
+    """Largest radius in half widths l; a mirror that needs less curvature is nearly flat."""
     coating_um: float = Field(0.0, ge=0, le=500)
     """Thickness of the mirror coat; the modelled sphere is smaller by it."""
 
@@ -228,30 +228,28 @@ def _read(path: Path) -> Table:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise SpecError(one_line(f"{path}: tables nested too deeply: flatten them")) from None
+        raise SpecError(f"{path}: tables nested too deeply: flatten them") from None
     except ValueError as error:
-        raise SpecError(one_line(f"{path}: not valid TOML: {error}: correct that line")) from None
+        raise SpecError(f"{path}: not valid TOML: {error}: correct that line") from None
 
 
 def _read_text(path: Path) -> str:
     try:
         if path.exists() and not path.is_file():
-            raise SpecError(one_line(f"{path}: not a file: name a design file (.toml)"))
+            raise SpecError(f"{path}: not a file: name a design file (.toml)")
         with path.open("rb") as file:
             data = file.read(_LARGEST_FILE + 1)
         if len(data) > _LARGEST_FILE:
-            raise SpecError(one_line(f"{path}: over 1 MB, no design: name a design file (.toml)"))
+            raise SpecError(f"{path}: over 1 MB, no design: name a design file (.toml)")
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        raise SpecError(
-            one_line(f"{path}: not UTF-8 text (line {line}): save it as UTF-8")
-        ) from None
+        raise SpecError(f"{path}: not UTF-8 text (line {line}): save it as UTF-8") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a null character
         if isinstance(error, SpecError):
             raise
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise SpecError(one_line(f"{path}: cannot be read: {reason}: check the path")) from None
+        raise SpecError(f"{path}: cannot be read: {reason}: check the path") from None
 
 
 def _texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:
@@ -263,7 +261,7 @@ def _texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:
 def _option(text: str) -> tuple[str, object]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise SpecError(one_line(f"option {text!r} is not key=value: write for instance optics.n=18"))
+        raise SpecError(f"option {text!r} is not key=value: write for instance optics.n=18")
     return _full_key(key.strip()), _value(value.strip())
 
 

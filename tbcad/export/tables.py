@@ -16,9 +16,11 @@ Row = dict[str, str | float | None]
 
 SCHEMA = "tbcad-design/1"
 COLUMNS = (
-    "id,camera,ux,uy,uz,px,py,pz,nx,ny,nz,cx,cy,cz,radius_mm,size_mm,theta0_deg,theta1_deg,"
-    "polar_deg,azimuth_deg,cell_area_mm2,coverage_mm"
-).split(",")
+    *("id", "camera"),
+    *("ux", "uy", "uz", "px", "py", "pz", "nx", "ny", "nz", "cx", "cy", "cz"),
+    *("radius_mm", "size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg"),
+    *("cell_area_mm2", "coverage_mm"),
+)
 
 
 def rows(half: Half) -> list[Row]:

@@ -24,10 +24,18 @@ from OCP.Geom import (
     Geom_TrimmedCurve,
 )
 from OCP.Geom2d import Geom2d_Line
-from OCP.gp import gp_Ax1, gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.ShapeFix import ShapeFix_Edge
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
+from OCP.TopoDS import (
+    TopoDS,
+    TopoDS_Edge,
+    TopoDS_Face,
+    TopoDS_Shell,
+    TopoDS_Solid,
+    TopoDS_Vertex,
+    TopoDS_Wire,
+)
 
 from tbcad.optics.conics import Ellipse, EllipseArc, Spheroid
 
@@ -80,9 +88,7 @@ class Maker:
         self.builder.Range(edge, first, last)
         return edge
 
-    def line(
-        self, a: Floats, b: Floats, start: TopoDS_Vertex, end: TopoDS_Vertex
-    ) -> TopoDS_Edge:
+    def line(self, a: Floats, b: Floats, start: TopoDS_Vertex, end: TopoDS_Vertex) -> TopoDS_Edge:
         """Straight edge from a to b, its parameter the length."""
         return self.edge(
             Geom_Line(self.point(a), self.direction(b - a)),
@@ -147,7 +153,9 @@ class Maker:
         """Elliptic cylinder along a direction."""
         return Geom_SurfaceOfLinearExtrusion(self.ellipse(ellipse), self.direction(direction))
 
-    def cylinder(self, centre: Floats, x: Floats, y: Floats, radius: float) -> Geom_CylindricalSurface:
+    def cylinder(
+        self, centre: Floats, x: Floats, y: Floats, radius: float
+    ) -> Geom_CylindricalSurface:
         """Cylinder about x cross y, its seam toward x."""
         return Geom_CylindricalSurface(gp_Ax3(self.frame(centre, x, y)), radius)
 
@@ -183,7 +191,11 @@ class Maker:
             self.pcurves.FixAddPCurve(edge, face, False, TOLERANCE)
 
     def straight_pcurve(
-        self, edge: TopoDS_Edge, face: TopoDS_Face, start: tuple[float, float], along: tuple[float, float]
+        self,
+        edge: TopoDS_Edge,
+        face: TopoDS_Face,
+        start: tuple[float, float],
+        along: tuple[float, float],
     ) -> None:
         """A straight curve in the surface's parameters, with the edge's own parameter."""
         line = Geom2d_Line(gp_Pnt2d(*start), gp_Dir2d(*along))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tbcad.design.spec import Mesh as MeshSpec
 from tbcad.model.chains import Chain
 from tbcad.optics.cells import Cells
+from tbcad.optics.vectors import dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -148,91 +149,139 @@ def _means(points: Floats, cell: Ints) -> Floats:
 
 
 def _spherical(spec: MeshSpec, cells: Cells, rim: _Rim, distance: Floats) -> Facets:
-    surfaces = cells.surfaces
-    radius, centre = surfaces.radius[: cells.mirrors], surfaces.centre[: cells.mirrors]
-
-    def on_sphere(points: Floats, cell: Ints) -> Floats:
-        away = points - centre[cell]
-        away *= (radius[cell] / np.linalg.norm(away, axis=1))[:, None]
-        return centre[cell] + away
-
+    """A strip along each rim, then rings of quads, then a fan about the middle."""
+    spheres = _Spheres(cells)
     cell, edge = rim.cell, rim.vertices[rim.line]
-    middle = on_sphere(_means(edge, cell), np.arange(cells.mirrors))
-    reach = np.linalg.norm(edge - middle[cell], axis=1)
-    nearest = np.full(cells.mirrors, np.inf)
-    np.minimum.at(nearest, cell, reach)
+    middle = spheres.onto(_means(edge, cell), np.arange(cells.mirrors))
+    reach = norm(edge - middle[cell])
     # The normal errs by (w / 2) / r, the reflected ray by twice that, over the distance.
-    width = np.maximum(spec.ray_error_mm * radius / distance, np.sqrt(2 * radius * STL_ROUNDING_MM))
-    width = np.minimum(width, WIDEST_STRIP * nearest)
-    strip = on_sphere(_inside(edge, rim, surfaces.gradient(cell, edge), width[cell]), cell)
-
-    ring_step = np.sqrt(4 * spec.chord_error_mm * radius)
-    farthest = np.zeros(cells.mirrors)
-    np.maximum.at(farthest, cell, reach)
-    rings = np.maximum(np.ceil(farthest / ring_step), 1).astype(np.int64)
-
-    vertices, triangles, mirror = [rim.vertices], [], []
-    count, outer = len(rim.vertices), rim.line
-    active = np.arange(len(cell))  # places whose ring is there
-    following = rim.following
-    for k in range(int(rings.max()) + 1):
-        keep = rings[cell[active]] > k
-        last = ~keep
-        hub = count_of_hubs = cell[active[last]]
-        del count_of_hubs
-        triangles.append(np.column_stack([outer[last], outer[following[last]], -1 - hub]))
-        mirror.append(hub)
-        if not keep.any():
-            break
-        share = (1 - k / rings[cell[active[keep]]])[:, None]
-        at = active[keep]
-        points = middle[cell[at]] + share * (strip[at] - middle[cell[at]])
-        points = strip[at] if k == 0 else on_sphere(points, cell[at])
-        inner = count + np.arange(len(at))
-        count += len(at)
-        vertices.append(points)
-        outer_here = outer[keep]
-        renumber = np.cumsum(keep) - 1
-        next_here = renumber[following[keep]]
-        late = rim.late[at] if k == 0 else _crossed(np.concatenate(vertices), outer_here, inner, next_here)
-        triangles += _quads(outer_here, inner, next_here, late)
-        mirror += [cell[at], cell[at]]
-        active, outer, following = at, inner, next_here
-    every = np.concatenate(triangles)
-    every = np.where(every < 0, count - 1 - every, every)
-    vertices.append(middle)
-    # Collected counter-clockwise from outside; the solid's outside is the light's side.
-    return Facets(
-        np.concatenate(vertices), every[:, ::-1], np.concatenate(mirror),
-        rim.first, rim.steps, rim.start, rim.end,
+    wanted = np.maximum(
+        spec.ray_error_mm * spheres.radius / distance,
+        np.sqrt(2 * spheres.radius * STL_ROUNDING_MM),
     )
+    width = np.minimum(wanted, WIDEST_STRIP * _per_cell(np.minimum, cell, reach))
+    inside = _inside(edge, rim, cells.surfaces.gradient(cell, edge), width[cell])
+    farthest = _per_cell(np.maximum, cell, reach)
+    rings = np.ceil(farthest / np.sqrt(4 * spec.chord_error_mm * spheres.radius))
+    build = _Rings(rim, spheres, middle, spheres.onto(inside, cell), rings.astype(np.int64))
+    vertices, triangles, mirror = build.all()
+    # Collected counter-clockwise from outside; the solid's outside is the light's side.
+    return Facets(vertices, triangles[:, ::-1], mirror, rim.first, rim.steps, rim.start, rim.end)
+
+
+def _per_cell(function: np.ufunc, cell: Ints, values: Floats) -> Floats:
+    result: Floats = function.reduceat(values, np.unique(cell, return_index=True)[1])
+    return result
+
+
+class _Spheres:
+    """Centres and radii of the mirrors."""
+
+    def __init__(self, cells: Cells) -> None:
+        self.radius = cells.surfaces.radius[: cells.mirrors]
+        self.centre = cells.surfaces.centre[: cells.mirrors]
+
+    def onto(self, points: Floats, cell: Ints) -> Floats:
+        """Points (k, 3) moved onto the spheres of their cells (k,) along the radii."""
+        away = points - self.centre[cell]
+        away *= (self.radius[cell] / norm(away))[:, None]
+        return self.centre[cell] + away
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """One ring of vertices in the cells that have so many: places in the lines, vertices."""
+
+    place: Ints
+    vertex: Ints
+    following: Ints
+
+    def part(self, keep: NDArray[np.bool_], vertex: Ints) -> "_Layer":
+        """The next ring, in the cells kept."""
+        renumbered = np.cumsum(keep) - 1
+        return _Layer(self.place[keep], vertex, renumbered[self.following[keep]])
+
+
+@dataclass(frozen=True)
+class _Rings:
+    """Rings from the rim of each cell to its middle.
+
+    Attributes:
+        rim: the outer rings.
+        spheres: of the cells.
+        middle: middle point of each cell, (m, 3).
+        strip: the second rings' points, in the order of the lines, (b, 3).
+        count: rings inside the rim, the strip's included, at least 1, (m,).
+    """
+
+    rim: _Rim
+    spheres: _Spheres
+    middle: Floats
+    strip: Floats
+    count: Ints
+
+    def all(self) -> tuple[Floats, Ints, Ints]:
+        """Vertices (v, 3), triangles (t, 3) and the mirror of each (t,)."""
+        rim, cell = self.rim, self.rim.cell
+        points, triangles, mirror = [rim.vertices, self.middle], [], []
+        hub = len(rim.vertices) + np.arange(len(self.middle))
+        layer = _Layer(np.arange(len(cell)), rim.line, rim.following)
+        total = len(rim.vertices) + len(self.middle)
+        for k in range(int(self.count.max()) + 1):
+            keep = self.count[cell[layer.place]] > k
+            done = cell[layer.place[~keep]]
+            last = np.column_stack([layer.vertex, layer.vertex[layer.following]])[~keep]
+            triangles.append(np.column_stack([last, hub[done]]))
+            mirror.append(done)
+            points.append(self._ring(k, layer.place[keep]))
+            inner = layer.part(keep, total + np.arange(len(points[-1])))
+            total += len(points[-1])
+            triangles += self._quads(k, layer, keep, inner, points)
+            mirror += [cell[inner.place]] * 2
+            layer = inner
+        return np.concatenate(points), np.concatenate(triangles), np.concatenate(mirror)
+
+    def _ring(self, k: int, place: Ints) -> Floats:
+        if k == 0:
+            return self.strip[place]
+        cell = self.rim.cell[place]
+        share = (1 - k / self.count[cell])[:, None]
+        middle = self.middle[cell]
+        return self.spheres.onto(middle + share * (self.strip[place] - middle), cell)
+
+    def _quads(
+        self, k: int, outer: _Layer, keep: NDArray[np.bool_], inner: _Layer, points: list[Floats]
+    ) -> list[Ints]:
+        """Two triangles for each quad.
+
+        In the strip the one on the rim has its right angle away from corners of the cell;
+        further inside the shorter diagonal keeps angles from growing obtuse.
+        """
+        a, b = outer.vertex[keep], outer.vertex[outer.following][keep]
+        c, d = inner.vertex[inner.following], inner.vertex
+        if k == 0:
+            crossed = self.rim.late[inner.place]
+        else:
+            every = np.concatenate(points)
+            crossed = _length(every, b, d) < _length(every, a, c)
+        first = np.column_stack([a, b, np.where(crossed, d, c)])
+        second = np.column_stack([np.where(crossed, b, a), c, d])
+        return [first, second]
+
+
+def _length(points: Floats, a: Ints, b: Ints) -> Floats:
+    result: Floats = norm(points[a] - points[b])
+    return result
 
 
 def _inside(edge: Floats, rim: _Rim, normal: Floats, width: Floats) -> Floats:
     """Points one strip width inside the rim, mitred where arcs meet."""
     ahead = edge[rim.following] - edge
-    across = np.cross(-normal, ahead)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    across = unit(np.cross(-normal, ahead))
     before = np.empty_like(across)
     before[rim.following] = across
-    scale = 1 + np.einsum("bx,bx->b", across, before)
+    scale = 1 + dot(across, before)
     mitre = (across + before) / scale[:, None]
-    long = np.linalg.norm(mitre, axis=1)
+    long = norm(mitre)
     mitre *= (np.minimum(long, LONGEST_MITRE) / long)[:, None]
     return edge + width[:, None] * mitre
-
-
-def _crossed(points: Floats, outer: Ints, inner: Ints, following: Ints) -> NDArray[np.bool_]:
-    """Where the diagonal from the next outer vertex to the inner one is the shorter."""
-    one = points[outer[following]] - points[inner]
-    other = points[inner[following]] - points[outer]
-    result: NDArray[np.bool_] = np.linalg.norm(one, axis=1) < np.linalg.norm(other, axis=1)
-    return result
-
-
-def _quads(outer: Ints, inner: Ints, following: Ints, late: NDArray[np.bool_]) -> list[Ints]:
-    """Two triangles for each quad; the one on the rim has its right angle away from corners."""
-    a, b, c, d = outer, outer[following], inner[following], inner
-    first = np.column_stack([a, b, np.where(late, d, c)])
-    second = np.column_stack([np.where(late, b, a), c, d])
-    return [first, second]

@@ -13,6 +13,7 @@ from tbcad.model.chains import boundary_chain
 from tbcad.model.facets import Facets, facets
 from tbcad.optics.cells import Cells
 from tbcad.optics.conics import EllipseArc, Spheroid
+from tbcad.optics.vectors import MIRROR, dot, norm
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -36,19 +37,19 @@ class Mesh:
     def volume(self) -> float:
         """Signed volume, mm^3."""
         corner = self.vertices[self.triangles]
-        return float(np.einsum("tx,tx->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))) / 6
+        return float(dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6
 
     @property
     def areas(self) -> Floats:
         """Areas of the triangles, mm^2, (t,)."""
         corner = self.vertices[self.triangles]
         across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        result: Floats = np.linalg.norm(across, axis=1) / 2
+        result: Floats = norm(across) / 2
         return result
 
     def mirrored(self) -> "Mesh":
         """Mirror image in the plane x = 0."""
-        return Mesh(self.vertices * np.array([-1.0, 1.0, 1.0]), self.triangles[:, ::-1])
+        return Mesh(self.vertices * MIRROR, self.triangles[:, ::-1])
 
 
 def mesh(spec: MeshSpec, cells: Cells, body: Body, distance: Floats) -> Mesh:
@@ -94,11 +95,23 @@ class _Skin:
         low, high = [0], [-1]
         joined = np.concatenate
         self.plane(plan_x, [joined([seam_back, seam_rim_back[::-1]]), *seam_far])
-        top = [foot_rim_top, seam_rim[high], seam_rim_back[high], foot_back[::-1],
-               seam_rim_back[low], seam_rim[low]]
+        top = [
+            foot_rim_top,
+            seam_rim[high],
+            seam_rim_back[high],
+            foot_back[::-1],
+            seam_rim_back[low],
+            seam_rim[low],
+        ]
         self.plane(plan_z, [joined(top), *foot_far])
-        wall = [foot_rim[low], seam_front, foot_rim[high], foot_rim_top[high], seam_rim[::-1],
-                foot_rim_top[low]]
+        wall = [
+            foot_rim[low],
+            seam_front,
+            foot_rim[high],
+            foot_rim_top[high],
+            seam_rim[::-1],
+            foot_rim_top[low],
+        ]
         self.plane(plan_x, [joined(wall), *seam_near], turned=True)
         self.plane(plan_z, [joined([foot_rim, foot_front[::-1]]), *foot_near], turned=True)
 
@@ -139,7 +152,7 @@ class _Skin:
         to_sphere = np.linalg.inv(back.from_sphere)
         a = (self.vertices(low[1:-1]) - back.centre) @ to_sphere
         b = (self.vertices(high[1:-1]) - back.centre) @ to_sphere
-        angle = np.arccos(np.clip(np.einsum("kx,kx->k", a, b), -1, 1))[:, None]
+        angle = np.arccos(np.clip(dot(a, b), -1, 1))[:, None]
         rows = int(np.ceil(angle.max() * np.sqrt(back.semi_axes[0] / (8 * self.error))))
         lines = [low]
         for share in np.arange(1, rows) / rows:
@@ -155,7 +168,9 @@ class _Skin:
         """Cylinders of holes; rings on the joining face and on the far one, turning right."""
         near, far = [], []
         for centre, radius in zip(holes.centre, holes.radius, strict=True):
-            count = max(LEAST_AROUND_HOLE, int(np.ceil(2 * np.pi * np.sqrt(radius / (8 * self.error)))))
+            count = max(
+                LEAST_AROUND_HOLE, int(np.ceil(2 * np.pi * np.sqrt(radius / (8 * self.error))))
+            )
             turn = -2 * np.pi * np.arange(count) / count
             ring = centre + radius * np.column_stack([np.cos(turn), np.sin(turn)]) @ axes
             near.append(self.add(ring))

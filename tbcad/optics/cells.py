@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.triangulation import Boundary, half_edges, radical_planes, settle
+from tbcad.optics.vectors import MIRROR, dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,9 +46,8 @@ class Cells:
 
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
-        flip = np.array([-1.0, 1.0, 1.0])
         return Cells(
-            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * flip
+            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * MIRROR
         )
 
     @cached_property
@@ -113,7 +113,7 @@ class Arcs:
     @property
     def length(self) -> Floats:
         """Distance of each arc's ends, mm, (e,)."""
-        result: Floats = np.linalg.norm(self.points[:, 2] - self.points[:, 0], axis=1)
+        result: Floats = norm(self.points[:, 2] - self.points[:, 0])
         return result
 
     def at(self, arc: Ints, t: Floats) -> Floats:
@@ -132,7 +132,7 @@ def arcs_of(cells: Cells) -> Arcs:
     ends, twin = half_edges(cells.triangles)
     edge = np.flatnonzero((np.arange(len(ends)) < twin) & (ends.min(axis=1) < cells.mirrors))
     between = np.column_stack([twin[edge] // 3, edge // 3])
-    gap = np.linalg.norm(np.diff(cells.corners[between], axis=1)[:, 0], axis=1)
+    gap = norm(np.diff(cells.corners[between], axis=1)[:, 0])
     between = _merged(between, gap < MERGED_MM, len(cells.corners))
     edge, (start, end) = edge[gap >= MERGED_MM], between[gap >= MERGED_MM].T
     side = np.full(len(ends), -1)
@@ -161,16 +161,16 @@ def _curves(
     swap = surfaces.curvature[right] > surfaces.curvature[left]
     p, q = np.where(swap, right, left), np.where(swap, left, right)
     plane, _ = radical_planes(surfaces, p, q)
-    plane /= np.linalg.norm(plane, axis=1, keepdims=True)
+    plane = unit(plane)
     chord = end - start
-    half = np.linalg.norm(chord, axis=1) / 2
-    tilt = np.einsum("ex,ex->e", surfaces.gradient(p, start), plane)
+    half = norm(chord) / 2
+    tilt = dot(surfaces.gradient(p, start), plane)
     sine = half * surfaces.curvature[p] / np.sqrt(1 - tilt**2)
     cosine = np.sqrt(1 - sine**2)
     middle = (start + end) / 2
     along = np.divide(chord, 2 * half[:, None], out=np.zeros_like(chord), where=half[:, None] > 0)
     outward = np.cross(plane, along)
-    outward *= np.sign(np.einsum("ex,ex->e", outward, surfaces.gradient(p, middle)))[:, None]
+    outward *= np.sign(dot(outward, surfaces.gradient(p, middle)))[:, None]
     control = middle + (half * sine / cosine)[:, None] * outward
     return np.stack([start, control, end], axis=1), cosine
 
@@ -209,7 +209,7 @@ def _plane_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets: 
     del arc, offsets
     from_apex = points - cells.surfaces.apex[mirror][:, None]
     normal = cells.surfaces.normal[mirror]
-    doubled = np.einsum("sx,sx->s", np.cross(from_apex[:, 0], from_apex[:, 2]), normal)
+    doubled = dot(np.cross(from_apex[:, 0], from_apex[:, 2]), normal)
     result: Floats = -doubled / 2
     return result
 
@@ -218,23 +218,20 @@ def _sphere_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets:
     """Exterior angle after each side and geodesic curvature along it, seen from outside."""
     surfaces = cells.surfaces
     outside = -surfaces.gradient(mirror, points[:, 2])
-    tangents = np.diff(points, axis=1)
-    tangents /= np.linalg.norm(tangents, axis=2, keepdims=True)
+    tangents = unit(np.diff(points, axis=1))
     following = np.arange(len(arc)) + 1
     following[offsets[1:] - 1] = offsets[:-1]
     before, after = tangents[:, 1], tangents[following, 0]
     angle = np.arctan2(
-        np.einsum("sx,sx->s", np.cross(before, after), outside),
-        np.einsum("sx,sx->s", before, after),
+        dot(np.cross(before, after), outside),
+        dot(before, after),
     )
     # Geodesic curvature of a circle of angular radius b is cot b / r; with the turn of the
     # tangent 2 asin(sin half angle) its integral is that turn times cos b.
     start, control, end = points[:, 0], points[:, 1], points[:, 2]
     bend = np.cross(control - start, end - control)
-    turn = 2 * np.arctan2(
-        np.linalg.norm(control - (start + end) / 2, axis=1), np.linalg.norm(end - start, axis=1) / 2
-    )
-    size = np.linalg.norm(bend, axis=1)
+    turn = 2 * np.arctan2(norm(control - (start + end) / 2), norm(end - start) / 2)
+    size = norm(bend)
     axis = np.divide(bend, size[:, None], out=np.zeros_like(bend), where=size[:, None] > 0)
-    result: Floats = angle + turn * np.einsum("sx,sx->s", axis, outside)
+    result: Floats = angle + turn * dot(axis, outside)
     return result

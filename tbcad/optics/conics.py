@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tbcad.optics.ellipsoid import Ellipsoid
+from tbcad.optics.vectors import dot, norm, unit
 
 Floats = NDArray[np.float64]
 
@@ -24,10 +25,10 @@ class Ellipse:
     major: Floats
     minor: Floats
 
-    def at(self, t: Floats) -> Floats:
+    def at(self, t: ArrayLike) -> Floats:
         """Points (..., 3) at parameters t (...), radians."""
-        t = np.asarray(t)[..., None]
-        return self.centre + np.cos(t) * self.major + np.sin(t) * self.minor
+        turn: Floats = np.asarray(t, dtype=float)[..., None]
+        return self.centre + np.cos(turn) * self.major + np.sin(turn) * self.minor
 
     def parameter(self, point: Floats) -> float:
         """Parameter t of a point (3,) on the ellipse, radians."""
@@ -57,7 +58,7 @@ class EllipseArc:
     first: float
     last: float
 
-    def at(self, share: Floats) -> Floats:
+    def at(self, share: ArrayLike) -> Floats:
         """Points (..., 3) at shares (...) of the way in the parameter."""
         return self.ellipse.at(self.first + np.asarray(share) * (self.last - self.first))
 
@@ -69,17 +70,17 @@ class EllipseArc:
         """The same arc from end to start."""
         return EllipseArc(self.ellipse, self.last, self.first)
 
-    def by_length(self, share: Floats) -> Floats:
+    def by_length(self, share: ArrayLike) -> Floats:
         """Points (..., 3) at shares (...) of the arc's length, to a part in 10^4."""
         dense = np.linspace(0, 1, 2001)
-        steps = np.linalg.norm(np.diff(self.at(dense), axis=0), axis=1)
+        steps = norm(np.diff(self.at(dense), axis=0))
         length = np.concatenate([[0], np.cumsum(steps)])
         return self.at(np.interp(np.asarray(share) * length[-1], length, dense))
 
     @property
     def length(self) -> float:
         """Length of the arc, mm."""
-        return float(np.linalg.norm(np.diff(self.at(np.linspace(0, 1, 2001)), axis=0), axis=1).sum())
+        return float(norm(np.diff(self.at(np.linspace(0, 1, 2001)), axis=0)).sum())
 
 
 @dataclass(frozen=True)
@@ -125,8 +126,7 @@ class Spheroid:
             raise ValueError("the plane does not meet the ellipsoid")
         across = across / size
         helper = np.eye(3)[np.argmin(np.abs(across))]
-        first = np.cross(across, helper)
-        first /= np.linalg.norm(first)
+        first = unit(np.cross(across, helper))
         radius = np.sqrt(1 - offset**2)
         p, q = radius * matrix @ first, radius * matrix @ np.cross(across, first)
         # Conjugate half-diameters p, q to principal ones.
@@ -155,7 +155,7 @@ def offset_to_hold(ellipsoid: Ellipsoid, points: Floats) -> float:
     """Least offset of a spheroid that holds all points (k, 3), mm."""
     away = points - ellipsoid.pinhole / 2
     along = away @ ellipsoid.axis
-    across = np.sqrt(np.maximum(np.einsum("kx,kx->k", away, away) - along**2, 0))
+    across = np.sqrt(np.maximum(dot(away, away) - along**2, 0))
     offset = np.zeros(len(points))
     for _ in range(50):
         major, minor = ellipsoid.semi_major + offset, ellipsoid.semi_minor + offset

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.optics.vectors import unit
+
 Floats = NDArray[np.float64]
 
 
@@ -33,7 +35,7 @@ class Ellipsoid:
     @property
     def axis(self) -> Floats:
         """Unit vector w from the origin to the pinhole, shape (3,)."""
-        return self.pinhole / np.linalg.norm(self.pinhole)
+        return unit(self.pinhole)
 
     @property
     def camera_distance(self) -> float:
@@ -42,7 +44,9 @@ class Ellipsoid:
 
     def radial_distance(self, u: Floats) -> Floats:
         """Distance rho of the ellipsoid from the origin along u (m, 3), mm, shape (m,)."""
-        return self.semi_minor**2 / (self.semi_major - self.linear_eccentricity * (u @ self.axis))
+        along = u @ self.axis
+        rho: Floats = self.semi_minor**2 / (self.semi_major - self.linear_eccentricity * along)
+        return rho
 
     def apices(self, u: Floats) -> Floats:
         """Apex P = rho u of each mirror, mm, shape (m, 3)."""
@@ -51,8 +55,7 @@ class Ellipsoid:
     def normals(self, u: Floats) -> Floats:
         """Unit normals (m, 3) at the apices, inward: they bisect -u and the way to the pinhole."""
         to_pinhole = self.pinhole - self.apices(u)
-        n = to_pinhole / np.linalg.norm(to_pinhole, axis=1, keepdims=True) - u
-        return n / np.linalg.norm(n, axis=1, keepdims=True)
+        return unit(unit(to_pinhole) - u)
 
     def frame(self) -> Floats:
         """Rows (3, 3): w, the direction of azimuth zero, and the third of a right-handed frame.
@@ -60,8 +63,7 @@ class Ellipsoid:
         Azimuth is counted about w from the side of the mirrors (the zenith has azimuth zero).
         """
         w = self.axis
-        up = np.array([0.0, 0.0, 1.0]) - w[2] * w
-        up /= np.linalg.norm(up)
+        up = unit(np.array([0.0, 0.0, 1.0]) - w[2] * w)
         return np.stack([w, up, np.cross(w, up)])
 
     def polar_azimuth(self, u: Floats) -> tuple[Floats, Floats]:

@@ -5,15 +5,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.optics.ellipsoid import Ellipsoid
+from tbcad.optics.vectors import dot, unit
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 # A geodesic vertex has at most six neighbours; two rings of them bound every flat mirror.
 NEIGHBOURS = 19
 
 
 def half_angles(ellipsoid: Ellipsoid, u: Floats, all_u: Floats) -> Floats:
-    """theta_0: half angle, at V about V -> origin, of the largest cone in the flat mirror's polygon.
+    """theta_0: half angle, at V about V -> origin, of the largest cone in the mirror's polygon.
 
     The polygon is cut out by the tangent planes at all directions; a plane that does not bound it
     never gives the least angle, so the nearest ones suffice.
@@ -26,16 +28,15 @@ def half_angles(ellipsoid: Ellipsoid, u: Floats, all_u: Floats) -> Floats:
     Returns:
         Half angles in radians, (m,).
     """
-    _, near = cKDTree(all_u).query(u, k=min(NEIGHBOURS, len(all_u)))
+    near: Ints = np.asarray(cKDTree(all_u).query(u, k=min(NEIGHBOURS, len(all_u)))[1])
     apex, normal = ellipsoid.apices(all_u), ellipsoid.normals(all_u)
     camera = ellipsoid.camera_distance * u
     own, others = near[:, :1], near[:, 1:]
     # height of V below each tangent plane; the pencil of planes through V and the shared edge
-    own_height = np.einsum("mkx,mkx->mk", normal[own], camera[:, None] - apex[own])
-    height = np.einsum("mkx,mkx->mk", normal[others], camera[:, None] - apex[others])
+    own_height = dot(normal[own], camera[:, None] - apex[own])
+    height = dot(normal[others], camera[:, None] - apex[others])
     plane = height[:, :, None] * normal[own] - own_height[:, :, None] * normal[others]
-    plane /= np.linalg.norm(plane, axis=2, keepdims=True)
-    sines: Floats = np.abs(np.einsum("mkx,mx->mk", plane, u)).min(axis=1)
+    sines: Floats = np.abs(dot(unit(plane), u[:, None])).min(axis=1)
     return np.arcsin(sines)
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.optics.vectors import norm, unit
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -11,16 +13,16 @@ ON_PLANE = 1e-12
 
 
 def icosahedron() -> tuple[Floats, Ints]:
-    """Vertices (12, 3) and outward faces (20, 3) with z as a two-fold axis (DESIGN.md section 2)."""
+    """Vertices (12, 3) and outward faces (20, 3) with z as a two-fold axis (DESIGN.md 2)."""
     phi = (1 + 5**0.5) / 2
     rectangle = np.array([(0.0, s, t * phi) for s in (-1, 1) for t in (-1, 1)])
     vertices = np.concatenate([np.roll(rectangle, shift, axis=1) for shift in range(3)])
-    near = np.isclose(np.linalg.norm(vertices[:, None] - vertices[None], axis=2), 2.0)
+    near = np.isclose(norm(vertices[:, None] - vertices[None]), 2.0)
     a, b, c = np.nonzero(near[:, :, None] & near[:, None, :] & near[None, :, :])
     faces = np.stack([a, b, c], axis=1)[(a < b) & (b < c)]
     inward = np.linalg.det(vertices[faces]) < 0
     faces[inward] = faces[inward][:, [0, 2, 1]]
-    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces
+    return unit(vertices), faces
 
 
 def prime_factors(n: int) -> list[int]:
@@ -42,7 +44,9 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
     sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
     edges, index = np.unique(np.sort(sides, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
     steps = np.arange(1, m) / m
-    on_edges = vertices[edges[:, :1]] * (1 - steps)[:, None] + vertices[edges[:, 1:]] * steps[:, None]
+    on_edges = (
+        vertices[edges[:, :1]] * (1 - steps)[:, None] + vertices[edges[:, 1:]] * steps[:, None]
+    )
     grid = [(i, j) for i in range(m + 1) for j in range(m + 1 - i)]
     inner = np.array([(i, j) for i, j in grid if i and j and i + j < m], dtype=np.int64)
     inner = inner.reshape(-1, 2)
@@ -65,7 +69,7 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
     down = [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i, j in grid if i + j < m - 1]
     small = np.array(up + down)
     triangles = ids[:, small[..., 0], small[..., 1]].reshape(-1, 3)
-    return points / np.linalg.norm(points, axis=1, keepdims=True), triangles
+    return unit(points), triangles
 
 
 def geodesic(n: int) -> tuple[Floats, Ints]:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.optics.vectors import MIRROR, dot
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -32,6 +34,7 @@ class Surfaces:
     curvature: Floats
 
     def __len__(self) -> int:
+        """Number of surfaces."""
         return len(self.curvature)
 
     @property
@@ -42,13 +45,16 @@ class Surfaces:
     @property
     def value_at_origin(self) -> Floats:
         """Constant h of f(x) = (k/2) |x|^2 + g . x + h, (m,)."""
-        squared = np.einsum("mx,mx->m", self.apex, self.apex)
-        return self.curvature / 2 * squared - np.einsum("mx,mx->m", self.normal, self.apex)
+        squared = dot(self.apex, self.apex)
+        value: Floats = self.curvature / 2 * squared
+        return value - dot(self.normal, self.apex)
 
     @property
     def radius(self) -> Floats:
         """Radii, mm, (m,); NaN for planes."""
-        return np.divide(1, self.curvature, out=np.full(len(self), np.nan), where=self.curvature > 0)
+        radius = np.full(len(self), np.nan)
+        np.divide(1, self.curvature, out=radius, where=self.curvature > 0)
+        return radius
 
     @property
     def centre(self) -> Floats:
@@ -58,8 +64,9 @@ class Surfaces:
     def value(self, i: Ints, x: Floats) -> Floats:
         """f_i at the points x (..., 3), for indices i (...)."""
         away = x - self.apex[i]
-        squared = np.einsum("...x,...x->...", away, away)
-        return np.einsum("...x,...x->...", self.normal[i], away) + self.curvature[i] / 2 * squared
+        squared = dot(away, away)
+        height: Floats = dot(self.normal[i], away)
+        return height + self.curvature[i] / 2 * squared
 
     def gradient(self, i: Ints, x: Floats) -> Floats:
         """Gradient of f_i at x (..., 3); on the surface itself the unit normal toward the light."""
@@ -77,8 +84,7 @@ class Surfaces:
 
     def mirrored(self) -> "Surfaces":
         """The surfaces of the other camera: mirror image in the plane x = 0."""
-        flip = np.array([-1.0, 1.0, 1.0])
-        return Surfaces(self.apex * flip, self.normal * flip, self.curvature)
+        return Surfaces(self.apex * MIRROR, self.normal * MIRROR, self.curvature)
 
     def joined(self, other: "Surfaces") -> "Surfaces":
         """These surfaces followed by the other ones."""

@@ -1,9 +1,10 @@
-"""Exact rays: camera -> mirror -> past the object, and what each mirror sees of the capture sphere."""
+"""Exact rays from camera over mirror past the object, and what each mirror sees."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.cells import Cells
+from tbcad.optics.vectors import dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -14,16 +15,15 @@ REFINEMENTS = 3
 
 def reflected(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
     """Unit directions (..., 3) of rays from the pinhole after the mirror at points (..., 3)."""
-    ray = point - pinhole
-    ray = ray / np.linalg.norm(ray, axis=-1, keepdims=True)
-    result: Floats = ray - 2 * np.einsum("...x,...x->...", ray, normal)[..., None] * normal
+    ray = unit(point - pinhole)
+    result: Floats = ray - 2 * dot(ray, normal)[..., None] * normal
     return result
 
 
 def miss_distances(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
     """Distances (...) of the reflected rays from the origin, mm."""
     out = reflected(pinhole, point, normal)
-    result: Floats = np.linalg.norm(np.cross(point, out), axis=-1)
+    result: Floats = norm(np.cross(point, out))
     return result
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.surfaces import Surfaces
+from tbcad.optics.vectors import dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -94,7 +95,8 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
     curvature there, at the point nearer to the apices. NaN where there is no common point.
     """
     pivot = np.argmax(surfaces.curvature[triangles], axis=1)
-    p, q, s = (np.take_along_axis(triangles, (pivot + k)[:, None] % 3, axis=1)[:, 0] for k in range(3))
+    row = np.arange(len(triangles))
+    p, q, s = (triangles[row, (pivot + k) % 3] for k in range(3))
     gq, hq = radical_planes(surfaces, p, q)
     gs, hs = radical_planes(surfaces, p, s)
     line = np.cross(gq, gs)
@@ -103,9 +105,9 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
         point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
         line = line / length
         start = surfaces.apex[triangles].mean(axis=1)
-        point += np.einsum("tx,tx->t", line, start)[:, None] * line
+        point += dot(line, start)[:, None] * line
         gradient = surfaces.gradient(p, point)
-        slope = np.einsum("tx,tx->t", line, gradient)
+        slope = dot(line, gradient)
         value = surfaces.value(p, point)
         root = np.copysign(np.sqrt(slope**2 - 2 * surfaces.curvature[p] * value), slope)
         result: Floats = point - (2 * value / (slope + root))[:, None] * line
@@ -179,7 +181,7 @@ def covered(surfaces: Surfaces, points: Floats) -> float:
     terms = np.column_stack(
         [surfaces.gradient_at_origin, surfaces.curvature / 2, surfaces.value_at_origin]
     )
-    squared = np.einsum("tx,tx->t", points, points)
+    squared = dot(points, points)
     lifted = np.column_stack([points, squared, np.ones(len(points))])
     rows = max(1, CHUNK // len(surfaces))
     least = [np.min(lifted[k : k + rows] @ terms.T) for k in range(0, len(points), rows)]

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from tbcad.optics.vectors import MIRROR, unit
+
 Floats = NDArray[np.float64]
 
 
@@ -44,11 +46,10 @@ class View:
 
     def mirrored(self) -> "View":
         """The other camera: mirror image in the plane x = 0, its rows running the other way."""
-        flip = np.array([-1.0, 1.0, 1.0])
         return View(
-            self.pinhole * flip,
-            self.forward * flip,
-            -self.right * flip,
+            self.pinhole * MIRROR,
+            self.forward * MIRROR,
+            -self.right * MIRROR,
             self.width_px,
             self.height_px,
             self.hfov,
@@ -63,30 +64,27 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
     return float(np.max(np.abs(across) / depth[:, None] / half_sizes))
 
 
-def turned_to(
-    pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
-) -> View:
+def turned_to(pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float) -> View:
     """The camera turned so that points (k, 3) fill the least share of its frame.
 
     The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
     """
-    rays = points - pinhole
-    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    middle = rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0))
-    across = np.cross([0.0, 0.0, 1.0], -pinhole)
-    across /= np.linalg.norm(across)
+    rays = unit(points - pinhole)
+    middle = unit(rays.mean(axis=0))
+    across = unit(np.cross([0.0, 0.0, 1.0], -pinhole))
     along = np.cross(middle, across)
     half = np.tan(hfov / 2)
     half_sizes = np.array([half, half * height_px / width_px])
 
     def axes(turn: Floats) -> tuple[Floats, Floats]:
-        forward = middle + turn[0] * across + turn[1] * along
-        forward /= np.linalg.norm(forward)
-        right = across - (across @ forward) * forward
-        return forward, right / np.linalg.norm(right)
+        forward = unit(middle + turn[0] * across + turn[1] * along)
+        return forward, unit(across - (across @ forward) * forward)
+
+    def fill(turn: Floats) -> float:
+        return min(_fill(*axes(turn), half_sizes, rays), 1e3)
 
     found = minimize(
-        lambda turn: min(_fill(*axes(turn), half_sizes, rays), 1e3),
+        fill,
         np.zeros(2),
         method="Nelder-Mead",
         options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},

@@ -1,0 +1,28 @@
+"""Products of arrays of vectors along their last axis."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+MIRROR = np.array([-1.0, 1.0, 1.0])
+"""Factors that mirror points and vectors in the plane x = 0."""
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Scalar products (...) of vectors (..., 3)."""
+    result: Floats = np.einsum("...x,...x->...", a, b)
+    return result
+
+
+def norm(v: Floats) -> Floats:
+    """Lengths (...) of vectors (..., 3)."""
+    result: Floats = np.linalg.norm(v, axis=-1)
+    return result
+
+
+def unit(v: Floats) -> Floats:
+    """Vectors (..., 3) divided by their lengths; zero vectors stay zero."""
+    length = norm(v)[..., None]
+    result: Floats = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
+    return result
