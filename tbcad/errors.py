@@ -1,5 +1,16 @@
 """The one error a user can cause."""
 
 
+def one_line(text: str) -> str:
+    """Return text with line breaks and all that a screen would not show written as escapes."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
+
+
 class InputError(Exception):
     """Bad input: its text is one line for the screen; commands end with exit code 2."""
+
+    def __init__(self, text: str) -> None:
+        """Keep the text, made one line: parts of it may come from a file or a path."""
+        super().__init__(one_line(text))

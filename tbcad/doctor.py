@@ -1,0 +1,271 @@
+"""What may be wrong with an environment, each fault with the command that repairs it.
+
+Native libraries are tried in child processes: two kernels that clash, or VTK without a display,
+can end a process without a word.
+"""
+
+import os
+import platform
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, distributions, metadata, requires
+from importlib.util import find_spec
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+_TIMEOUT_S = 180  # the first import on a cold disk reads 1 GB
+_LEAST_MEMORY_GB = 2.0
+_LEAST_DISK_GB = 1.0
+_QUIET = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
+
+_KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
+_VTKS = ("vtk", "cadquery-vtk")
+_LIBRARIES = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
+
+_KERNEL = "import OCP; print(OCP.__version__)"
+_BOTH = """
+import build123d, cadquery
+box = cadquery.Shape.cast(build123d.Box(1, 2, 3).wrapped)
+assert abs(box.Volume() - 6) < 1e-9, box.Volume()
+print("they share one kernel")
+"""
+_EMBREE = """
+import numpy as np
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+scene = rtcore_scene.EmbreeScene()
+TriangleMesh(scene, np.array([[[-1, -1, 2], [1, -1, 2], [0, 1, 2]]], np.float32))
+ray = np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32)
+assert abs(scene.run(*ray, output=1)["tfar"][0] - 2) < 1e-6
+print("a ray hits where it should")
+"""
+_MANIFOLD = """
+from manifold3d import Manifold
+assert abs(Manifold.cube((1, 2, 3)).volume() - 6) < 1e-6
+print("a box has its volume")
+"""
+_LIB3MF = """
+from lib3mf import get_wrapper
+print("version", ".".join(map(str, get_wrapper().GetLibraryVersion())))
+"""
+_PICTURE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window = vtkRenderWindow()
+window.SetOffScreenRendering(1)
+window.AddRenderer(vtkRenderer())
+window.Render()
+print("drawn")
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: whether it is in order, what was seen, what would repair it."""
+
+    name: str
+    ok: bool
+    detail: str
+    remedy: str = ""
+
+
+def diagnose(folder: Path = Path()) -> list[Finding]:
+    """Look at everything a build needs.
+
+    Args:
+        folder: where exports are to go, for the free space.
+    """
+    needs = _requirements()
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        tried = list(pool.map(lambda attempt: attempt(), _attempts(needs)))
+    return [
+        python_version(platform.python_version()),
+        one_of("CAD kernel", _KERNELS, _installed(), needs),
+        one_of("VTK", _VTKS, _installed(), needs),
+        versions(needs, _installed()),
+        *tried,
+        memory(_available_memory_gb()),
+        disk(folder),
+    ]
+
+
+def _attempts(needs: Sequence[Requirement]) -> list[Callable[[], Finding]]:
+    repair = _reinstall(_KERNELS, _KERNELS[0], needs)
+    return [
+        lambda: attempt("OCP", _KERNEL, f"{_LIBRARIES}; if that is not it: {repair}"),
+        lambda: attempt("build123d with cadquery", _BOTH, repair),
+        lambda: attempt("embreex", _EMBREE, _reinstall(["embreex"], "embreex", needs)),
+        lambda: attempt("manifold3d", _MANIFOLD, _reinstall(["manifold3d"], "manifold3d", needs)),
+        lambda: attempt("lib3mf", _LIB3MF, _reinstall(["lib3mf"], "lib3mf", needs)),
+        pictures,
+    ]
+
+
+def python_version(version: str) -> Finding:
+    """Compare a Python version with the one that the installed tbcad asks for."""
+    try:
+        wanted = metadata("tbcad")["Requires-Python"]
+    except PackageNotFoundError:
+        return Finding(
+            "Python", False, f"{version}; tbcad is not installed", f"{_pip('install')} ."
+        )
+    ok = Requirement(f"python{wanted}").specifier.contains(version, prereleases=True)
+    return Finding("Python", ok, version, "" if ok else f"make a venv with Python {wanted}")
+
+
+def one_of(
+    name: str,
+    rivals: Sequence[str],
+    installed: Iterable[tuple[str, str]],
+    needs: Sequence[Requirement] = (),
+) -> Finding:
+    """Tell whether exactly one of some distributions that own the same files is installed.
+
+    Args:
+        name: what they are called together.
+        rivals: their names.
+        installed: (name, version) of everything installed.
+        needs: tbcad's requirements, for the version in the remedy.
+    """
+    found = [f"{which} {version}" for which, version in installed if which in rivals]
+    detail = " and ".join(found) or "none installed"
+    if len(found) > 1:
+        detail += " overwrite each other"
+    ok = len(found) == 1
+    # The kernel brings the VTK it was built with.
+    return Finding(name, ok, detail, "" if ok else _reinstall(rivals, _KERNELS[0], needs))
+
+
+def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]]) -> Finding:
+    """Tell whether all that tbcad requires is installed in a version it allows."""
+    present = dict(installed)
+    wrong = [need for need in needs if not _is_met(need, present)]
+    if not needs:
+        return Finding("versions", False, "tbcad is not installed", f"{_pip('install')} .")
+    if not wrong:
+        return Finding("versions", True, f"{len(needs)} libraries as required")
+    seen = ", ".join(f"{n.name} {present.get(canonicalize_name(n.name), 'missing')}" for n in wrong)
+    return Finding("versions", False, seen, f"{_pip('install')} {_quoted(wrong)}")
+
+
+def _is_met(need: Requirement, present: dict[str, str]) -> bool:
+    version = present.get(canonicalize_name(need.name))
+    return version is not None and need.specifier.contains(version, prereleases=True)
+
+
+def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) -> Finding:
+    """Run a small Python program in a child process; what it prints last is the detail.
+
+    Args:
+        name: what is tried.
+        program: Python source that fails when it does not work.
+        remedy: what to do then.
+        before: a command in front of the interpreter.
+    """
+    command = [*before, sys.executable, "-P", "-c", _QUIET + program]
+    try:
+        run = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Finding(name, False, f"no answer after {_TIMEOUT_S} s", remedy)
+    if run.returncode == 0:
+        return Finding(name, True, _last_line(run.stdout))
+    return Finding(name, False, _why(run.returncode, run.stderr), remedy)
+
+
+def _why(code: int, stderr: str) -> str:
+    crash = f"crashed ({signal.Signals(-code).name})" if code < 0 else ""
+    return ": ".join(filter(None, [crash, _last_line(stderr)])) or f"ended with {code}"
+
+
+def _last_line(text: str) -> str:
+    plain = re.sub(r"\x1b\[[0-9;]*m|.*ERR\| ", "", text)  # VTK's colours, times and addresses
+    return ([line.strip() for line in plain.splitlines() if line.strip()] or [""])[-1]
+
+
+def pictures() -> Finding:
+    """Tell whether VTK can draw without a window, by itself or under xvfb-run."""
+    remedy = (
+        "apt-get install xvfb libgl1-mesa-dri, then run under xvfb-run -a; only pictures need it"
+    )
+    direct = attempt("pictures", _PICTURE, remedy)
+    if direct.ok or not shutil.which("xvfb-run"):
+        return direct
+    under_x = attempt("pictures", _PICTURE, remedy, ["xvfb-run", "-a"])
+    return replace(under_x, detail=f"{under_x.detail}, under xvfb-run")
+
+
+def memory(available_gb: float | None) -> Finding:
+    """Compare the free memory with what the largest build takes."""
+    if available_gb is None:
+        return Finding("memory", True, "unknown on this system")
+    ok = available_gb >= _LEAST_MEMORY_GB
+    remedy = "" if ok else f"close other programs: {_LEAST_MEMORY_GB:g} GB are needed"
+    return Finding("memory", ok, f"{available_gb:.1f} GB free", remedy)
+
+
+def disk(folder: Path) -> Finding:
+    """Compare the free space where a folder is or would be with what exports take."""
+    there = next(path for path in [folder.absolute(), *folder.absolute().parents] if path.exists())
+    free = shutil.disk_usage(there).free / 1e9
+    ok = free >= _LEAST_DISK_GB
+    remedy = "" if ok else f"free some space: {_LEAST_DISK_GB:g} GB are needed"
+    return Finding("disk", ok, f"{free:.1f} GB free at {there}", remedy)
+
+
+def _available_memory_gb() -> float | None:
+    try:
+        text = Path("/proc/meminfo").read_text(encoding="ascii")
+    except OSError:
+        return None
+    found = re.search(r"^MemAvailable:\s+(\d+) kB", text, re.MULTILINE)
+    return int(found[1]) * 1024 / 1e9 if found else None
+
+
+def _installed() -> list[tuple[str, str]]:
+    return sorted({(canonicalize_name(d.name), d.version) for d in distributions() if d.name})
+
+
+def _requirements() -> list[Requirement]:
+    """Return what the installed tbcad requires here, without extras."""
+    try:
+        needs = [Requirement(text) for text in requires("tbcad") or ()]
+    except PackageNotFoundError:
+        return []
+    return [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
+
+
+def _reinstall(remove: Sequence[str], add: str, needs: Sequence[Requirement]) -> str:
+    """Return the commands that remove distributions and install one as tbcad pins it."""
+    pinned = [need for need in needs if canonicalize_name(need.name) == add] or [Requirement(add)]
+    removing = _pip("uninstall") if _uses_uv() else f"{_pip('uninstall')} -y"
+    return f"{removing} {' '.join(remove)} && {_pip('install')} {_quoted(pinned)}"
+
+
+def _quoted(needs: Iterable[Requirement]) -> str:
+    return " ".join(f'"{need.name}{need.specifier}"' for need in needs)
+
+
+def _pip(verb: str) -> str:
+    python = shlex.quote(sys.executable)
+    return f"uv pip {verb} --python {python}" if _uses_uv() else f"{python} -m pip {verb}"
+
+
+def _uses_uv() -> bool:
+    return find_spec("pip") is None
