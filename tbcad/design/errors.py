@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, one_line
 
 _LONGEST_VALUE = 60
 _LEAST_LIKENESS = 0.6
@@ -20,11 +20,6 @@ _ORDER = {Gt: "above", Ge: "from", Lt: "below", Le: "to"}
 
 class SpecError(InputError, ValueError):
     """A design that cannot be read or built; its text is one line."""
-
-
-def one_line(text: str) -> str:
-    """Return text with line breaks and control characters made visible or dropped."""
-    return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
 
 
 def shown(value: object) -> str:
@@ -91,10 +86,12 @@ def unknown_key(where: str, key: str, model: type[BaseModel]) -> SpecError:
     """Return the error for a key that does not exist, or is a section where a key must be."""
     known = [name for name, _ in fields(model)]
     if key in known:
-        return SpecError(f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}")
+        return SpecError(
+            f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}"
+        )
     likely = nearest(key, known)
     hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(_siblings(key, known))
-    return SpecError(one_line(f"{where}: unknown key {key}: {hint}"))
+    return SpecError(f"{where}: unknown key {key}: {hint}")
 
 
 def _siblings(key: str, known: list[str]) -> list[str]:
@@ -121,11 +118,11 @@ def refused(
     more = f" (and {len(others)} more)" if others else ""
     if first["type"] == "value_error":
         where = f"{file} with options" if options else file
-        return SpecError(one_line(f"{where}: {key and key + ': '}{first['ctx']['error']}{more}"))
+        return SpecError(f"{where}: {key and key + ': '}{first['ctx']['error']}{more}")
     where = "option" if key in options else file
     if first["type"] == "extra_forbidden":
         return SpecError(f"{unknown_key(where, key, model)}{more}")
-    return SpecError(one_line(f"{where}: {_fault(first, key, model)}{more}"))
+    return SpecError(f"{where}: {_fault(first, key, model)}{more}")
 
 
 def _fault(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:

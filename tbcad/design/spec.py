@@ -81,7 +81,7 @@ class Mirrors(Section):
 
     radius_rule: RadiusRule = "traced"
     """Radii from exact ray tracing, from eqs. 1 and 2 of the paper, or planar mirrors."""
-    margin_mm: float = Field(0.5, ge=0, le=20)
+    margin_mm: float = Field(0.6, ge=0, le=20)
     """Coverage added to the capture diameter as the target of rule traced."""
     max_radius_widths: float = Field(30.0, ge=5, le=1000)
     """Largest radius in half widths l; a mirror that needs less curvature is nearly flat."""
@@ -140,7 +140,7 @@ class Mesh(Section):
 
     ray_error_mm: float = Field(0.05, ge=0.01, le=10)
     """How far a ray off a facet may miss, at the capture sphere, the ray off the exact sphere."""
-    chord_error_mm: float = Field(0.008, ge=0.0002, le=1)
+    chord_error_mm: float = Field(0.015, ge=0.0002, le=1)
     """Distance of a mirror's facets from its sphere."""
     structure_error_mm: float = Field(0.02, ge=0.002, le=5)
     """Distance of all other facets (back, flanges, holes) from the exact surface."""

@@ -1,0 +1,91 @@
+"""The designs that come with tbcad, and what their comments promise."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tbcad.design.errors import allowed, fields, section_of
+from tbcad.design.mirrors import design
+from tbcad.design.spec import Spec, load_spec
+
+DESIGNS = Path(__file__).parents[1] / "designs"
+PAPER = DESIGNS / "turtleback.toml"
+KEYS = {key: field for key, field in fields(Spec) if section_of(field) is None}
+
+
+def dotted(table: dict[str, object], prefix: str = "") -> set[str]:
+    keys = set()
+    for key, value in table.items():
+        inner = dotted(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key}
+        keys |= inner
+    return keys
+
+
+def comments(text: str) -> dict[str, str]:
+    """The comment block that each dotted key of a design stands under."""
+    found, section, block, before = {}, "", "", ""
+    for line in text.splitlines():
+        if line.startswith("#"):
+            block = (block if before.startswith("#") else "") + line[1:]
+        elif match := re.fullmatch(r"\[(.+)\]", line):
+            section, block = match[1] + ".", ""
+        elif match := re.match(r"(\w+) = ", line):
+            found[section + match[1]] = block
+        before = line
+    return found
+
+
+def test_the_papers_design_is_the_default() -> None:
+    assert load_spec(PAPER) == load_spec(None) == Spec()
+
+
+def test_the_papers_design_names_every_key() -> None:
+    assert dotted(tomllib.loads(PAPER.read_text())) == KEYS.keys()
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_the_papers_design_tells_what_each_key_allows(key: str) -> None:
+    comment = comments(PAPER.read_text())[key]
+    assert len(comment.split()) > 3
+    kind = KEYS[key].annotation
+    if kind in (int, float):
+        limits = allowed(kind, KEYS[key].metadata).split(maxsplit=3 if kind is int else 2)[-1]
+        assert limits in re.sub(r"\s+", " ", comment)
+
+
+@pytest.mark.parametrize("path", sorted(DESIGNS.glob("*.toml")), ids=lambda path: path.stem)
+class TestEveryDesign:
+    def test_is_named_like_its_file(self, path: Path) -> None:
+        assert load_spec(path).name == path.stem
+
+    def test_mirrors_see_the_capture_sphere(self, path: Path) -> None:
+        spec = load_spec(path)
+        assert design(spec).halves[0].coverage.min() >= spec.optics.capture_diameter_mm
+
+
+def test_the_flat_baseline_sees_what_its_comment_says() -> None:
+    half = design(load_spec(DESIGNS / "mukaigawa-flat.toml")).halves[0]
+    assert half.coverage.min() == pytest.approx(21.1, abs=0.05)
+
+
+def test_the_sensor_design_keeps_the_papers_balance() -> None:
+    """Mirrors and pixels per mirror grow by the same factor, within the rounding of n."""
+    paper, larger = load_spec(None), load_spec(DESIGNS / "sensor-10mp.toml")
+    pixels = [spec.camera.width_px * spec.camera.height_px for spec in (paper, larger)]
+    mirrors = [847, 1489]
+    assert [len(design(spec).halves[0]) for spec in (paper, larger)] == mirrors
+    growth = mirrors[1] / mirrors[0]
+    assert pixels[1] / pixels[0] / growth == pytest.approx(growth, rel=0.02)
+
+
+def test_the_print_is_the_paper_at_half_scale() -> None:
+    paper, small = load_spec(None).optics, load_spec(DESIGNS / "afternoon-print.toml").optics
+    assert [2 * x for x in small.camera_mm] == list(paper.camera_mm)
+    assert 2 * small.semi_minor_mm == paper.semi_minor_mm
+    assert 2 * small.capture_diameter_mm == paper.capture_diameter_mm
+
+
+def test_every_key_says_what_it_is() -> None:
+    assert [key for key, field in KEYS.items() if not field.description] == []
