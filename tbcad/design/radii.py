@@ -19,6 +19,7 @@ Progress = Callable[[str], None]
 # Asked for is 0.01 mm of coverage; the proof's figures are steadier when the design is exact.
 CONVERGED_MM = 1e-4
 MAX_ITERATIONS = 400
+MAX_HALVINGS = 12
 NAMED = 5
 
 
@@ -67,22 +68,32 @@ def traced(task: Task, progress: Progress = lambda _: None) -> tuple[Cells, Floa
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
-    curvature is scaled by target / coverage, all together, until none is off.
+    curvature is scaled by target / coverage, all together, until none is off. Where a step goes
+    so far that spheres no longer meet it is halved: flat mirrors always close.
 
     Raises:
         SpecError: names the mirrors for which no radius was found.
     """
-    curvature, triangles = np.maximum(task.mirrors.curvature, task.least), task.triangles
-    for iteration in range(MAX_ITERATIONS):
-        cells = task.cells(curvature, triangles)
-        triangles, covered = cells.triangles, coverage(cells, task.pinhole)
-        error = np.where(curvature > task.least, np.abs(covered - task.target), 0.0)
+    curvature, least = np.maximum(task.mirrors.curvature, task.least), task.least
+    closed, triangles, covered = np.zeros(len(least)), task.triangles, np.zeros(len(least))
+    error, halvings = np.full(len(least), np.inf), 0
+    for _ in range(MAX_ITERATIONS):
+        try:
+            cells = task.cells(curvature, triangles)
+        except UnsettledError:
+            halvings += 1
+            if halvings > MAX_HALVINGS:
+                break
+            curvature = (curvature + closed) / 2
+            least = np.minimum(least, curvature)
+            continue
+        closed, triangles, covered = curvature, cells.triangles, coverage(cells, task.pinhole)
+        error = np.where(curvature > least, np.abs(covered - task.target), 0.0)
         error = np.maximum(error, task.target - covered)
         if error.max() < CONVERGED_MM:
             return cells, covered
-        if iteration % 4 == 0:
-            progress(f"largest error of coverage {error.max():.2g} mm")
-        curvature = np.maximum(curvature * task.target / covered, task.least)
+        progress(f"largest error of coverage {error.max():.1g} mm")
+        curvature = np.maximum(curvature * task.target / covered, least)
     worst = np.argsort(-error)[:NAMED]
     raise SpecError(_not_made(worst, covered, task.target))
 

@@ -9,8 +9,9 @@ from tbcad.optics.vectors import dot, norm, unit
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Samples of each arc, first over all of it, then about the least; a parabola does the rest.
 SAMPLES = 9
-REFINEMENTS = 3
+ROUNDS = 3
 
 
 def reflected(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
@@ -49,15 +50,27 @@ def coverage(cells: Cells, pinhole: Floats) -> Floats:
     """
     mirror, arc = counted_sides(cells)
     low, high = np.zeros(len(arc)), np.ones(len(arc))
-    for _ in range(REFINEMENTS):
+    row = np.arange(len(arc))
+    for _ in range(ROUNDS):
         t = np.linspace(low, high, SAMPLES, axis=1)
         distance = _along(cells, pinhole, mirror, arc, t)
-        best = np.argmin(distance, axis=1)[:, None]
-        low = np.take_along_axis(t, np.maximum(best - 1, 0), axis=1)[:, 0]
-        high = np.take_along_axis(t, np.minimum(best + 1, SAMPLES - 1), axis=1)[:, 0]
+        best = np.argmin(distance, axis=1)
+        low, high = t[row, np.maximum(best - 1, 0)], t[row, np.minimum(best + 1, SAMPLES - 1)]
     least = np.full(cells.mirrors, np.inf)
-    np.minimum.at(least, mirror, distance.min(axis=1))
+    np.minimum.at(least, mirror, _lowest(distance))
     return 2 * least
+
+
+def _lowest(values: Floats) -> Floats:
+    """Least of each row (k, s) of even samples, on the parabola through its neighbours."""
+    row, best = np.arange(len(values)), np.argmin(values, axis=1)
+    middle = np.clip(best, 1, values.shape[1] - 2)
+    before, here, after = (values[row, middle + k] for k in (-1, 0, 1))
+    bend, slope = before - 2 * here + after, after - before
+    inside = (best == middle) & (bend > 0)
+    result: Floats = values[row, best]
+    result[inside] -= (slope**2)[inside] / (8 * bend)[inside]
+    return result
 
 
 def _along(cells: Cells, pinhole: Floats, mirror: Ints, arc: Ints, t: Floats) -> Floats:

@@ -22,7 +22,7 @@ Bools = NDArray[np.bool_]
 COVERED = 1e-9
 # Flips settle within some ten rounds; a search that runs on is going in circles.
 MAX_ROUNDS = 200
-MAX_STEPS = 1024
+MAX_STEPS = 64
 # Rounding in the test against all mirrors, mm.
 TOUCHING = 1e-7
 # Pairs of point and surface looked at in one go: bounds the memory.
@@ -88,11 +88,12 @@ def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
     return ends, twin
 
 
-def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
+def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     """Points where three surfaces meet on the light's side, in closed form, mm, (t, 3).
 
     Two planes of equal power (radical planes) give a line; it meets the sphere of the greatest
-    curvature there, at the point nearer to the apices. NaN where there is no common point.
+    curvature there, at the point nearer to the mirrors' apices. NaN where there is no common
+    point. Indices from `mirrors` on are bounding planes.
     """
     pivot = np.argmax(surfaces.curvature[triangles], axis=1)
     row = np.arange(len(triangles))
@@ -104,7 +105,7 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
         line = line / length
-        start = surfaces.apex[triangles].mean(axis=1)
+        start = _between(surfaces, triangles, mirrors)
         point += dot(line, start)[:, None] * line
         gradient = surfaces.gradient(p, point)
         slope = dot(line, gradient)
@@ -112,6 +113,13 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
         root = np.copysign(np.sqrt(slope**2 - 2 * surfaces.curvature[p] * value), slope)
         result: Floats = point - (2 * value / (slope + root))[:, None] * line
     return result
+
+
+def _between(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+    """Mean of the apices of those faces of each corner that are mirrors."""
+    mirror = (triangles < mirrors)[:, :, None]
+    mean: Floats = np.mean(surfaces.apex[triangles], axis=1, where=mirror)
+    return mean
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
@@ -160,13 +168,13 @@ def _follow(surfaces: Surfaces, start: Ints, mirrors: int, steps: int) -> tuple[
 
 def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     """Flip the triangles in place until settled, and return their corners."""
-    points = corners(surfaces, triangles)
+    points = corners(surfaces, triangles, mirrors)
     for _ in range(MAX_ROUNDS):
         edge, twin = _flips(surfaces, triangles, points, mirrors)
         if not len(edge):
             break
         changed = _flip(triangles, edge, twin)
-        points[changed] = corners(surfaces, triangles[changed])
+        points[changed] = corners(surfaces, triangles[changed], mirrors)
     deepest = covered(surfaces, points)
     if not deepest > -TOUCHING:
         raise UnsettledError(f"a corner lies {-deepest:.3g} mm inside another mirror")

@@ -1,0 +1,35 @@
+"""What several test files build once."""
+
+import pytest
+
+from tbcad.design.body import Body, body
+from tbcad.design.mirrors import Design, Half, design
+from tbcad.design.spec import load_spec
+
+
+@pytest.fixture(scope="session")
+def paper_design() -> Design:
+    """The paper's design with exact radii: n = 18, target 60 mm plus the default margin."""
+    return design(load_spec(None))
+
+
+@pytest.fixture(scope="session")
+def paper_half(paper_design: Design) -> Half:
+    return paper_design.halves[0]
+
+
+@pytest.fixture(scope="session")
+def small_design() -> Design:
+    """A quick one with everything in it: few mirrors, both flanges, halved mirrors."""
+    return design(load_spec(None, ["n=6"]))
+
+
+@pytest.fixture(scope="session")
+def small_half(small_design: Design) -> Half:
+    return small_design.halves[0]
+
+
+@pytest.fixture(scope="session")
+def small_body(small_design: Design) -> Body:
+    half = small_design.halves[0]
+    return body(small_design.spec.shell, half.body, half.ellipsoid)

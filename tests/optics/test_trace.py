@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from tbcad.design.mirrors import Half, design
+from tbcad.design.spec import load_spec
+from tbcad.optics.cells import Cells
+from tbcad.optics.trace import coverage, miss_distances, reflected
+from tbcad.optics.vectors import norm, unit
+
+PINHOLE = np.array([100.0, 0.0, -100.0])
+
+
+def test_reflection_at_a_plane() -> None:
+    point, normal = np.array([[0.0, 0.0, 10.0]]), np.array([[0.0, 0.0, -1.0]])
+    out = reflected(np.array([3.0, 0.0, 0.0]), point, normal)
+    assert out[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
+
+
+def test_ray_over_the_apex_passes_the_origin(paper_half: Half) -> None:
+    mirrors = paper_half.mirrors
+    assert miss_distances(PINHOLE, mirrors.apex, mirrors.normal).max() < 1e-9
+
+
+def brute_force_coverage(cells: Cells, pinhole: np.ndarray, i: int, reach: float) -> float:
+    """Twice the least miss of rays over points of sphere i that another surface covers.
+
+    It looks at a grid of points and at every other surface, and knows nothing of arcs. A mirror
+    halved by the seam must not be asked for.
+    """
+    surfaces = cells.surfaces
+    normal, radius = surfaces.normal[i], surfaces.radius[i]
+    first = unit(np.cross(normal, [0.1, 0.9, 0.3]))
+    step = np.linspace(-reach, reach, 701)
+    a, b = np.meshgrid(step, step)
+    flat = a[..., None] * first + b[..., None] * np.cross(normal, first)
+    point = surfaces.centre[i] + radius * unit(radius * normal + flat)
+    away = norm(surfaces.apex[: cells.mirrors] - surfaces.apex[i])
+    near = [*np.argsort(away)[1:25], *range(cells.mirrors, len(surfaces))]
+    hidden = np.zeros(a.shape, dtype=bool)
+    for j in near:
+        hidden |= surfaces.value(np.array(j), point) < 0
+    miss = miss_distances(pinhole, point, (point - surfaces.centre[i]) / radius)
+    return 2 * float(miss[hidden].min())
+
+
+@pytest.mark.parametrize("rule", ["paper", "traced"])
+def test_coverage_against_brute_force(rule: str) -> None:
+    half = design(load_spec(None, [f"radius_rule={rule}"])).halves[0]
+    whole = np.flatnonzero(half.u[:, 0] > 0)
+    extremes = whole[np.argsort(half.coverage[whole])[[0, 1, -1]]]
+    for i in [*extremes, *whole[:: len(whole) // 6]]:
+        found = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.size[i])
+        # The grid's step is a third of a percent of its reach, and so is its error.
+        assert found == pytest.approx(half.coverage[i], rel=4e-3)
+
+
+def test_the_seam_does_not_limit_halved_mirrors(paper_half: Half) -> None:
+    """With the cut counted a halved mirror would see nothing: its apex lies on the cut."""
+    halved = paper_half.u[:, 0] == 0
+    assert halved.sum() == 37
+    assert coverage(paper_half.cells, PINHOLE)[halved].min() > 60
+
+
+def test_smaller_radius_sees_more(paper_half: Half) -> None:
+    cells = paper_half.cells
+    before = coverage(cells, PINHOLE)
+    finer = Cells(
+        cells.surfaces.with_curvature(1.01 * cells.surfaces.curvature),
+        cells.boundary,
+        cells.triangles,
+        cells.corners,
+    )
+    assert (coverage(finer, PINHOLE) > before).all()
