@@ -6,6 +6,8 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
+from tbcad import __version__
+
 MANIFEST, VERDICT = "manifest.json", "verify.json"
 SCHEMA = "tbcad-manifest/1"
 LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh")
@@ -14,7 +16,7 @@ LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh"
 def write_manifest(folder: Path) -> None:
     """Write manifest.json over all files of the folder but itself and the verdict."""
     names = sorted(p.name for p in folder.iterdir() if p.name not in (MANIFEST, VERDICT))
-    versions = {name: version(name) for name in ("tbcad", *LIBRARIES)}
+    versions = {"tbcad": __version__, **{name: version(name) for name in LIBRARIES}}
     document = {
         "schema": SCHEMA,
         "files": {name: fingerprint(folder / name) for name in names},

@@ -31,7 +31,7 @@ def export_shells(design: Design, folder: Path, progress: Progress = lambda _: N
     write_design(folder / "design.json", design, records)
     closing = body(design.spec.shell, first.body, first.ellipsoid)
     progress("facets")
-    facets = mesh(design.spec.mesh, first.body, closing, distances(first))
+    facets = mesh(design.spec, first.body, closing, distances(first))
     for half in design.halves:
         _export(design, half, closing, facets, folder, progress)
     progress("manifest")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.spec import Mesh as MeshSpec
+from tbcad.design.spec import Spec
 from tbcad.model.chains import Chain
 from tbcad.optics.cells import Cells
 from tbcad.optics.vectors import dot, norm, unit
@@ -21,9 +21,7 @@ Ints = NDArray[np.int64]
 
 # A corner's inner point may lie this many strip widths away, where two arcs meet at a sharp angle.
 LONGEST_MITRE = 4.0
-# A narrower strip than sqrt(2 r q) gains nothing: the tilt q / w that rounding to 32-bit
-# coordinates gives its facets is then more than w / (2 r).
-STL_ROUNDING_MM = 2e-6
+LEAST_STEPS = 3
 # Share of the way from rim to centre that the strip may take at most.
 WIDEST_STRIP = 0.1
 
@@ -61,15 +59,15 @@ class Facets:
         return line if forward else line[::-1]
 
 
-def facets(spec: MeshSpec, cells: Cells, distance: Floats) -> Facets:
+def facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
     """Facets of all cells within the mesh tolerances.
 
     Args:
-        spec: tolerances.
+        spec: design with the mesh tolerances.
         cells: of the modelled surfaces.
         distance: from each mirror to the object, mm, (m,).
     """
-    rim = _rim(spec, cells)
+    rim = _rim(cells, _steps(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(cells, rim)
     return _spherical(spec, cells, rim, distance)
@@ -90,12 +88,12 @@ class _Rim:
     cell: Ints  # of each vertex in the lines, (b,)
     line: Ints  # vertex, (b,)
     following: Ints  # place of the next vertex of the same line, (b,)
-    late: NDArray[np.bool_]  # in the second half of its arc, (b,)
+    corner: NDArray[np.bool_]  # where two arcs meet, (b,)
+    late: NDArray[np.bool_]  # begins the last segment of its arc, (b,)
 
 
-def _rim(spec: MeshSpec, cells: Cells) -> _Rim:
+def _rim(cells: Cells, steps: Ints) -> _Rim:
     arcs = cells.arcs
-    steps = _steps(spec, cells)
     used, place = np.unique(np.concatenate([arcs.start, arcs.end]), return_inverse=True)
     start, end = place[: len(arcs)], place[len(arcs) :]
     first = len(used) + np.concatenate([[0], np.cumsum(steps - 1)[:-1]])
@@ -108,17 +106,28 @@ def _rim(spec: MeshSpec, cells: Cells) -> _Rim:
     inner = first[arc] + np.where(back, steps[arc] - k, k) - 1
     line = np.where(k == 0, np.where(back, end[arc], start[arc]), inner)
     cell = np.repeat(np.arange(cells.mirrors), np.diff(offsets))[side]
-    late = 2 * k >= steps[arc]
-    return _Rim(vertices, first, steps, start, end, cell, line, _following(cell), late)
+    late = k == steps[arc] - 1
+    return _Rim(vertices, first, steps, start, end, cell, line, _following(cell), k == 0, late)
 
 
-def _steps(spec: MeshSpec, cells: Cells) -> Ints:
-    """Segments of each arc: with quads this long, facets keep the chord error."""
-    arcs, curvature = cells.arcs, cells.surfaces.curvature[cells.arcs.faces].max(axis=1)
-    longest = np.sqrt(4 * spec.chord_error_mm / np.where(curvature > 0, curvature, np.inf))
-    with np.errstate(divide="ignore"):
-        steps = np.ceil(arcs.length / np.where(curvature > 0, longest, np.inf))
-    return np.where(curvature > 0, np.maximum(steps, 2), 1).astype(np.int64)
+def _steps(spec: Spec, cells: Cells, distance: Floats) -> Ints:
+    """Segments of each arc, for the mirror that needs more of the two.
+
+    A facet keeps one normal along its segment of length s, so the rays at its ends shift by
+    s (distance / r) along the rim's image. Near where that image comes closest to the object's
+    centre it turns about the circle of radius R: a shift d costs d^2 / 2 R of coverage's radius.
+    """
+    curvature = np.zeros(len(cells.surfaces))
+    longest = np.full(len(cells.surfaces), np.inf)
+    curvature[: cells.mirrors] = cells.surfaces.curvature[: cells.mirrors]
+    curved = curvature > 0
+    shift = np.sqrt(spec.optics.capture_diameter_mm * spec.mesh.ray_error_mm)
+    by_rays = shift / (curvature[curved] * distance)
+    by_chord = np.sqrt(4 * spec.mesh.chord_error_mm / curvature[curved])
+    longest[curved] = np.minimum(by_rays, by_chord)
+    arcs = cells.arcs
+    steps = np.ceil(arcs.length / longest[arcs.faces].min(axis=1))
+    return np.where(curved[arcs.faces].any(axis=1), np.maximum(steps, LEAST_STEPS), 1).astype(int)
 
 
 def _ragged(counts: Ints) -> tuple[Ints, Ints]:
@@ -148,7 +157,7 @@ def _means(points: Floats, cell: Ints) -> Floats:
     return np.column_stack([np.bincount(cell, weights=points[:, k]) for k in range(3)]) / counts
 
 
-def _spherical(spec: MeshSpec, cells: Cells, rim: _Rim, distance: Floats) -> Facets:
+def _spherical(spec: Spec, cells: Cells, rim: _Rim, distance: Floats) -> Facets:
     """A strip along each rim, then rings of quads, then a fan about the middle."""
     spheres = _Spheres(cells)
     cell, edge = rim.cell, rim.vertices[rim.line]
@@ -156,17 +165,28 @@ def _spherical(spec: MeshSpec, cells: Cells, rim: _Rim, distance: Floats) -> Fac
     reach = norm(edge - middle[cell])
     # The normal errs by (w / 2) / r, the reflected ray by twice that, over the distance.
     wanted = np.maximum(
-        spec.ray_error_mm * spheres.radius / distance,
-        np.sqrt(2 * spheres.radius * STL_ROUNDING_MM),
+        spec.mesh.ray_error_mm * spheres.radius / distance,
+        np.sqrt(2 * spheres.radius * _rounding(middle)),
     )
     width = np.minimum(wanted, WIDEST_STRIP * _per_cell(np.minimum, cell, reach))
     inside = _inside(edge, rim, cells.surfaces.gradient(cell, edge), width[cell])
     farthest = _per_cell(np.maximum, cell, reach)
-    rings = np.ceil(farthest / np.sqrt(4 * spec.chord_error_mm * spheres.radius))
+    rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * spheres.radius))
     build = _Rings(rim, spheres, middle, spheres.onto(inside, cell), rings.astype(np.int64))
     vertices, triangles, mirror = build.all()
     # Collected counter-clockwise from outside; the solid's outside is the light's side.
     return Facets(vertices, triangles[:, ::-1], mirror, rim.first, rim.steps, rim.start, rim.end)
+
+
+def _rounding(points: Floats) -> Floats:
+    """Rounding error of points (m, 3) written as 32-bit floats, mm, (m,).
+
+    A strip narrower than sqrt(2 r q) gains nothing: the tilt q / w that a rounding error q gives
+    its facets is then more than w / (2 r), the tilt of an exact strip.
+    """
+    largest = np.abs(points).max(axis=1).astype(np.float32)
+    rounding: Floats = np.spacing(largest).astype(np.float64) / 2
+    return rounding
 
 
 def _per_cell(function: np.ufunc, cell: Ints, values: Floats) -> Floats:
@@ -254,8 +274,9 @@ class _Rings:
     ) -> list[Ints]:
         """Two triangles for each quad.
 
-        In the strip the one on the rim has its right angle away from corners of the cell;
-        further inside the shorter diagonal keeps angles from growing obtuse.
+        In the strip the one on the rim has its right angle at the end of its segment, or at the
+        start where the end is a corner of the cell; further inside the shorter diagonal keeps
+        angles from growing obtuse.
         """
         a, b = outer.vertex[keep], outer.vertex[outer.following][keep]
         c, d = inner.vertex[inner.following], inner.vertex
@@ -270,18 +291,20 @@ class _Rings:
 
 
 def _length(points: Floats, a: Ints, b: Ints) -> Floats:
-    result: Floats = norm(points[a] - points[b])
-    return result
+    return norm(points[a] - points[b])
 
 
 def _inside(edge: Floats, rim: _Rim, normal: Floats, width: Floats) -> Floats:
-    """Points one strip width inside the rim, mitred where arcs meet."""
-    ahead = edge[rim.following] - edge
-    across = unit(np.cross(-normal, ahead))
+    """Points one strip width inside the rim.
+
+    Square to the segment before, so that its facet on the rim has a right angle there; where
+    arcs meet, mitred. An arc has one such point less than segments: its last one, where rays
+    are farthest from the object's centre, makes do with a skew.
+    """
+    across = unit(np.cross(-normal, edge[rim.following] - edge))
     before = np.empty_like(across)
     before[rim.following] = across
-    scale = 1 + dot(across, before)
-    mitre = (across + before) / scale[:, None]
+    mitre = (across + before) / (1 + dot(across, before))[:, None]
     long = norm(mitre)
     mitre *= (np.minimum(long, LONGEST_MITRE) / long)[:, None]
-    return edge + width[:, None] * mitre
+    return edge + width[:, None] * np.where(rim.corner[:, None], mitre, before)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.design.body import Body, Holes
-from tbcad.design.spec import Mesh as MeshSpec
+from tbcad.design.spec import Spec
 from tbcad.model.chains import boundary_chain
 from tbcad.model.facets import Facets, facets
 from tbcad.optics.cells import Cells
@@ -52,17 +52,17 @@ class Mesh:
         return Mesh(self.vertices * MIRROR, self.triangles[:, ::-1])
 
 
-def mesh(spec: MeshSpec, cells: Cells, body: Body, distance: Floats) -> Mesh:
+def mesh(spec: Spec, cells: Cells, body: Body, distance: Floats) -> Mesh:
     """Mesh of camera a's half.
 
     Args:
-        spec: tolerances.
+        spec: design with the mesh tolerances.
         cells: camera a's cells of the modelled surfaces.
         body: what closes them.
         distance: from each mirror to the object, mm, (m,).
     """
     front = facets(spec, cells, distance)
-    skin = _Skin(spec.structure_error_mm, cells, front, body)
+    skin = _Skin(spec.mesh.structure_error_mm, cells, front, body)
     points = np.concatenate([front.vertices, *skin.points])
     # Joining faces are flat to the last bit: rounding noise of 1e-15 mm is no geometry.
     return Mesh(np.round(points, 12) + 0.0, np.concatenate([front.triangles, *skin.triangles]))

@@ -1,0 +1,108 @@
+"""Reading back what tbcad wrote, by other means than it was written with where there are any."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import lib3mf
+import numpy as np
+import trimesh
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.STEPControl import STEPControl_Reader
+from OCP.StepShape import StepShape_AdvancedFace
+from OCP.TopAbs import TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+
+from tbcad.design.body import Body, body
+from tbcad.design.mirrors import Design, Half
+from tbcad.export.shells import distances
+from tbcad.model.mesh import Mesh, mesh
+from tbcad.model.shell import Solid, shell
+
+
+@dataclass(frozen=True)
+class StepContent:
+    """What a STEP file holds when the kernel reads it anew."""
+
+    shape: TopoDS_Shape
+    solids: int
+    valid: bool
+    faces: dict[str, TopoDS_Face]
+    kinds: Counter[str]
+
+
+def read_step(path: Path) -> StepContent:
+    """Read a STEP file; faces by the names in the file."""
+    reader = STEPControl_Reader()
+    assert reader.ReadFile(str(path)) == IFSelect_RetDone
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    transfer = reader.WS().TransferReader()
+    model, faces, kinds = reader.StepModel(), {}, Counter()
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        if isinstance(entity, StepShape_AdvancedFace):
+            faces[entity.Name().ToCString()] = TopoDS.Face_s(transfer.ShapeResult(entity))
+            kinds[type(entity.FaceGeometry()).__name__] += 1
+    return StepContent(
+        shape, count(shape, TopAbs_SOLID), BRepCheck_Analyzer(shape).IsValid(), faces, kinds
+    )
+
+
+def count(shape: TopoDS_Shape, kind: object) -> int:
+    explorer, found = TopExp_Explorer(shape, kind), 0
+    while explorer.More():
+        found += 1
+        explorer.Next()
+    return found
+
+
+def volume(shape: TopoDS_Shape) -> float:
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    return float(properties.Mass())
+
+
+def area(shape: TopoDS_Shape) -> float:
+    properties = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(shape, properties)
+    return float(properties.Mass())
+
+
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """Read an STL or 3MF as one mesh with merged vertices."""
+    if path.suffix == ".3mf":
+        return trimesh.Trimesh(*read_3mf(path), process=False)
+    return trimesh.load_mesh(path)
+
+
+def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromFile(str(path))
+    objects = model.GetMeshObjects()
+    assert objects.MoveNext()
+    part = objects.GetCurrentMeshObject()
+    vertices = np.array([list(v.Coordinates) for v in part.GetVertices()])
+    triangles = np.array([list(t.Indices) for t in part.GetTriangleIndices()])
+    assert not objects.MoveNext()
+    return vertices, triangles
+
+
+def solid_of(made: Design, which: int) -> Solid:
+    half = made.halves[which]
+    name = f"shell_{half.camera}"
+    return shell(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
+
+
+def body_of(made: Design) -> Body:
+    half = made.halves[0]
+    return body(made.spec.shell, half.body, half.ellipsoid)
+
+
+def mesh_of(made: Design) -> Mesh:
+    half: Half = made.halves[0]
+    return mesh(made.spec, half.body, body_of(made), distances(half))
