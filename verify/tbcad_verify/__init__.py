@@ -1,0 +1,10 @@
+"""Proof, on the files that tbcad wrote and without its code, that the mirrors do what they must."""
+
+from __future__ import annotations
+
+from tbcad_verify.cli import main
+from tbcad_verify.errors import BadExport
+from tbcad_verify.proof import verify
+from tbcad_verify.report import Report
+
+__all__ = ["BadExport", "Report", "main", "verify"]

@@ -1,0 +1,110 @@
+"""One line of the proof, and what a whole proof says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Name = tuple[str, str, str]  # of a check: name, file, unit
+NAMED = 5  # how many offenders a line names
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing measured.
+
+    Attributes:
+        name: what.
+        file: where, inside the export.
+        passed: None is "unknown", and no pass.
+        measured: number, None where there is none.
+        limit: what it was held against; None for figures that inform only.
+        unit: of both.
+        detail: who offends, by how much, or why it is unknown.
+    """
+
+    name: str
+    file: str
+    passed: bool | None
+    measured: float | None
+    limit: float | None
+    unit: str
+    detail: str = ""
+
+
+def at_most(check: Name, measured: float, limit: float, detail: str = "") -> Check:
+    """A check that a figure does not exceed its limit; one that is not finite fails.
+
+    Args:
+        check: name, file, unit.
+        measured: figure.
+        limit: largest allowed.
+        detail: kept when it fails.
+    """
+    return _held(check, measured, limit, measured <= limit, detail)
+
+
+def at_least(check: Name, measured: float, limit: float, detail: str = "") -> Check:
+    """A check that a figure reaches its limit; one that is not finite fails."""
+    return _held(check, measured, limit, measured >= limit, detail)
+
+
+def told(check: Name, measured: float, detail: str = "") -> Check:
+    """A figure without a limit: it informs, and passes."""
+    return Check(check[0], check[1], True, finite(measured), None, check[2], detail)
+
+
+def unknown(check: Name, reason: str) -> Check:
+    """What could not be found out."""
+    return Check(check[0], check[1], None, None, None, check[2], reason)
+
+
+def guarded(checks: Sequence[Name], work: Callable[[], Sequence[Check]]) -> list[Check]:
+    """Run one stage; if it breaks, everything it should have measured is unknown."""
+    try:
+        return list(work())
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        return [unknown(check, reason) for check in checks]
+
+
+def finite(value: float) -> float | None:
+    """The value, or None for what JSON cannot hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def offenders(
+    names: Sequence[str],
+    values: Floats,
+    unit: str,
+    worst_first: NDArray[np.intp],
+    form: str = ".2f",
+) -> str:
+    """The worst few by name and figure, and how many more there are."""
+    shown = [f"{names[k]} {values[k]:{form}} {unit}" for k in worst_first[:NAMED].tolist()]
+    return _listed(shown, len(worst_first))
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few names, and how many more there are."""
+    return _listed(list(names[:NAMED]), len(names))
+
+
+def passed(checks: Sequence[Check]) -> bool:
+    """True if every check passes; unknown is no pass."""
+    return all(check.passed is True for check in checks)
+
+
+def _held(check: Name, measured: float, limit: float, good: bool, detail: str) -> Check:
+    name, file, unit = check
+    return Check(name, file, bool(good), finite(measured), limit, unit, "" if good else detail)
+
+
+def _listed(shown: list[str], count: int) -> str:
+    more = count - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")

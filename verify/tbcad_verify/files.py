@@ -1,0 +1,149 @@
+"""Reading a folder that is not trusted: plain names, regular files, honest sizes."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.errors import BadExport
+
+MAX_BYTES = 4 * 10**9
+MAX_TEXT_BYTES = 256 * 10**6
+AGAIN = "write the export again with `tbcad build`"
+
+
+@dataclass(frozen=True)
+class Blob:
+    """One file as it was when it was read: what is hashed is what is parsed.
+
+    Attributes:
+        name: path inside the export, with forward slashes.
+        data: the bytes, shape (size,), uint8.
+        sha256: hex digest of exactly these bytes.
+    """
+
+    name: str
+    data: NDArray[np.uint8]
+    sha256: str
+
+    @property
+    def digest(self) -> tuple[int, str]:
+        """Size in bytes, and sha256."""
+        return self.data.size, self.sha256
+
+    def text(self) -> str:
+        """The bytes as UTF-8 text.
+
+        Raises:
+            BadExport: the file is not UTF-8.
+        """
+        try:
+            return self.data.tobytes().decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise BadExport(
+                f"{self.name}: not UTF-8 text ({error.reason} at byte {error.start}); {AGAIN}"
+            ) from error
+
+
+def open_folder(folder: Path) -> Path:
+    """The folder itself, resolved.
+
+    Raises:
+        BadExport: it is missing or is no folder.
+    """
+    if not folder.exists():
+        raise BadExport(f"{folder}: no such folder; give the folder that `tbcad build` wrote")
+    if not folder.is_dir():
+        raise BadExport(f"{folder}: not a folder; give the folder that `tbcad build` wrote")
+    return folder.resolve()
+
+
+def locate(folder: Path, name: str) -> Path:
+    """The path of a regular file inside the export, and never of anything outside it.
+
+    Args:
+        folder: the export, resolved.
+        name: path from the export's own lists, relative, with forward slashes.
+
+    Raises:
+        BadExport: the name leaves the folder, or the file is missing, no regular file or too big.
+    """
+    refuse_unsafe(name)
+    path = folder / name
+    try:
+        real = path.resolve(strict=True)
+        info = real.stat()
+    except (OSError, RuntimeError) as error:
+        raise BadExport(f"{name}: missing from {folder}; {AGAIN}") from error
+    if not real.is_relative_to(folder):
+        raise BadExport(f"{name}: a link that leads out of the export; only files inside count")
+    if not stat.S_ISREG(info.st_mode):
+        raise BadExport(f"{name}: not a regular file; {AGAIN}")
+    if info.st_size > MAX_BYTES:
+        raise BadExport(f"{name}: {info.st_size} bytes; at most {MAX_BYTES} are read")
+    return real
+
+
+def read(folder: Path, name: str, limit: int = MAX_BYTES) -> Blob:
+    """Read a whole file once, and hash what was read.
+
+    Args:
+        folder: the export, resolved.
+        name: path inside it.
+        limit: largest size allowed, bytes.
+
+    Raises:
+        BadExport: as `locate`, over the limit, or the file changed while it was read.
+    """
+    path = locate(folder, name)
+    try:
+        with path.open("rb") as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size > limit:
+                raise BadExport(f"{name}: {size} bytes; at most {limit} are read")
+            data = np.fromfile(stream, dtype=np.uint8, count=size)
+            rest = stream.read(1)
+    except OSError as error:
+        raise BadExport(f"{name}: cannot be read ({error.strerror}); {AGAIN}") from error
+    if data.size != size or rest:
+        raise BadExport(f"{name}: changed while it was read; let the build finish, then verify")
+    return Blob(name, data, hashlib.sha256(data.data).hexdigest())
+
+
+def digest(folder: Path, name: str) -> tuple[int, str]:
+    """Size in bytes and sha256 of a file that is not parsed.
+
+    Raises:
+        BadExport: as `locate`.
+    """
+    path = locate(folder, name)
+    with path.open("rb") as stream:
+        return os.fstat(stream.fileno()).st_size, hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def listing(folder: Path) -> frozenset[str]:
+    """Every file below the folder, by relative name; linked folders are not entered."""
+    found = (
+        Path(root, name).relative_to(folder).as_posix()
+        for root, _, names in os.walk(folder)
+        for name in names
+    )
+    return frozenset(found)
+
+
+def refuse_unsafe(name: str) -> None:
+    """Refuse names that lead, or might lead, out of the export.
+
+    Raises:
+        BadExport: absolute, with `..`, a drive, or another system's separators.
+    """
+    parts = PurePosixPath(name).parts
+    bad = not parts or name.startswith("/") or ".." in parts or "\\" in name or "\0" in name
+    if bad or ":" in parts[0]:
+        raise BadExport(f"{name!r}: not a plain file name inside the export; {AGAIN}")

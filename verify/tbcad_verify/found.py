@@ -1,0 +1,93 @@
+"""Every recorded mirror is on the mesh, there and with that radius, and nothing else is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad_verify.bench import Bench
+from tbcad_verify.checks import Check, Name, at_most, listed, offenders
+from tbcad_verify.match import places
+from tbcad_verify.recover import FORM_MM
+
+Floats = NDArray[np.float64]
+
+POSITION_MM = 5e-3
+CHECKS = {
+    "mirrors found": "missing or extra",
+    "form": "mm",
+    "centre error": "mm",
+    "radius error": "mm",
+}
+
+
+def checks(bench: Bench, files: str) -> list[Check]:
+    """Compare what was recovered with the record."""
+    found, form, centre, radius = ((name, files, unit) for name, unit in CHECKS.items())
+    match, ids = bench.match, bench.export.mirrors.ids
+    lost = [ids[k] for k in np.flatnonzero(match.segment < 0).tolist()]
+    shape = _forms(bench)
+    rough = np.argsort(-shape, kind="stable")
+    rough = rough[shape[rough] > FORM_MM]
+    return [
+        at_most(found, len(lost) + match.extra.size, 0, _who(bench, lost)),
+        at_most(form, float(shape.max()), FORM_MM, offenders(ids, shape, "mm RMS", rough, ".4f")),
+        _errors(bench, centre, match.centre_error, _swaps(bench) + _scale(bench)),
+        _errors(bench, radius, match.radius_error, ""),
+    ]
+
+
+def _forms(bench: Bench) -> Floats:
+    """(M,) form error of each mirror's patch, mm; of the nearest patch for missing mirrors."""
+    fits, segment = bench.recovery.fits, bench.match.segment.copy()
+    lost = np.flatnonzero(segment < 0)
+    if lost.size:
+        apex = bench.export.mirrors.columns("px", 3)[:, lost]
+        segment[lost] = cKDTree(fits.middle.T).query(apex.T)[1]
+    return fits.form[segment]
+
+
+def _who(bench: Bench, lost: list[str]) -> str:
+    extra, ids = bench.match.extra, bench.export.mirrors.ids
+    near = places(bench.export.mirrors, bench.recovery.fits.middle[:, extra])
+    said = [f"missing: {listed(lost)}"] if lost else []
+    if extra.size:
+        said.append(f"{extra.size} not in the record, near {listed([ids[k] for k in near])}")
+    return "; ".join(said) + _scale(bench)
+
+
+def _errors(bench: Bench, name: Name, errors: Floats, more: str) -> Check:
+    known = np.nan_to_num(errors, nan=-1.0, posinf=1e300)
+    worst = np.argsort(-known, kind="stable")
+    worst = worst[known[worst] > POSITION_MM]
+    measured = float(known.max()) if known.max() >= 0 else np.nan
+    who = offenders(bench.export.mirrors.ids, errors, "mm", worst, ".4f") or "no mirror found"
+    return at_most(name, measured, POSITION_MM, who + more)
+
+
+def _swaps(bench: Bench) -> str:
+    """Mirrors whose recovered centre is the recorded one of another."""
+    match, mirrors = bench.match, bench.export.mirrors
+    moved = np.flatnonzero(match.centre_error > POSITION_MM)[:100]
+    recorded = mirrors.columns("cx", 3)
+    centre = bench.mirrors.take(moved).centre()
+    far = [np.nan_to_num(np.linalg.norm(recorded.T - c, axis=1), nan=np.inf) for c in centre.T]
+    pairs = [
+        (k, int(np.argmin(d)))
+        for k, d in zip(moved.tolist(), far, strict=True)
+        if d.min() <= POSITION_MM
+    ]
+    said = [f"{mirrors.ids[k]} has the place of {mirrors.ids[other]}" for k, other in pairs]
+    return f"; {listed(said)}" if said else ""
+
+
+def _scale(bench: Bench) -> str:
+    """A hint when everything is off by one factor, as with inches."""
+    recorded = np.linalg.norm(bench.export.mirrors.columns("px", 3), axis=0)
+    patches = np.flatnonzero(bench.recovery.mirror)
+    if not patches.size:
+        return ""
+    ratio = np.median(np.linalg.norm(bench.recovery.fits.middle[:, patches], axis=0))
+    ratio /= np.median(recorded)
+    return f"; the mesh is about {ratio:.2g} x the record's size" if abs(ratio - 1) > 0.2 else ""

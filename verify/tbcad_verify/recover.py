@@ -1,0 +1,143 @@
+"""Find the mirrors in a mesh: cut it into patches, heal cuts that part one surface, judge each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.fits import Corners, Fits, corners, fit
+from tbcad_verify.mesh import Mesh, distinct, linked
+from tbcad_verify.segments import Segments, measure_edges, split
+from tbcad_verify.surfaces import Surfaces, bounce
+from tbcad_verify.vectors import dot, norm
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# A patch is a mirror's only if its vertices lie on one sphere or plane to within this, RMS.
+FORM_MM = 1e-3
+# Two patches are one if the smaller lies on the larger's surface to within this, everywhere.
+SAME_MM = 2e-4
+# What bulges less than this over its extent is a plane: ten times what float32 rounding does.
+FLAT_MM = 1e-4
+# So many vertices, twice a sphere's four unknowns, before a patch counts as a sphere.
+LEAST = 8
+# Light that comes or goes flatter than this cosine is not a mirror's.
+GRAZING = 0.05
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """The patches of one or more meshes.
+
+    Attributes:
+        segments: patch of every facet.
+        fits: surface of every patch.
+        mirror: (K,) true for those that are mirrors.
+    """
+
+    segments: Segments
+    fits: Fits
+    mirror: Bools
+
+
+def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
+    """Find the mirrors of one part, from triangles alone.
+
+    A mirror is a patch of a bulging sphere, or of a plane that sends the camera's light into the
+    capture sphere; in either case it faces both the camera and the object.
+
+    Args:
+        mesh: the part.
+        pinhole: (3,) mm; None for parts that have no mirrors.
+        radius_mm: of the capture sphere about the origin.
+    """
+    edges = measure_edges(mesh)
+    segments = split(mesh, edges)
+    points = corners(mesh, segments)
+    healed = _heal(mesh, segments, points, fit(mesh, segments, points))
+    fits = fit(mesh, healed, corners(mesh, healed))
+    return Recovery(healed, fits, _judge(fits, pinhole, radius_mm))
+
+
+def joined(parts: list[Recovery]) -> Recovery:
+    """Several parts' patches, numbered on."""
+    starts = np.cumsum([0, *(part.segments.count for part in parts)])
+    label = np.concatenate(
+        [part.segments.label + start for part, start in zip(parts, starts, strict=False)]
+    )
+    return Recovery(
+        Segments(label.astype(np.int32), int(starts[-1])),
+        _joined([part.fits for part in parts]),
+        np.concatenate([part.mirror for part in parts]),
+    )
+
+
+def _joined(fits: list[Fits]) -> Fits:
+    surfaces = _columns([item.surfaces for item in fits])
+    return Fits(Surfaces(*surfaces), *_columns(fits)[1:])
+
+
+def _columns(items: Sequence[Fits] | Sequence[Surfaces]) -> list[Any]:
+    """Each field of several dataclasses, end to end; fields that are no arrays stay lists."""
+    columns = [[getattr(item, field.name) for item in items] for field in fields(items[0])]
+    return [np.concatenate(c, axis=-1) if isinstance(c[0], np.ndarray) else c for c in columns]
+
+
+def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
+    if pinhole is None:
+        return np.zeros(fits.form.size, dtype=np.bool_)
+    middle, normal = fits.middle, fits.normal
+    incoming = middle - pinhole[:, None]
+    facing = [-dot(way, normal) > GRAZING * norm(way) for way in (incoming, middle)]
+    outgoing = bounce(incoming, normal)
+    along = dot(middle, outgoing) / dot(outgoing, outgoing)
+    lands = norm(middle - along * outgoing) <= radius_mm
+    bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
+    return np.asarray((fits.form < FORM_MM) & facing[0] & facing[1] & (bulges | (plane & lands)))
+
+
+def _heal(mesh: Mesh, segments: Segments, points: Corners, fits: Fits) -> Segments:
+    """Undo cuts inside one surface: facets of a sphere need not form a convex body."""
+    small, large = _neighbours(mesh, segments, fits)
+    worst = _farthest(mesh, points, fits.surfaces, small, large)
+    order = np.lexsort((worst, small))
+    _, first = np.unique(small[order], return_index=True)
+    best = order[first]  # to one neighbour only: a splinter must not bridge two mirrors
+    best = best[worst[best] < SAME_MM]
+    count, label = linked(segments.count, small[best], large[best])
+    return Segments(label[segments.label], count)
+
+
+def _neighbours(
+    mesh: Mesh, segments: Segments, fits: Fits
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of patches with a common edge, the one of smaller area first."""
+    half = np.flatnonzero(mesh.twin >= 0)
+    one, two = segments.label[half // 3], segments.label[mesh.twin[half] // 3]
+    rank = np.empty(segments.count, dtype=np.int64)
+    rank[np.argsort(fits.area, kind="stable")] = np.arange(segments.count)
+    down = rank[one] < rank[two]
+    keys = distinct(one[down].astype(np.int64) * segments.count + two[down])
+    return keys // segments.count, keys % segments.count
+
+
+def _farthest(
+    mesh: Mesh,
+    points: Corners,
+    surfaces: Surfaces,
+    small: NDArray[np.int64],
+    large: NDArray[np.int64],
+) -> Floats:
+    """Largest distance of each first patch's vertices from its neighbour's surface, mm."""
+    if not small.size:
+        return np.zeros(0)
+    size = np.diff(np.append(points.first, points.segment.size))[small]
+    starts = np.cumsum(size) - size
+    rows = np.arange(size.sum()) + np.repeat(points.first[small] - starts, size)
+    height = surfaces.take(np.repeat(large, size)).height(mesh.points[points.vertex[rows]].T)
+    return np.asarray(np.maximum.reduceat(np.abs(height), starts))

@@ -1,0 +1,221 @@
+"""What a proof found: as JSON in the export, as a table and one verdict line on screen."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from tbcad_verify.checks import NAMED, Check, finite, passed
+
+Floats = NDArray[np.float64]
+DIGITS = 9
+NAME = "verify.json"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """One row a recorded mirror, M of them; NaN is unknown. Halves of one mirror share coverage.
+
+    Attributes:
+        ids: names.
+        virtual: (M,) virtual camera of each mirror.
+        coverage_facet: (M,) mm.
+        coverage_fitted: (M,) mm.
+        centre_error: (M,) mm.
+        radius_error: (M,) mm.
+        pixels: (M,) of the real camera that see the object in this mirror.
+    """
+
+    ids: tuple[str, ...]
+    virtual: NDArray[np.intp]
+    coverage_facet: Floats
+    coverage_fitted: Floats
+    centre_error: Floats
+    radius_error: Floats
+    pixels: Floats
+
+
+@dataclass(frozen=True)
+class Report:
+    """The proof of one export.
+
+    Attributes:
+        target_mm: diameter that every virtual camera must see.
+        checks: in the order they were made.
+        findings: mirror by mirror.
+    """
+
+    target_mm: float
+    checks: tuple[Check, ...]
+    findings: Findings
+
+    @property
+    def passed(self) -> bool:
+        """True if every check passed; what is unknown does not."""
+        return passed(self.checks)
+
+    @property
+    def verdict(self) -> str:
+        """One line: PASS or FAIL, and what decides it."""
+        return _pass_line(self) if self.passed else _fail_line(self)
+
+    def to_json(self) -> str:
+        """The text of verify.json: the same for the same export, whatever the machine's load."""
+        return (
+            json.dumps(
+                {
+                    "pass": self.passed,
+                    "target_mm": self.target_mm,
+                    "checks": [_check_row(check) for check in self.checks],
+                    "mirrors": _mirror_rows(self.findings),
+                },
+                indent=1,
+                allow_nan=False,
+            )
+            + "\n"
+        )
+
+    def write(self, folder: Path) -> Path:
+        """Write verify.json whole or not at all."""
+        handle, name = tempfile.mkstemp(prefix=".verify-", suffix=".json", dir=folder)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                stream.write(self.to_json())
+                stream.flush()
+                os.fsync(stream.fileno())
+            Path(name).chmod(0o644)
+            Path(name).replace(folder / NAME)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+        return folder / NAME
+
+    def show(self, console: Console) -> None:
+        """Print the table and the verdict."""
+        console.print(_table(self))
+        console.print(self.verdict, markup=False, highlight=False, soft_wrap=True)
+
+
+def _check_row(check: Check) -> dict[str, Any]:
+    row = {
+        "name": check.name,
+        "file": check.file,
+        "pass": check.passed,
+        "measured": _rounded(check.measured),
+        "limit": check.limit,
+        "unit": check.unit,
+    }
+    return row if check.passed is True else row | {"detail": check.detail}
+
+
+def _mirror_rows(found: Findings) -> list[dict[str, Any]]:
+    columns = {
+        "coverage_facet_mm": found.coverage_facet,
+        "coverage_fitted_mm": found.coverage_fitted,
+        "centre_error_mm": found.centre_error,
+        "radius_error_mm": found.radius_error,
+        "pixels": found.pixels,
+    }
+    order = sorted(range(len(found.ids)), key=found.ids.__getitem__)
+    return [
+        {"id": found.ids[k]} | {key: _rounded(finite(values[k])) for key, values in columns.items()}
+        for k in order
+    ]
+
+
+def _rounded(value: float | None) -> float | int | None:
+    if value is None:
+        return None
+    return int(value) if float(value).is_integer() else round(float(value), DIGITS)
+
+
+def _table(report: Report) -> Table:
+    table = Table(title=None, box=None, pad_edge=False)
+    for name, side in (
+        ("check", "left"),
+        ("file", "left"),
+        ("", "left"),
+        ("measured", "right"),
+        ("limit", "right"),
+        ("unit", "left"),
+        ("", "left"),
+    ):
+        table.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
+    for check in report.checks:
+        table.add_row(
+            check.name,
+            check.file,
+            _mark(check),
+            _figure(check.measured),
+            _figure(check.limit),
+            check.unit,
+            check.detail,
+        )
+    return table
+
+
+def _mark(check: Check) -> str:
+    if check.passed is None:
+        return "[yellow]unknown[/]"
+    if not check.passed:
+        return "[red]FAIL[/]"
+    return "info" if check.limit is None else "[green]pass[/]"
+
+
+def _figure(value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+
+
+def _pass_line(report: Report) -> str:
+    found = report.findings
+    return (
+        f"PASS: {len(found.ids)} mirrors, {_cameras(found)} virtual cameras see "
+        f"{report.target_mm:g} mm or more (facets {np.min(found.coverage_facet):.2f}, spheres "
+        f"{np.min(found.coverage_fitted):.2f}); nothing blocked; centres within "
+        f"{np.max(found.centre_error) * 1e3:.2f} and radii within "
+        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record"
+    )
+
+
+def _fail_line(report: Report) -> str:
+    wrong = [check.name for check in report.checks if check.passed is False]
+    unsure = [check.name for check in report.checks if check.passed is None]
+    said = [
+        f"{word}: {', '.join(dict.fromkeys(names))}"
+        for word, names in (("failed", wrong), ("unknown", unsure))
+        if names
+    ]
+    return f"FAIL: {'; '.join([*_short_mirrors(report), *said])}"
+
+
+def _short_mirrors(report: Report) -> list[str]:
+    found = report.findings
+    least = np.fmin(found.coverage_facet, found.coverage_fitted)
+    _, first = np.unique(found.virtual, return_index=True)  # a halved mirror is named once
+    short = first[least[first] < report.target_mm]
+    if not short.size:
+        return []
+    worst = short[np.argsort(least[short], kind="stable")]
+    named = [
+        f"{found.ids[k]} sees {least[k]:.2f} mm, {report.target_mm - least[k]:.2f} short"
+        for k in worst[:NAMED].tolist()
+    ]
+    return [
+        f"{short.size} of {_cameras(found)} virtual cameras fall short of {report.target_mm:g} mm",
+        *named,
+    ]
+
+
+def _cameras(found: Findings) -> int:
+    return np.unique(found.virtual).size

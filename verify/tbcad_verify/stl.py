@@ -1,0 +1,67 @@
+"""Binary STL, read as data that may lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.files import AGAIN, Blob
+
+HEAD = 84
+FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+@dataclass(frozen=True)
+class Facets:
+    """The triangles of one STL, as written.
+
+    Attributes:
+        name: the file.
+        normals: (F, 3) float32, as stored; zero where the writer left them out.
+        corners: (F, 3, 3) float32: facet, corner, axis; mm.
+    """
+
+    name: str
+    normals: NDArray[np.float32]
+    corners: NDArray[np.float32]
+
+
+def parse(blob: Blob) -> Facets:
+    """Facets of a binary STL.
+
+    Raises:
+        BadExport: ASCII, a size that does not follow from the count, no facets, or coordinates
+            that are not finite.
+
+    Source: the 84 + 50 n byte layout of the 1988 StereoLithography Interface Specification.
+    """
+    count = _count(blob)
+    table = blob.data[HEAD : HEAD + FACET.itemsize * count].view(FACET)
+    corners = np.ascontiguousarray(table["corners"])
+    normals = np.ascontiguousarray(table["normal"])
+    _refuse_infinite(blob.name, corners)
+    _refuse_infinite(blob.name, normals)
+    return Facets(blob.name, normals, corners)
+
+
+def _count(blob: Blob) -> int:
+    size = blob.data.size
+    count = int(blob.data[80:HEAD].view("<u4")[0]) if size >= HEAD else 0
+    if size == HEAD + FACET.itemsize * count and count > 0:
+        return count
+    if blob.data[:5].tobytes().lower() == b"solid":
+        raise BadExport(f"{blob.name}: an ASCII STL; only binary ones are read; {AGAIN}")
+    raise BadExport(
+        f"{blob.name}: {size} bytes, but its header's {count} facets make "
+        f"{HEAD + FACET.itemsize * count}: truncated or no binary STL; {AGAIN}"
+    )
+
+
+def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:
+    finite = np.isfinite(values)
+    if not finite.all():
+        first = int(np.argwhere(~finite)[0][0])
+        raise BadExport(f"{name}: facet {first} has a number that is not finite; {AGAIN}")
