@@ -1,0 +1,200 @@
+"""The command `tbcad`: thin; heavy libraries are imported inside the commands."""
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad import __version__
+from tbcad.errors import InputError
+from tbcad.screen import Stages, stages
+
+if TYPE_CHECKING:
+    from tbcad_verify.report import Report
+
+    from tbcad.design.spec import Spec
+
+BUILD_STAGES, PROOF_STAGES, PIPED_WIDTH = 7, 6, 160
+
+app = typer.Typer(
+    name="tbcad",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
+    "made, proved on the files written. Start with [bold]tbcad build --out exports[/bold].",
+)
+
+
+class RadiusRule(StrEnum):
+    """How the mirrors get their radii."""
+
+    TRACED = "traced"
+    PAPER = "paper"
+    FLAT = "flat"
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"tbcad {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    del version
+
+
+@app.command()
+def build(
+    design: Annotated[
+        Path | None,
+        typer.Argument(help="Design file (TOML); without one, the design of the paper."),
+    ] = None,
+    n: Annotated[
+        int | None,
+        typer.Option(help="Subdivision of the icosahedron, 1 to 60: mirrors grow with its square."),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")
+    ] = Path("exports"),
+    radius_rule: Annotated[
+        RadiusRule | None,
+        typer.Option(
+            help="traced: every mirror sees the whole object, by exact rays; "
+            "paper: eqs. 1 and 2; flat: planar mirrors."
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
+        ),
+    ] = None,
+    verify: Annotated[bool, typer.Option(help="Prove the optics on the files written.")] = True,
+    force: Annotated[
+        bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
+    ] = False,
+) -> int:
+    """Compute the mirrors, build both shells, write STEP, STL and 3MF, and prove them.
+
+    Exit code 0: built and proved. 1: built, but the proof fails (the files stay). 2: bad input,
+    nothing written.
+    """
+    from tbcad.design.spec import load_spec
+    from tbcad.export.folder import check_target
+
+    options = list(settings or [])
+    options += [f"optics.n={n}"] if n is not None else []
+    options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
+    spec = load_spec(design, options)
+    check_target(out, force)
+    with stages(BUILD_STAGES + PROOF_STAGES * verify) as told:
+        report = _built(spec, out, force, verify, told)
+    if report is None:
+        typer.echo(f"{out}: built, not proved: run tbcad verify {out}")
+        return 0
+    _show(report)
+    typer.echo(f"{out}: shell_a and shell_b as STEP, STL and 3MF; mirrors.csv, design.json")
+    return 0 if report.passed else 1
+
+
+def _built(spec: "Spec", out: Path, force: bool, verify: bool, told: Stages) -> "Report | None":
+    """The stages of a build; the proof reads the files back before they replace the old ones."""
+    from tbcad.design.mirrors import design
+    from tbcad.export.folder import replacing
+    from tbcad.export.shells import export_shells
+
+    told.stage("mirrors: radii and cells")
+    made = design(spec, told.detail)
+    with replacing(out, force) as folder:
+        export_shells(made, folder, told.stage)
+        return _prove(folder, told) if verify else None
+
+
+@app.command("verify")
+def verify_command(
+    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+) -> int:
+    """Prove the optics on the files of an export, and write verify.json there.
+
+    Exit code 0: proved. 1: the proof fails. 2: not an export, or a broken one.
+    """
+    with stages(PROOF_STAGES) as told:
+        report = _prove(folder, told)
+    _show(report)
+    return 0 if report.passed else 1
+
+
+def _prove(folder: Path, told: Stages) -> "Report":
+    """The proof knows nothing of tbcad; its own refusals become ours."""
+    from tbcad_verify.errors import BadExport
+    from tbcad_verify.proof import verify
+
+    try:
+        return verify(folder, lambda text: told.stage(f"proof: {text}"))
+    except BadExport as error:
+        raise InputError(str(error)) from None
+
+
+def _show(report: "Report") -> None:
+    from rich.console import Console
+
+    # Piped, a table needs no terminal's width.
+    report.show(Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH))
+
+
+@app.command()
+def picture(
+    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("shell.png"),
+) -> int:
+    """Draw both halves, from outside and as a camera looks up into the mirrors."""
+    from tbcad.report.drawing import picture as draw
+
+    draw(folder, out)
+    typer.echo(f"{out}: drawn")
+    return 0
+
+
+@app.command()
+def doctor() -> int:
+    """Check that this Python environment has all that tbcad needs, and say how to mend it."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from tbcad.doctor import diagnose
+
+    findings = diagnose()
+    table = Table("", "what", "found", "what to do", box=None)
+    for finding in findings:
+        table.add_row("ok" if finding.ok else "NO", finding.name, finding.detail, finding.remedy)
+    Console().print(table)
+    return 0 if all(finding.ok for finding in findings) else 1
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command and return its exit code; bad input is told in one line on stderr."""
+    try:
+        return int(app(arguments, standalone_mode=False) or 0)
+    except typer.Exit as stop:
+        return stop.exit_code
+    except (InputError, typer.TyperException) as error:
+        text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
+        sys.stderr.write(f"tbcad: {text}\n")
+        return 2
+    except (KeyboardInterrupt, typer.Abort):
+        sys.stderr.write("tbcad: stopped; nothing was changed\n")
+        return 130
+
+
+def main() -> None:
+    """Entry point of the command."""
+    sys.exit(run(sys.argv[1:]))

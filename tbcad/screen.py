@@ -1,0 +1,48 @@
+"""What a long command shows: a bar on a terminal, plain lines elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+
+class Stages:
+    """Stages of one command, told on stderr."""
+
+    def __init__(self, bar: Progress | None, total: int) -> None:
+        """Tell stages on a bar, or in plain lines when there is none."""
+        self._bar = bar
+        self._task = bar.add_task("", total=total) if bar else None
+        self._plain = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._stage = ""
+
+    def stage(self, text: str) -> None:
+        """Begin the next stage."""
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=text, advance=1 if self._stage else 0)
+        else:
+            self._plain.print(f"tbcad: {text}", markup=False)
+        self._stage = text
+
+    def detail(self, text: str) -> None:
+        """Say how far the stage has come, on a terminal only."""
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=f"{self._stage}: {text}")
+
+
+@contextmanager
+def stages(total: int) -> Iterator[Stages]:
+    """Show about this many stages while the block runs."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield Stages(None, total)
+        return
+    columns = (
+        SpinnerColumn(),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}", markup=False),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        yield Stages(bar, total)
