@@ -59,8 +59,11 @@ def build(
         typer.Argument(help="Design file (TOML); without one, the design of the paper."),
     ] = None,
     n: Annotated[
-        int | None,
-        typer.Option(help="Subdivision of the icosahedron, 1 to 60: mirrors grow with its square."),
+        str | None,
+        typer.Option(
+            metavar="N",
+            help="Subdivision of the icosahedron, 1 to 60: mirrors grow with its square.",
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")

@@ -117,17 +117,17 @@ def _steps(spec: Spec, cells: Cells, distance: Floats) -> Ints:
     s (distance / r) along the rim's image. Near where that image comes closest to the object's
     centre it turns about the circle of radius R: a shift d costs d^2 / 2 R of coverage's radius.
     """
-    curvature = np.zeros(len(cells.surfaces))
-    longest = np.full(len(cells.surfaces), np.inf)
-    curvature[: cells.mirrors] = cells.surfaces.curvature[: cells.mirrors]
-    curved = curvature > 0
+    curvature = cells.surfaces.curvature[: cells.mirrors]
     shift = np.sqrt(spec.optics.capture_diameter_mm * spec.mesh.ray_error_mm)
-    by_rays = shift / (curvature[curved] * distance)
-    by_chord = np.sqrt(4 * spec.mesh.chord_error_mm / curvature[curved])
-    longest[curved] = np.minimum(by_rays, by_chord)
+    with np.errstate(divide="ignore"):
+        by_rays = shift / (curvature * distance)
+        by_chord = np.sqrt(4 * spec.mesh.chord_error_mm / curvature)
+    longest = np.full(len(cells.surfaces), np.inf)
+    longest[: cells.mirrors] = np.minimum(by_rays, by_chord)
     arcs = cells.arcs
     steps = np.ceil(arcs.length / longest[arcs.faces].min(axis=1))
-    return np.where(curved[arcs.faces].any(axis=1), np.maximum(steps, LEAST_STEPS), 1).astype(int)
+    straight = arcs.weight == 1
+    return np.where(straight, 1, np.maximum(steps, LEAST_STEPS)).astype(np.int64)
 
 
 def _ragged(counts: Ints) -> tuple[Ints, Ints]:

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,12 +14,20 @@ def half_of(*settings: str) -> Half:
     return design(load_spec(None, settings)).halves[0]
 
 
+def attempt(*settings: str) -> tuple[Half | None, str]:
+    """The half, or what the refusal says."""
+    try:
+        return half_of(*settings), ""
+    except SpecError as error:
+        return None, str(error)
+
+
 @pytest.mark.parametrize("n", [*range(1, 13), 17, 24, 36])
 def test_traced_mirrors_all_see_the_target(n: int) -> None:
     half = half_of(f"n={n}")
     curved = half.mirrors.radius < 29.9999 * half.size
-    assert half.coverage.min() > 60.5 - 0.01
-    assert half.coverage[curved].max(initial=0) < 60.5 + 0.01
+    assert half.coverage.min() > 60.6 - 0.01
+    assert half.coverage[curved].max(initial=0) < 60.6 + 0.01
     assert (half.mirrors.radius > 0).all()
     assert np.isfinite(half.mirrors.radius).all()
 
@@ -27,7 +37,7 @@ def test_mirrors_that_see_enough_are_nearly_flat() -> None:
     half = half_of("n=4")
     nearly_flat = np.isclose(half.mirrors.radius, 30 * half.size)
     assert nearly_flat.sum() > 5
-    assert (half.coverage[nearly_flat] >= 60.5 - 0.01).all()
+    assert (half.coverage[nearly_flat] >= 60.6 - 0.01).all()
 
 
 def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
@@ -105,11 +115,10 @@ def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
         f"semi_minor_mm={b}",
         f"capture_diameter_mm={capture}",
     ]
-    try:
-        half = half_of(*options)
-    except SpecError as error:
-        assert "\n" not in str(error)
-        assert "change" in str(error) or "make" in str(error) or "bring" in str(error)
+    half, told = attempt(*options)
+    if half is None:
+        assert "\n" not in told
+        assert re.search("change|make|bring", told)
         return
-    assert half.coverage.min() > capture + 0.5 - 0.01
+    assert half.coverage.min() > capture + 0.6 - 0.01
     assert (half.area > 0).all()

@@ -1,10 +1,13 @@
 """Cells against slow oracles that know nothing of triangulations."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Half, design
 from tbcad.design.spec import load_spec
 from tbcad.optics.cells import Cells, areas, cells_of
@@ -99,7 +102,7 @@ def test_rings_close(paper_half: Half) -> None:
     offsets, sides = cells.rings
     tail = np.where(sides % 2, cells.arcs.end[sides // 2], cells.arcs.start[sides // 2])
     head = np.where(sides % 2, cells.arcs.start[sides // 2], cells.arcs.end[sides // 2])
-    for a, b in zip(offsets[:-1], offsets[1:], strict=True):
+    for a, b in pairwise(offsets):
         assert np.array_equal(np.roll(head[a:b], 1), tail[a:b])
 
 
@@ -148,12 +151,11 @@ def test_four_cells_that_meet_in_one_point(diagonal: int, curvature: float) -> N
 )
 def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str) -> None:
     """Each mirror's cell lies on its own sphere and all of them add up to what rays see."""
+    options = [f"n={n}", f"camera_mm=[{x}, 0, {z}]", f"radius_rule={rule}"]
     try:
-        spec = load_spec(None, [f"n={n}", f"camera_mm=[{x}, 0, {z}]", f"radius_rule={rule}"])
-        cells = design(spec).halves[0].cells
-    except ValueError as error:
-        assert "change" in str(error) or "make" in str(error)
-        return
+        cells = design(load_spec(None, options)).halves[0].cells
+    except SpecError:
+        assume(False)
     assert (areas(cells) > 0).all()
     arc, t = np.broadcast_arrays(np.arange(len(cells.arcs))[:, None], np.linspace(0, 1, 5))
     assert covered(cells.surfaces, cells.arcs.at(arc, t).reshape(-1, 3)) > -1e-7

@@ -37,7 +37,7 @@ class Design:
     width: int = 260
     height: int = 194
     hfov: float = 89.0
-    arc: int = 10
+    arc: int = 16
     rings: int = 4
     strip: float = 3e-3
     moved: dict[int, Any] = field(default_factory=dict)
@@ -50,7 +50,7 @@ def unit(v):
 
 
 def vertices(n: int) -> np.ndarray:
-    """Geodesic vertices for n = 1 or a power of two: edge midpoints, pushed out, again and again."""
+    """Geodesic vertices for n = 1 or a power of two: midpoints, pushed out, again."""
     phi = (1 + 5**0.5) / 2
     ico = [np.roll([0, s, t * phi], k) for k in range(3) for s in (1, -1) for t in (1, -1)]
     faces = [
@@ -120,15 +120,14 @@ class Cells:
 
     def planes(self, k):
         """Half spaces a.x >= b that bound cell k: neighbours by number, then seam -1, foot -2."""
-        centre, radius, normal = self.spheres[k]
+        centre, radius, _ = self.spheres[k]
         cuts = []
         for j, (c, r, n) in enumerate(self.spheres):
             near = self.mirrors[k]["u"] @ self.mirrors[j]["u"] > np.cos(3.2 / self.design.n)
             if j == k or not near:
                 continue
             if radius is None:
-                cuts.append((j, n - normal, (n - normal) @ c - normal @ (centre - c)))
-                cuts[-1] = (j, -(n - normal), -(n @ c - normal @ centre))
+                cuts.append((j, n, n @ c))
             else:
                 b = centre @ centre - radius**2 - c @ c + r**2
                 cuts.append((j, 2 * (centre - c), b))
@@ -209,7 +208,7 @@ class Cells:
 
     def _mesh(self, k):
         corners, cuts = self.corners(k)
-        centre, radius, normal = self.spheres[k]
+        normal = self.spheres[k][2]
         middle = self._onto(k, np.mean(corners, axis=0))
         e = unit(np.cross(normal, [0.3, 0.5, 0.8]))
         f = np.cross(normal, e)

