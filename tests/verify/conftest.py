@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from synthetic_export import Cells, Design, export
-from tbcad_verify.bench import Bench, set_up
+from tbcad_verify.bench import Bench, pinhole_of, set_up
 from tbcad_verify.files import read
 from tbcad_verify.mesh import merge
 from tbcad_verify.record import read_export
@@ -34,7 +34,7 @@ def bench_of(folder: Path) -> Bench:
     record = read_export(folder)
     meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
     found = [
-        recover(mesh, record.cameras[part.camera].pinhole, record.target_mm / 2)
+        recover(mesh, pinhole_of(record, part), record.target_mm / 2)
         for mesh, part in zip(meshes, record.parts, strict=True)
     ]
     return set_up(record, meshes, found)

@@ -74,7 +74,7 @@ def test_pixel_counts_against_brute_force(bench: Bench, made: tuple[Path, Cells]
 
 def test_nearest_way_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
     d = pixels(bench)
-    mirror, useful = exact(made[1], d, bench.radius)
+    useful = exact(made[1], d, bench.radius)[1]
     d = d[useful]
     foot = -(d @ PIN) / (d * d).sum(axis=1)
     expected = np.linalg.norm(PIN + foot[:, None] * d, axis=1).min()
@@ -144,17 +144,24 @@ def test_a_post_inside_the_capture_sphere_is_the_object(good: Path) -> None:
     assert lines["light path"].passed is True
 
 
+def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: Bench) -> None:
+    """DESIGN.md section 3: 62.0 mm, at the zenith mirror."""
+    camera = bench.cameras[0]
+    zenith = np.flatnonzero(bench.u[2] > 1 - 1e-12)[:1]
+    start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
+    seen = bench.seen(camera)
+    small = frame.ring(seen, zenith, start, bench.u[:, zenith], 1e-3)
+    way = frame.nearest_on_the_way(seen, small.direction, small.lines)
+    assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
+
+
 def test_an_object_too_large_stands_in_the_light(bench: Bench) -> None:
-    """DESIGN.md section 3: beyond 62.0 mm the object blocks rays to the zenith mirror."""
-
-    def clear(diameter: float) -> float:
+    lines = {}
+    for diameter in (40.0, 75.0):
         big = replace(bench, export=replace(bench.export, target_mm=diameter))
-        ring = sensor._ring(big, big.cameras[0])
-        way = frame.nearest_on_the_way(big.seen(big.cameras[0]), ring.direction, ring.lines)
-        return float(np.nanmin(way)) - diameter / 2
-
-    assert clear(61.0) > 0
-    assert clear(63.0) < 0
+        lines[diameter] = {c.name: c for c in sensor.checks(big, "x")[1]}["object clear"]
+    assert lines[40.0].passed is True
+    assert lines[75.0].passed is False
 
 
 def test_ring_grazes_the_capture_sphere(bench: Bench) -> None:
