@@ -104,8 +104,8 @@ def build(
     if report is None:
         typer.echo(f"{out}: built, not proved: run tbcad verify {out}")
         return 0
-    _show(report)
     typer.echo(f"{out}: shell_a and shell_b as STEP, STL and 3MF; mirrors.csv, design.json")
+    _show(report)
     return 0 if report.passed else 1
 
 
