@@ -157,6 +157,8 @@ def test_interrupt_is_told_in_one_line(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
+        # A shell's background job, and what it starts, would ignore the interrupt.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert build.stderr is not None
     build.stderr.readline()
