@@ -151,14 +151,18 @@ def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # the killed one's rest is gone
 
 
+def _heed_interrupts() -> None:
+    """A shell's background job, and all it starts, would ignore them."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_interrupt_is_told_in_one_line(tmp_path: Path) -> None:
     build = subprocess.Popen(
         [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        # A shell's background job, and what it starts, would ignore the interrupt.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=_heed_interrupts,  # noqa: PLW1509 - no threads here
     )
     assert build.stderr is not None
     build.stderr.readline()
