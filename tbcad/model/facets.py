@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tbcad.design.spec import Spec
 from tbcad.model.chains import Chain
+from tbcad.model.rim import Rim, rim_of, steps_of
 from tbcad.optics.cells import Cells
 from tbcad.optics.vectors import dot, norm, unit
 
@@ -21,7 +22,6 @@ Ints = NDArray[np.int64]
 
 # A corner's inner point may lie this many strip widths away, where two arcs meet at a sharp angle.
 LONGEST_MITRE = 4.0
-LEAST_STEPS = 3
 # Share of the way from rim to centre that the strip may take at most.
 WIDEST_STRIP = 0.1
 
@@ -67,83 +67,13 @@ def facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
         cells: of the modelled surfaces.
         distance: from each mirror to the object, mm, (m,).
     """
-    rim = _rim(cells, _steps(spec, cells, distance))
+    rim = rim_of(cells, steps_of(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(cells, rim)
     return _spherical(spec, cells, rim, distance)
 
 
-@dataclass(frozen=True)
-class _Rim:
-    """Vertices on the arcs, and the closed line of vertices round each cell.
-
-    Lines run counter-clockwise seen from outside, one cell after another.
-    """
-
-    vertices: Floats
-    first: Ints
-    steps: Ints
-    start: Ints
-    end: Ints
-    cell: Ints  # of each vertex in the lines, (b,)
-    line: Ints  # vertex, (b,)
-    following: Ints  # place of the next vertex of the same line, (b,)
-    corner: NDArray[np.bool_]  # where two arcs meet, (b,)
-    late: NDArray[np.bool_]  # begins the last segment of its arc, (b,)
-
-
-def _rim(cells: Cells, steps: Ints) -> _Rim:
-    arcs = cells.arcs
-    used, place = np.unique(np.concatenate([arcs.start, arcs.end]), return_inverse=True)
-    start, end = place[: len(arcs)], place[len(arcs) :]
-    first = len(used) + np.concatenate([[0], np.cumsum(steps - 1)[:-1]])
-    arc, k = _ragged(steps - 1)
-    vertices = np.concatenate([cells.corners[used], arcs.at(arc, (k + 1) / steps[arc])])
-
-    offsets, sides = cells.rings
-    side, k = _ragged(steps[sides // 2])
-    arc, back = sides[side] // 2, sides[side] % 2 == 1
-    inner = first[arc] + np.where(back, steps[arc] - k, k) - 1
-    line = np.where(k == 0, np.where(back, end[arc], start[arc]), inner)
-    cell = np.repeat(np.arange(cells.mirrors), np.diff(offsets))[side]
-    late = k == steps[arc] - 1
-    return _Rim(vertices, first, steps, start, end, cell, line, _following(cell), k == 0, late)
-
-
-def _steps(spec: Spec, cells: Cells, distance: Floats) -> Ints:
-    """Segments of each arc, for the mirror that needs more of the two.
-
-    A facet keeps one normal along its segment of length s, so the rays at its ends shift by
-    s (distance / r) along the rim's image. Near where that image comes closest to the object's
-    centre it turns about the circle of radius R: a shift d costs d^2 / 2 R of coverage's radius.
-    """
-    curvature = cells.surfaces.curvature[: cells.mirrors]
-    shift = np.sqrt(spec.optics.capture_diameter_mm * spec.mesh.ray_error_mm)
-    with np.errstate(divide="ignore"):
-        by_rays = shift / (curvature * distance)
-        by_chord = np.sqrt(4 * spec.mesh.chord_error_mm / curvature)
-    longest = np.full(len(cells.surfaces), np.inf)
-    longest[: cells.mirrors] = np.minimum(by_rays, by_chord)
-    arcs = cells.arcs
-    steps = np.ceil(arcs.length / longest[arcs.faces].min(axis=1))
-    straight = arcs.weight == 1
-    return np.where(straight, 1, np.maximum(steps, LEAST_STEPS)).astype(np.int64)
-
-
-def _ragged(counts: Ints) -> tuple[Ints, Ints]:
-    """Row and place in the row of every element of rows with these counts."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
-
-
-def _following(cell: Ints) -> Ints:
-    place = np.arange(len(cell))
-    begins = np.searchsorted(cell, cell, side="left")
-    last = np.append(cell[1:] != cell[:-1], True)
-    return np.where(last, begins, place + 1)
-
-
-def _planar(cells: Cells, rim: _Rim) -> Facets:
+def _planar(cells: Cells, rim: Rim) -> Facets:
     """Fans about the apices: any triangulation of a plane is exact."""
     count = len(rim.vertices)
     vertices = np.concatenate([rim.vertices, _means(rim.vertices[rim.line], rim.cell)])
@@ -157,7 +87,7 @@ def _means(points: Floats, cell: Ints) -> Floats:
     return np.column_stack([np.bincount(cell, weights=points[:, k]) for k in range(3)]) / counts
 
 
-def _spherical(spec: Spec, cells: Cells, rim: _Rim, distance: Floats) -> Facets:
+def _spherical(spec: Spec, cells: Cells, rim: Rim, distance: Floats) -> Facets:
     """A strip along each rim, then rings of quads, then a fan about the middle."""
     spheres = _Spheres(cells)
     cell, edge = rim.cell, rim.vertices[rim.line]
@@ -234,7 +164,7 @@ class _Rings:
         count: rings inside the rim, the strip's included, at least 1, (m,).
     """
 
-    rim: _Rim
+    rim: Rim
     spheres: _Spheres
     middle: Floats
     strip: Floats
@@ -294,7 +224,7 @@ def _length(points: Floats, a: Ints, b: Ints) -> Floats:
     return norm(points[a] - points[b])
 
 
-def _inside(edge: Floats, rim: _Rim, normal: Floats, width: Floats) -> Floats:
+def _inside(edge: Floats, rim: Rim, normal: Floats, width: Floats) -> Floats:
     """Points one strip width inside the rim.
 
     Square to the segment before, so that its facet on the rim has a right angle there; where
