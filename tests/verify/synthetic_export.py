@@ -37,7 +37,7 @@ class Design:
     width: int = 260
     height: int = 194
     hfov: float = 89.0
-    arc: int = 16
+    arc: int = 12
     rings: int = 4
     strip: float = 3e-3
     moved: dict[int, Any] = field(default_factory=dict)

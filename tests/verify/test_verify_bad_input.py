@@ -168,3 +168,35 @@ def test_bad_arguments_are_bad_input() -> None:
     with pytest.raises(SystemExit) as stop:
         main([])
     assert stop.value.code == 2
+
+
+def test_a_file_cut_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tbcad_verify import files
+
+    whole = np.fromfile
+
+    def cut(stream, dtype, count):
+        return whole(stream, dtype=dtype, count=count - 1)
+
+    monkeypatch.setattr(files.np, "fromfile", cut)
+    with pytest.raises(BadExport, match="changed while it was read"):
+        verify(good)
+
+
+def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tbcad_verify import files
+
+    def smaller(handle: int) -> os.stat_result:
+        return os.stat_result((0o100644, 0, 0, 1, 0, 0, real(handle).st_size - 50, 0, 0, 0))
+
+    real = os.fstat
+    monkeypatch.setattr(files.os, "fstat", smaller)
+    with pytest.raises(BadExport, match="changed while it was read"):
+        verify(good)
+
+
+def test_a_folder_that_takes_no_verdict(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (good / "verify.json").mkdir()
+    assert main([str(good), "-q"]) == 2
+    assert "verify.json cannot be written" in capsys.readouterr().err
+    assert [p.name for p in good.iterdir() if p.name.startswith(".")] == []

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from conftest import bench_of
+from benches import bench_of
 from synthetic_export import PIN, Cells, Design, export, poses, unit
 from tbcad_verify import coverage, seam
 from tbcad_verify.bench import Bench
@@ -255,7 +255,7 @@ def test_seam_gap_against_brute_force(bench: Bench) -> None:
         chord = np.sqrt(radius**2 - height**2)
         expected = np.clip(2 * np.minimum(np.abs(curve), chord) * np.sign(curve), 0, None).max()
         v = bench.virtual_ids.index(f"a{m['number']:04d}")
-        assert gaps[v] == pytest.approx(expected, abs=0.02)
+        assert gaps[v] == pytest.approx(expected, abs=0.04)  # chords for arcs
     assert gaps.max() > 1
     whole = [v for v in range(bench.virtual.count) if (bench.virtual.index == v).sum() == 1]
     assert (gaps[whole] == 0).all()

@@ -15,7 +15,7 @@ from tbcad_verify.outline import Patches
 from tbcad_verify.poses import Virtual, virtual_cameras
 from tbcad_verify.rays import Scene, build
 from tbcad_verify.record import Camera, Export, Part
-from tbcad_verify.recover import FORM_MM, Recovery
+from tbcad_verify.recover import Recovery, smooth
 from tbcad_verify.recover import joined as joined_recoveries
 from tbcad_verify.surfaces import Seen, Surfaces, seen_from
 
@@ -90,7 +90,7 @@ class Bench:
             self.recovery.segments.label,
             self.owner(),
             fits.surfaces,
-            fits.form < FORM_MM,
+            smooth(fits),
             self.export.coating_mm,
         )
 
@@ -133,7 +133,7 @@ def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Be
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
-    found = match(export.mirrors, recovery, camera, export.coating_mm)
+    found = match(export.mirrors, recovery, mesh, camera, export.coating_mm)
     mirrors = recovery.fits.surfaces.take(found.segment).coated(export.coating_mm)
     return Bench(
         export, mesh, recovery, part, found, virtual_cameras(export.mirrors), build(mesh), mirrors

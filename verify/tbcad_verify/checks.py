@@ -64,13 +64,22 @@ def unknown(check: Name, reason: str) -> Check:
     return Check(check[0], check[1], None, None, None, check[2], reason)
 
 
+class Unknown(Exception):
+    """Something cannot be found out because something before it was not; the message says why."""
+
+
 def guarded(checks: Sequence[Name], work: Callable[[], Sequence[Check]]) -> list[Check]:
     """Run one stage; if it breaks, everything it should have measured is unknown."""
     try:
         return list(work())
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        return [unknown(check, reason) for check in checks]
+        return [unknown(check, reason_of(error)) for check in checks]
+
+
+def reason_of(error: Exception) -> str:
+    """One line that says what broke."""
+    kind = "" if isinstance(error, Unknown) else f"{type(error).__name__}: "
+    return f"{kind}{error}".strip(": ").partition("\n")[0]
 
 
 def finite(value: float) -> float | None:

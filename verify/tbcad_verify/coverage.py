@@ -19,9 +19,10 @@ from tbcad_verify.outline import (
     trace_outline,
     turns,
 )
-from tbcad_verify.rays import first_hits, in_threads, slices
+from tbcad_verify.rays import RAYS_A_CHUNK, first_hits, in_threads
 from tbcad_verify.record import Camera
 from tbcad_verify.surfaces import Lines
+from tbcad_verify.vectors import slices
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,7 @@ CHECKS = {
     "coverage, spheres": "mm",
     "mirrors seen": "hidden points",
     "seam gap": "mm",
+    "coverage, off the record": "mm",
 }
 
 
@@ -76,7 +78,7 @@ def measure(bench: Bench) -> Coverage:
 
 def checks(bench: Bench, found: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
-    facets, spheres, seen, gap = ((name, files, unit) for name, unit in CHECKS.items())
+    facets, spheres, seen, gap, off = ((name, files, unit) for name, unit in CHECKS.items())
     worst = np.argsort(-found.hidden, kind="stable")[: np.count_nonzero(found.hidden)]
     who = offenders(bench.export.mirrors.ids, found.hidden, "points", worst, ".0f")
     widest = bench.virtual_ids[int(np.argmax(found.gap))]
@@ -85,6 +87,7 @@ def checks(bench: Bench, found: Coverage, files: str) -> list[Check]:
         _covers(bench, spheres, found.fitted),
         at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {listed(found.blockers)}"),
         told(gap, float(found.gap.max()), f"widest at {widest}"),
+        told(off, _off_the_record(bench, found)),
     ]
 
 
@@ -110,6 +113,13 @@ def _covers(bench: Bench, name: Name, diameter: Floats) -> Check:
     return at_least(name, 0.0 if unseen else measured, target, "; ".join(said))
 
 
+def _off_the_record(bench: Bench, found: Coverage) -> float:
+    """Largest difference between coverage on fitted surfaces and as the designer computed it."""
+    recorded = bench.export.mirrors.columns("coverage_mm")[0]
+    off = np.abs(found.fitted[bench.virtual.index] - recorded)
+    return float(np.nan_to_num(off, nan=-1).max())
+
+
 def _hidden(
     bench: Bench, camera: Camera, outline: Outline
 ) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
@@ -117,16 +127,20 @@ def _hidden(
 
     The points are the outline's, a little inside, and the middle of every facet of the mirrors.
     """
-    owner = np.append(bench.owner()[bench.recovery.segments.label], -1)
+    owner = np.append(bench.owner()[bench.recovery.segments.label], -1).astype(np.int32)
     facets = np.flatnonzero((owner[:-1] >= 0) & bench.mine(camera)[owner[:-1]])
-    points = np.hstack([outline.inside, middles(bench.mesh)[:, facets]])
-    mirror = np.concatenate([outline.mirror, owner[facets]])
     origin = camera.pinhole[:, None]
 
-    def trace(part: slice) -> NDArray[np.int32]:
-        return first_hits(bench.scene, origin, points[:, part] - origin)
+    def edges(part: slice) -> NDArray[np.int32]:
+        return first_hits(bench.scene, origin, outline.inside[:, part] - origin)
 
-    hits = in_threads(trace, slices(mirror.size))
-    facet = np.concatenate(hits) if hits else np.zeros(0, dtype=np.int32)
+    def insides(part: slice) -> NDArray[np.int32]:
+        return first_hits(bench.scene, origin, middles(bench.mesh, facets[part]) - origin)
+
+    jobs = [(edges, part) for part in slices(outline.mirror.size, RAYS_A_CHUNK)]
+    jobs += [(insides, part) for part in slices(facets.size, RAYS_A_CHUNK)]
+    hits = in_threads(lambda job: job[0](job[1]), jobs)
+    facet = np.concatenate([np.zeros(0, dtype=np.int32), *hits])
+    mirror = np.concatenate([outline.mirror, owner[facets]])
     wrong = np.flatnonzero(owner[facet] != mirror)
     return mirror[wrong], facet[wrong]

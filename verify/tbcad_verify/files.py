@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from tbcad_verify.errors import BadExport
 
 MAX_BYTES = 4 * 10**9
+HEAD = 84  # bytes that tell what a file is
 MAX_TEXT_BYTES = 256 * 10**6
 AGAIN = "write the export again with `tbcad build`"
 
@@ -90,13 +92,19 @@ def locate(folder: Path, name: str) -> Path:
     return real
 
 
-def read(folder: Path, name: str, limit: int = MAX_BYTES) -> Blob:
+def read(
+    folder: Path,
+    name: str,
+    limit: int = MAX_BYTES,
+    expect: Callable[[str, int, bytes], None] = lambda _name, _size, _head: None,
+) -> Blob:
     """Read a whole file once, and hash what was read.
 
     Args:
         folder: the export, resolved.
         name: path inside it.
         limit: largest size allowed, bytes.
+        expect: called with name, size and the first bytes before the rest is read; may refuse.
 
     Raises:
         BadExport: as `locate`, over the limit, or the file changed while it was read.
@@ -107,6 +115,8 @@ def read(folder: Path, name: str, limit: int = MAX_BYTES) -> Blob:
             size = os.fstat(stream.fileno()).st_size
             if size > limit:
                 raise BadExport(f"{name}: {size} bytes; at most {limit} are read")
+            expect(name, size, stream.read(HEAD))
+            stream.seek(0)
             data = np.fromfile(stream, dtype=np.uint8, count=size)
             rest = stream.read(1)
     except OSError as error:

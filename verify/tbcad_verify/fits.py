@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh import Mesh, distinct
-from tbcad_verify.segments import Segments
+from tbcad_verify.segments import Segments, rounding
 from tbcad_verify.surfaces import Surfaces
-from tbcad_verify.vectors import across, dot, norm, unit
+from tbcad_verify.vectors import across, dot, norm, slices, unit
 
 Floats = NDArray[np.float64]
 STEPS = 4
@@ -30,20 +30,25 @@ class Fits:
     Attributes:
         surfaces: K best spheres or planes.
         form: (K,) root mean square of the vertices' distances, mm.
+        chord: (K,) largest distance of a facet's middle from the surface, mm.
         extent: (K,) distance of the farthest vertex from the segment's middle, mm.
         middle: (3, K) mean of the facets' middles by area, mm.
         normal: (3, K) mean normal by area, unit.
         area: (K,) of the facets, mm^2.
         count: (K,) vertices.
+        blur: (K,) how far float32 rounding of the vertices, taken as random, can have moved a
+            sphere's centre or changed its radius, six standard deviations, mm.
     """
 
     surfaces: Surfaces
     form: Floats
+    chord: Floats
     extent: Floats
     middle: Floats
     normal: Floats
     area: Floats
     count: NDArray[np.intp]
+    blur: Floats
 
     @property
     def sag(self) -> Floats:
@@ -90,7 +95,7 @@ def fit(mesh: Mesh, segments: Segments, points: Corners) -> Fits:
     middle, normal, area = _means(mesh, segments)
     frames = _frames(mesh, points, middle, normal)
     basis = np.stack([np.ones_like(frames.x), frames.x, frames.y, -_square(frames) / 2])
-    matrix = _sums(points, (basis[:, None] * basis[None]).reshape(16, -1)).T.reshape(-1, 4, 4)
+    matrix = _moments(points, basis)
     inverse = np.linalg.inv(
         matrix + RIDGE * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(4)
     )
@@ -101,20 +106,42 @@ def fit(mesh: Mesh, segments: Segments, points: Corners) -> Fits:
     gap, _ = _distances(frames, points, solution)
     gap = gap * frames.extent[points.segment]
     share = np.diff(np.append(points.first, points.segment.size))
+    surfaces = _surfaces(frames, solution)
     return Fits(
-        _surfaces(frames, solution),
+        surfaces,
         np.sqrt(np.add.reduceat(gap**2, points.first) / share),
+        _chords(mesh, segments, surfaces),
         frames.extent,
         middle,
         normal,
         area,
         share,
+        6 / 3 * rounding(mesh) * _gain(surfaces, inverse, frames.extent),
     )
 
 
-def middles(mesh: Mesh) -> Floats:
-    """(3, F) the middle of each facet, mm."""
-    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
+def _gain(surfaces: Surfaces, inverse: Floats, extent: Floats) -> Floats:
+    """How much a vertex's random error grows in a sphere's centre or radius."""
+    # The inverse normal matrix is the covariance of (h, a, b, k) for unit errors.
+    with np.errstate(divide="ignore"):
+        radius = np.abs(1 / surfaces.curvature)
+    tilt = inverse[:, 1, 1] + inverse[:, 2, 2]
+    bulge = np.maximum(inverse[:, 3, 3], 0) * (radius / extent) ** 2
+    return np.asarray(radius / extent * np.sqrt(np.maximum(tilt, 0) + bulge))
+
+
+def _chords(mesh: Mesh, segments: Segments, surfaces: Surfaces) -> Floats:
+    deepest = np.zeros(segments.count)
+    for part in slices(segments.label.size):
+        label = segments.label[part]
+        height = surfaces.take(label).height(middles(mesh, part))
+        np.maximum.at(deepest, label, np.abs(height))
+    return deepest
+
+
+def middles(mesh: Mesh, facets: slice | NDArray[np.intp] = slice(None)) -> Floats:
+    """(3, N) the middles of some facets, or of all, mm."""
+    corner = [np.take(mesh.points, mesh.faces[facets, k], axis=0).T for k in range(3)]
     return (corner[0] + corner[1] + corner[2]) / 3
 
 
@@ -147,6 +174,15 @@ def _square(f: _Frames) -> Floats:
 
 def _sums(points: Corners, values: Floats) -> Floats:
     return np.asarray(np.add.reduceat(values, points.first, axis=-1))
+
+
+def _moments(points: Corners, basis: Floats) -> Floats:
+    """(K, 4, 4) sums of products of the (4, P) basis functions."""
+    matrix = np.empty((points.first.size, 4, 4))
+    for i in range(4):
+        for j in range(i + 1):
+            matrix[:, i, j] = matrix[:, j, i] = _sums(points, basis[i] * basis[j])
+    return matrix
 
 
 def _times(matrix: Floats, vector: Floats) -> Floats:

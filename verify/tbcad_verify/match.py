@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.fits import Fits
+from tbcad_verify.mesh import Mesh
 from tbcad_verify.mirrors import Mirrors
 from tbcad_verify.recover import FLAT_MM, Recovery
-from tbcad_verify.vectors import norm, unit
+from tbcad_verify.surfaces import Surfaces
+from tbcad_verify.vectors import norm, slices, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -26,22 +28,27 @@ class Match:
         extra: patches that are mirrors nobody asked for.
         centre_error: (M,) mm; NaN where missing. For planes: see `compare`.
         radius_error: (M,) mm; NaN where missing, 0 for planes.
+        blur: (M,) how well float32 lets either be known, mm; 0 for planes.
+        surface_error: (M,) largest distance of a patch's vertex from the recorded surface, mm.
     """
 
     segment: Ints
     extra: Ints
     centre_error: Floats
     radius_error: Floats
+    blur: Floats
+    surface_error: Floats
 
 
 def match(
-    mirrors: Mirrors, recovery: Recovery, camera: NDArray[np.str_], coating_mm: float
+    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, camera: NDArray[np.str_], coating_mm: float
 ) -> Match:
     """Pair mirrors and patches that are each other's nearest, camera by camera.
 
     Args:
         mirrors: the record.
         recovery: all parts' patches, K.
+        mesh: all parts.
         camera: (K,) the camera that each patch's part is for.
         coating_mm: the coat that the mesh does not show.
     """
@@ -54,7 +61,9 @@ def match(
         )
     extra = np.setdiff1d(np.flatnonzero(recovery.mirror), segment)
     centre, radius = compare(mirrors, recovery.fits, segment, coating_mm)
-    return Match(segment, extra, centre, radius)
+    blur = np.where(mirrors.flat | (segment < 0), 0.0, recovery.fits.blur[segment])
+    surface = _surface_errors(mirrors, recovery, mesh, segment, coating_mm)
+    return Match(segment, extra, centre, radius, blur, surface)
 
 
 def compare(
@@ -82,12 +91,37 @@ def compare(
     return errors[0], errors[1]
 
 
+def recorded(mirrors: Mirrors) -> Surfaces:
+    """The M reflecting surfaces as recorded, by apex, normal and radius."""
+    radius = mirrors.columns("radius_mm")[0]
+    curvature = np.where(mirrors.flat, 0.0, 1 / np.where(mirrors.flat, 1.0, radius))
+    return Surfaces(mirrors.columns("px", 3), mirrors.columns("nx", 3), curvature)
+
+
 def places(mirrors: Mirrors, middle: Floats) -> list[int]:
     """The recorded mirrors nearest to patches whose middles are (3, N)."""
     if not middle.size:
         return []
     tree = cKDTree(mirrors.columns("px", 3).T)
     return [int(k) for k in np.atleast_1d(tree.query(middle.T)[1])]
+
+
+def _surface_errors(
+    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, segment: Ints, coating_mm: float
+) -> Floats:
+    owner = np.full(recovery.segments.count, -1, dtype=np.intp)
+    owner[segment[segment >= 0]] = np.flatnonzero(segment >= 0)
+    mirror = owner[recovery.segments.label]
+    facets = np.flatnonzero(mirror >= 0)
+    modelled = recorded(mirrors).coated(-coating_mm)
+    worst = np.where(segment >= 0, 0.0, np.nan)
+    for part in slices(facets.size):
+        mine = mirror[facets[part]]
+        surfaces = modelled.take(mine)
+        for k in range(3):
+            x = np.take(mesh.points, mesh.faces[facets[part], k], axis=0).T
+            np.maximum.at(worst, mine, np.abs(surfaces.height(x)))
+    return worst
 
 
 def _mutual(apex: Floats, middle: Floats, patches: Ints) -> Ints:

@@ -127,7 +127,11 @@ def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[n
     _, index, inverse = np.unique(key, return_index=True, return_inverse=True)
     if not np.array_equal(rows[index][inverse], rows):
         _, index, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return index, inverse.ravel()
+    # Numbered as they first occur, neighbours in the file stay neighbours in memory.
+    order = np.argsort(index)
+    number = np.empty_like(order)
+    number[order] = np.arange(order.size)
+    return index[order], number[inverse.ravel()]
 
 
 def _edge_keys(faces: Ints, count: int) -> NDArray[np.int64]:

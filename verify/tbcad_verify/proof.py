@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tbcad_verify import coverage, found, sensor
 from tbcad_verify.bench import Bench, pinhole_of, set_up
-from tbcad_verify.checks import Check, Name, guarded
-from tbcad_verify.files import read
+from tbcad_verify.checks import Check, Name, Unknown, guarded, reason_of
+from tbcad_verify.errors import BadExport
 from tbcad_verify.integrity import manifest_checks, mesh_checks, record_checks
 from tbcad_verify.mesh import Mesh, examine, merge
 from tbcad_verify.poses import virtual_cameras
@@ -21,7 +21,7 @@ from tbcad_verify.rays import in_threads
 from tbcad_verify.record import Export, Part, read_export
 from tbcad_verify.recover import Recovery, recover
 from tbcad_verify.report import Findings, Report
-from tbcad_verify.stl import Facets, parse
+from tbcad_verify.stl import Facets, read_facets
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -51,7 +51,7 @@ def verify(
         write: False leaves the folder as it is.
 
     Raises:
-        BadExport: the folder is no readable export; nothing is written.
+        BadExport: the folder is no readable export, or cannot be written to; nothing is written.
     """
     progress("reading")
     export = read_export(Path(folder))
@@ -68,15 +68,22 @@ def verify(
     findings, optical = _optics(export, solids, progress)
     report = Report(export.target_mm, (*checks, *optical), findings)
     if write:
-        report.write(export.folder)
+        _write(report, export.folder)
     return report
+
+
+def _write(report: Report, folder: Path) -> None:
+    try:
+        report.write(folder)
+    except OSError as error:
+        raise BadExport(f"{folder}: verify.json cannot be written ({error.strerror})") from error
 
 
 def _read_parts(export: Export) -> tuple[list[Facets], dict[str, tuple[int, str]]]:
     facets, digests = [], {}
     for part in export.parts:
-        blob = read(export.folder, part.stl)
-        facets.append(parse(blob))
+        one, blob = read_facets(export.folder, part.stl)
+        facets.append(one)
         digests[part.stl] = blob.digest
     return facets, digests
 
@@ -148,10 +155,10 @@ def _attempt(work: Callable[[], T]) -> tuple[T | None, str]:
     try:
         return work(), ""
     except Exception as error:
-        return None, f"{type(error).__name__}: {error}".splitlines()[0]
+        return None, reason_of(error)
 
 
 def _needed(value: T | None, reason: str) -> T:
     if value is None:
-        raise RuntimeError(reason)
+        raise Unknown(reason)
     return value

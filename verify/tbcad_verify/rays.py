@@ -7,7 +7,7 @@ facet is worked out again in float64.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -24,7 +24,7 @@ Ints = NDArray[np.int32]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-RAYS_A_CHUNK = 1 << 15  # such that a chunk's arrays stay in a core's cache
+RAYS_A_CHUNK = 1 << 14  # such that a chunk's arrays stay in a core's cache
 THREADS = min(os.cpu_count() or 1, 8)
 
 
@@ -82,11 +82,6 @@ def row_chunks(camera: Camera) -> list[tuple[int, int]]:
     """Bands of pixel rows, a chunk of rays each: (first, last + 1)."""
     step = max(1, RAYS_A_CHUNK // camera.width)
     return [(k, min(k + step, camera.height)) for k in range(0, camera.height, step)]
-
-
-def slices(count: int) -> Iterator[slice]:
-    """Consecutive chunks of rays."""
-    return (slice(k, min(k + RAYS_A_CHUNK, count)) for k in range(0, count, RAYS_A_CHUNK))
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

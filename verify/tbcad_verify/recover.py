@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.fits import Corners, Fits, corners, fit
 from tbcad_verify.mesh import Mesh, distinct, linked
-from tbcad_verify.segments import Segments, measure_edges, split
+from tbcad_verify.segments import SHARP_RAD, Edges, Segments, measure_edges, split
 from tbcad_verify.surfaces import Surfaces, bounce
 from tbcad_verify.vectors import dot, norm
 
@@ -20,10 +20,16 @@ Bools = NDArray[np.bool_]
 
 # A patch is a mirror's only if its vertices lie on one sphere or plane to within this, RMS.
 FORM_MM = 1e-3
+# And only if its facets, which are flat, follow the surface to within this, or to within this
+# share of its bulge: vertices alone may fit by chance, as those of a cone or a bore do, whose few
+# circles lie on a sphere.
+CHORD_MM, CHORD_SHARE = 0.1, 0.05
 # Two patches are one if the smaller lies on the larger's surface to within this, everywhere.
 SAME_MM = 2e-4
 # What bulges less than this over its extent is a plane: ten times what float32 rounding does.
 FLAT_MM = 1e-4
+# Of two patches, so many vertices are tried before all.
+SOME = 6
 # So many vertices, twice a sphere's four unknowns, before a patch counts as a sphere.
 LEAST = 8
 # Light that comes or goes flatter than this cosine is not a mirror's.
@@ -59,7 +65,7 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
     edges = measure_edges(mesh)
     segments = split(mesh, edges)
     points = corners(mesh, segments)
-    healed = _heal(mesh, segments, points, fit(mesh, segments, points))
+    healed = _heal(mesh, edges, segments, points)
     fits = fit(mesh, healed, corners(mesh, healed))
     return Recovery(healed, fits, _judge(fits, pinhole, radius_mm))
 
@@ -88,6 +94,12 @@ def _columns(items: Sequence[Fits] | Sequence[Surfaces]) -> list[Any]:
     return [np.concatenate(c, axis=-1) if isinstance(c[0], np.ndarray) else c for c in columns]
 
 
+def smooth(fits: Fits) -> Bools:
+    """(K,) true where the fitted surface is what the patch really is."""
+    followed = fits.chord < np.maximum(CHORD_MM, CHORD_SHARE * np.abs(fits.sag))
+    return np.asarray((fits.form < FORM_MM) & followed)
+
+
 def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
     if pinhole is None:
         return np.zeros(fits.form.size, dtype=np.bool_)
@@ -96,14 +108,19 @@ def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
     facing = [-dot(way, normal) > GRAZING * norm(way) for way in (incoming, middle)]
     outgoing = bounce(incoming, normal)
     along = dot(middle, outgoing) / dot(outgoing, outgoing)
-    lands = norm(middle - along * outgoing) <= radius_mm
+    # Some of its light lands: what leaves the middle may miss by the patch's own image.
+    image = fits.extent * (1 + norm(middle) / norm(incoming))
+    lands = norm(middle - along * outgoing) <= radius_mm + image
     bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
-    return np.asarray((fits.form < FORM_MM) & facing[0] & facing[1] & (bulges | (plane & lands)))
+    return np.asarray(smooth(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))
 
 
-def _heal(mesh: Mesh, segments: Segments, points: Corners, fits: Fits) -> Segments:
+def _heal(mesh: Mesh, edges: Edges, segments: Segments, points: Corners) -> Segments:
     """Undo cuts inside one surface: facets of a sphere need not form a convex body."""
-    small, large = _neighbours(mesh, segments, fits)
+    fits = fit(mesh, segments, points)
+    small, large = _neighbours(mesh, edges, segments, fits.area)
+    likely = _farthest(mesh, points, fits.surfaces, small, large, SOME) < SAME_MM
+    small, large = small[likely], large[likely]
     worst = _farthest(mesh, points, fits.surfaces, small, large)
     order = np.lexsort((worst, small))
     _, first = np.unique(small[order], return_index=True)
@@ -114,13 +131,14 @@ def _heal(mesh: Mesh, segments: Segments, points: Corners, fits: Fits) -> Segmen
 
 
 def _neighbours(
-    mesh: Mesh, segments: Segments, fits: Fits
+    mesh: Mesh, edges: Edges, segments: Segments, area: Floats
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of patches with a common edge, the one of smaller area first."""
-    half = np.flatnonzero(mesh.twin >= 0)
+    """Pairs of patches with a common edge that is not sharp, the one of smaller area first."""
+    blunt = np.abs(edges.angle) <= SHARP_RAD + edges.noise
+    half = np.concatenate([edges.half[blunt], mesh.twin[edges.half[blunt]]])
     one, two = segments.label[half // 3], segments.label[mesh.twin[half] // 3]
     rank = np.empty(segments.count, dtype=np.int64)
-    rank[np.argsort(fits.area, kind="stable")] = np.arange(segments.count)
+    rank[np.argsort(area, kind="stable")] = np.arange(segments.count)
     down = rank[one] < rank[two]
     keys = distinct(one[down].astype(np.int64) * segments.count + two[down])
     return keys // segments.count, keys % segments.count
@@ -132,11 +150,12 @@ def _farthest(
     surfaces: Surfaces,
     small: NDArray[np.int64],
     large: NDArray[np.int64],
+    most: int = 1 << 62,
 ) -> Floats:
-    """Largest distance of each first patch's vertices from its neighbour's surface, mm."""
+    """Largest distance of (the most first of) a patch's vertices from its neighbour's surface."""
     if not small.size:
         return np.zeros(0)
-    size = np.diff(np.append(points.first, points.segment.size))[small]
+    size = np.minimum(np.diff(np.append(points.first, points.segment.size))[small], most)
     starts = np.cumsum(size) - size
     rows = np.arange(size.sum()) + np.repeat(points.first[small] - starts, size)
     height = surfaces.take(np.repeat(large, size)).height(mesh.points[points.vertex[rows]].T)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh import Mesh, linked
-from tbcad_verify.vectors import cross, dot, norm, unit
+from tbcad_verify.vectors import cross, dot, norm, slices, unit
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -59,20 +59,29 @@ class Segments:
 
 def measure_edges(mesh: Mesh) -> Edges:
     """Angle over every edge that has two facets, and how far rounding can have moved it."""
-    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
+    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size, dtype=np.int32))
+    normal, double = unit(mesh.area), np.maximum(norm(mesh.area), np.finfo(np.float64).tiny)
+    angle, tilt = np.empty((2, half.size))
+    for part in slices(half.size):
+        angle[part], tilt[part] = _bend(mesh, normal, double, half[part])
+    return Edges(half, angle, rounding(mesh) * tilt)
+
+
+def _bend(
+    mesh: Mesh, normal: Floats, double: Floats, half: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Angles over edges, rad, and how far they tilt a unit of vertex error, rad/mm."""
     other = mesh.twin[half]
     start = _corner(mesh, half, 0)
     edge = _corner(mesh, half, 1) - start
     length = norm(edge)
-    normal = unit(mesh.area)
     n, m = np.take(normal, half // 3, axis=1), np.take(normal, other // 3, axis=1)
     angle = np.arctan2(dot(cross(n, m), edge) / length, dot(n, m))
-    double = np.maximum(norm(mesh.area), np.finfo(np.float64).tiny)
-    tilt = [
+    one, two = (
         _leverage(_corner(mesh, h, 2) - start, edge, length) * length / double[h // 3]
         for h in (half, other)
-    ]
-    return Edges(half, angle, rounding(mesh) * (tilt[0] + tilt[1]))
+    )
+    return angle, one + two
 
 
 def rounding(mesh: Mesh) -> float:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.files import AGAIN, Blob
+from tbcad_verify.files import AGAIN, HEAD, Blob, read
 
-HEAD = 84
 FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -29,17 +29,31 @@ class Facets:
     corners: NDArray[np.float32]
 
 
+def read_facets(folder: Path, name: str) -> tuple[Facets, Blob]:
+    """Facets of a binary STL, and the bytes they came from.
+
+    Args:
+        folder: the export, resolved.
+        name: the file in it.
+
+    Raises:
+        BadExport: ASCII, a size that does not follow from the count (found out before the file
+            is read), no facets, or numbers that are not finite.
+
+    Source: the 84 + 50 n byte layout of the 1988 StereoLithography Interface Specification.
+    """
+    blob = read(folder, name, expect=_refuse_foreign)
+    return parse(blob), blob
+
+
 def parse(blob: Blob) -> Facets:
     """Facets of a binary STL.
 
     Raises:
-        BadExport: ASCII, a size that does not follow from the count, no facets, or coordinates
-            that are not finite.
-
-    Source: the 84 + 50 n byte layout of the 1988 StereoLithography Interface Specification.
+        BadExport: as `read_facets`.
     """
-    count = _count(blob)
-    table = blob.data[HEAD : HEAD + FACET.itemsize * count].view(FACET)
+    _refuse_foreign(blob.name, blob.data.size, blob.data[:HEAD].tobytes())
+    table = blob.data[HEAD:].view(FACET)
     corners = np.ascontiguousarray(table["corners"])
     normals = np.ascontiguousarray(table["normal"])
     _refuse_infinite(blob.name, corners)
@@ -47,15 +61,14 @@ def parse(blob: Blob) -> Facets:
     return Facets(blob.name, normals, corners)
 
 
-def _count(blob: Blob) -> int:
-    size = blob.data.size
-    count = int(blob.data[80:HEAD].view("<u4")[0]) if size >= HEAD else 0
+def _refuse_foreign(name: str, size: int, head: bytes) -> None:
+    count = int.from_bytes(head[80:HEAD], "little") if len(head) == HEAD else 0
     if size == HEAD + FACET.itemsize * count and count > 0:
-        return count
-    if blob.data[:5].tobytes().lower() == b"solid":
-        raise BadExport(f"{blob.name}: an ASCII STL; only binary ones are read; {AGAIN}")
+        return
+    if head[:5].lower() == b"solid":
+        raise BadExport(f"{name}: an ASCII STL; only binary ones are read; {AGAIN}")
     raise BadExport(
-        f"{blob.name}: {size} bytes, but its header's {count} facets make "
+        f"{name}: {size} bytes, but its header's {count} facets make "
         f"{HEAD + FACET.itemsize * count}: truncated or no binary STL; {AGAIN}"
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +30,11 @@ def cross(a: Floats, b: Floats) -> Floats:
     return np.stack(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
+
+
+def slices(count: int, step: int = 1 << 17) -> Iterator[slice]:
+    """Consecutive pieces of `count` columns, so that intermediate results stay small."""
+    return (slice(k, min(k + step, count)) for k in range(0, count, step))
 
 
 def across(n: Floats) -> tuple[Floats, Floats]:

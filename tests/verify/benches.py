@@ -1,0 +1,22 @@
+"""An export on the optical bench, without the checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tbcad_verify.bench import Bench, pinhole_of, set_up
+from tbcad_verify.files import read
+from tbcad_verify.mesh import merge
+from tbcad_verify.record import read_export
+from tbcad_verify.recover import recover
+from tbcad_verify.stl import parse
+
+
+def bench_of(folder: Path) -> Bench:
+    record = read_export(folder)
+    meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
+    found = [
+        recover(mesh, pinhole_of(record, part), record.target_mm / 2)
+        for mesh, part in zip(meshes, record.parts, strict=True)
+    ]
+    return set_up(record, meshes, found)
