@@ -132,7 +132,7 @@ def test_a_post_between_camera_and_mirrors_is_named(good: Path) -> None:
 
 def test_a_post_between_mirror_and_object_is_named(good: Path) -> None:
     bench = bench_of(with_post(good, [-6, -6, 30], [6, 6, 32]))
-    lines = {c.name: c for c in sensor.checks(bench, "x")[1]}
+    lines = {c.name: c for c in sensor.checks(bench, None, "x")[1]}
     assert lines["light path"].passed is False
     assert "blocked by post (no mirror)" in lines["light path"].detail
     assert lines["light path"].measured > 10
@@ -140,7 +140,7 @@ def test_a_post_between_mirror_and_object_is_named(good: Path) -> None:
 
 def test_a_post_inside_the_capture_sphere_is_the_object(good: Path) -> None:
     bench = bench_of(with_post(good, [-5, -5, -5], [5, 5, 5]))
-    lines = {c.name: c for c in sensor.checks(bench, "x")[1]}
+    lines = {c.name: c for c in sensor.checks(bench, None, "x")[1]}
     assert lines["light path"].passed is True
 
 
@@ -150,7 +150,7 @@ def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: Bench) -> None:
     zenith = np.flatnonzero(bench.u[2] > 1 - 1e-12)[:1]
     start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
     seen = bench.seen(camera)
-    small = frame.ring(seen, zenith, start, bench.u[:, zenith], 1e-3)
+    small = frame.ring(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
     way = frame.nearest_on_the_way(seen, small.direction, small.lines)
     assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
 
@@ -159,14 +159,14 @@ def test_an_object_too_large_stands_in_the_light(bench: Bench) -> None:
     lines = {}
     for diameter in (40.0, 75.0):
         big = replace(bench, export=replace(bench.export, target_mm=diameter))
-        lines[diameter] = {c.name: c for c in sensor.checks(big, "x")[1]}["object clear"]
+        lines[diameter] = {c.name: c for c in sensor.checks(big, None, "x")[1]}["object clear"]
     assert lines[40.0].passed is True
     assert lines[75.0].passed is False
 
 
 def test_ring_grazes_the_capture_sphere(bench: Bench) -> None:
     camera = bench.cameras[0]
-    ring = sensor._ring(bench, camera)
+    ring = sensor._ring(bench, camera, None)
     assert ring.error.max() < 1e-6
     from tbcad_verify.surfaces import misses
 
@@ -179,9 +179,19 @@ def test_a_narrow_camera_cuts_mirrors_off(good: Path) -> None:
     for camera in design["cameras"]:
         camera["hfov_deg"] = 70.0
     (good / "design.json").write_text(json.dumps(design))
-    lines = {c.name: c for c in sensor.checks(bench_of(good), "x")[1]}
+    lines = {c.name: c for c in sensor.checks(bench_of(good), None, "x")[1]}
     assert lines["in frame"].passed is False
     assert "partly out of the frame: a0" in lines["in frame"].detail
+
+
+def test_the_rim_is_looked_for_only_where_a_mirror_reaches(bench: Bench) -> None:
+    """A mirror that sees little fails for that, and not for being out of frame as well."""
+    found = coverage.measure(bench)
+    short = replace(found, fitted=np.full_like(found.fitted, 10.0))
+    ring = sensor._ring(bench, bench.cameras[0], short)
+    from tbcad_verify.surfaces import misses
+
+    np.testing.assert_allclose(misses(ring.lines), 5.0, atol=1e-6)
 
 
 def test_margins_by_hand(bench: Bench) -> None:

@@ -159,6 +159,16 @@ def test_splinters_are_no_spheres() -> None:
     assert (found.fits.area[found.mirror] < 0.1 * found.fits.area.max()).all()
 
 
+def test_a_fold_is_seen() -> None:
+    """A vertex pulled across its neighbours: closed still, but folded."""
+    mesh = closed_cap(20.0, 0.0)
+    assert recover(mesh, PINHOLE, 30).folds == 0
+    points = mesh.points.copy()
+    inner = mesh.faces[np.argmax(mesh.faces.min(axis=1) > 100)]
+    points[inner[0]] += 3 * (points[inner[1]] - points[inner[0]])
+    assert recover(indexed(points, mesh.faces), PINHOLE, 30).folds > 0
+
+
 def test_a_countersink_is_no_mirror() -> None:
     """A cone's rim and tip lie on a sphere; its facets do not follow it."""
     a = 2 * np.pi * np.arange(60) / 60

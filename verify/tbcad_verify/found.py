@@ -95,4 +95,4 @@ def _swaps(bench: Bench) -> str:
 def _scale(bench: Bench) -> str:
     """A hint when everything is off by one factor, as with inches."""
     ratio = norm(bench.mesh.points.T).max() / norm(bench.export.mirrors.columns("px", 3)).max()
-    return "" if 0.5 < ratio < 2 else f"; the mesh is about {ratio:.2g} x the record's size"
+    return "" if 0.2 < ratio < 5 else f"; the mesh is about {ratio:.2g} x the record's size"

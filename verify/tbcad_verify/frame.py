@@ -35,7 +35,7 @@ class Ring:
     error: Floats
 
 
-def ring(seen: Seen, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius_mm: float) -> Ring:
+def ring(seen: Seen, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius: Floats) -> Ring:
     """Aim at the rim of the capture sphere off each mirror, by Newton's method.
 
     Args:
@@ -43,12 +43,12 @@ def ring(seen: Seen, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius
         mirrors: (K,) which of them.
         start: (3, K) mm, a point on each mirror to begin with.
         u: (3, K) their virtual cameras' directions.
-        radius_mm: of the capture sphere.
+        radius: (K,) of the sphere about the origin to graze, mm.
     """
     chief = _aim(seen, mirrors, start - seen.origin[:, None], u, np.zeros((2, mirrors.size)))
     angle = np.tile(np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS), mirrors.size)
     index, u = np.repeat(mirrors, AZIMUTHS), np.repeat(u, AZIMUTHS, axis=1)
-    target = radius_mm * np.stack([np.cos(angle), np.sin(angle)])
+    target = np.repeat(radius, AZIMUTHS) * np.stack([np.cos(angle), np.sin(angle)])
     d = _aim(seen, index, np.repeat(chief, AZIMUTHS, axis=1), u, target)
     lines = reflect(seen, index, d)
     return Ring(index, d, lines, np.asarray(np.hypot(*(_miss(lines, u) - target))))

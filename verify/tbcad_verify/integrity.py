@@ -102,6 +102,11 @@ def mesh_checks(name: str, found: Topology) -> list[Check]:
     ]
 
 
+def fold_check(name: str, folds: int) -> Check:
+    """No facet lies back to back with its neighbour."""
+    return at_most(("folds", name, "edges"), folds, 0, "the surface is folded onto itself")
+
+
 def _found(export: Export, name: str) -> tuple[int, str] | None:
     if name in OWN:
         return None

@@ -14,7 +14,7 @@ from tbcad_verify import coverage, found, sensor
 from tbcad_verify.bench import Bench, pinhole_of, set_up
 from tbcad_verify.checks import Check, Name, Unknown, guarded, reason_of
 from tbcad_verify.errors import BadExport
-from tbcad_verify.integrity import manifest_checks, mesh_checks, record_checks
+from tbcad_verify.integrity import fold_check, manifest_checks, mesh_checks, record_checks
 from tbcad_verify.mesh import Mesh, examine, merge
 from tbcad_verify.poses import virtual_cameras
 from tbcad_verify.rays import in_threads
@@ -97,7 +97,11 @@ def _solid(export: Export, part: Part, facets: Facets) -> Solid:
     recovery, why = _attempt(
         lambda: recover(_needed(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
     )
-    return Solid(mesh, recovery, checks, reason or why)
+    folds = guarded(
+        [("folds", part.stl, "edges")],
+        lambda: [fold_check(part.stl, _needed(recovery, reason or why).folds)],
+    )
+    return Solid(mesh, recovery, checks + folds, reason or why)
 
 
 def _optics(
@@ -118,7 +122,7 @@ def _optics(
         lambda: coverage.checks(ready(), _needed(seen, why), files),
     )
     progress("every pixel")
-    light, why = _attempt(lambda: sensor.checks(ready(), files))
+    light, why = _attempt(lambda: sensor.checks(ready(), seen, files))
     checks += guarded(_names(sensor.CHECKS, files), lambda: _needed(light, why)[1])
     return _findings(export, bench, seen, light[0] if light else None), checks
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.fits import Corners, Fits, corners, fit
-from tbcad_verify.mesh import Mesh, distinct, linked
-from tbcad_verify.segments import SHARP_RAD, Edges, Segments, measure_edges, split
+from tbcad_verify.fits import Fits
+from tbcad_verify.heal import LEAST, heal
+from tbcad_verify.mesh import Mesh
+from tbcad_verify.segments import Segments, folds, measure_edges, split
 from tbcad_verify.surfaces import Surfaces, bounce
 from tbcad_verify.vectors import dot, norm
 
@@ -24,14 +25,8 @@ FORM_MM = 1e-3
 # share of its bulge: vertices alone may fit by chance, as those of a cone or a bore do, whose few
 # circles lie on a sphere.
 CHORD_MM, CHORD_SHARE = 0.1, 0.05
-# Two patches are one if the smaller lies on the larger's surface to within this, everywhere.
-SAME_MM = 2e-4
 # What bulges less than this over its extent is a plane: ten times what float32 rounding does.
 FLAT_MM = 1e-4
-# Of two patches, so many vertices are tried before all.
-SOME = 6
-# So many vertices, twice a sphere's four unknowns, before a patch counts as a sphere.
-LEAST = 8
 # Light that comes or goes flatter than this cosine is not a mirror's.
 GRAZING = 0.05
 
@@ -44,11 +39,13 @@ class Recovery:
         segments: patch of every facet.
         fits: surface of every patch.
         mirror: (K,) true for those that are mirrors.
+        folds: edges at which the mesh is folded onto itself.
     """
 
     segments: Segments
     fits: Fits
     mirror: Bools
+    folds: int
 
 
 def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
@@ -63,11 +60,8 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
         radius_mm: of the capture sphere about the origin.
     """
     edges = measure_edges(mesh)
-    segments = split(mesh, edges)
-    points = corners(mesh, segments)
-    healed = _heal(mesh, edges, segments, points)
-    fits = fit(mesh, healed, corners(mesh, healed))
-    return Recovery(healed, fits, _judge(fits, pinhole, radius_mm))
+    segments, fits = heal(mesh, edges, split(mesh, edges))
+    return Recovery(segments, fits, _judge(fits, pinhole, radius_mm), folds(edges))
 
 
 def joined(parts: list[Recovery]) -> Recovery:
@@ -80,6 +74,7 @@ def joined(parts: list[Recovery]) -> Recovery:
         Segments(label.astype(np.int32), int(starts[-1])),
         _joined([part.fits for part in parts]),
         np.concatenate([part.mirror for part in parts]),
+        sum(part.folds for part in parts),
     )
 
 
@@ -113,50 +108,3 @@ def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
     lands = norm(middle - along * outgoing) <= radius_mm + image
     bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
     return np.asarray(smooth(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))
-
-
-def _heal(mesh: Mesh, edges: Edges, segments: Segments, points: Corners) -> Segments:
-    """Undo cuts inside one surface: facets of a sphere need not form a convex body."""
-    fits = fit(mesh, segments, points)
-    small, large = _neighbours(mesh, edges, segments, fits.area)
-    likely = _farthest(mesh, points, fits.surfaces, small, large, SOME) < SAME_MM
-    small, large = small[likely], large[likely]
-    worst = _farthest(mesh, points, fits.surfaces, small, large)
-    order = np.lexsort((worst, small))
-    _, first = np.unique(small[order], return_index=True)
-    best = order[first]  # to one neighbour only: a splinter must not bridge two mirrors
-    best = best[worst[best] < SAME_MM]
-    count, label = linked(segments.count, small[best], large[best])
-    return Segments(label[segments.label], count)
-
-
-def _neighbours(
-    mesh: Mesh, edges: Edges, segments: Segments, area: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of patches with a common edge that is not sharp, the one of smaller area first."""
-    blunt = np.abs(edges.angle) <= SHARP_RAD + edges.noise
-    half = np.concatenate([edges.half[blunt], mesh.twin[edges.half[blunt]]])
-    one, two = segments.label[half // 3], segments.label[mesh.twin[half] // 3]
-    rank = np.empty(segments.count, dtype=np.int64)
-    rank[np.argsort(area, kind="stable")] = np.arange(segments.count)
-    down = rank[one] < rank[two]
-    keys = distinct(one[down].astype(np.int64) * segments.count + two[down])
-    return keys // segments.count, keys % segments.count
-
-
-def _farthest(
-    mesh: Mesh,
-    points: Corners,
-    surfaces: Surfaces,
-    small: NDArray[np.int64],
-    large: NDArray[np.int64],
-    most: int = 1 << 62,
-) -> Floats:
-    """Largest distance of (the most first of) a patch's vertices from its neighbour's surface."""
-    if not small.size:
-        return np.zeros(0)
-    size = np.minimum(np.diff(np.append(points.first, points.segment.size))[small], most)
-    starts = np.cumsum(size) - size
-    rows = np.arange(size.sum()) + np.repeat(points.first[small] - starts, size)
-    height = surfaces.take(np.repeat(large, size)).height(mesh.points[points.vertex[rows]].T)
-    return np.asarray(np.maximum.reduceat(np.abs(height), starts))

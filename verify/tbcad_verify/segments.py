@@ -23,10 +23,12 @@ Bools = NDArray[np.bool_]
 # A concave edge is a crease beyond this and the rounding. Flat mirrors at n = 60 meet at 0.003.
 CONCAVE_RAD = 1e-3
 # A convex one beyond this: facets of a mirror differ by 2 sqrt(2 chord error / radius), 0.1 at
-# most for 0.01 mm on the smallest mirrors; walls meet mirrors at 0.6 or more.
-SHARP_RAD = 0.35
+# most for 0.01 mm on the smallest mirrors; walls meet mirrors at 0.36 or more from n = 2 on.
+SHARP_RAD = 0.2
 # Rounding above which an edge's angle says nothing: it must not join two patches.
 BLIND_RAD = 0.05
+# Two facets that lie back to back, closer than this to a full turn: the surface is folded over.
+FOLD_RAD = 0.2
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,12 @@ def creases(edges: Edges) -> Bools:
     concave = edges.angle < -(CONCAVE_RAD + edges.noise)
     sharp = edges.angle > SHARP_RAD + edges.noise
     return np.asarray(concave | sharp | (edges.noise > BLIND_RAD))
+
+
+def folds(edges: Edges) -> int:
+    """How many edges fold the surface back onto itself; a solid one can make has none."""
+    turned = np.abs(edges.angle) - edges.noise > np.pi - FOLD_RAD
+    return int(turned.sum())
 
 
 def split(mesh: Mesh, edges: Edges) -> Segments:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tbcad_verify import frame, light
 from tbcad_verify.bench import Bench
 from tbcad_verify.checks import Check, Name, at_least, at_most, listed, offenders, told, unknown
+from tbcad_verify.coverage import Coverage
 from tbcad_verify.record import Camera
 
 Floats = NDArray[np.float64]
@@ -25,13 +26,20 @@ CHECKS = {
 }
 
 
-def checks(bench: Bench, files: str) -> tuple[Floats, list[Check]]:
-    """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show."""
+def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
+    """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show.
+
+    Args:
+        bench: what to look at.
+        seen: what the mirrors cover; no rim is looked for where they do not reach. None takes
+            them to reach the whole object.
+        files: where, for the report.
+    """
     path, clear, least, median, most, framed, second, half, nearly_all = (
         (name, files, unit) for name, unit in CHECKS.items()
     )
     tally = light.total([light.full_sensor(bench.stage(camera)) for camera in bench.cameras])
-    rings = [(camera, _ring(bench, camera)) for camera in bench.cameras]
+    rings = [(camera, _ring(bench, camera, seen)) for camera in bench.cameras]
     each = np.bincount(bench.virtual.index, tally.pixels, bench.virtual.count)
     none = [bench.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
     spread = np.percentile(tally.spread, [50, 95]) if tally.spread.size else [np.nan, np.nan]
@@ -48,14 +56,22 @@ def checks(bench: Bench, files: str) -> tuple[Floats, list[Check]]:
     ]
 
 
-def _ring(bench: Bench, camera: Camera) -> frame.Ring:
+def _ring(bench: Bench, camera: Camera, seen: Coverage | None) -> frame.Ring:
     mine = np.flatnonzero(bench.mine(camera))
     start = bench.recovery.fits.middle[:, bench.match.segment[mine]]
-    found = frame.ring(bench.seen(camera), mine, start, bench.u[:, mine], bench.radius)
+    found = frame.ring(bench.seen(camera), mine, start, bench.u[:, mine], _reach(bench, seen)[mine])
     # A halved mirror shows the camera only what its own half reflects.
     side = np.repeat(np.sign(start[0]), frame.AZIMUTHS)
     own = ~bench.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
     return frame.chosen(found, own)
+
+
+def _reach(bench: Bench, seen: Coverage | None) -> Floats:
+    """(M,) radius about the origin that each mirror sees, the capture sphere's at most, mm."""
+    if seen is None:
+        return np.full(len(bench.export.mirrors), bench.radius)
+    each = np.nan_to_num(seen.fitted / 2, nan=np.inf)[bench.virtual.index]
+    return np.asarray(np.minimum(each, bench.radius))
 
 
 def _path(bench: Bench, name: Name, tally: light.Tally) -> Check:
