@@ -93,14 +93,19 @@ def _spherical(spec: Spec, cells: Cells, rim: Rim, distance: Floats) -> Facets:
     cell, edge = rim.cell, rim.vertices[rim.line]
     middle = spheres.onto(_means(edge, cell), np.arange(cells.mirrors))
     reach = norm(edge - middle[cell])
+    farthest = _per_cell(np.maximum, cell, reach)
     # The normal errs by (w / 2) / r, the reflected ray by twice that, over the distance.
     wanted = np.maximum(
         spec.mesh.ray_error_mm * spheres.radius / distance,
         np.sqrt(2 * spheres.radius * _rounding(middle)),
     )
     width = np.minimum(wanted, WIDEST_STRIP * _per_cell(np.minimum, cell, reach))
-    inside = _inside(edge, rim, cells.surfaces.gradient(cell, edge), width[cell])
-    farthest = _per_cell(np.maximum, cell, reach)
+    outside = -cells.surfaces.gradient(cell, edge)
+    inside = _inside(edge, rim, outside, width[cell])
+    folded = _folded(edge, inside, middle[cell], rim, outside)
+    # There the strip goes straight toward the middle instead, which never folds.
+    straight = edge + (width / farthest)[cell, None] * (middle[cell] - edge)
+    inside = np.where(folded[:, None], straight, inside)
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * spheres.radius))
     build = _Rings(rim, spheres, middle, spheres.onto(inside, cell), rings.astype(np.int64))
     vertices, triangles, mirror = build.all()
@@ -224,17 +229,29 @@ def _length(points: Floats, a: Ints, b: Ints) -> Floats:
     return norm(points[a] - points[b])
 
 
-def _inside(edge: Floats, rim: Rim, normal: Floats, width: Floats) -> Floats:
+def _inside(edge: Floats, rim: Rim, outside: Floats, width: Floats) -> Floats:
     """Points one strip width inside the rim.
 
     Square to the segment before, so that its facet on the rim has a right angle there; where
     arcs meet, mitred. An arc has one such point less than segments: its last one, where rays
     are farthest from the object's centre, makes do with a skew.
     """
-    across = unit(np.cross(-normal, edge[rim.following] - edge))
+    across = unit(np.cross(outside, edge[rim.following] - edge))
     before = np.empty_like(across)
     before[rim.following] = across
     mitre = (across + before) / (1 + dot(across, before))[:, None]
     long = norm(mitre)
     mitre *= (np.minimum(long, LONGEST_MITRE) / long)[:, None]
     return edge + width[:, None] * np.where(rim.corner[:, None], mitre, before)
+
+
+def _folded(
+    edge: Floats, inside: Floats, middle: Floats, rim: Rim, outside: Floats
+) -> NDArray[np.bool_]:
+    """Places (b,) of cells whose strip would fold, as in a corner much sharper than 60 degrees."""
+    a, b, c, d = edge, edge[rim.following], inside[rim.following], inside
+    every = ((a, b, c), (a, c, d), (a, b, d), (b, c, d), (d, c, middle))
+    wrong = [dot(np.cross(q - p, r - p), outside) <= 0 for p, q, r in every]
+    bad: NDArray[np.bool_] = np.zeros(rim.cell[-1] + 1, dtype=bool)
+    bad[rim.cell[np.any(wrong, axis=0)]] = True
+    return bad[rim.cell]

@@ -47,6 +47,17 @@ def test_facets_lie_on_their_spheres_and_face_the_light(small_design: Design) ->
     assert dot(normal, surfaces.gradient(made.mirror, corner.mean(axis=1))).min() > 0
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7])
+def test_no_facet_folds_in_sharp_corners_of_coarse_cells(n: int) -> None:
+    """At n = 3 and 5 the foot cuts cells in corners so sharp that a mitred strip would fold."""
+    made = design(load_spec(None, [f"n={n}"]))
+    half = made.halves[0]
+    every = facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    corner = every.vertices[every.triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    assert dot(normal, half.body.surfaces.gradient(every.mirror, corner.mean(axis=1))).min() > 0
+
+
 def test_chord_error_is_kept(small_design: Design) -> None:
     half = small_design.halves[0]
     made = facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))

@@ -1,0 +1,63 @@
+"""Measure how fast tbcad is and print a markdown table: python benchmarks/run.py --help."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import builds
+from timing import Row
+
+HEAD = "| what | median (least ... most) | limit | holds |\n|---|---|---|---|"
+
+
+def rows(folder: Path, rounds: int, largest: bool) -> Iterator[list[Row]]:
+    """All lines of the table, part by part."""
+    # First of all, while this process is small: see builds.build.
+    yield builds.small_and_large(folder, rounds)
+    if largest:
+        yield builds.largest(folder)
+    yield builds.step_sizes(folder / "18")
+    from solids import radii, solids
+    from tracing import tracing
+
+    yield solids(rounds)
+    yield radii(rounds)
+    yield tracing(folder / "18", rounds)
+
+
+def circumstances(rounds: int) -> str:
+    """What one must know to read the table."""
+    return (
+        f"{os.cpu_count()} cores ({processor()}), Python {platform.python_version()}, "
+        f"{rounds} rounds, load of the machine before the first: {os.getloadavg()[0]:.1f}."
+    )
+
+
+def processor() -> str:
+    """The processor's name, where the system tells it."""
+    about = Path("/proc/cpuinfo")
+    lines = about.read_text(encoding="utf-8").splitlines() if about.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Measure tbcad and print a markdown table.")
+    parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
+    parser.add_argument("--skip-largest", action="store_true", help="leave out the build of n = 60")
+    wanted = parser.parse_args()
+    sys.stdout.write(f"{circumstances(wanted.rounds)}\n\n{HEAD}\n")
+    with tempfile.TemporaryDirectory() as folder:
+        for part in rows(Path(folder), wanted.rounds, not wanted.skip_largest):
+            sys.stdout.writelines(f"{row}\n" for row in part)
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,127 @@
+"""Solids in closed form against booleans of the same spheres, by manifold3d and by the kernel."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import manifold3d
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Pnt
+from OCP.TopTools import TopTools_ListOfShape
+from timing import Figure, Row, at_most, in_turns, told
+
+from tbcad.design.body import body
+from tbcad.design.mirrors import Design, Half, design, directions
+from tbcad.design.spec import load_spec
+from tbcad.model.shell import Solid, shell
+from tbcad.optics.cells import cells_of
+from tbcad.optics.triangulation import bounded
+
+Floats = NDArray[np.float64]
+
+SEGMENTS = 64
+FUSED = (8, 16)
+
+
+def solids(rounds: int) -> list[Row]:
+    """Both shells, checked by the kernel, against unions of one half's spheres."""
+    made = design(load_spec(None, ["optics.n=18"]))
+    half = made.halves[0]
+    meshed = meshed_spheres(half)
+    exact = {count: exact_spheres(half, count) for count in FUSED}
+    fuses = [partial(fused, exact[count]) for count in FUSED]
+    works = [partial(shells, made), partial(united, meshed), *fuses]
+    ours, union, *kernel = in_turns(works, rounds)
+    return [
+        told("cells, both solids, kernel's check", ours, "s"),
+        told(f"manifold3d's union, {len(half)} spheres of one half", union, "s"),
+        told("cells, both solids, check to manifold3d", ours.over(union), "times"),
+        # Load by others slows manifold3d, on two cores, more than us on one: least is fairest.
+        at_most("- least of each", Figure((ours.least / union.least,)), 0.75, "times"),
+        *(
+            told(f"the kernel's union, {count} of the spheres", figure, "s")
+            for count, figure in zip(FUSED, kernel, strict=True)
+        ),
+    ]
+
+
+def radii(rounds: int) -> list[Row]:
+    """The mirrors with exact radii, from the spec."""
+    specs = {n: load_spec(None, [f"optics.n={n}"]) for n in (18, 36, 60)}
+    small, *large = in_turns([partial(design, spec) for spec in specs.values()], rounds)
+    return [
+        at_most("radius solve, n = 18", small, 2, "s"),
+        *(
+            told(f"radius solve, n = {n}", figure, "s")
+            for n, figure in zip((36, 60), large, strict=True)
+        ),
+    ]
+
+
+def shells(made: Design) -> list[Solid]:
+    """Cells and both solids with the kernel's check, given the radii: what no boolean does here.
+
+    The cells start from the polyhedron, not from those that the radii were solved with.
+    """
+    half = made.halves[0]
+    every, faces = directions(made.spec.optics.n)
+    triangles, boundary = bounded(faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0))
+    cells = cells_of(half.body.surfaces, boundary, triangles)
+    closing = body(made.spec.shell, cells, half.ellipsoid)
+    return [
+        shell(f"shell_{one.camera}", one.ids, cells, closing, mirrored=one.camera == "b")
+        for one in made.halves
+    ]
+
+
+def spheres(half: Half) -> list[tuple[list[float], float]]:
+    """Centres and radii of one half's mirrors."""
+    mirrors = half.mirrors
+    centres = mirrors.apex - mirrors.radius[:, None] * mirrors.normal
+    return list(zip(centres.tolist(), mirrors.radius.tolist(), strict=True))
+
+
+def meshed_spheres(half: Half) -> list[manifold3d.Manifold]:
+    """All of one half's spheres as meshes, made beforehand: only the union is on the clock."""
+    made = [
+        manifold3d.Manifold.sphere(radius, SEGMENTS).translate(centre)
+        for centre, radius in spheres(half)
+    ]
+    for one in made:
+        one.num_tri()  # made only when asked for something
+    return made
+
+
+def united(parts: list[manifold3d.Manifold]) -> manifold3d.Manifold:
+    """Union; the question at the end makes manifold3d compute it."""
+    whole = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
+    if whole.is_empty():
+        raise RuntimeError("manifold3d's union is empty")
+    return whole
+
+
+def exact_spheres(half: Half, count: int) -> list[BRepPrimAPI_MakeSphere]:
+    """Neighbouring mirrors from the middle of one half, as solids of the kernel."""
+    middle = half.u[np.argmax(half.u.sum(axis=1))]
+    near = np.argsort(-half.u @ middle, kind="stable")[:count]
+    every = spheres(half)
+    return [BRepPrimAPI_MakeSphere(gp_Pnt(*every[k][0]), every[k][1]).Shape() for k in near]
+
+
+def fused(parts: list[BRepPrimAPI_MakeSphere]) -> BRepAlgoAPI_Fuse:
+    """The kernel's general fuse of all at once, on all cores."""
+    first, others = TopTools_ListOfShape(), TopTools_ListOfShape()
+    first.Append(parts[0])
+    for part in parts[1:]:
+        others.Append(part)
+    fuse = BRepAlgoAPI_Fuse()
+    fuse.SetArguments(first)
+    fuse.SetTools(others)
+    fuse.SetRunParallel(True)
+    fuse.Build()
+    if not fuse.IsDone():
+        raise RuntimeError("the kernel does not fuse the spheres")
+    return fuse

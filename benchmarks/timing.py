@@ -1,0 +1,99 @@
+"""Clocks and table rows. What is compared is run in turns, so that all of it meets the same load.
+
+Nothing here is a limit that a test enforces: seconds depend on the machine and on what else runs.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+Work = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One value a round, in the order of the rounds."""
+
+    values: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.values)
+
+    @property
+    def least(self) -> float:
+        return min(self.values)
+
+    def over(self, other: Figure) -> Figure:
+        """Ratios, round by round."""
+        return Figure(tuple(a / b for a, b in zip(self.values, other.values, strict=True)))
+
+    def rate(self, count: float) -> Figure:
+        """So many things a second, where the values are the seconds for all of them."""
+        return Figure(tuple(count / value for value in self.values))
+
+    def __str__(self) -> str:
+        if len(self.values) == 1:
+            return shown(self.median)
+        return f"{shown(self.median)} ({shown(min(self.values))} ... {shown(max(self.values))})"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table; where there is a limit, `holds` says whether the median keeps it."""
+
+    what: str
+    measured: str
+    limit: str = ""
+    holds: bool | None = None
+
+    def __str__(self) -> str:
+        verdict = {None: "", True: "yes", False: "NO"}[self.holds]
+        return f"| {self.what} | {self.measured} | {self.limit} | {verdict} |"
+
+
+def told(what: str, figure: Figure, unit: str = "") -> Row:
+    """A figure without a limit."""
+    return Row(what, f"{figure} {unit}".rstrip())
+
+
+def at_most(what: str, figure: Figure, limit: float, unit: str = "") -> Row:
+    """A figure whose median must not be above a limit."""
+    bound = f"at most {limit:g} {unit}".rstrip()
+    return Row(what, f"{figure} {unit}".rstrip(), bound, figure.median <= limit)
+
+
+def at_least(what: str, figure: Figure, limit: float, unit: str = "") -> Row:
+    """A figure whose median must not be below a limit."""
+    bound = f"at least {limit:g} {unit}".rstrip()
+    return Row(what, f"{figure} {unit}".rstrip(), bound, figure.median >= limit)
+
+
+def in_turns(works: Sequence[Work], rounds: int) -> list[Figure]:
+    """Seconds of each work, once a round; every other round runs backward. One round is a warm-up.
+
+    The warm-up pays for imports and first touches of memory, and is not counted.
+    """
+    taken: list[list[float]] = [[] for _ in works]
+    for turn in range(rounds + 1):
+        order = range(len(works))
+        for k in reversed(order) if turn % 2 else order:
+            taken[k].append(_seconds(works[k]))
+    return [Figure(tuple(values[1:])) for values in taken]
+
+
+def shown(value: float) -> str:
+    """Three digits, never as a power of ten."""
+    digits = 0 if value >= 100 else 1 if value >= 10 else 2
+    return f"{value:.{digits}f}"
+
+
+def _seconds(work: Work) -> float:
+    start = time.perf_counter()
+    result = work()
+    end = time.perf_counter()
+    del result  # after the clock: freeing a solid is nobody's work
+    return end - start

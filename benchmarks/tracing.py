@@ -1,0 +1,113 @@
+"""Rays of the proof against the same rays given straight to Embree, in as many threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tbcad_verify import light
+from tbcad_verify.bench import Bench, pinhole_of, set_up
+from tbcad_verify.files import read
+from tbcad_verify.mesh import merge
+from tbcad_verify.rays import (
+    THREADS,
+    Scene,
+    first_hits,
+    in_threads,
+    pixel_rows,
+    reach,
+    row_chunks,
+)
+from tbcad_verify.record import Camera, read_export
+from tbcad_verify.recover import recover
+from tbcad_verify.stl import parse
+from timing import Row, at_least, in_turns, told
+
+Singles = NDArray[np.float32]
+Calls = list[tuple[Singles, Singles]]
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Passes rays on to Embree and keeps them: origins and directions, (N, 3) a call."""
+
+    embree: Any
+    calls: Calls = field(default_factory=list)
+
+    def run(self, origins: Singles, directions: Singles) -> Any:
+        self.calls.append((origins, directions))
+        return self.embree.run(origins, directions)
+
+
+def tracing(export: Path, rounds: int) -> list[Row]:
+    """Camera rays alone, and all that the proof's last stage does."""
+    bench = on_bench(export)
+    first, both = (recorded(bench, stage) for stage in (camera_rays, full_sensor))
+    embree = bench.scene.embree
+    works = [
+        partial(camera_rays, bench, bench.scene),
+        partial(straight, embree, first),
+        partial(full_sensor, bench, bench.scene),
+        partial(straight, embree, both),
+    ]
+    hits, raw_hits, sensor, raw_sensor = in_turns(works, rounds)
+    few, many = count(first) / 1e6, count(both) / 1e6
+    unit = "million rays/s"
+    return [
+        told("proof: every pixel's ray, hit in float64", hits.rate(few), unit),
+        told(f"Embree alone, {THREADS} threads, these {few:.1f} million", raw_hits.rate(few), unit),
+        at_least("proof to Embree", raw_hits.over(hits), 0.5, "times"),
+        told("proof: the whole stage, reflected rays too", sensor.rate(many), unit),
+        told(f"Embree alone, these {many:.1f} million", raw_sensor.rate(many), unit),
+        at_least("proof to Embree", raw_sensor.over(sensor), 0.5, "times"),
+    ]
+
+
+def on_bench(folder: Path) -> Bench:
+    """An export as the proof sees it when it is ready to trace."""
+    export = read_export(folder)
+    meshes = [merge(parse(read(export.folder, part.stl))) for part in export.parts]
+    pairs = zip(meshes, export.parts, strict=True)
+    found = [recover(mesh, pinhole_of(export, part), export.target_mm / 2) for mesh, part in pairs]
+    return set_up(export, meshes, found)
+
+
+def camera_rays(bench: Bench, scene: Scene) -> None:
+    """Make every pixel's ray, find its facet, and where it meets that one in float64."""
+    for camera in bench.cameras:
+        in_threads(partial(hit, scene, camera), row_chunks(camera))
+
+
+def hit(scene: Scene, camera: Camera, rows: tuple[int, int]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Facets that the rays of some rows meet, and how far away."""
+    origin, rays = camera.pinhole[:, None], pixel_rows(camera, *rows)
+    facet = first_hits(scene, origin, rays)
+    met = np.flatnonzero(facet >= 0)
+    return facet, reach(scene, facet[met], origin, np.take(rays, met, axis=1))
+
+
+def full_sensor(bench: Bench, scene: Scene) -> None:
+    """The proof's own last stage: every pixel's ray, its reflection, and the way on from there."""
+    for camera in bench.cameras:
+        light.full_sensor(replace(bench.stage(camera), scene=scene))
+
+
+def straight(embree: Any, calls: Calls) -> None:
+    """Embree and nothing else, on rays that are ready as float32."""
+    in_threads(lambda call: embree.run(*call), calls)
+
+
+def recorded(bench: Bench, stage: Any) -> Calls:
+    """The rays that a stage gives to Embree."""
+    recorder = Recorder(bench.scene.embree)
+    stage(bench, replace(bench.scene, embree=recorder))
+    return recorder.calls
+
+
+def count(calls: Iterable[tuple[Singles, Singles]]) -> int:
+    return sum(len(origins) for origins, _ in calls)
