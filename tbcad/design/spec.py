@@ -12,19 +12,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from tbcad.design.errors import SpecError, fields, refused, section_of, unknown_key
+from tbcad.design.prototype_keys import Prototype
+from tbcad.design.section import Section, as_tuple
 
 _LARGEST_FILE = 1_000_000  # bytes; a design is a few thousand
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
 _BUILT_IN = "built-in design"
 
 Table: TypeAlias = dict[str, Any]
-
-
-def _as_tuple(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def _whole(value: object) -> object:
@@ -39,17 +37,9 @@ Point: TypeAlias = Annotated[
         Annotated[float, Field(ge=-10_000, le=10_000)],
         Annotated[float, Field(ge=-10_000, lt=0)],
     ],
-    BeforeValidator(_as_tuple),
+    BeforeValidator(as_tuple),
 ]
 RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
-
-
-class Section(BaseModel):
-    """A frozen table of the design; unknown keys and wrong types are errors."""
-
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
 
 
 class Optics(Section):
@@ -166,6 +156,7 @@ class Spec(Section):
     shell: Shell = Shell()
     mesh: Mesh = Mesh()
     step: Step = Step()
+    prototype: Prototype = Prototype()
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:

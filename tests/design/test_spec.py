@@ -4,6 +4,7 @@ import json
 import math
 import os
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import example, given
@@ -11,7 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from tbcad.design.errors import SpecError, allowed, fields, nearest, section_of
+from tbcad.design.prototype_keys import GradeName
 from tbcad.design.spec import FootFlange, Optics, Spec, load_spec, spec_dict
+from tbcad.design.stock import load_grades
 from tbcad.errors import InputError
 
 KEYS = {key: field for key, field in fields(Spec) if section_of(field) is None}
@@ -336,3 +339,26 @@ class TestOptions:
             load_spec(None, [text])
         except InputError as error:
             assert str(error).isprintable()  # noqa: PT017
+
+
+class TestPrototype:
+    @pytest.mark.parametrize("value", ["0", "1001", "true", "1.0", "many", "[]", "-1"])
+    def test_number_of_balls(self, value: str) -> None:
+        said = refusal(None, f"prototype.k={value}")
+        assert "give a whole number from 1 to 1000, or auto" in said
+
+    def test_number_of_balls_may_be_found(self) -> None:
+        assert load_spec(None, ["prototype.k=auto"]).prototype.k == "auto"
+        assert load_spec(None, ["prototype.k=7"]).prototype.k == 7
+
+    @pytest.mark.parametrize("value", ["[]", "metric", "[1]", "[['metric']]"])
+    def test_catalogues_are_a_list_of_names(self, value: str) -> None:
+        assert 'give a list such as ["metric", "my.csv"]' in refusal(None, f"catalogues={value}")
+
+    def test_grades_are_those_of_the_table(self) -> None:
+        assert "allowed is G3 or G5" in refusal(None, "grade=G11")
+        assert list(load_grades()) == list(get_args(GradeName))
+
+    def test_wall_of_the_shell_is_still_the_only_one(self) -> None:
+        """Its short name was in use before the prototype had keys."""
+        assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
