@@ -64,7 +64,7 @@ def tracing(export: Path, rounds: int) -> list[Row]:
         at_least("proof to Embree", raw_hits.over(hits), 0.5, "times"),
         told("proof: the whole stage, reflected rays too", sensor.rate(many), unit),
         told(f"Embree alone, these {many:.1f} million", raw_sensor.rate(many), unit),
-        at_least("proof to Embree", raw_sensor.over(sensor), 0.5, "times"),
+        at_least("proof to Embree", raw_sensor.over(sensor), 0.7, "times"),
     ]
 
 

@@ -12,11 +12,12 @@ from tbcad.errors import InputError
 from tbcad.screen import Stages, stages
 
 if TYPE_CHECKING:
+    from tbcad_verify.proof import Wishes
     from tbcad_verify.report import Report
 
     from tbcad.design.spec import Spec
 
-BUILD_STAGES, PROOF_STAGES, PIPED_WIDTH = 7, 6, 160
+BUILD_STAGES, PROOF_STAGES, PIPED_WIDTH = 7, 9, 160
 
 app = typer.Typer(
     name="tbcad",
@@ -125,24 +126,47 @@ def _built(spec: "Spec", out: Path, force: bool, verify: bool, told: Stages) -> 
 @app.command("verify")
 def verify_command(
     folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    printers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--printer",
+            metavar="NAME|FILE",
+            help="Fail unless every part suits this machine: fdm, sla, sls, machined, or a TOML "
+            "file; repeatable.",
+        ),
+    ] = None,
+    clients: Annotated[
+        bool,
+        typer.Option(
+            "--clients", help="Ask FreeCAD, gmsh, PrusaSlicer and admesh too, where installed."
+        ),
+    ] = False,
+    time_limit: Annotated[
+        float, typer.Option(metavar="S", help="Seconds that each stage, file or program may take.")
+    ] = 600.0,
 ) -> int:
-    """Prove the optics on the files of an export, and write verify.json there.
+    """Prove an export on its files, and write verify.json there.
 
     Exit code 0: proved. 1: the proof fails. 2: not an export, or a broken one.
     """
+    from tbcad_verify.proof import Wishes
+
+    if not time_limit > 0:
+        raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
     with stages(PROOF_STAGES) as told:
-        report = _prove(folder, told)
+        wishes = Wishes(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
+        report = _prove(folder, told, wishes)
     _show(report)
     return 0 if report.passed else 1
 
 
-def _prove(folder: Path, told: Stages) -> "Report":
+def _prove(folder: Path, told: Stages, wishes: "Wishes | None" = None) -> "Report":
     """The proof knows nothing of tbcad; its own refusals become ours."""
     from tbcad_verify.errors import BadExport
-    from tbcad_verify.proof import verify
+    from tbcad_verify.proof import Wishes, verify
 
     try:
-        return verify(folder, lambda text: told.stage(f"proof: {text}"))
+        return verify(folder, lambda text: told.stage(f"proof: {text}"), wishes or Wishes())
     except BadExport as error:
         raise InputError(str(error)) from None
 

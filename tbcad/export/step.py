@@ -3,15 +3,17 @@
 from pathlib import Path
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
 from OCP.StepBasic import StepBasic_Product
-from OCP.STEPConstruct import STEPConstruct
+from OCP.STEPConstruct import STEPConstruct, STEPConstruct_ValidationProps
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from OCP.StepShape import StepShape_ManifoldSolidBrep
 from OCP.TCollection import TCollection_HAsciiString
-from OCP.TopoDS import TopoDS_Face
+from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 
 from tbcad.model.shell import Solid
@@ -29,7 +31,8 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
 
     Args:
         path: file to write.
-        solid: with the names of its faces, which become the names of the advanced faces.
+        solid: with the names of its faces, which become the names of the advanced faces; its
+            volume, area and centroid go along as validation properties.
         pcurves: write curves in the surfaces' parameters too; readers make their own.
 
     Raises:
@@ -46,6 +49,7 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
     finder = writer.WS().TransferWriter().FinderProcess()
     for name, face in solid.faces:
         _name(finder, face, name)
+    _validation_properties(writer, solid.shape)
     _name_product(writer, solid.name)
     _head(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
@@ -63,6 +67,24 @@ def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:
     if item is None:
         raise StepError(f"the kernel lost face {name}")
     item.SetName(TCollection_HAsciiString(name))
+
+
+def _validation_properties(writer: STEPControl_Writer, solid: TopoDS_Solid) -> None:
+    """Volume, area and centroid, for readers to compare with what they have read.
+
+    Source: CAx-IF, Recommended Practices for Geometric and Assembly Validation Properties.
+    """
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, volume)
+    BRepGProp.SurfaceProperties_s(solid, area)
+    properties = STEPConstruct_ValidationProps(writer.WS())
+    written = (
+        properties.AddVolume(solid, volume.Mass())
+        and properties.AddArea(solid, area.Mass())
+        and properties.AddCentroid(solid, volume.CentreOfMass())
+    )
+    if not written:
+        raise StepError("the kernel cannot write the validation properties")
 
 
 def _name_product(writer: STEPControl_Writer, name: str) -> None:

@@ -1,60 +1,78 @@
 """Programs that users open our files with. Each is skipped when it is not installed."""
 
 import json
-import os
-import re
+import math
 import shutil
-import subprocess
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tbcad_verify.checks import Check
+from tbcad_verify.child import Limits
+from tbcad_verify.programs import Wanted, admesh, client_checks, freecad, gmsh, is_skipped, prusa
+from tbcad_verify.programs.errand import on_path, room
 
 from tbcad.cli import run
 
 pytestmark = pytest.mark.clients
 
-INSPECT = """
-import json, os, sys
+SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
+PROGRAMS = {
+    "freecad": ["solids", "valid", "spheres", "volume"],
+    "gmsh": ["solids", "spheres", "volume"],
+    "prusa": ["manifold", "parts", "volume"] * 2 + ["slices", "filament", "time"],
+    "admesh": ["repairs", "parts", "volume"],
+}
+READERS = {
+    ("freecad", "step"): freecad.STEP,
+    ("gmsh", "step"): gmsh.STEP,
+    ("prusa", "stl"): prusa.STL,
+    ("prusa", "3mf"): prusa.THREEMF,
+    ("admesh", "stl"): admesh.STL,
+}
+KINDS = """
+import json, sys
 from collections import Counter
 try:
     import Part
-    found = {}
-    for path in os.environ["STEP_FILES"].split(os.pathsep):
-        shape = Part.Shape()
-        shape.read(path)
-        kinds = Counter(type(face.Surface).__name__ for face in shape.Faces)
-        found[os.path.basename(path)] = {
-            "solids": len(shape.Solids),
-            "valid": all(solid.isValid() and solid.isClosed() for solid in shape.Solids),
-            "volume": shape.Volume,
-            "kinds": dict(kinds),
-        }
-    open(os.environ["FOUND"], "w").write(json.dumps(found))
+    shape = Part.Shape()
+    shape.read("given.step")
+    kinds = Counter(type(face.Surface).__name__ for face in shape.Faces)
+    open("kinds.json", "w").write(json.dumps(kinds))
 except Exception as error:
     print(error)
     sys.exit(3)
 """
 
 
-def program(name: str) -> str:
-    path = shutil.which(name)
-    if path is None:
-        pytest.skip(f"{name} is not installed")
-    return path
+def wanted(export: Path, relative: float) -> list[Wanted]:
+    """What the record and the meshes say; volumes may differ by this share."""
+    import trimesh
+
+    design = json.loads((export / "design.json").read_text())
+    volumes = [float(trimesh.load_mesh(export / part["stl"]).volume) for part in design["parts"]]
+    return [
+        Wanted(
+            part["name"],
+            {kind: part[kind] for kind in ("step", "stl", "3mf")},
+            sum(
+                mirror["camera"] == part["camera"] and mirror["radius_mm"] is not None
+                for mirror in design["mirrors"]
+            ),
+            volume,
+            relative * volume,
+        )
+        for part, volume in zip(design["parts"], volumes, strict=True)
+    ]
 
 
-def told(*command: str, **environment: str) -> str:
-    done = subprocess.run(
-        command,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        env={**os.environ, "PYTHONPATH": "", **environment},
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+def of(program: str, checks: Iterable[Check]) -> list[Check]:
+    """One program's checks."""
+    mine = [check for check in checks if check.name.split()[0] == program]
+    if all(map(is_skipped, mine)):
+        pytest.skip(mine[0].detail)
+    return mine
 
 
 @pytest.fixture(scope="module")
@@ -66,70 +84,163 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def volumes(export: Path) -> dict[str, float]:
-    import trimesh
-
-    return {c: float(trimesh.load_mesh(export / f"shell_{c}.stl").volume) for c in "ab"}
-
-
-def test_freecad_opens_both_shells(export: Path, volumes: dict[str, float], tmp_path: Path) -> None:
-    command = program("freecadcmd")
-    script, found = tmp_path / "look_into.py", tmp_path / "found.json"
-    script.write_text(INSPECT)
-    files = os.pathsep.join(str(export / f"shell_{c}.step") for c in "ab")
-    told(command, str(script), STEP_FILES=files, FOUND=str(found))
-    for camera, volume in volumes.items():
-        shell = json.loads(found.read_text())[f"shell_{camera}.step"]
-        assert shell["solids"] == 1
-        assert shell["valid"]
-        assert shell["kinds"]["Sphere"] == 847
-        assert shell["kinds"]["Cylinder"] == 15
-        assert shell["volume"] == pytest.approx(volume, rel=5e-3)
+def parts(export: Path) -> list[Wanted]:
+    found = wanted(export, 5e-3)
+    assert [(part.name, part.spheres) for part in found] == [("shell_a", 847), ("shell_b", 847)]
+    return found
 
 
-@pytest.mark.parametrize("camera", ["a", "b"])
-def test_gmsh_reads_the_step(export: Path, volumes: dict[str, float], camera: str) -> None:
-    gmsh = pytest.importorskip("gmsh", exc_type=OSError)
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        shapes = gmsh.model.occ.importShapes(str(export / f"shell_{camera}.step"))
-        gmsh.model.occ.synchronize()
-        assert [dimension for dimension, _ in shapes] == [3]
-        assert gmsh.model.occ.getMass(*shapes[0]) == pytest.approx(volumes[camera], rel=5e-3)
-        kinds = [gmsh.model.getType(2, tag) for _, tag in gmsh.model.getEntities(2)]
-        assert kinds.count("Sphere") == 847
-    finally:
-        gmsh.finalize()
+@pytest.fixture(scope="module")
+def checks(export: Path, parts: list[Wanted]) -> list[Check]:
+    before = {path: path.stat() for path in export.iterdir()}
+    found = client_checks(export, parts)
+    assert {path: path.stat().st_mtime_ns for path in export.iterdir()} == {
+        path: stat.st_mtime_ns for path, stat in before.items()
+    }
+    return found
 
 
-@pytest.mark.parametrize("file", ["shell_a.stl", "shell_b.stl", "shell_a.3mf"])
-def test_prusa_slicer_finds_the_mesh_manifold(export: Path, file: str) -> None:
-    info = told(program("prusa-slicer"), "--info", str(export / file))
-    assert "manifold = yes" in info
-    assert re.search(r"number_of_parts = +1\n", info)
-    assert "open_edges" not in info
-    assert "repaired" not in info
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_each_program_passes_both_shells(checks: list[Check], program: str) -> None:
+    mine = of(program, checks)
+    names = [f"{program} {question}" for question in PROGRAMS[program]]
+    assert [check.name for check in mine] == names * 2
+    for check in mine:
+        assert check.passed is True, check
+        assert check.measured is not None, check
 
 
-def test_prusa_slicer_slices_a_shell(export: Path, tmp_path: Path) -> None:
-    code = tmp_path / "shell.gcode"
-    bed = "0x0,400x0,400x400,0x400"
-    slicer = program("prusa-slicer")
-    file = str(export / "shell_a.stl")
-    told(slicer, "-g", "--bed-shape", bed, "--layer-height", "0.3", "-o", str(code), file)
-    assert "; filament used [mm]" in code.read_text()
+def test_a_print_takes_filament_and_hours(checks: list[Check]) -> None:
+    told = {(c.name, c.file): c.measured for c in of("prusa", checks) if c.limit is None}
+    for shell in ("shell_a.stl", "shell_b.stl"):
+        assert told["prusa filament", shell] == pytest.approx(82.8, rel=0.05)
+        assert told["prusa time", shell] == pytest.approx(13.8, rel=0.2)
+
+
+def test_meshes_are_fine(export: Path) -> None:
+    """What was checked above were no coarse stand-ins."""
+    assert all((export / f"shell_{c}.stl").stat().st_size > 50 * 100_000 for c in "ab")
 
 
 @pytest.mark.parametrize("camera", ["a", "b"])
-def test_admesh_has_nothing_to_repair(export: Path, camera: str) -> None:
-    """It repairs before it reports: the "Original" column must already be right."""
-    report = told(program("admesh"), str(export / f"shell_{camera}.stl"))
-    figures = dict(re.findall(r"^(\w[\w ]*?) +: +(\d+)", report, flags=re.MULTILINE))
-    assert int(figures["Number of facets"]) > 100_000
-    for name, figure in figures.items():
-        if "disconnected" in name:
-            assert int(figure) == 0, name
-    assert figures["Number of parts"] == "1"
-    for name in ("Degenerate facets", "Edges fixed", "Facets removed", "Facets reversed"):
-        assert figures[name] == "0", name
+def test_freecad_sees_bolt_and_dowel_holes(export: Path, camera: str) -> None:
+    command = on_path("freecadcmd", "FreeCADCmd")
+    if not command:
+        pytest.skip("freecadcmd is not installed")
+    with room(command, export, f"shell_{camera}.step", "step", Limits()) as given:
+        (given.place / "look.py").write_text(KINDS)
+        done = given.run(given.place / "look.py")
+        assert done.code == 0, done
+        kinds = json.loads((given.place / "kinds.json").read_text())
+    assert kinds["Sphere"] == 847
+    assert kinds["Cylinder"] == 15
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def rubbish(path: Path) -> None:
+    path.write_text("ISO-10303-21;\nHEADER;\nthis is no STEP file, and no STL file either\n" * 9)
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def without_a_facet(path: Path) -> None:
+    data = bytearray(path.read_bytes()[:-50])
+    data[80:84] = (int.from_bytes(data[80:84], "little") - 1).to_bytes(4, "little")
+    path.write_bytes(data)
+
+
+def turned_facet(path: Path) -> None:
+    """Two corners of the last one swapped."""
+    data = path.read_bytes()
+    first, second = data[-38:-26], data[-26:-14]
+    path.write_bytes(data[:-38] + second + first + data[-14:])
+
+
+def without_a_face(path: Path) -> None:
+    """The shell lists a face less, and so is open."""
+    head, mark, tail = path.read_text().partition("CLOSED_SHELL('',(")
+    assert mark
+    path.write_text(head + mark + tail.partition(",")[2])
+
+
+def an_inch(path: Path) -> None:
+    """Another unit, all else as it was."""
+    text = path.read_text()
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)"))
+
+
+@pytest.fixture
+def sample(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(SAMPLE, tmp_path / "sample"))
+
+
+def asked(sample: Path, kind: str, program: str, **others: float) -> dict[str, bool | None]:
+    """Verdicts on shell_a's one file of a kind."""
+    part = replace(wanted(SAMPLE, 0.02)[0], **others)
+    said = of(program, client_checks(sample, [part], errands=[READERS[program, kind]]))
+    return {check.name.split()[1]: check.passed for check in said}
+
+
+@pytest.mark.parametrize("program", ["freecad", "gmsh"])
+@pytest.mark.parametrize("damage", [cut, rubbish, empty])
+def test_a_broken_step_passes_nothing(
+    sample: Path, program: str, damage: Callable[[Path], None]
+) -> None:
+    damage(sample / "shell_a.step")
+    verdicts = asked(sample, "step", program)
+    assert len(verdicts) == len(PROGRAMS[program])
+    assert True not in verdicts.values()
+
+
+@pytest.mark.parametrize("program", ["freecad", "gmsh"])
+def test_an_open_step_is_no_solid(sample: Path, program: str) -> None:
+    without_a_face(sample / "shell_a.step")
+    verdicts = asked(sample, "step", program)
+    assert verdicts["solids"] is False
+    assert verdicts.get("valid", False) is False
+
+
+@pytest.mark.parametrize("program", ["freecad", "gmsh"])
+def test_a_step_in_another_unit(sample: Path, program: str) -> None:
+    assert asked(sample, "step", program)["volume"] is True
+    an_inch(sample / "shell_a.step")
+    verdicts = asked(sample, "step", program)
+    assert verdicts["volume"] is False
+    assert verdicts["solids"] is True
+
+
+@pytest.mark.parametrize("program", ["freecad", "gmsh"])
+def test_spheres_that_are_none(sample: Path, program: str) -> None:
+    """The sample's mirrors are planar."""
+    verdicts = asked(sample, "step", program, spheres=1)
+    assert verdicts.pop("spheres") is False
+    assert {*verdicts.values()} == {True}
+
+
+@pytest.mark.parametrize(("program", "question"), [("prusa", "manifold"), ("admesh", "repairs")])
+@pytest.mark.parametrize("damage", [without_a_facet, turned_facet])
+def test_a_holed_or_turned_mesh_fails(
+    sample: Path, program: str, question: str, damage: Callable[[Path], None]
+) -> None:
+    damage(sample / "shell_a.stl")
+    assert asked(sample, "stl", program, volume=math.nan)[question] is False
+
+
+@pytest.mark.parametrize("program", ["prusa", "admesh"])
+@pytest.mark.parametrize("damage", [rubbish, empty])
+def test_a_broken_mesh_passes_nothing(
+    sample: Path, program: str, damage: Callable[[Path], None]
+) -> None:
+    damage(sample / "shell_a.stl")
+    assert True not in asked(sample, "stl", program).values()
+
+
+def test_a_broken_3mf_passes_nothing(sample: Path) -> None:
+    cut(sample / "shell_a.3mf")
+    assert True not in asked(sample, "3mf", "prusa").values()

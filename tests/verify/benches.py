@@ -7,9 +7,12 @@ from pathlib import Path
 from tbcad_verify.bench import Bench, pinhole_of, set_up
 from tbcad_verify.files import read
 from tbcad_verify.mesh import merge
+from tbcad_verify.proof import Wishes
 from tbcad_verify.record import read_export
 from tbcad_verify.recover import recover
 from tbcad_verify.stl import parse
+
+HERE = Wishes(apart=False)  # in this process: quicker, and open to monkeypatches
 
 
 def bench_of(folder: Path) -> Bench:

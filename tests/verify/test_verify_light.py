@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from benches import bench_of
+from benches import HERE, bench_of
 from synthetic_export import PIN, Cells, sign, stl
 from tbcad_verify import coverage, frame, light, rays, sensor, verify
 from tbcad_verify.bench import Bench
@@ -209,7 +209,7 @@ def test_a_mirror_without_pixels_fails(good: Path) -> None:
     for camera in design["cameras"]:
         camera["width_px"], camera["height_px"] = 13, 10
     (good / "design.json").write_text(json.dumps(design))
-    report = verify(good, write=False)
+    report = verify(good, wishes=replace(HERE, write=False))
     lines = {c.name: c for c in report.checks}
     assert lines["pixels a virtual camera"].passed is False
     assert lines["pixels a virtual camera"].measured == 0

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -135,6 +136,19 @@ def digest(folder: Path, name: str) -> tuple[int, str]:
     path = locate(folder, name)
     with path.open("rb") as stream:
         return os.fstat(stream.fileno()).st_size, hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def stamps(folder: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """What tells that a file was replaced or written to: device, inode, size and times, by name.
+
+    Files that are not there are left out.
+    """
+    found: dict[str, tuple[int, ...]] = {}
+    for name in names:
+        with contextlib.suppress(OSError):
+            info = (folder / name).stat()
+            found[name] = (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns)
+    return found
 
 
 def listing(folder: Path) -> frozenset[str]:

@@ -67,7 +67,8 @@ def _errors(bench: Bench, name: Name, errors: Floats, more: str) -> Check:
 
 def _worst(bench: Bench, name: Name, errors: Floats, limits: Floats, more: str) -> Check:
     """Hold every mirror to its own limit, and show the one that uses most of it."""
-    used = np.nan_to_num(errors / limits, nan=-1.0, posinf=1e300)
+    with np.errstate(invalid="ignore"):  # infinitely wrong, of something infinitely in doubt
+        used = np.nan_to_num(errors / limits, nan=-1.0, posinf=1e300)
     order = np.argsort(-used, kind="stable")
     over = order[used[order] > 1]
     if used[order[0]] < 0:

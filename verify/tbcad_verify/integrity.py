@@ -6,6 +6,7 @@ The files are those of the manifest, the record is the design's, and the meshes 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from tbcad_verify.record import Export
 from tbcad_verify.report import NAME
 
 LEAST_VOLUME_MM3 = 1e-6
+PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
 OWN = frozenset({"manifest.json", NAME})
 
 
@@ -41,13 +43,15 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
         if parsed.get(name, _found(export, name)) != wanted
     ]
     unlisted = sorted({*parsed} - {*export.manifest} - OWN)
+    unread = sorted({*filter(_is_part, export.manifest)} - export.part_files)
     others = sorted(listing(export.folder) - {*export.manifest} - OWN)
     return [
         at_most(
             ("manifest", "manifest.json", "wrong files"),
-            len(wrong + unlisted),
+            len(wrong + unlisted + unread),
             0,
-            f"missing, unlisted, or not as written: {listed(wrong + unlisted)}",
+            "missing, unlisted, not as written, or of no part: "
+            + listed(wrong + unlisted + unread),
         ),
         told(("other files", "", "files"), len(others), listed(others)),
     ]
@@ -105,6 +109,10 @@ def mesh_checks(name: str, found: Topology) -> list[Check]:
 def fold_check(name: str, folds: int) -> Check:
     """No facet lies back to back with its neighbour."""
     return at_most(("folds", name, "edges"), folds, 0, "the surface is folded onto itself")
+
+
+def _is_part(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in PART_KINDS
 
 
 def _found(export: Export, name: str) -> tuple[int, str] | None:

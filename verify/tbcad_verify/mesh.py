@@ -101,7 +101,7 @@ def examine(mesh: Mesh, facets: Facets) -> Topology:
         stored_normals=_contradicted(facets.normals, mesh.area),
         components=_components(mesh),
         volume=_volume(mesh),
-        status=_manifold_status(mesh),
+        status=manifold_status(mesh),
     )
 
 
@@ -199,7 +199,8 @@ def _volume(mesh: Mesh) -> float:
     return float(np.einsum("ni,in->n", corner, mesh.area).sum()) / 6
 
 
-def _manifold_status(mesh: Mesh) -> str:
+def manifold_status(mesh: Mesh) -> str:
+    """What manifold3d says; "NoError" is good."""
     import manifold3d
 
     shape = manifold3d.Manifold(

@@ -53,6 +53,12 @@ class Mirrors:
         start = NUMBERS.index(first)
         return np.ascontiguousarray(self.table[:, start : start + count].T)
 
+    def take(self, index: NDArray[np.integer]) -> Mirrors:
+        """The mirrors with these numbers, in this order."""
+        return Mirrors(
+            tuple(self.ids[k] for k in index.tolist()), self.camera[index], self.table[index]
+        )
+
     @property
     def flat(self) -> NDArray[np.bool_]:
         """(M,) true for planar mirrors, which have no radius."""

@@ -62,11 +62,13 @@ class Camera:
 
 @dataclass(frozen=True)
 class Part:
-    """One exported solid, and the camera its mirrors are for (empty: it has none)."""
+    """One exported solid, the camera its mirrors are for, and its files; empty: it has none."""
 
     name: str
     camera: str
     stl: str
+    step: str = ""
+    threemf: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,21 @@ class Export:
     rows: Mirrors
     manifest: Mapping[str, tuple[int, str]]
     digests: Mapping[str, tuple[int, str]]
+
+    @property
+    def part_files(self) -> frozenset[str]:
+        """All files of all parts."""
+        files = ((part.stl, part.step, part.threemf) for part in self.parts)
+        return frozenset(name for names in files for name in names if name)
+
+    @property
+    def mesh_error_mm(self) -> float:
+        """How far the spec lets the mesh be from the exact surface, mm; NaN if it does not say."""
+        mesh = self.spec.get("mesh")
+        keys = ("chord_error_mm", "structure_error_mm")
+        values = [mesh.get(key) for key in keys] if isinstance(mesh, dict) else [None]
+        good = all(isinstance(value, int | float) for value in values)
+        return float(max(values)) if good else math.nan  # type: ignore[type-var, arg-type]
 
 
 def read_export(folder: Path) -> Export:
@@ -150,7 +167,13 @@ def _camera(item: Record) -> Camera:
 
 def _parts(design: Record) -> tuple[Part, ...]:
     parts = tuple(
-        Part(word(item, "name"), str(item.get("camera") or ""), _file(item))
+        Part(
+            word(item, "name"),
+            str(item.get("camera") or ""),
+            _file(item, "stl"),
+            _file(item, "step") if item.get("step") else "",
+            _file(item, "3mf") if item.get("3mf") else "",
+        )
         for item in objects(design, "parts")
     )
     if not parts or len({part.stl for part in parts}) != len(parts):
@@ -158,10 +181,10 @@ def _parts(design: Record) -> tuple[Part, ...]:
     return parts
 
 
-def _file(item: Record) -> str:
-    name = str(typed(item, "stl", str))
+def _file(item: Record, kind: str) -> str:
+    name = str(typed(item, kind, str))
     if not re.fullmatch(r"[^/\\:\0]{1,255}", name) or name in {".", ".."}:
-        raise BadExport(f"design.json: stl {name!r:.80} must be a plain file name; {AGAIN}")
+        raise BadExport(f"design.json: {kind} {name!r:.80} must be a plain file name; {AGAIN}")
     return name
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 
 from tbcad_verify.checks import NAMED, Check, finite, passed
+from tbcad_verify.mirrors import Mirrors
+from tbcad_verify.poses import virtual_cameras
+from tbcad_verify.programs import is_skipped
+from tbcad_verify.results import PER_MIRROR
+from tbcad_verify.table import table
 
 Floats = NDArray[np.float64]
 DIGITS = 9
@@ -44,6 +49,21 @@ class Findings:
     pixels: Floats
 
 
+def findings(mirrors: Mirrors, columns: Mapping[str, Floats]) -> Findings:
+    """Findings from the columns that the stages could make; the others are unknown.
+
+    Args:
+        mirrors: as recorded.
+        columns: of `PER_MIRROR`, (M,) each.
+    """
+    blank = np.full(len(mirrors), np.nan)
+    return Findings(
+        mirrors.ids,
+        virtual_cameras(mirrors).index,
+        *(columns.get(name, blank) for name in PER_MIRROR),
+    )
+
+
 @dataclass(frozen=True)
 class Report:
     """The proof of one export.
@@ -52,16 +72,20 @@ class Report:
         target_mm: diameter that every virtual camera must see.
         checks: in the order they were made.
         findings: mirror by mirror.
+        programs: what other programs on this machine said; empty unless they were asked.
+        printing: what making each part on each machine comes to.
     """
 
     target_mm: float
     checks: tuple[Check, ...]
     findings: Findings
+    programs: tuple[Check, ...] = ()
+    printing: tuple[dict[str, Any], ...] = ()
 
     @property
     def passed(self) -> bool:
         """True if every check passed; what is unknown does not."""
-        return passed(self.checks)
+        return passed(self.checks + self.programs)
 
     @property
     def verdict(self) -> str:
@@ -69,20 +93,20 @@ class Report:
         return _pass_line(self) if self.passed else _fail_line(self)
 
     def to_json(self) -> str:
-        """The text of verify.json: the same for the same export, whatever the machine's load."""
-        return (
-            json.dumps(
-                {
-                    "pass": self.passed,
-                    "target_mm": self.target_mm,
-                    "checks": [_check_row(check) for check in self.checks],
-                    "mirrors": _mirror_rows(self.findings),
-                },
-                indent=1,
-                allow_nan=False,
-            )
-            + "\n"
-        )
+        """The text of verify.json.
+
+        The same for the same export, but for what other programs said, if they were asked.
+        """
+        document = {
+            "pass": self.passed,
+            "target_mm": self.target_mm,
+            "checks": [_check_row(check) for check in self.checks],
+            "printing": list(self.printing),
+            "mirrors": _mirror_rows(self.findings),
+        }
+        if self.programs:
+            document["programs"] = [_check_row(check) for check in self.programs]
+        return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
     def write(self, folder: Path) -> Path:
         """Write verify.json whole or not at all."""
@@ -101,7 +125,7 @@ class Report:
 
     def show(self, console: Console) -> None:
         """Print the table and the verdict."""
-        console.print(_table(self))
+        console.print(table(self.checks + self.programs))
         console.print(self.verdict, markup=False, highlight=False, soft_wrap=True)
 
 
@@ -114,20 +138,26 @@ def _check_row(check: Check) -> dict[str, Any]:
         "limit": check.limit,
         "unit": check.unit,
     }
-    return row if check.passed is True else row | {"detail": check.detail}
+    return row | {"detail": check.detail} if check.detail and not _held(check) else row
+
+
+def _held(check: Check) -> bool:
+    """Whether a check passed against a limit, and so needs no words."""
+    return check.passed is True and check.limit is not None
 
 
 def _mirror_rows(found: Findings) -> list[dict[str, Any]]:
-    columns = {
-        "coverage_facet_mm": found.coverage_facet,
-        "coverage_fitted_mm": found.coverage_fitted,
-        "centre_error_mm": found.centre_error,
-        "radius_error_mm": found.radius_error,
-        "pixels": found.pixels,
-    }
+    values = (
+        found.coverage_facet,
+        found.coverage_fitted,
+        found.centre_error,
+        found.radius_error,
+        found.pixels,
+    )
+    columns = dict(zip(PER_MIRROR, values, strict=True))
     order = sorted(range(len(found.ids)), key=found.ids.__getitem__)
     return [
-        {"id": found.ids[k]} | {key: _rounded(finite(values[k])) for key, values in columns.items()}
+        {"id": found.ids[k]} | {key: _rounded(finite(column[k])) for key, column in columns.items()}
         for k in order
     ]
 
@@ -138,59 +168,21 @@ def _rounded(value: float | None) -> float | int | None:
     return int(value) if float(value).is_integer() else round(float(value), DIGITS)
 
 
-def _table(report: Report) -> Table:
-    table = Table(title=None, box=None, pad_edge=False)
-    for name, side in (
-        ("check", "left"),
-        ("file", "left"),
-        ("", "left"),
-        ("measured", "right"),
-        ("limit", "right"),
-        ("unit", "left"),
-        ("", "left"),
-    ):
-        table.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
-    for check in report.checks:
-        table.add_row(
-            check.name,
-            check.file,
-            _mark(check),
-            _figure(check.measured),
-            _figure(check.limit),
-            check.unit,
-            check.detail,
-        )
-    return table
-
-
-def _mark(check: Check) -> str:
-    if check.passed is None:
-        return "[yellow]unknown[/]"
-    if not check.passed:
-        return "[red]FAIL[/]"
-    return "info" if check.limit is None else "[green]pass[/]"
-
-
-def _figure(value: float | None) -> str:
-    if value is None:
-        return ""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
-
-
 def _pass_line(report: Report) -> str:
-    found = report.findings
+    found, left = report.findings, sum(map(is_skipped, report.programs))
+    skipped = f"; {left} questions to other programs skipped" if left else ""
     return (
         f"PASS: {len(found.ids)} mirrors, {_cameras(found)} virtual cameras see "
         f"{report.target_mm:g} mm or more (facets {np.min(found.coverage_facet):.2f}, spheres "
         f"{np.min(found.coverage_fitted):.2f}); nothing blocked; centres within "
         f"{np.max(found.centre_error) * 1e3:.2f} and radii within "
-        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record"
+        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record{skipped}"
     )
 
 
 def _fail_line(report: Report) -> str:
-    wrong = [check.name for check in report.checks if check.passed is False]
-    unsure = [check.name for check in report.checks if check.passed is None]
+    wrong = [check.name for check in (*report.checks, *report.programs) if check.passed is False]
+    unsure = [check.name for check in (*report.checks, *report.programs) if check.passed is None]
     said = [
         f"{word}: {', '.join(dict.fromkeys(names))}"
         for word, names in (("failed", wrong), ("unknown", unsure))

@@ -1,0 +1,48 @@
+"""What a proof works out from the bytes of one file alone, worked out once for many proofs."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest import mock
+
+from tbcad_verify import prove
+from tbcad_verify.files import Blob
+from tbcad_verify.mesh import Mesh
+from tbcad_verify.step import checks
+
+
+@contextmanager
+def remembered() -> Iterator[None]:
+    """Within, no STEP file is read twice and no mesh is put on printers twice; what fails is."""
+    step, shape = _Once(checks.examine, _bytes), _Once(prove.measure, _corners)
+    with mock.patch.object(checks, "examine", step), mock.patch.object(prove, "measure", shape):
+        yield
+
+
+class _Once:
+    """A function that keeps what it returned, by a key of its first argument, and the others."""
+
+    def __init__(self, work: Callable[..., Any], key: Callable[[Any], str]) -> None:
+        self._work, self._key = work, key
+        self._found: dict[object, Any] = {}
+        self._busy: defaultdict[object, threading.Lock] = defaultdict(threading.Lock)
+
+    def __call__(self, first: Any, *rest: Any) -> Any:
+        key = self._key(first), repr(rest)
+        with self._busy[key]:
+            if key not in self._found:
+                self._found[key] = self._work(first, *rest)
+            return self._found[key]
+
+
+def _bytes(blob: Blob) -> str:
+    return blob.sha256
+
+
+def _corners(mesh: Mesh) -> str:
+    return hashlib.sha256(mesh.points.tobytes() + mesh.faces.tobytes()).hexdigest()

@@ -1,0 +1,144 @@
+"""Profiles are data from users: read strictly, refused in one line."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from tbcad_verify.errors import BadExport
+from tbcad_verify.printing.profile import MAX_BYTES, BadProfile, Profile, built_in, load
+
+GOOD = """\
+name = "mine"
+process = "FDM"
+bed_mm = [200, 210.5, 250]
+spot_mm = 0.6
+wall_mm = 1.8
+hole_mm = 2
+clearance_mm = 0.4
+tolerance_mm = 0.3
+overhang_deg = 50
+material = "PETG"
+density_g_cm3 = 1.27
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.toml"
+    path.write_text(GOOD)
+    return path
+
+
+def test_the_four_built_in_ones() -> None:
+    assert built_in() == ("fdm", "machined", "sla", "sls")
+    profiles = {name: load(name) for name in built_in()}
+    assert all(profile.name == name for name, profile in profiles.items())
+    assert profiles["fdm"].bed_mm == (256, 256, 256)
+    assert [p.overhang_deg is None for p in profiles.values()] == [False, True, False, True]
+    assert [profile.process for profile in profiles.values()] == ["FDM", "machined", "SLA", "SLS"]
+
+
+def test_the_first_file_explains_every_key() -> None:
+    folder = Path(__file__).parents[3] / "verify/tbcad_verify/printing/profiles"
+    lines = (folder / "fdm.toml").read_text().splitlines()
+    given = {line.split(" = ")[0] for line in lines if " = " in line and line[0] != "#"}
+    assert given == set(Profile.model_fields)
+
+
+def test_a_users_file(file: Path) -> None:
+    mine = load(str(file))
+    assert mine.bed_mm == (200, 210.5, 250)
+    assert mine.overhang_deg == 50
+    assert mine.cavities
+    assert mine.max_triangles is None
+
+
+def test_a_profile_cannot_be_changed(file: Path) -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load(str(file)).wall_mm = 2  # type: ignore[misc]
+
+
+BAD = [
+    ("wall_mm", "wal_mm", "unknown key wal_mm: did you mean wall_mm\\? allowed are name, process"),
+    ("wall_mm = 1.8", "", "wall_mm is missing, allowed is a number from 0 to 1000: change it"),
+    ("wall_mm = 1.8", "wall_mm = -1", "wall_mm is -1, allowed is a number from 0 to 1000"),
+    ("wall_mm = 1.8", 'wall_mm = "1"', "wall_mm is 1, allowed is a number"),
+    ("wall_mm = 1.8", "wall_mm = true", "wall_mm is True, allowed is a number"),
+    ("wall_mm = 1.8", "wall_mm = nan", "wall_mm is nan, allowed is a number"),
+    ("wall_mm = 1.8", "wall_mm = inf", "wall_mm is inf, allowed is a number"),
+    ("spot_mm = 0.6", "spot_mm = 0", "spot_mm is 0, allowed is a number above 0 to 100:"),
+    ('"FDM"', '"fdm"', "process is fdm, allowed is FDM, SLA, SLS or machined"),
+    ("[200, 210.5, 250]", "[200, 210.5]", "bed_mm.* allowed is three numbers above 0 to 100000"),
+    ("[200, 210.5, 250]", "[200, 0, 250]", "bed_mm\\[1\\] is 0, allowed is three numbers above"),
+    ("[200, 210.5, 250]", "200", "bed_mm is 200, allowed is three numbers above"),
+    ("clearance_mm = 0.4", "clearance_mm = 100", "clearance_mm is 100, allowed is less than half"),
+    ("overhang_deg = 50", "overhang_deg = 91", "overhang_deg is 91, allowed is a number from 0 to"),
+    ('"mine"', '"a\\nb"', "name is 'a.*, allowed is text that matches"),
+    ('"PETG"', '""', "material is '', allowed is text that matches"),
+    ("hole_mm = 2", "hole_mm = 2\nhole_mm = 3", "no TOML"),
+    ("hole_mm = 2", "hole_mm = 2\nmax_triangles = 1e6", "max_triangles is .*, allowed is a whole"),
+    ("hole_mm = 2", "hole_mm = 2\ncavities = 1", "cavities is 1, allowed is true or false"),
+    ("hole_mm = 2", "hole_mm = 2\n[bed]\nx = 1", "unknown key bed: .*allowed are"),
+    ("hole_mm = 2", "hole_mm = 2\n'a\\u000ab' = 1", "unknown key"),
+    ("hole_mm = 2", "wall = 2\nhol = 3", "and 2 more"),
+    ("hole_mm = 2", f"hole_mm = {'[' * 3000}", "no TOML"),
+    ("wall_mm = 1.8", f"wall_mm = {'9' * 4000}", "wall_mm is 999.*, allowed is a number"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), BAD)
+def test_broken_files_are_refused_in_one_line(file: Path, old: str, new: str, message: str) -> None:
+    assert old in GOOD
+    file.write_text(GOOD.replace(old, new))
+    with pytest.raises(BadProfile, match=message) as caught:
+        load(str(file))
+    line = str(caught.value)
+    assert line.startswith("profile ")
+    assert "mine.toml" in line
+    assert line.isprintable()
+    assert len(line) < 400
+
+
+def test_a_bad_profile_is_a_bad_export() -> None:
+    assert issubclass(BadProfile, BadExport)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("fmd", "did you mean fdm"),
+        ("FDM", "built in are fdm, machined, sla, sls; or give the path of a .toml"),
+        ("no/such.toml", "neither built in nor a file"),
+        ("", "neither built in nor a file"),
+        ("a\0b", "neither built in nor a file"),
+        ("a\nb", "neither built in nor a file"),
+        ("/", "not a regular file"),
+        ("/dev/null", "not a regular file"),
+    ],
+)
+def test_names_that_are_none(name: str, message: str) -> None:
+    with pytest.raises(BadProfile, match=message) as caught:
+        load(name)
+    assert str(caught.value).isprintable()
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(BadProfile, match="not a regular file"):
+        load(str(tmp_path / "pipe.toml"))
+
+
+def test_a_file_that_is_too_large(file: Path) -> None:
+    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD)))
+    assert load(str(file)).name == "mine"
+    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD) + 1))
+    with pytest.raises(BadProfile, match=f"larger than the {MAX_BYTES} bytes"):
+        load(str(file))
+
+
+def test_no_text(file: Path) -> None:
+    file.write_bytes(GOOD.encode() + b"# \xff")
+    with pytest.raises(BadProfile, match="not UTF-8 text"):
+        load(str(file))

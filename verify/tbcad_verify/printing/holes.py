@@ -1,0 +1,174 @@
+"""Round holes, through or blind, found on the mesh: patches that are hollow cylinders."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh import Mesh, linked
+from tbcad_verify.printing.circles import circles, gaps
+from tbcad_verify.segments import BLIND_RAD, CONCAVE_RAD, Edges
+from tbcad_verify.vectors import across, dot, norm, unit
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+Groups = NDArray[np.int32]
+
+# Neighbours in a hole's wall bend by no more than this: an octagon, 45 degrees, is a coarse hole; a
+# hexagon, 60, is a nut's pocket.
+BEND_RAD = math.radians(50)
+BENDS = 5  # the fewest between facets of a patch: three quarters of an octagon
+UPRIGHT = 0.1  # most cosine between a wall's normals and its axis
+ROUND = 0.02  # most deviation from the circle, of its radius
+GAP_RAD = math.pi / 2 + 1e-3  # what may be missing of the turn
+
+
+@dataclass(frozen=True)
+class Holes:
+    """The H holes, in the order of their first facets.
+
+    Attributes:
+        diameter: (H,) mm of the circle through the corners; facets bulge inside it.
+        middle: (3, H) mm, half way down.
+        axis: (3, H) unit, either way.
+        depth: (H,) mm, of the cylinder.
+    """
+
+    diameter: Floats
+    middle: Floats
+    axis: Floats
+    depth: Floats
+
+
+@dataclass(frozen=True)
+class Patches:
+    """N facets in G patches.
+
+    Attributes:
+        facet: (N,) indices, ascending.
+        group: (N,) patch of each, 0 ... G - 1.
+        count: G.
+    """
+
+    facet: Indices
+    group: Groups
+    count: int
+
+
+def holes(mesh: Mesh, edges: Edges) -> Holes:
+    """Find every round hole that keeps three quarters of its turn.
+
+    Args:
+        mesh: a closed solid, outward.
+        edges: of the mesh.
+    """
+    bent = _bent(edges)
+    half, bend = edges.half[bent], -edges.angle[bent]
+    links = np.concatenate([half, edges.half[_flat(edges)]])
+    links = np.stack([links // 3, mesh.twin[links] // 3])
+    hollow = _bending(_joined(len(mesh.faces), links, np.arange(len(mesh.faces))), half // 3)
+    axis = _straight(mesh, half, bend, _label(hollow, len(mesh.faces)), hollow.count)
+    upright = np.abs(dot(_normals(mesh, hollow), axis[:, hollow.group])) < UPRIGHT
+    return _round(mesh, _joined(len(mesh.faces), links, hollow.facet[upright]))
+
+
+def _bent(edges: Edges) -> Bools:
+    bend = -edges.angle
+    clear = (bend > CONCAVE_RAD + edges.noise) & (edges.noise < BLIND_RAD)
+    return np.asarray(clear & (bend < BEND_RAD))
+
+
+def _flat(edges: Edges) -> Bools:
+    flat = np.abs(edges.angle) <= CONCAVE_RAD + edges.noise
+    return np.asarray(flat & (edges.noise < BLIND_RAD))
+
+
+def _joined(size: int, links: Indices, facet: Indices) -> Patches:
+    """The given facets of `size`, in patches that links (2, L) between facets hold together."""
+    number = np.full(size, -1)
+    number[facet] = np.arange(facet.size)
+    one, two = number[links]
+    both = (one >= 0) & (two >= 0)
+    count, group = linked(facet.size, one[both], two[both])
+    return Patches(facet, group, count)
+
+
+def _bending(patches: Patches, bent: Indices) -> Patches:
+    """The patches with enough bends; `bent` has a facet of every bent edge."""
+    enough = np.bincount(patches.group[bent], minlength=patches.count) >= BENDS
+    mine = enough[patches.group]
+    number = (np.cumsum(enough) - 1).astype(np.int32)
+    return Patches(patches.facet[mine], number[patches.group[mine]], int(enough.sum()))
+
+
+def _label(patches: Patches, size: int) -> Groups:
+    """(size,) the patch of every facet; -1 for none."""
+    label = np.full(size, -1, dtype=np.int32)
+    label[patches.facet] = patches.group
+    return label
+
+
+def _straight(mesh: Mesh, half: Indices, bend: Floats, label: Groups, count: int) -> Floats:
+    """(3, G) the direction along which each patch does not bend.
+
+    Source: D. Cohen-Steiner, J.-M. Morvan, Restricted Delaunay Triangulations and Normal Cycle,
+    2003: bent edges, by bend times length, add up to the curvature tensor, and lie across bending.
+    """
+    mine = label[half // 3] >= 0
+    half, bend = half[mine], bend[mine]
+    start, end = mesh.faces.ravel()[half], np.roll(mesh.faces, -1, axis=1).ravel()[half]
+    edge = np.take(mesh.points, end, axis=0).T - np.take(mesh.points, start, axis=0).T
+    tensor = _outer(edge, bend / norm(edge), label[half // 3], count)
+    return np.ascontiguousarray(np.linalg.eigh(tensor)[1][:, :, 2].T)
+
+
+def _outer(a: Floats, weight: Floats, group: Groups, count: int) -> Floats:
+    """(G, 3, 3) sums of weight a a^T over each group; a is (3, N)."""
+    sums = np.empty((count, 3, 3))
+    for i in range(3):
+        for j in range(i + 1):
+            sums[:, i, j] = sums[:, j, i] = np.bincount(group, weight * a[i] * a[j], count)
+    return sums
+
+
+def _normals(mesh: Mesh, patches: Patches) -> Floats:
+    return unit(mesh.area[:, patches.facet])
+
+
+def _round(mesh: Mesh, patches: Patches) -> Holes:
+    """Look along each patch, fit a circle, and keep those that are the walls of round holes.
+
+    They bend inward, or they would not be patches: their normals point to the axis.
+    """
+    normal, group = _normals(mesh, patches), np.repeat(patches.group, 3)
+    spread = _outer(normal, norm(mesh.area[:, patches.facet]), patches.group, patches.count)
+    axis = np.ascontiguousarray(np.linalg.eigh(spread)[1][:, :, 0].T)
+    sides = across(axis)
+    corner = np.take(mesh.points, mesh.faces[patches.facet].ravel(), axis=0).T
+    flat = np.stack([dot(side[:, group], corner) for side in sides])
+    centre, radius = circles(flat, group, patches.count)
+    radius = np.where(np.isfinite(radius), radius, 0.0)  # points on a line are no hole
+    centre = np.where(radius > 0, centre, 0.0)
+    spoke = flat - centre[:, group]
+    off = np.abs(np.hypot(*spoke) - radius[group])
+    good = _every(off < ROUND * radius[group], group, patches.count)
+    good &= gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
+    low, high = _extent(dot(axis[:, group], corner), group, patches.count)
+    middle = centre[0] * sides[0] + centre[1] * sides[1] + (low + high) / 2 * axis
+    return Holes(2 * radius[good], middle[:, good], axis[:, good], (high - low)[good])
+
+
+def _every(good: Bools, group: Groups, count: int) -> Bools:
+    """(G,) whether all members are good."""
+    return np.asarray(np.bincount(group[~good], minlength=count) == 0)
+
+
+def _extent(along: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, group, along)
+    np.maximum.at(high, group, along)
+    return low, high

@@ -1,0 +1,32 @@
+"""The separate pieces of a mesh: solids that would fall apart, and cavities closed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad_verify.mesh import Mesh, linked
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """How many connected surfaces there are.
+
+    Attributes:
+        solids: that enclose material; one more than one is a loose shell.
+        cavities: that enclose a void: turned inside out.
+    """
+
+    solids: int
+    cavities: int
+
+
+def pieces(mesh: Mesh) -> Pieces:
+    """Connected surfaces by the sign of their volume."""
+    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
+    count, label = linked(len(mesh.faces), half // 3, mesh.twin[half] // 3)
+    corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
+    share = np.einsum("ni,in->n", corner, mesh.area)
+    inside_out = int((np.bincount(label, share, count) < 0).sum())
+    return Pieces(count - inside_out, inside_out)

@@ -1,0 +1,82 @@
+"""How a part can lie: on the faces of its convex hull, along the file's axes, or tilted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from tbcad_verify.checks import Unknown
+from tbcad_verify.vectors import across, norm
+
+Floats = NDArray[np.float64]
+
+MOST = 24  # faces of the hull that are tried, the largest first
+LEAST_SHARE = 0.002  # of the hull's area, of a face to rest on
+GRID = 1 / 256  # side of the cells of directions whose facets are merged
+SAME_COS = np.cos(np.radians(0.1))  # directions closer than this are one
+AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file has it
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The convex hull of a part.
+
+    Attributes:
+        points: (3, V) its corners, mm.
+        down: (3, D) unit directions which can point down: large faces, then the axes.
+        tilted: (3, T) further ones, tried when nothing else fits.
+    """
+
+    points: Floats
+    down: Floats
+    tilted: Floats
+
+
+def wrap(points: Floats) -> Hull:
+    """The hull of points (V, 3), and the directions to try.
+
+    Raises:
+        Unknown: all points lie in a plane.
+    """
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise Unknown("the part is flat: its points lie in one plane") from error
+    faces = _faces(hull, points)
+    down = _each_once(np.hstack([faces, AXES]))
+    return Hull(points[hull.vertices].T, down, _tilted(down[:, 0]))
+
+
+def _faces(hull: ConvexHull, points: Floats) -> Floats:
+    """(3, D) outward normals of the largest faces; parallel triangles count as one."""
+    a, b, c = (points[hull.simplices[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    normal = hull.equations[:, :3].T
+    order = np.argsort(-area, kind="stable")  # so that each cell's first is its largest
+    cell = np.rint(normal[:, order] / GRID).astype(np.int64)
+    _, first, group = np.unique(cell, axis=1, return_index=True, return_inverse=True)
+    size = np.bincount(group.ravel(), area[order])
+    best = np.lexsort((first, -size))[:MOST]
+    best = best[size[best] > LEAST_SHARE * area.sum()]
+    return np.asarray(normal[:, order[first[best]]])
+
+
+def _each_once(directions: Floats) -> Floats:
+    kept: list[Floats] = []
+    for d in directions.T:
+        if all(float((d * other).sum()) < SAME_COS for other in kept):
+            kept.append(d)
+    return np.array(kept).T
+
+
+def _tilted(down: Floats) -> Floats:
+    """(3, 20) along the diagonals of a box that stands on the largest face."""
+    one, two = (side[:, 0] for side in across(down[:, None]))
+    steps = [s for s in product((-1, 0, 1), repeat=3) if np.abs(s).sum() > 1]
+    frame = np.stack([one, two, down], axis=1)
+    tilted = np.einsum("ij,kj->ik", frame, np.array(steps, dtype=np.float64))
+    return np.asarray(tilted / norm(tilted))

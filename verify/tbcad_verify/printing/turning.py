@@ -1,0 +1,84 @@
+"""The turn about the vertical by which a part fits a rectangle, by rotating callipers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+Floats = NDArray[np.float64]
+
+
+def turn(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
+    """The best turn, and the sides of the box then.
+
+    The least of the enclosing rectangles that fit; if none of those with a side along an edge
+    fits, the turn by which the larger excess over width or depth is least.
+
+    Args:
+        points: (2, N) seen from above, mm.
+        width: of the rectangle along x, mm.
+        depth: along y, mm.
+        slack: by how much the sides may be exceeded, mm.
+
+    Returns:
+        Angle from 0 to below pi, counter-clockwise, and (2,) extent along x and y, mm.
+
+    Source: H. Freeman, R. Shapira, Determining the Minimum-Area Encasing Rectangle, 1975.
+    """
+    rim = points[:, ConvexHull(points.T).vertices]
+    edges = _edges(rim)
+    sides = _sides(rim, edges)
+    fits = (sides <= np.array([[width], [depth]]) + slack).all(axis=0)
+    if fits.any():
+        area = np.where(fits, sides[0] * sides[1], np.inf)
+        k = int(np.argmax(area <= area.min() * (1 + 1e-9)))
+        return float(edges[k]), sides[:, k]
+    turns = _canonical(np.concatenate([edges, _balanced(rim, edges, width - depth)]))
+    sides = _sides(rim, turns)
+    excess = np.maximum(sides[0] - width, sides[1] - depth)
+    k = int(np.argmax(excess <= excess.min() + 1e-9 * np.abs(sides).max()))
+    return float(turns[k]), sides[:, k]
+
+
+def _edges(rim: Floats) -> Floats:
+    """Turns that bring an edge of the rim to lie along x or y, ascending."""
+    edge = np.roll(rim, -1, axis=1) - rim
+    across = np.mod(-np.arctan2(edge[1], edge[0]), np.pi / 2)
+    return _canonical(np.concatenate([across, across + np.pi / 2]))
+
+
+def _canonical(turns: Floats) -> Floats:
+    """Each turn once, from 0 to below pi; what rounding leaves below pi is 0."""
+    turns = np.mod(turns, np.pi)
+    return np.unique(np.where(turns > np.pi - 1e-9, 0, turns))
+
+
+def _sides(rim: Floats, turns: Floats) -> Floats:
+    """(2, K) extents along x and y of the rim, turned by each of (K,) angles."""
+    cos, sin = np.cos(turns)[:, None], np.sin(turns)[:, None]
+    x, y = cos * rim[0] - sin * rim[1], sin * rim[0] + cos * rim[1]
+    return np.stack([np.ptp(x, axis=1), np.ptp(y, axis=1)])
+
+
+def _balanced(rim: Floats, edges: Floats, difference: float) -> Floats:
+    """Turns at which the extents along x and y differ by so much: the other minima of excess.
+
+    Between two turns at which an edge lies along an axis, the outermost points stay the same, so
+    both extents are sines, and bulge: their larger excess is least at an end or where they cross.
+    """
+    between = (edges + np.append(edges[1:], edges[0] + np.pi)) / 2
+    cos, sin = np.cos(between)[:, None], np.sin(between)[:, None]
+    a = _chord(rim, cos * rim[0] - sin * rim[1])
+    b = _chord(rim, sin * rim[0] + cos * rim[1])
+    # width = a0 cos - a1 sin, depth = b0 sin + b1 cos
+    p, q = a[0] - b[1], -a[1] - b[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        swing = np.arccos(difference / np.hypot(p, q))
+    found = np.arctan2(q, p) + np.stack([swing, -swing])
+    return np.asarray(found[np.isfinite(found)])
+
+
+def _chord(rim: Floats, height: Floats) -> Floats:
+    """(2, K) from the lowest to the highest point of the rim, for (K, N) heights."""
+    return rim[:, height.argmax(axis=1)] - rim[:, height.argmin(axis=1)]

@@ -1,0 +1,180 @@
+"""Wall thickness by rays: from the surface inward to where they leave the part again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh import Mesh
+from tbcad_verify.rays import Scene, first_hits, in_threads, reach
+from tbcad_verify.segments import Edges, rounding
+from tbcad_verify.vectors import dot, norm, slices, unit
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+# How squarely the far side must look back at a ray. Where a wall between smooth sides is thinnest,
+# they look straight at each other, or the thickness would still fall to one side. Facets of a round
+# hole of eight sides are off by 22.5 degrees at most. Beyond 30 the sides meet in an edge, where
+# thickness tends to nought by nature; an edge sharper than 30 degrees is a wall that runs out.
+SQUARE_COS = math.cos(math.radians(30))
+# A ray from the bottom of a groove bisects its sides and meets a groove of 90 degrees on the other
+# side at 45. No edge is near, so no thickness tends to nought there.
+GROOVE_COS = math.cos(math.radians(50))
+GROOVE_RAD = 0.1  # a concave edge beyond this is the bottom of a groove
+# Facets whose normal rounding may have tilted more than this are neither measured from nor to:
+# a sliver that looks askance sees its own neighbours.
+SOUND_RAD = 0.05
+STEP = 0.01  # of the box's diagonal: facets longer than this are measured in several places
+INSET = 0.01  # how far samples keep from a facet's rim, of its size
+LATTICES = (16, 8, 4, 2, 1)  # most steps along a side of a facet; the first that is affordable
+RAYS = 1_500_000  # affordable, beyond one a facet
+LIFT = 8  # units in the last place by which rays start below the surface: float32 cannot tell less
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Thickness wherever it was measured.
+
+    Attributes:
+        thickness: (S,) mm; infinite where no wall is: nothing looks back.
+        share: (S,) mm^2 of surface that a sample stands for; 0 in grooves.
+        least: mm; infinite if there is no wall at all.
+        where: (3,) middle of the thinnest wall, mm.
+    """
+
+    thickness: Floats
+    share: Floats
+    least: float
+    where: Floats
+
+
+@dataclass(frozen=True)
+class Probes:
+    """Where rays start, and which way they go.
+
+    Attributes:
+        start: (3, S) on the surface, mm.
+        inward: (3, S) unit.
+        share: (S,) mm^2.
+        square: least cosine between the ray and the outward normal that it meets.
+    """
+
+    start: Floats
+    inward: Floats
+    share: Floats
+    square: float
+
+
+def walls(mesh: Mesh, edges: Edges, scene: Scene) -> Walls:
+    """Measure thickness from every facet, and from the bottom of every groove.
+
+    Args:
+        mesh: a closed solid, outward.
+        edges: of the mesh.
+        scene: of the mesh.
+    """
+    longest = _longest(mesh)
+    # Twice the area over the longest side is the least height; both ends of it are rounded.
+    sound = norm(mesh.area) * SOUND_RAD > 2 * rounding(mesh) * longest
+    step = STEP * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    probes = [*_from_facets(mesh, sound, longest, step), *_from_grooves(mesh, edges, sound, step)]
+    thickness = [_measure(scene, sound, probe) for probe in probes]
+    best = int(np.argmin([depth.min(initial=np.inf) for depth in thickness] or [0]))
+    return _walls(probes, thickness, best)
+
+
+def thin_area(found: Walls, limit: float) -> float:
+    """Surface over walls thinner than a limit, mm^2; walls of two sides count twice."""
+    return float(found.share[found.thickness < limit].sum())
+
+
+def _walls(probes: list[Probes], thickness: list[Floats], best: int) -> Walls:
+    depths, shares = np.concatenate(thickness), np.concatenate([probe.share for probe in probes])
+    if not np.isfinite(depths).any():
+        return Walls(depths, shares, math.inf, np.full(3, np.nan))
+    k = int(thickness[best].argmin())
+    least = float(thickness[best][k])
+    probe = probes[best]
+    return Walls(depths, shares, least, probe.start[:, k] + least / 2 * probe.inward[:, k])
+
+
+def _measure(scene: Scene, sound: Bools, probe: Probes) -> Floats:
+    """(S,) distances to walls that look back; infinite where none does."""
+    lift = LIFT * float(np.spacing(np.float32(np.abs(probe.start).max(initial=1e-30))))
+
+    def part(these: slice) -> Floats:
+        start, d = probe.start[:, these], probe.inward[:, these]
+        facet = first_hits(scene, start + lift * d, d)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = reach(scene, facet, start, d)
+        looks_back = dot(np.take(scene.planes[:, :3], facet, axis=0).T, d) >= probe.square
+        return np.where((facet >= 0) & sound[facet] & looks_back, np.maximum(depth, 0), np.inf)
+
+    return np.concatenate(in_threads(part, slices(probe.share.size)) or [np.empty(0)])
+
+
+def _longest(mesh: Mesh) -> Floats:
+    """(F,) longest side of every facet, mm."""
+    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
+    squares = [dot(side, side) for side in (corner[k] - corner[k - 1] for k in range(3))]
+    return np.asarray(np.sqrt(np.max(squares, axis=0)))
+
+
+def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iterator[Probes]:
+    size = _steps(np.where(sound, longest, 0), step)
+    for k in LATTICES[::-1]:
+        yield _on_lattice(mesh, np.flatnonzero(sound & (size == k)), _lattice(k))
+
+
+def _steps(length: Floats, step: float) -> Indices:
+    """(N,) into how many steps a length is divided, of `LATTICES`, such that all is affordable."""
+    wanted = 2 ** np.ceil(np.log2(np.maximum(length / step, 1)))
+    for most in LATTICES:
+        size = np.minimum(wanted, most).astype(np.intp)
+        if ((size > 1) * (size + 1) * (size + 2) / 2).sum() <= RAYS:
+            return np.asarray(size)
+    return np.ones(length.size, dtype=np.intp)
+
+
+def _lattice(k: int) -> Floats:
+    """(3, L) barycentric points: the middle, or all corners of k steps, drawn in a little."""
+    if k == 1:
+        return np.full((3, 1), 1 / 3)
+    points = [(i, j, k - i - j) for i in range(k + 1) for j in range(k + 1 - i)]
+    return (1 - INSET) * np.array(points, dtype=np.float64).T / k + INSET / 3
+
+
+def _on_lattice(mesh: Mesh, facets: Indices, lattice: Floats) -> Probes:
+    start = np.zeros((3, facets.size, lattice.shape[1]))
+    for corner, weight in zip(mesh.faces[facets].T, lattice, strict=True):
+        start += np.take(mesh.points, corner, axis=0).T[:, :, None] * weight
+    count = lattice.shape[1]
+    area = mesh.area[:, facets]
+    inward = np.repeat(-unit(area), count, axis=1)
+    share = np.repeat(norm(area) / (2 * count), count)
+    return Probes(start.reshape(3, -1), inward, share, SQUARE_COS)
+
+
+def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterator[Probes]:
+    """Facets beside a groove look past the thinnest place below it; its bottom does not."""
+    half = edges.half[edges.angle < -(GROOVE_RAD + edges.noise)]
+    half = half[sound[half // 3] & sound[mesh.twin[half] // 3]]
+    start = np.take(mesh.points, mesh.faces.ravel()[half], axis=0).T
+    edge = np.take(mesh.points, np.roll(mesh.faces, -1, axis=1).ravel()[half], axis=0).T - start
+    size = _steps(norm(edge), step)
+    inward = -unit(unit(mesh.area[:, half // 3]) + unit(mesh.area[:, mesh.twin[half] // 3]))
+    for k in LATTICES[::-1]:
+        mine = size == k
+        yield _along(start[:, mine], edge[:, mine], inward[:, mine], k)
+
+
+def _along(start: Floats, edge: Floats, inward: Floats, k: int) -> Probes:
+    at = np.linspace(INSET, 1 - INSET, k + 1) if k > 1 else np.array([0.5])
+    points = (start[:, :, None] + edge[:, :, None] * at).reshape(3, -1)
+    return Probes(points, np.repeat(inward, at.size, axis=1), np.zeros(points.shape[1]), GROOVE_COS)

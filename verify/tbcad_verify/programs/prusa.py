@@ -1,0 +1,149 @@
+"""PrusaSlicer: is a mesh manifold as it is, and does it become a print of the right volume?"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+from tbcad_verify.checks import Check, Unknown, at_most, told, unknown
+from tbcad_verify.programs.answers import exactly, near, text_of
+from tbcad_verify.programs.errand import Errand, Room, Wanted, on_path
+
+INSTALL = "apt install prusa-slicer"
+PARTS, VOLUME = "parts", "mm^3 off"
+REPAIRS = (
+    "open_edges",
+    "degenerate_facets",
+    "edges_fixed",
+    "facets_removed",
+    "facets_reversed",
+    "backwards_edges",
+)
+FILAMENT_MM = 1.75
+SOLID_PERCENT = 5.0  # a print's volume is that of its lines; measured: 1.0 to 1.8 too much
+TAIL = 1_000_000  # bytes of G-code that hold the figures at its end
+HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
+
+# A solid print on a bed that is large enough; coordinates end at 2 m.
+PROFILE = (
+    *("--bed-shape", "0x0,1000x0,1000x1000,0x1000"),
+    *("--filament-diameter", str(FILAMENT_MM), "--nozzle-diameter", "0.4"),
+    *("--layer-height", "0.3", "--first-layer-height", "0.3"),
+    *("--fill-density", "100%", "--fill-pattern", "rectilinear", "--skirts", "0"),
+)
+
+
+def ask_info(room: Room, wanted: Wanted) -> list[Check]:
+    """Manifold without repair, one part, the mesh's volume.
+
+    Raises:
+        Unknown: there is no answer.
+    """
+    said = _lines(text_of(room.run("--datadir", room.place / "home", "--info", room.given)))
+    return [
+        _manifold(room.file, said),
+        exactly(
+            ("prusa parts", room.file, PARTS), _needed(said, "number_of_parts"), 1, "must be one"
+        ),
+        near(
+            ("prusa volume", room.file, VOLUME),
+            _needed(said, "volume"),
+            wanted.volume,
+            wanted.volume_error,
+        ),
+    ]
+
+
+def ask_slices(room: Room, wanted: Wanted) -> list[Check]:
+    """The print's volume is the mesh's; how much filament and time it takes is told.
+
+    Raises:
+        Unknown: there is no answer.
+    """
+    code = room.place / "sliced.gcode"
+    data = ("--datadir", room.place / "home")
+    text_of(room.run(*data, "--export-gcode", *PROFILE, "--output", code, room.given))
+    length, hours = _print(_tail(code))
+    return [
+        _slices(("prusa slices", room.file, "%"), length, wanted.volume),
+        told(("prusa filament", room.file, "m"), length / 1e3),
+        told(("prusa time", room.file, "h"), round(hours, 1)),  # seconds differ from run to run
+    ]
+
+
+def _lines(text: str) -> list[tuple[str, str]]:
+    """Key and value of every line; an object of the file begins anew."""
+    return re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE)
+
+
+def _manifold(file: str, said: list[tuple[str, str]]) -> Check:
+    verdicts = [value for key, value in said if key == "manifold"]
+    if not verdicts or {*verdicts} - {"yes", "no"}:
+        raise Unknown("ended well, but did not say whether the mesh is manifold")
+    repairs = {key: _sum(said, key) for key in REPAIRS if any(name == key for name, _ in said)}
+    flaws = verdicts.count("no") + sum(map(abs, repairs.values()))
+    named = ", ".join(f"{key} {count:.0f}" for key, count in repairs.items())
+    detail = f"manifold: {', '.join(verdicts)}; {named or 'no repairs'}"
+    return at_most(("prusa manifold", file, "flaws"), flaws, 0, detail)
+
+
+def _needed(said: list[tuple[str, str]], key: str) -> float:
+    if not any(name == key for name, _ in said):
+        raise Unknown(f"ended well, but did not say its {key}")
+    return _sum(said, key)
+
+
+def _sum(said: list[tuple[str, str]], key: str) -> float:
+    try:
+        return sum([float(value) for name, value in said if name == key]) + 0.0
+    except ValueError as error:
+        raise Unknown(f"ended well, but its {key} is no number") from error
+
+
+def _slices(name: tuple[str, str, str], length: float, mesh: float) -> Check:
+    if not math.isfinite(mesh) or mesh <= 0:
+        return unknown(name, "the mesh's volume is unknown")
+    printed = length * math.pi / 4 * FILAMENT_MM**2
+    detail = f"a solid print takes {printed:.6g} mm^3, but the mesh has {mesh:.6g}"
+    return at_most(name, 100 * abs(printed / mesh - 1), SOLID_PERCENT, detail)
+
+
+def _tail(code: Path) -> str:
+    try:
+        with code.open("rb") as stream:
+            stream.seek(max(0, code.stat().st_size - TAIL))
+            return stream.read(TAIL).decode("utf-8", "replace")
+    except OSError as error:
+        raise Unknown("ended well, but wrote no G-code") from error
+
+
+def _print(code: str) -> tuple[float, float]:
+    """Length of filament, mm, and time, h."""
+    length = re.search(r"^; filament used \[mm\] = (\d{1,12}(?:\.\d{1,9})?)$", code, re.MULTILINE)
+    time = re.search(r"^; estimated printing time \(normal mode\) = (.{2,40})$", code, re.MULTILINE)
+    spans = re.findall(r"(\d{1,9})([dhms])", time[1]) if time else []
+    if length is None or not spans:
+        raise Unknown("ended well, but its G-code tells neither filament nor time")
+    return float(length[1]), sum(int(count) * HOURS[unit] for count, unit in spans)
+
+
+def _info(kind: str) -> Errand:
+    questions = {"prusa manifold": "flaws", "prusa parts": PARTS, "prusa volume": VOLUME}
+    return Errand("prusa", kind, INSTALL, questions, _find, ask_info)
+
+
+def _find() -> tuple[str, ...]:
+    return on_path("prusa-slicer", "PrusaSlicer")
+
+
+STL = _info("stl")
+THREEMF = _info("3mf")
+SLICES = Errand(
+    program="prusa",
+    kind="stl",
+    install=INSTALL,
+    questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
+    find=_find,
+    ask=ask_slices,
+)

@@ -1,0 +1,28 @@
+"""What both readers of STEP are asked: one solid, its spherical faces, its volume."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tbcad_verify.checks import Check
+from tbcad_verify.programs.answers import exactly, near
+from tbcad_verify.programs.errand import Wanted
+
+SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
+
+
+def one_solid(program: str, file: str, seen: Mapping[str, float]) -> Check:
+    """The file holds one solid."""
+    return exactly((f"{program} solids", file, SOLID), seen["solids"], 1, "must be one")
+
+
+def spheres(program: str, file: str, seen: Mapping[str, float], wanted: Wanted) -> Check:
+    """Every mirror is a face on an exact sphere, and nothing else is."""
+    name = (f"{program} spheres", file, SPHERES)
+    return exactly(name, seen["spheres"], wanted.spheres, "spherical faces, unlike the mirrors")
+
+
+def volume(program: str, file: str, seen: Mapping[str, float], wanted: Wanted) -> Check:
+    """Solid and mesh enclose the same volume."""
+    name = (f"{program} volume", file, VOLUME)
+    return near(name, seen["volume"], wanted.volume, wanted.volume_error)

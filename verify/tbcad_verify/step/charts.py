@@ -1,0 +1,196 @@
+"""Every other mirror and wall, drawn on a flat map of each mirror.
+
+A mirror is a sphere or plane with apex p, unit normal N there and curvature k = 1 / r. Its map is
+the tangent plane at p; a point y of the map stands for x = p + d with
+
+    d = w (y - (k / 2) |y|^2 N),   w = 1 / (1 + k^2 |y|^2 / 4),
+
+the stereographic projection from the point opposite p, and nothing at all when k = 0. What another
+ball or half-space leaves free of the mirror is, on the map,
+
+    alpha |y|^2 + beta . y + gamma >= 0:
+
+the in- or outside of a circle, or one side of a line. So spheres, planes and walls are one case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.surfaces import Surfaces
+from tbcad_verify.vectors import across, dot, slices
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+COINCIDENT = 1e-12
+FAR = 1e4
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Maps of M surfaces.
+
+    Attributes:
+        surfaces: M of them; the apex is the map's origin.
+        right: (3, M) unit, the map's first axis.
+        up: (3, M) unit, its second; right, up and normal are right-handed.
+        reach: (M,) mm on the map, how far it is looked at: to the horizon of the front side.
+    """
+
+    surfaces: Surfaces
+    right: Floats
+    up: Floats
+    reach: Floats
+
+    def take(self, index: Ints) -> Charts:
+        """The maps with these numbers."""
+        return Charts(
+            self.surfaces.take(index), self.right[:, index], self.up[:, index], self.reach[index]
+        )
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Circles on the maps, K on each of M, scaled so that |beta|^2 - 4 alpha gamma = 1.
+
+    Attributes:
+        alpha: (M, K) 1/mm; twice this is the circle's curvature.
+        beta: (2, M, K).
+        gamma: (M, K) mm.
+        real: (M, K) false where the other one does not cut the mirror.
+        covers: (M, K) true where it covers all of the mirror.
+    """
+
+    alpha: Floats
+    beta: Floats
+    gamma: Floats
+    real: NDArray[np.bool_]
+    covers: NDArray[np.bool_]
+
+    def take(self, column: Ints) -> Rings:
+        """Some of each map's rings: (M, K') numbers of columns."""
+        pick = [
+            np.take_along_axis(a, column, axis=1)
+            for a in (self.alpha, *self.beta, self.gamma, self.real, self.covers)
+        ]
+        return Rings(pick[0], np.stack(pick[1:3]), pick[3], pick[4], pick[5])
+
+    def rows(self, row: Ints) -> Rings:
+        """The rings of these maps."""
+        return Rings(
+            self.alpha[row], self.beta[:, row], self.gamma[row], self.real[row], self.covers[row]
+        )
+
+    @property
+    def clearance(self) -> Floats:
+        """(M, K) mm, from the apex to what is covered; below zero inside it."""
+        distance = 2 * self.gamma / (np.hypot(*self.beta) + 1)
+        return np.where(self.real, distance, np.where(self.covers, -np.inf, np.inf))
+
+
+def charts(surfaces: Surfaces, front: bool, spread: float) -> Charts:
+    """Maps of surfaces that lie `spread` mm apart at most.
+
+    With `front`, a map ends at the horizon, 90 degrees from the apex; else it has no end. A plane
+    has no horizon: its map ends far outside of everything.
+    """
+    right, up = across(surfaces.normal)
+    far = np.full(len(surfaces.curvature), FAR * spread)
+    reach = np.divide(2, surfaces.curvature, out=far, where=surfaces.curvature > 0)
+    whole = ~front & (surfaces.curvature > 0)
+    return Charts(surfaces, right, up, np.where(whole, np.inf, reach))
+
+
+def rings(charts: Charts, number: Ints, others: Surfaces, spread: float) -> Rings:
+    """What T others, walls among them, and last the horizon, leave of M maps: (M, T + 1) circles.
+
+    `number` (M,) says which of the others each map's own surface is. Of two equal surfaces the
+    first keeps what both have.
+    """
+    alpha, beta, gamma = _forms(charts, others)
+    same = (np.abs(alpha) * spread + np.abs(beta).sum(axis=0) + np.abs(gamma) / spread) < COINCIDENT
+    own = number[:, None] == np.arange(len(others.curvature))
+    earlier = np.arange(len(others.curvature)) < number[:, None]
+    size = beta[0] ** 2 + beta[1] ** 2
+    square = size - 4 * alpha * gamma
+    real = (square > COINCIDENT * (size + np.abs(alpha * gamma))) & ~same & ~own
+    covers = ~own & np.where(same, earlier, ~real & (alpha * spread + gamma / spread < 0))
+    scale = 1 / np.sqrt(np.where(real, square, 1))
+    return _with_horizon(
+        Rings(alpha * scale, beta * scale, gamma * scale, real, covers), charts.reach
+    )
+
+
+def _forms(charts: Charts, others: Surfaces) -> tuple[Floats, Floats, Floats]:
+    """Alpha (M, T), beta (2, M, T) and gamma (M, T), not yet scaled."""
+    mine = charts.surfaces
+    shape = (3, len(mine.curvature), len(others.curvature))
+    away = mine.point[:, :, None] - others.point[:, None]
+    slope = others.normal[:, None] + others.curvature * away
+    flat = away.reshape(3, -1)
+    height = np.broadcast_to(others.normal[:, None], shape).reshape(3, -1)
+    gamma = (dot(height, flat)).reshape(shape[1:])
+    gamma = gamma + others.curvature / 2 * dot(flat, flat).reshape(shape[1:])
+    along = [np.einsum("im,imt->mt", a, slope) for a in (charts.right, charts.up, mine.normal)]
+    k = mine.curvature[:, None]
+    alpha = k**2 / 4 * gamma + (others.curvature - k * along[2]) / 2
+    return alpha, np.stack(along[:2]), gamma
+
+
+def _with_horizon(rings: Rings, reach: Floats) -> Rings:
+    """A last column: 1 - |y|^2 / reach^2 >= 0."""
+    finite = np.isfinite(reach)
+    edge = np.where(finite, reach, 1.0)[:, None]
+    no = np.zeros_like(edge, dtype=bool)
+    return Rings(
+        np.hstack([rings.alpha, -1 / (2 * edge)]),
+        np.concatenate([rings.beta, np.zeros((2, *edge.shape))], axis=2),
+        np.hstack([rings.gamma, edge / 2]),
+        np.hstack([rings.real, finite[:, None]]),
+        np.hstack([rings.covers, no]),
+    )
+
+
+def lift(charts: Charts, y: Floats) -> Floats:
+    """(3, M) points of the surfaces for points (2, M) of their maps, one each, mm."""
+    s = charts.surfaces
+    square = y[0] ** 2 + y[1] ** 2
+    w = 1 / (1 + s.curvature**2 * square / 4)
+    return np.asarray(
+        s.point + w * (y[0] * charts.right + y[1] * charts.up - s.curvature / 2 * square * s.normal)
+    )
+
+
+def turned(surfaces: Surfaces, others: Surfaces) -> Surfaces:
+    """Whole spheres with their apex moved to where the largest cap that others cover is opposite.
+
+    So the point that the map cannot show is never part of what is free, unless all is.
+    """
+    out = [_opposite(surfaces, others, part) for part in slices(len(surfaces.curvature), 256)]
+    normal = np.concatenate(out, axis=1)
+    k = surfaces.curvature
+    reach = np.divide(1, k, out=np.zeros_like(k), where=k > 0)
+    return Surfaces(surfaces.point + reach * (normal - surfaces.normal), normal, k)
+
+
+def _opposite(surfaces: Surfaces, others: Surfaces, part: slice) -> Floats:
+    """(3, part) new normals."""
+    mine = surfaces.take(np.arange(len(surfaces.curvature))[part])
+    k = mine.curvature
+    centre = mine.point - np.divide(mine.normal, k, out=np.zeros((3, len(k))), where=k > 0)
+    away = centre[:, :, None] - others.point[:, None]
+    slope = others.normal[:, None] + others.curvature * away
+    value = np.einsum("it,imt->mt", others.normal, away)
+    value = value + others.curvature / 2 * np.einsum("imt,imt->mt", away, away)
+    steep = np.sqrt(np.einsum("imt,imt->mt", slope, slope))
+    # On the sphere C + r s, k times the other's function is level + slope . s.
+    level = value * k[:, None] + others.curvature / 2 / np.where(k > 0, k, 1)[:, None]
+    cuts = (np.abs(level) < steep) & (steep > COINCIDENT) & (k > 0)[:, None]
+    size = np.where(cuts, -level / np.where(cuts, steep, 1), -np.inf)
+    best, row = np.argmax(size, axis=1), np.arange(len(k))
+    chosen = slope[:, row, best] / np.where(steep[row, best] > 0, steep[row, best], 1)
+    return np.where(cuts[row, best], chosen, mine.normal)

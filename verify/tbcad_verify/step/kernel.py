@@ -1,0 +1,145 @@
+"""What the CAD kernel makes of a STEP file: the one module of the proof that imports a kernel.
+
+It runs in a process of its own: native code that reads a foreign file may hang or crash.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepGProp import BRepGProp
+from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
+from OCP.gp import gp_Dir, gp_Pln, gp_Pnt
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Message import Message, Message_Gravity
+from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+from OCP.STEPControl import STEPControl_Reader
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+
+Row = dict[str, Any]
+
+GREATEST = 1  # of all tolerances, in the kernel's words
+FAR_MM = 1e4  # farther than any part, near enough for the digits
+
+
+def read_solid(path: Path) -> Row:
+    """Counts, measures and faces of a STEP file, as plain numbers and words; mm.
+
+    Raises:
+        ValueError: the kernel cannot read it, or finds no shape in it.
+    """
+    shape = _transferred(path)
+    volume = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, volume)
+    return {
+        "solids": _count(shape, TopAbs_SOLID),
+        "shells": _count(shape, TopAbs_SHELL),
+        "open_edges": _open_edges(shape),
+        "valid": bool(BRepCheck_Analyzer(shape).IsValid()),
+        "gap": ShapeAnalysis_ShapeTolerance().Tolerance(shape, GREATEST),
+        "volume": volume.Mass(),
+        "centroid": _point(volume.CentreOfMass()),
+        "box": _box(shape),
+        "faces": [_face(TopoDS.Face_s(face)) for face in _each(shape, TopAbs_FACE)],
+    }
+
+
+def _transferred(path: Path) -> TopoDS_Shape:
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Gravity.Message_Alarm)
+    reader = STEPControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        raise ValueError("the kernel cannot read it as STEP")
+    if reader.TransferRoots() < 1:
+        raise ValueError("the kernel finds no shape in it")
+    return reader.OneShape()
+
+
+def _each(shape: TopoDS_Shape, kind: Any) -> Iterator[TopoDS_Shape]:
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _count(shape: TopoDS_Shape, kind: Any) -> int:
+    return sum(1 for _ in _each(shape, kind))
+
+
+def _open_edges(shape: TopoDS_Shape) -> int:
+    """Edges without exactly two sides; seams are both their own, and poles are points."""
+    sides = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, sides)
+    return sum(
+        sides.FindFromIndex(k).Extent() != 2
+        and not BRep_Tool.Degenerated_s(TopoDS.Edge_s(sides.FindKey(k)))
+        for k in range(1, sides.Extent() + 1)
+    )
+
+
+def _face(face: TopoDS_Face) -> Row:
+    measured = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, measured)
+    return {
+        "area": measured.Mass(),
+        "centroid": _point(measured.CentreOfMass()),
+        **_surface(face),
+    }
+
+
+def _surface(face: TopoDS_Face) -> Row:
+    """Kind and figures; `outward` is whether the natural normal points out of the solid."""
+    surface = BRepAdaptor_Surface(face)
+    forward = face.Orientation() == TopAbs_FORWARD
+    if surface.GetType() == GeomAbs_Sphere:
+        sphere = surface.Sphere()
+        return {
+            "kind": "sphere",
+            "point": _point(sphere.Location()),
+            "radius": sphere.Radius(),
+            "outward": forward == bool(sphere.Position().Direct()),
+        }
+    if surface.GetType() == GeomAbs_Plane:
+        plane = surface.Plane()
+        axis, sign = plane.Axis().Direction(), 1 if forward == plane.Position().Direct() else -1
+        return {
+            "kind": "plane",
+            "point": _point(plane.Location()),
+            "axis": [axis.X(), axis.Y(), axis.Z()],
+            "normal": [sign * axis.X(), sign * axis.Y(), sign * axis.Z()],
+        }
+    return {"kind": "other"}
+
+
+def _point(point: gp_Pnt) -> list[float]:
+    return [point.X(), point.Y(), point.Z()]
+
+
+def _box(shape: TopoDS_Shape) -> list[list[float]]:
+    """Least and greatest x, y, z: by the distance to far walls, on all six sides.
+
+    The kernel's own boxes are those of whole surfaces, so that a patch of a spheroid fills too
+    much.
+    """
+    greatest = [_reach(shape, *axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    least = [-_reach(shape, *axis) for axis in ((-1, 0, 0), (0, -1, 0), (0, 0, -1))]
+    return [least, greatest]
+
+
+def _reach(shape: TopoDS_Shape, x: int, y: int, z: int) -> float:
+    """How far the shape reaches along an axis, mm."""
+    wall = gp_Pln(gp_Pnt(x * FAR_MM, y * FAR_MM, z * FAR_MM), gp_Dir(x, y, z))
+    face = BRepBuilderAPI_MakeFace(wall, -FAR_MM, FAR_MM, -FAR_MM, FAR_MM).Face()
+    distance = BRepExtrema_DistShapeShape(shape, face)
+    return FAR_MM - distance.Value() if distance.IsDone() else float("nan")

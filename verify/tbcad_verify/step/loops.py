@@ -1,0 +1,105 @@
+"""Arcs that follow one another: loops, and which of them bound the cell that faces the light.
+
+A ball that is much larger than its neighbours may come out behind them too, far from its apex.
+That is the back of the union, a piece of its own, and not the mirror.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tbcad_verify.step.rims import Arcs, arc_length, roots
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+CLOSED = 1e-8  # of the spread: how far apart one corner may be in two arcs
+RAY = np.array([0.8137159, 0.5812531])  # no direction that a symmetric design prefers
+
+
+@dataclass(frozen=True)
+class Loops:
+    """How N arcs, in ascending order of mirror, hang together.
+
+    Attributes:
+        label: (N,) number of the arc's loop.
+        loose: (N,) the arc ends where no other of its cell begins.
+    """
+
+    label: Ints
+    loose: Bools
+
+
+def loops(arcs: Arcs, spread: float) -> Loops:
+    """Follow arcs, in ascending order of mirror, from end to start."""
+    start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
+    index, other = _partners(arcs.mirror, arcs.mirror)
+    away = np.abs(start[:, other] - end[:, index]).max(axis=0)
+    order = np.lexsort((away, index))
+    best = order[np.unique(index[order], return_index=True)[1]]
+    count = len(arcs.mirror)
+    graph = coo_array((np.ones(count, dtype=np.int8), (index[best], other[best])), (count, count))
+    label = connected_components(graph, directed=False)[1].astype(np.intp)
+    return Loops(label, ~(away[best] <= CLOSED * spread))
+
+
+def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
+    """All pairs (P,), (P,) of an item and one of the same mirror among others, which are sorted."""
+    first, last = (np.searchsorted(among, mirror, side) for side in ("left", "right"))
+    count = last - first
+    index = np.repeat(np.arange(len(mirror)), count)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(count) - count - first, count)
+
+
+def facing(arcs: Arcs, spread: float) -> Arcs:
+    """Of each mirror only the piece nearest to its apex: its outer loop, and the holes in it."""
+    label = loops(arcs, spread).label
+    outer = np.bincount(label, _swept(arcs))[label] > 0
+    least = np.hypot(*arcs.point(np.clip(0, *arcs.s)))
+    order = np.lexsort((least, arcs.mirror))
+    order = order[outer[order]]
+    nearest = order[np.unique(arcs.mirror[order], return_index=True)[1]]
+    main = np.isin(label, label[nearest])
+    hole = np.flatnonzero(~outer)
+    y = arcs.take(hole).point(arcs.s[0, hole])
+    held = hole[inside(arcs.take(main), arcs.mirror[hole], y)]
+    return arcs.take(main | np.isin(label, label[held]))
+
+
+def _swept(arcs: Arcs) -> Floats:
+    """(N,) twice the area on the map between each arc and the apex, mm^2; < 0 clockwise."""
+    start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
+    turn = arcs.bend * arcs.length  # to the right
+    chord = start[0] * end[1] - start[1] * end[0]
+    return np.asarray(chord - arcs.length**2 * turn * _bulge(turn))
+
+
+def _bulge(turn: Floats) -> Floats:
+    """(turn - sin turn) / turn^3."""
+    small = np.abs(turn) < 1e-2
+    safe = np.where(small, 1.0, turn)
+    return np.where(small, 1 / 6 - turn**2 / 120, (safe - np.sin(safe)) / safe**3)
+
+
+def inside(arcs: Arcs, mirror: Ints, y: Floats) -> Bools:
+    """Whether points y (2, P) of the maps of `mirror` (P,) lie within that mirror's loops.
+
+    A ray from such a point crosses the loops an odd number of times.
+    """
+    index, other = _partners(mirror, arcs.mirror)
+    some, from_ = arcs.take(other), y[:, index]
+    across = np.array([[-RAY[1]], [RAY[0]]])
+    form = some.form(np.zeros(len(other)), across + 0 * from_, -(across * from_).sum(axis=0))
+    crossings = np.zeros(len(mirror), dtype=np.intp)
+    for t in roots(form):
+        hit = (t > some.t[0]) & (t < some.t[1]) & np.isfinite(t)
+        there = some.point(arc_length(some.bend, np.where(hit, t, 0.0)))
+        ahead = hit & ((RAY[:, None] * (there - from_)).sum(axis=0) > 0)
+        crossings += np.bincount(index[ahead], minlength=len(mirror))
+    return np.asarray(crossings % 2 == 1)

@@ -1,0 +1,160 @@
+"""A STEP file of an export, read twice in a process of its own, and both readings joined."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.bulk import Bulk
+from tbcad_verify.checks import Unknown
+from tbcad_verify.child import Limits, run
+from tbcad_verify.errors import BadExport
+from tbcad_verify.files import AGAIN, Blob, read
+
+MAX_STEP_BYTES = 10**9
+START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
+WAYS = ("sphere", "plane")
+
+Floats = NDArray[np.float64]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The F faces of a STEP file: surfaces from the text, measures from the kernel.
+
+    Attributes:
+        names: as the text has them.
+        kind: (F,) "sphere", "plane" or "other".
+        point: (F, 3) centre of a sphere, a point of a plane, mm.
+        radius: (F,) of spheres, mm.
+        normal: (F, 3) of planes, out of the solid.
+        outward: (F,) true where a sphere is convex seen from outside the solid, and a plane faces
+            the way the kernel says, in the text too: kernels mend a face that is turned about,
+            other readers may not.
+        area: (F,) mm^2.
+        middle: (F, 3) of the area, mm.
+
+    What there is not is NaN: so are measures where the kernel has no face on the text's surface.
+    """
+
+    names: tuple[str, ...]
+    kind: NDArray[np.str_]
+    point: Floats
+    radius: Floats
+    normal: Floats
+    outward: NDArray[np.bool_]
+    area: Floats
+    middle: Floats
+
+
+@dataclass(frozen=True)
+class StepFile:
+    """One STEP file.
+
+    Attributes:
+        solids: names of the solids in the text.
+        counts: the kernel's solids, shells and open edges.
+        valid: the kernel's check of the shape.
+        gap: how far the kernel had to widen corners and edges until they met, mm.
+        bulk: of the whole, by the kernel.
+        properties: volume, area and centroid as the file claims them; what it does not is missing.
+        faces: all of them.
+    """
+
+    solids: tuple[str, ...]
+    counts: dict[str, int]
+    valid: bool
+    gap: float
+    bulk: Bulk
+    properties: dict[str, Any]
+    faces: Faces
+
+
+def load(folder: Path, name: str) -> Blob:
+    """The bytes of a STEP file.
+
+    Raises:
+        BadExport: as `files.read`; it does not begin or does not end as ISO 10303-21 demands.
+    """
+    blob = read(folder, name, MAX_STEP_BYTES, _refuse_foreign)
+    if not blob.data[-len(END) - 64 :].tobytes().rstrip().endswith(END):
+        raise BadExport(f"{name}: does not end with {END.decode()}: truncated; {AGAIN}")
+    return blob
+
+
+def examine(blob: Blob, seconds: float) -> StepFile:
+    """Read the bytes as text and by the kernel, from a private copy.
+
+    Raises:
+        Unknown: a reading failed, crashed or took too long.
+    """
+    with tempfile.TemporaryDirectory(prefix="tbcad-step-") as place:
+        copy, answer = Path(place) / "part.step", Path(place) / "answer.json"
+        blob.data.tofile(copy)
+        # -P: what lies in the current folder must not be imported.
+        command = [sys.executable, "-P", "-m", "tbcad_verify.step", str(copy), str(answer)]
+        outcome = run(command, Path(place), Limits(seconds))
+        if outcome.code != 0:
+            raise Unknown(outcome.reason or outcome.text.strip().rpartition("\n")[2])
+        value = json.loads(answer.read_text(encoding="utf-8"))
+    return parse(value["text"], value["solid"])
+
+
+def parse(text: Row, solid: Row) -> StepFile:
+    """Join what the text says with what the kernel measured."""
+    rows = solid["faces"]
+    area = sum(row["area"] for row in rows)
+    return StepFile(
+        tuple(text["solids"]),
+        {key: solid[key] for key in ("solids", "shells", "open_edges")},
+        solid["valid"],
+        solid["gap"],
+        Bulk(solid["volume"], area, solid["centroid"], *solid["box"]),
+        text["properties"],
+        _faces(text["faces"], {_key(row): row for row in rows}),
+    )
+
+
+def _key(row: Row) -> tuple[Any, ...]:
+    """A surface as both readers give it, to what the text's digits are worth."""
+    numbers = [*row.get("point", ()), *row.get("axis", ()), row.get("radius", 0.0)]
+    return row["kind"], *(round(number, 9) + 0.0 for number in numbers)
+
+
+def _faces(rows: list[Row], measured: dict[tuple[Any, ...], Row]) -> Faces:
+    joined = [measured.get(_key(row), {}) if row["kind"] in WAYS else {} for row in rows]
+    return Faces(
+        tuple(row["name"] for row in rows),
+        np.array([row["kind"] for row in rows], dtype=str),
+        _vectors(rows, "point"),
+        np.array([row.get("radius", np.nan) for row in rows]),
+        _vectors(joined, "normal"),
+        np.array([_outward(row, text) for row, text in zip(joined, rows, strict=True)]),
+        np.array([row.get("area", np.nan) for row in joined]),
+        _vectors(joined, "centroid"),
+    )
+
+
+def _outward(row: Row, text: Row) -> bool:
+    if row.get("kind") != "plane":
+        return bool(row.get("outward") and text["forward"])
+    along = sum(a * b for a, b in zip(text["axis"], row["normal"], strict=True)) > 0
+    return bool(along == text["forward"])
+
+
+def _vectors(rows: list[Row], key: str) -> Floats:
+    return np.array([row.get(key, [np.nan] * 3) for row in rows], dtype=np.float64).reshape(-1, 3)
+
+
+def _refuse_foreign(name: str, size: int, head: bytes) -> None:
+    del size
+    if not head.lstrip().startswith(START):
+        raise BadExport(f"{name}: does not begin with {START.decode()}: no STEP file; {AGAIN}")

@@ -1,0 +1,212 @@
+"""What is left free on a map: the arcs that bound it.
+
+On each circle every other circle forbids an interval, in closed form. What no interval forbids are
+the arcs; their ends are the corners. Nothing is assumed about how many loops a cell has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.step.charts import Rings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+SAME_CIRCLE = 1e-11
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """N arcs on maps, what is free to their left.
+
+    A circle is followed from its point nearest the apex; an arc that passes the farthest one is
+    two arcs.
+
+    Attributes:
+        mirror: (N,) number of the map.
+        ring: (N,) column of the circle.
+        near: (2, N) mm, the circle's nearest point.
+        inward: (2, N) unit, toward what is free, there.
+        bend: (N,) 1/mm, the circle's signed curvature; 0 for lines.
+        t: (2, N) both ends, mm: twice the tangent of half the angle from `near`, over the bend.
+        s: (2, N) both ends, mm of arc length from `near`.
+    """
+
+    mirror: Ints
+    ring: Ints
+    near: Floats
+    inward: Floats
+    bend: Floats
+    t: Floats
+    s: Floats
+
+    def take(self, index: NDArray[np.generic]) -> Arcs:
+        """The arcs with these numbers, or for which a mask holds."""
+        return Arcs(
+            self.mirror[index],
+            self.ring[index],
+            self.near[:, index],
+            self.inward[:, index],
+            self.bend[index],
+            self.t[:, index],
+            self.s[:, index],
+        )
+
+    @property
+    def length(self) -> Floats:
+        """(N,) mm on the map."""
+        return np.asarray(self.s[1] - self.s[0])
+
+    def point(self, s: Floats) -> Floats:
+        """(2, N) points of the map at arc lengths s (N,), mm."""
+        ahead, aside = _turn(self.bend, s)
+        return np.asarray(self.near + ahead * self.forward - aside * self.inward)
+
+    def direction(self, s: Floats) -> Floats:
+        """(2, N) unit tangents at arc lengths s (N,)."""
+        angle = self.bend * s
+        return np.asarray(np.cos(angle) * self.forward - np.sin(angle) * self.inward)
+
+    def form(self, alpha: Floats, beta: Floats, gamma: Floats) -> Floats:
+        """(3, N) forms (N,), (2, N), (N,), one an arc, as c0 + c1 t + c2 t^2 along it."""
+        return along(self.near, self.inward, self.bend, (alpha, beta, gamma))
+
+    @property
+    def forward(self) -> Floats:
+        """(2, N) unit tangents at the nearest points."""
+        return np.stack([self.inward[1], -self.inward[0]])
+
+
+def _turn(bend: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """Sin(bend s) / bend and (1 - cos(bend s)) / bend, also for bend = 0."""
+    half = np.sinc(bend * s / (2 * np.pi))
+    return s * np.sinc(bend * s / np.pi), bend * s**2 / 2 * half**2
+
+
+def arc_length(bend: Floats, t: Floats) -> Floats:
+    """Arc length for the rational parameter t, which may be infinite."""
+    safe = np.where(bend == 0, 1.0, bend)
+    return np.where(bend == 0, t, 2 / safe * np.arctan(safe * t / 2))
+
+
+def joined(parts: list[Arcs]) -> Arcs:
+    """All arcs of several maps in one list, which may be empty."""
+    none, no = np.zeros((2, 0)), np.zeros(0, dtype=np.intp)
+    every = [Arcs(no, no, none, none, none[0], none, none), *parts]
+    return Arcs(
+        np.concatenate([a.mirror for a in every]),
+        np.concatenate([a.ring for a in every]),
+        np.concatenate([a.near for a in every], axis=1),
+        np.concatenate([a.inward for a in every], axis=1),
+        np.concatenate([a.bend for a in every]),
+        np.concatenate([a.t for a in every], axis=1),
+        np.concatenate([a.s for a in every], axis=1),
+    )
+
+
+def arcs(rings: Rings, spread: float) -> Arcs:
+    """The arcs that no ring forbids, of all maps."""
+    near = _near(rings)
+    inward = rings.beta + 2 * rings.alpha * near
+    low, high = _forbidden(rings, near, inward, spread)
+    start, end = _gaps(low, high)
+    cut = rings.real & ~np.any(rings.covers, axis=1, keepdims=True)
+    free = (end > start) & cut[..., None]
+    mirror, ring, gap = np.nonzero(free)
+    bend = 2 * rings.alpha[mirror, ring]
+    t = np.stack([start[mirror, ring, gap], end[mirror, ring, gap]])
+    pick = (slice(None), mirror, ring)
+    return Arcs(mirror, ring, near[pick], inward[pick], bend, t, arc_length(bend, t))
+
+
+def _near(rings: Rings) -> Floats:
+    """(2, M, K) the point of each circle that is nearest the apex; any where all are as near."""
+    size = np.hypot(*rings.beta)
+    tiny = size < np.finfo(np.float64).eps
+    toward = np.where(tiny, np.array([1.0, 0.0])[:, None, None], rings.beta)
+    return np.asarray(-2 * rings.gamma / (size + 1) * toward / np.where(tiny, 1.0, size))
+
+
+def along(
+    near: Floats, inward: Floats, bend: Floats, form: tuple[Floats, Floats, Floats]
+) -> Floats:
+    """(3, ...) alpha |y|^2 + beta . y + gamma along circles, as c0 + c1 t + c2 t^2.
+
+    The parameter is that of `Arcs`; a factor 1 + bend^2 t^2 / 4 > 0 is left out.
+    """
+    alpha, beta, gamma = form
+    slope = beta + 2 * alpha * near
+    c0 = alpha * _dot(near, near) + _dot(beta, near) + gamma
+    c1 = slope[0] * inward[1] - slope[1] * inward[0]
+    c2 = c0 * bend**2 / 4 - bend / 2 * _dot(slope, inward) + alpha
+    return np.stack([c0, c1, c2 + 0.0])  # + 0.0: no negative zero, whose inverse is -inf
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[0] * b[0] + a[1] * b[1])
+
+
+def _forbidden(rings: Rings, near: Floats, inward: Floats, spread: float) -> tuple[Floats, Floats]:
+    """(M, K, 2 K) intervals of t on each circle that the others forbid; none: (inf, inf)."""
+    form = (rings.alpha[:, None], rings.beta[:, :, None], rings.gamma[:, None])
+    c = along(near[..., None], inward[..., None], 2 * rings.alpha[..., None], form)
+    first, last = roots(c)
+    whole, free = _uncrossed(rings, inward, c, spread)
+    outer = (c[2] < 0) & ~whole & ~free
+    low = np.where(free, np.inf, np.where(whole | outer, -np.inf, first))
+    high = np.where(free | whole, np.inf, np.where(outer, first, last))
+    second = np.where(outer, last, np.inf)
+    return (
+        np.concatenate([low, second], axis=2),
+        np.concatenate([high, np.full_like(high, np.inf)], axis=2),
+    )
+
+
+def _uncrossed(
+    rings: Rings, inward: Floats, c: Floats, spread: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(M, K, K) circles that lie wholly where another forbids, and wholly where it does not.
+
+    Of a circle drawn twice the first keeps the arcs, and none does if only the circle is left.
+    """
+    index = np.arange(rings.alpha.shape[1])
+    absent = ~rings.real[:, None] | (index[:, None] == index)
+    size = np.abs(c) * np.array([1 / spread, 1, spread])[:, None, None, None]
+    same = size.max(axis=0) < SAME_CIRCLE
+    keeps = (_dot(inward[..., None], inward[:, :, None]) > 0) & (index[:, None] < index)
+    none = ~(c[1] ** 2 - 4 * c[0] * c[2] > 0) & ~same
+    below = c[0] / spread + c[2] * spread < 0
+    free = absent | (same & keeps) | (none & ~below)
+    return ~free & (same | none), free
+
+
+def roots(c: Floats) -> tuple[Floats, Floats]:
+    """Both roots of c0 + c1 t + c2 t^2 (3, ...), the lesser first, infinite ones too; or NaN."""
+    square = c[1] ** 2 - 4 * c[0] * c[2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        half = -(c[1] + np.copysign(np.sqrt(square), c[1])) / 2
+        one, other = half / c[2], c[0] / half
+    none = ~(square > 0)
+    return (
+        np.where(none, np.nan, np.minimum(one, other)),
+        np.where(none, np.nan, np.maximum(one, other)),
+    )
+
+
+def _gaps(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """(M, K, L + 1) what intervals (M, K, L) leave of the line: begins and ends of each gap."""
+    order = np.argsort(low, axis=2, kind="stable")
+    low = np.take_along_axis(low, order, axis=2)
+    high = np.maximum.accumulate(
+        np.where(low == np.inf, -np.inf, np.take_along_axis(high, order, axis=2)), axis=2
+    )
+    edge = np.full((*low.shape[:2], 1), np.inf)
+    start = np.concatenate([-edge, high], axis=2)
+    end = np.concatenate([low, edge], axis=2)
+    # Absent intervals (inf, inf) all end the last gap; only the first of them may.
+    end[..., 1:] = np.where(end[..., :-1] == np.inf, -np.inf, end[..., 1:])
+    return start, end

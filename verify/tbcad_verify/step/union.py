@@ -1,0 +1,218 @@
+"""The union of balls in closed form: what every mirror's cell must be, from the record alone.
+
+A cell is the part of a mirror's surface that no other ball, or half-space behind a planar mirror,
+of the same camera covers, on the side that faces the light, cut by the seam x = 0 and the foot
+plane. Nothing of a STEP file, a mesh or a CAD kernel is looked at, nor any neighbourhood that
+somebody else found: the result is an oracle for them.
+
+By Gauss' theorem the columns `volume` and `moment`, summed over all faces of a closed solid, are
+its volume and its volume times its centroid; `vector_area` sums to zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.record import Export
+from tbcad_verify.step.boxes import boxes
+from tbcad_verify.step.cells import Rims, rims
+from tbcad_verify.step.charts import lift
+from tbcad_verify.step.loops import facing, loops
+from tbcad_verify.step.moments import Moments, moments, whole_sphere
+from tbcad_verify.step.rims import Arcs
+from tbcad_verify.surfaces import Surfaces
+from tbcad_verify.vectors import dot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+TOUCHING = 1e-11  # of the spread: corners that are one corner
+
+
+@dataclass(frozen=True)
+class Edges:
+    """E arcs or straight lines between corners, each as seen by one of the two cells it bounds.
+
+    An arc that passes the point of its circle farthest from the mirror's apex is cut there in two.
+
+    Attributes:
+        mirror: (E,) number of the cell; it lies to the left, seen from the light.
+        other: (E,) number of the mirror that ends it; M + w for wall w, M + W for the horizon.
+        points: (E, 3, 3) mm: start, some point between, end.
+    """
+
+    mirror: Ints
+    other: Ints
+    points: Floats
+
+
+@dataclass(frozen=True)
+class Cells:
+    """One cell a mirror, M of them, in the order given.
+
+    Attributes:
+        area: (M,) mm^2.
+        vector_area: (M, 3) mm^2, the integral of the unit normal n out of the solid.
+        first: (M, 3) mm^3, the integral of x.
+        volume: (M,) mm^3, the integral of x.n / 3.
+        moment: (M, 3) mm^4, the integral of x (x.n) / 4.
+        box: (M, 2, 3) mm, least and greatest x, y, z; NaN for empty cells.
+        corners: (M,) how many; where four cells meet within rounding, one corner.
+        edges: (M,) how many; a full circle is an edge without corners.
+        empty: (M,) nothing is left of the mirror.
+        closed: (M,) every arc goes on where another one ends, and the cell ends before the
+            horizon (for planes: before infinity). False where the figures mean nothing.
+        rim: the edges.
+    """
+
+    area: Floats
+    vector_area: Floats
+    first: Floats
+    volume: Floats
+    moment: Floats
+    box: Floats
+    corners: Ints
+    edges: Ints
+    empty: Bools
+    closed: Bools
+    rim: Edges
+
+    def __len__(self) -> int:
+        """How many mirrors."""
+        return len(self.area)
+
+
+def cells(
+    point: Floats, normal: Floats, curvature: Floats, walls: Floats, *, front: bool = True
+) -> Cells:
+    """Cells of balls and half-spaces, each without what the others cover.
+
+    Args:
+        point: (M, 3) mm, on the surfaces.
+        normal: (M, 3) unit, there, out of the solid.
+        curvature: (M,) 1/mm, 1 / radius; 0 for planes, whose solid is a half-space.
+        walls: (W, 4) planes: kept is what lies at x . (first three) >= fourth, mm.
+        front: of each ball only the piece nearest to the point given, no farther than 90 degrees
+            from it; else all of it.
+
+    Returns:
+        Their integrals, boxes and edges. Empty and open cells are marked, never refused.
+
+    Source: Archimedes' projection and Stokes' theorem, see `moments`.
+    """
+    wall = np.asarray(walls, dtype=np.float64).reshape(-1, 4)
+    length = np.sqrt((wall[:, :3] ** 2).sum(axis=1))
+    across = (wall[:, :3].T / length).copy()
+    planes = Surfaces(across * (wall[:, 3] / length), across, np.zeros(len(wall)))
+    mirrors = Surfaces(point.T.copy(), normal.T.copy(), curvature.astype(np.float64))
+    found = rims(mirrors, planes, front)
+    arcs = facing(_merged(found), found.spread) if front else _merged(found)
+    return _measured(replace(found, arcs=arcs), len(point) + len(wall))
+
+
+def of_balls(centre: Floats, radius: Floats, walls: Floats) -> Cells:
+    """All that is free of balls (M, 3) mm, (M,) mm, front and back, on the right side of walls."""
+    up = np.zeros_like(centre) + np.array([0.0, 0.0, 1.0])
+    return cells(centre + radius[:, None] * up, up, 1 / radius, walls, front=False)
+
+
+def of_export(export: Export, camera: str, *, coated: bool = False) -> Cells:
+    """The cells of one camera's rows of mirrors.csv, in their order, as the solid has them.
+
+    The recorded radius is that of the reflecting surface; the solid ends one coat below it, unless
+    `coated`. A row without a radius is a plane. The camera keeps the side of x = 0 that its
+    pinhole is on, and all above the foot plane. The recorded `cell_area_mm2` is the coated one.
+    """
+    rows = export.rows
+    mine = np.flatnonzero(rows.camera == camera)
+    radius = rows.columns("radius_mm")[0]
+    curvature = np.where(rows.flat, 0.0, 1 / np.where(rows.flat, 1.0, radius))
+    recorded = Surfaces(rows.columns("px", 3), rows.columns("nx", 3), curvature)
+    solid = recorded.take(mine).coated(0.0 if coated else -export.coating_mm)
+    side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
+    walls = np.array([[side, 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
+    return cells(solid.point.T, solid.normal.T, solid.curvature, walls)
+
+
+def _merged(found: Rims) -> Arcs:
+    """Without the arcs that are nothing but rounding at corners of four cells and more."""
+    return found.arcs.take(found.arcs.length > TOUCHING * found.spread)
+
+
+def _measured(found: Rims, horizon: int) -> Cells:
+    """All figures of the cells; `horizon` is the number that stands for it."""
+    count, arcs = len(found.whole), found.arcs
+    empty = ~found.whole & (_count(arcs.mirror, count) == 0)
+    area, vector_area, first, volume, moment = _integrals(found)
+    passed, circles = _passes(arcs)
+    corners = _count(arcs.mirror, count) - _count(passed, count)
+    wrong = loops(arcs, found.spread).loose | (arcs.ring == horizon)
+    return Cells(
+        area=area,
+        vector_area=vector_area.T,
+        first=first.T,
+        volume=volume,
+        moment=moment.T,
+        box=np.where(empty[:, None, None], np.nan, _box(found)),
+        corners=corners,
+        edges=corners + _count(circles, count),
+        empty=empty,
+        closed=_count(arcs.mirror[wrong], count) == 0,
+        rim=_edges(found),
+    )
+
+
+def _count(mirror: Ints, count: int) -> Ints:
+    return np.bincount(mirror, minlength=count)
+
+
+def _edges(found: Rims) -> Edges:
+    arcs, maps = found.arcs, found.charts.take(found.arcs.mirror)
+    along = (arcs.s[0], arcs.s.mean(axis=0), arcs.s[1])
+    points = np.stack([lift(maps, arcs.point(s)).T for s in along], axis=1)
+    return Edges(arcs.mirror, arcs.ring, points)
+
+
+def _integrals(found: Rims) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Area (M,), vector area and first moment (3, M), volume (M,), moment (3, M)."""
+    mine, local = found.charts.surfaces, _moments(found)
+    p, n, k, area = mine.point, mine.normal, mine.curvature, local.area
+    axes = np.stack([found.charts.right, found.charts.up, n])
+    first = np.einsum("aim,am->im", axes, local.first)
+    # On the surface x.n = p.n0 + d.e: linear in d = x - p, for n = n0 + k d and d.(2 n0 + k d) = 0.
+    height, e = dot(p, n), k * p - n
+    volume = height * area + dot(e, first)
+    bent = np.einsum("aim,abm,bjm,jm->im", axes, local.second, axes, e, optimize=False)
+    moment = p * volume + height * first + bent
+    return area, n * area + k * first, p * area + first, volume / 3, moment / 4
+
+
+def _moments(found: Rims) -> Moments:
+    """Integrals over the cells about their apices; of whole spheres too, which have no arcs."""
+    some, k = moments(found.charts, found.arcs), found.charts.surfaces.curvature
+    full = whole_sphere(np.where(found.whole, k, 1.0))
+    pairs = ((full.area, some.area), (full.first, some.first), (full.second, some.second))
+    return Moments(*(np.where(found.whole, a, b) for a, b in pairs))
+
+
+def _box(found: Rims) -> Floats:
+    mine = found.charts.surfaces
+    radius = 1 / np.where(found.whole, mine.curvature, 1.0)
+    centre = (mine.point - radius * mine.normal).T
+    whole = np.stack([centre - radius[:, None], centre + radius[:, None]], axis=1)
+    return np.where(found.whole[:, None, None], whole, boxes(found.charts, found.arcs))
+
+
+def _passes(arcs: Arcs) -> tuple[Ints, Ints]:
+    """Mirrors' numbers, one a circle of which both sides of the farthest point are arcs' ends.
+
+    Such an end is no corner. And one a full circle.
+    """
+    begin, end = arcs.t[0] == -np.inf, arcs.t[1] == np.inf
+    circle = arcs.mirror * (arcs.ring.max(initial=0) + 1) + arcs.ring
+    start = np.flatnonzero(begin)
+    return arcs.mirror[start[np.isin(circle[start], circle[end])]], arcs.mirror[begin & end]
