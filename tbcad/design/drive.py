@@ -35,11 +35,12 @@ SIZES: dict[str, tuple[str, ...]] = {
     "magnets": ("diameter_mm", "height_mm"),
     "leds": ("diameter_mm", "flange_mm", "height_mm"),
     "electronics": (),
+    "extrusions": ("side_mm", "slot_mm", "length_mm"),
+    "tnuts": ("thread_mm", "slot_mm"),
+    "collars": ("bore_mm", "outer_mm", "width_mm"),
+    "plates": ("length_mm", "width_mm", "thickness_mm"),
 }
-DRIVE_COLUMNS = (
-    *("drive", "motor", "pinion", "wheel", "belt", "coupling"),
-    *("efficiency", "source"),
-)
+DRIVE_COLUMNS = ("drive", "motor", "pinion", "wheel", "belt", "coupling", "efficiency", "source")
 NEEDED = {  # which of motor, pinion, wheel, belt and coupling a drive may have, by kind
     "motor": ("motors", "stages"),
     "pinion": ("wheels",),
