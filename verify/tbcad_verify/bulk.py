@@ -23,6 +23,8 @@ class Bulk:
         centroid: x, y, z of the volume's middle, mm.
         low: least x, y, z, mm.
         high: greatest x, y, z, mm.
+        bend: how fast the area of the surface at a distance grows with it at most, mm^2 / mm:
+            by Steiner, the sum over edges of length times angle. None where nobody asked.
     """
 
     volume: float
@@ -30,6 +32,7 @@ class Bulk:
     centroid: list[float]
     low: list[float]
     high: list[float]
+    bend: float | None = None
 
 
 def bulk(mesh: Mesh) -> Bulk:

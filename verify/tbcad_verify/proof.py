@@ -13,7 +13,9 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.files import listing, open_folder, stamps
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import Wanted, client_checks
-from tbcad_verify.prove import STAGES, prove
+from tbcad_verify.prototype import steps
+from tbcad_verify.prototype.made import Printed
+from tbcad_verify.prove import prove, stages
 from tbcad_verify.record import TEXTS, Export, Part, read_export
 from tbcad_verify.report import Report, findings
 from tbcad_verify.results import Results
@@ -64,12 +66,15 @@ def verify(
     export = read_export(root)
     results = Results(progress)
     if wishes.apart:
-        watched(worker(export.folder, wishes.printers), STAGES, results, wishes.seconds)
+        watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
     else:
         prove(export.folder, results, wishes.printers)
     if any(part.step for part in export.parts):
         results.stage("STEP")
         results.checks(step_checks(export, results.bulks, wishes.seconds))
+    if export.prototype and any(part.step for part in export.prototype.parts):
+        results.stage("STEP of the prototype")
+        results.checks(steps.step_checks(export, results.bulks, wishes.seconds))
     programs = _programs(export, results, wishes.seconds) if wishes.clients else []
     _refuse_changes(export, before)
     report = Report(
@@ -78,6 +83,8 @@ def verify(
         findings(export.mirrors, results.columns),
         tuple(programs),
         tuple(results.printing),
+        shell=bool(export.parts),
+        prototype=results.machine,
     )
     if wishes.write:
         _write(report, export.folder)
@@ -97,6 +104,8 @@ def _refuse_changes(export: Export, before: Stamps) -> None:
 
 def _programs(export: Export, results: Results, seconds: float) -> list[Check]:
     wanted = [_wanted(export, part, results.bulks.get(part.name)) for part in export.parts]
+    for part in export.prototype.parts if export.prototype else ():
+        wanted.append(_printed(export, part, results.bulks.get(part.name)))
     return client_checks(export.folder, wanted, seconds, results.stage)
 
 
@@ -108,6 +117,18 @@ def _wanted(export: Export, part: Part, bulk: Bulk | None) -> Wanted:
         part.name,
         {"step": part.step, "stl": part.stl, "3mf": part.threemf},
         int((mirrors & ~export.rows.flat).sum()),
+        volume,
+        max(area * export.mesh_error_mm, SUMMED * abs(volume)),
+    )
+
+
+def _printed(export: Export, part: Printed, bulk: Bulk | None) -> Wanted:
+    """The same of a prototype's part, whose spherical faces nobody counts."""
+    volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
+    return Wanted(
+        part.name,
+        {"step": part.step, "stl": part.stl, "3mf": part.threemf},
+        None,
         volume,
         max(area * export.mesh_error_mm, SUMMED * abs(volume)),
     )

@@ -21,6 +21,9 @@ from tbcad_verify.printing.assess import assess, print_name, to_row
 from tbcad_verify.printing.assess import checks as printing_checks
 from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.printing.shape import measure
+from tbcad_verify.prototype import prove as machine
+from tbcad_verify.prototype.bodies import Body
+from tbcad_verify.prototype.made import Printed
 from tbcad_verify.rays import in_threads
 from tbcad_verify.record import Export, Part, read_export
 from tbcad_verify.recover import Recovery, recover
@@ -57,6 +60,11 @@ class Solid:
     reason: str
 
 
+def stages(export: Export) -> tuple[str, ...]:
+    """Titles of the stages of an export's proof, in order."""
+    return (*STAGES, *(machine.STAGES if export.prototype else ()))
+
+
 def prove(folder: Path, taker: Taker, printers: Sequence[str] = ()) -> None:
     """Make all stages, and hand over what each finds.
 
@@ -71,9 +79,13 @@ def prove(folder: Path, taker: Taker, printers: Sequence[str] = ()) -> None:
     profiles = [load(name) for name in printers or built_in()]
     taker.stage("reading")
     export = read_export(folder)
-    facets, digests = _read_parts(export)
+    printed = export.prototype.parts if export.prototype else ()
+    facets, digests = _read_parts(export, export.parts)
+    others, more = _read_parts(export, printed)
+    digests |= more
     taker.stage("3MF")
-    for part, one in zip(export.parts, facets, strict=True):
+    every: list[Part | Printed] = [*export.parts, *printed]
+    for part, one in zip(every, facets + others, strict=True):
         if part.threemf:
             digests[part.threemf] = _threemf(export, part, one, taker)
     taker.stage("files and record")
@@ -91,11 +103,17 @@ def prove(folder: Path, taker: Taker, printers: Sequence[str] = ()) -> None:
     taker.stage("printability")
     for part, solid in zip(export.parts, solids, strict=True):
         _printing(part, solid, profiles, bool(printers), taker)
-    _optics(export, solids, taker)
+    if export.parts:
+        _optics(export, solids, taker)
+    if export.prototype:
+        bodies = machine.prove(export, export.prototype, others, taker)
+        taker.stage(machine.PRINTING)
+        for body in bodies:
+            _printing(body.part, body, profiles, bool(printers), taker)
 
 
 def _printing(
-    part: Part, solid: Solid, profiles: list[Profile], wanted: bool, taker: Taker
+    part: Part | Printed, solid: Solid | Body, profiles: list[Profile], wanted: bool, taker: Taker
 ) -> None:
     def work() -> list[Check]:
         topology = _needed(solid.topology, solid.reason)
@@ -108,16 +126,18 @@ def _printing(
     taker.checks(guarded([print_name(part.stl, profile) for profile in profiles], work))
 
 
-def _read_parts(export: Export) -> tuple[list[Facets], dict[str, tuple[int, str]]]:
+def _read_parts(
+    export: Export, parts: Sequence[Part | Printed]
+) -> tuple[list[Facets], dict[str, tuple[int, str]]]:
     facets, digests = [], {}
-    for part in export.parts:
+    for part in parts:
         one, blob = read_facets(export.folder, part.stl)
         facets.append(one)
         digests[part.stl] = blob.digest
     return facets, digests
 
 
-def _threemf(export: Export, part: Part, facets: Facets, taker: Taker) -> tuple[int, str]:
+def _threemf(export: Export, part: Part | Printed, facets: Facets, taker: Taker) -> tuple[int, str]:
     corners, blob = read_3mf(export.folder, part.threemf)
     name = ("3MF", part.threemf, "mm")
     taker.checks(guarded([name], lambda: [same_check(name, corners, facets)]))

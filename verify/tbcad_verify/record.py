@@ -6,7 +6,6 @@ Only requirements and poses are taken from here. What the mirrors are is measure
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.fields import Record, number, objects, parse, typed, vector, word
+from tbcad_verify.fields import Record, number, objects, parse, plain_file, typed, vector, word
 from tbcad_verify.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
 from tbcad_verify.mirrors import Mirrors, from_csv, from_json
+from tbcad_verify.prototype.made import RECORD, Prototype
+from tbcad_verify.prototype.record import read_prototype
 
 SCHEMA = "tbcad-design/1"
 TEXTS = ("design.json", "mirrors.csv", "manifest.json")
@@ -87,6 +88,7 @@ class Export:
         rows: from mirrors.csv.
         manifest: file name -> (size, sha256), as it should be.
         digests: file name -> (size, sha256), of the bytes that all this was parsed from.
+        prototype: the machine with balls; None where only the shell was built.
     """
 
     folder: Path
@@ -100,12 +102,14 @@ class Export:
     rows: Mirrors
     manifest: Mapping[str, tuple[int, str]]
     digests: Mapping[str, tuple[int, str]]
+    prototype: Prototype | None = None
 
     @property
     def part_files(self) -> frozenset[str]:
-        """All files of all parts."""
+        """All files of all parts, and of their assembly."""
         files = ((part.stl, part.step, part.threemf) for part in self.parts)
-        return frozenset(name for names in files for name in names if name)
+        more = self.prototype.part_files if self.prototype else frozenset()
+        return frozenset(name for names in files for name in names if name) | more
 
     @property
     def mesh_error_mm(self) -> float:
@@ -118,7 +122,7 @@ class Export:
 
 
 def read_export(folder: Path) -> Export:
-    """Read design.json, mirrors.csv and manifest.json, strictly.
+    """Read design.json, mirrors.csv, manifest.json and what describes a prototype, strictly.
 
     Raises:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
@@ -128,18 +132,25 @@ def read_export(folder: Path) -> Export:
     design = parse(texts["design.json"])
     if design.get("schema") != SCHEMA:
         raise BadExport(f"design.json: schema must be {SCHEMA!r}, not {design.get('schema')!r:.60}")
+    cameras, manifest = _cameras(design), _manifest(parse(texts["manifest.json"]))
+    digests = {name: blob.digest for name, blob in texts.items()}
+    prototype = None
+    if RECORD in manifest or (root / RECORD).exists():
+        prototype = read_prototype(root, cameras)
+        digests |= prototype.digests
     return Export(
         folder=root,
         spec=typed(design, "spec", dict),
         target_mm=number(design, "target_mm", 1e-3, 1e6),
         coating_mm=number(design, "coating_mm", 0.0, 1e3),
         foot_z_mm=number(design, "foot_z_mm", -1e6, 1e6),
-        cameras=_cameras(design),
-        parts=_parts(design),
+        cameras=cameras,
+        parts=_parts(design, prototype),
         mirrors=from_json(objects(design, "mirrors")),
         rows=from_csv(texts["mirrors.csv"]),
-        manifest=_manifest(parse(texts["manifest.json"])),
-        digests={name: blob.digest for name, blob in texts.items()},
+        manifest=manifest,
+        digests=digests,
+        prototype=prototype,
     )
 
 
@@ -165,27 +176,25 @@ def _camera(item: Record) -> Camera:
     return Camera(word(item, "id"), vector(item, "pinhole_mm"), forward, right, width, height, hfov)
 
 
-def _parts(design: Record) -> tuple[Part, ...]:
+def _parts(design: Record, prototype: Prototype | None) -> tuple[Part, ...]:
     parts = tuple(
         Part(
             word(item, "name"),
             str(item.get("camera") or ""),
-            _file(item, "stl"),
-            _file(item, "step") if item.get("step") else "",
-            _file(item, "3mf") if item.get("3mf") else "",
+            plain_file(item, "stl"),
+            plain_file(item, "step") if item.get("step") else "",
+            plain_file(item, "3mf") if item.get("3mf") else "",
         )
         for item in objects(design, "parts")
     )
-    if not parts or len({part.stl for part in parts}) != len(parts):
+    others = prototype.parts if prototype else ()
+    meshes = [part.stl for part in parts] + [part.stl for part in others]
+    if not meshes or len(set(meshes)) != len(meshes):
         raise BadExport(f"design.json: parts must be there, each with an STL of its own; {AGAIN}")
+    twice = {part.name for part in parts} & {part.name for part in others}
+    if twice:
+        raise BadExport(f"{RECORD}: part {min(twice)!r} is in design.json too; {AGAIN}")
     return parts
-
-
-def _file(item: Record, kind: str) -> str:
-    name = str(typed(item, kind, str))
-    if not re.fullmatch(r"[^/\\:\0]{1,255}", name) or name in {".", ".."}:
-        raise BadExport(f"design.json: {kind} {name!r:.80} must be a plain file name; {AGAIN}")
-    return name
 
 
 def _manifest(value: Record) -> dict[str, tuple[int, str]]:

@@ -74,6 +74,8 @@ class Report:
         findings: mirror by mirror.
         programs: what other programs on this machine said; empty unless they were asked.
         printing: what making each part on each machine comes to.
+        shell: whether there is a shell; without, the mirrors are only wanted.
+        prototype: what is found of the machine with balls; None where there is none.
     """
 
     target_mm: float
@@ -81,6 +83,8 @@ class Report:
     findings: Findings
     programs: tuple[Check, ...] = ()
     printing: tuple[dict[str, Any], ...] = ()
+    shell: bool = True
+    prototype: Mapping[str, Any] | None = None
 
     @property
     def passed(self) -> bool:
@@ -104,6 +108,8 @@ class Report:
             "printing": list(self.printing),
             "mirrors": _mirror_rows(self.findings),
         }
+        if self.prototype is not None:
+            document["prototype"] = self.prototype
         if self.programs:
             document["programs"] = [_check_row(check) for check in self.programs]
         return json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -169,14 +175,33 @@ def _rounded(value: float | None) -> float | int | None:
 
 
 def _pass_line(report: Report) -> str:
-    found, left = report.findings, sum(map(is_skipped, report.programs))
+    left = sum(map(is_skipped, report.programs))
     skipped = f"; {left} questions to other programs skipped" if left else ""
+    said = [_shell_line(report)] if report.shell else ["no shell in this export"]
+    said += [_machine_line(report)] if report.prototype is not None else []
+    return f"PASS: {'; '.join(said)}{skipped}"
+
+
+def _shell_line(report: Report) -> str:
+    found = report.findings
     return (
-        f"PASS: {len(found.ids)} mirrors, {_cameras(found)} virtual cameras see "
+        f"{len(found.ids)} mirrors, {_cameras(found)} virtual cameras see "
         f"{report.target_mm:g} mm or more (facets {np.min(found.coverage_facet):.2f}, spheres "
         f"{np.min(found.coverage_fitted):.2f}); nothing blocked; centres within "
         f"{np.max(found.centre_error) * 1e3:.2f} and radii within "
-        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record{skipped}"
+        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record"
+    )
+
+
+def _machine_line(report: Report) -> str:
+    made = report.prototype or {}
+    balls, stops = made["balls"], made["stops"]
+    least = min(ball["coverage_mm"] for ball in balls)
+    worst = max(ball["centre_error_um"] for ball in balls)
+    return (
+        f"prototype: {len(balls)} balls at {len(stops)} stops show {report.target_mm:g} mm or "
+        f"more for every mirror ({least:.2f}); nothing blocked; pads hold the balls within "
+        f"{worst:.2f} micrometres of the record"
     )
 
 
@@ -188,6 +213,7 @@ def _fail_line(report: Report) -> str:
         for word, names in (("failed", wrong), ("unknown", unsure))
         if names
     ]
+    said = said if report.shell else ["no shell in this export", *said]
     return f"FAIL: {'; '.join([*_short_mirrors(report), *said])}"
 
 

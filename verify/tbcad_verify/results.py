@@ -43,6 +43,9 @@ class Taker(Protocol):
     def prints(self, rows: Sequence[Row]) -> None:
         """What making one part on several machines comes to."""
 
+    def prototype(self, found: Row) -> None:
+        """What is found of the prototype, ball by ball and stop by stop."""
+
 
 @dataclass
 class Results:
@@ -53,6 +56,7 @@ class Results:
     columns: dict[str, Floats] = field(default_factory=dict)
     bulks: dict[str, Bulk] = field(default_factory=dict)
     printing: list[Row] = field(default_factory=list)
+    machine: Row | None = None
     stages: list[str] = field(default_factory=list)
 
     def stage(self, title: str) -> None:
@@ -75,6 +79,10 @@ class Results:
     def prints(self, rows: Sequence[Row]) -> None:
         """Keep rows in their order."""
         self.printing.extend(rows)
+
+    def prototype(self, found: Row) -> None:
+        """Keep it."""
+        self.machine = found
 
 
 class Lines:
@@ -104,6 +112,10 @@ class Lines:
         """Send them."""
         self.send({"prints": list(rows)})
 
+    def prototype(self, found: Row) -> None:
+        """Send it."""
+        self.send({"prototype": found})
+
     def send(self, message: Mapping[str, Any]) -> None:
         """One line, at once."""
         self._stream.write(json.dumps(message) + "\n")
@@ -129,4 +141,6 @@ def replay(line: str, taker: Taker) -> bool:
         taker.bulk(message["part"], Bulk(**message["bulk"]))
     elif "prints" in message:
         taker.prints(message["prints"])
+    elif "prototype" in message:
+        taker.prototype(message["prototype"])
     return "done" in message

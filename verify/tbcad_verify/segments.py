@@ -98,9 +98,14 @@ def creases(edges: Edges) -> Bools:
     return np.asarray(concave | sharp | (edges.noise > BLIND_RAD))
 
 
-def folds(edges: Edges) -> int:
-    """How many edges fold the surface back onto itself; a solid one can make has none."""
-    turned = np.abs(edges.angle) - edges.noise > np.pi - FOLD_RAD
+def folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
+    """How many edges fold the surface back onto itself; a solid one can make has none.
+
+    Args:
+        edges: of a mesh.
+        nearest: facets closer than this to a full turn lie back to back, rad.
+    """
+    turned = np.abs(edges.angle) - edges.noise > np.pi - nearest
     return int(turned.sum())
 
 

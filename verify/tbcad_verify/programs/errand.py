@@ -23,14 +23,14 @@ class Wanted:
     Attributes:
         name: of the part.
         files: "step", "stl", "3mf" -> file name inside the export; what is missing is skipped.
-        spheres: number of spherical faces of the solid.
+        spheres: number of spherical faces of the solid; None: any number.
         volume: of the mesh, mm^3; NaN when it is unknown.
         volume_error: how far another file's volume may be from it, mm^3.
     """
 
     name: str
     files: Mapping[str, str]
-    spheres: int
+    spheres: int | None
     volume: float
     volume_error: float
 

@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.bulk import Bulk
-from tbcad_verify.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
+from tbcad_verify.checks import Check, Name, at_most, guarded, listed, offenders
 from tbcad_verify.files import Blob
 from tbcad_verify.rays import in_threads
 from tbcad_verify.record import Export, Part
+from tbcad_verify.step import lumps
+from tbcad_verify.step.lumps import Lump
 from tbcad_verify.step.reading import StepFile, examine, load
 from tbcad_verify.step.union import Cells, of_export
 
 Floats = NDArray[np.float64]
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
-GAP_MM = 1e-5  # a hundred times the kernel's own precision
 CELL_SHARE = 1e-6  # of a cell's area
 MIDDLE_MM = 1e-5
-CLAIM_SHARE = 1e-6  # of what the file claims
 AREAS = ("cell areas", "mirrors.csv", "of the area")
 UNITS = {
     "step solid": "faults",
@@ -50,22 +50,21 @@ class Subject:
     """One part's STEP file and all that it is held against.
 
     Attributes:
-        name: of the part.
-        file: as read.
+        lump: the file, and the mesh that it is held against.
         row: (m,) numbers of the part's mirrors in the record.
         face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
         cells: (m,) in closed form.
-        bulk: the mesh's; None where it could not be measured.
-        off: how far the mesh may be from the exact surface, mm.
     """
 
-    name: str
-    file: StepFile
+    lump: Lump
     row: NDArray[np.intp]
     face: NDArray[np.intp]
     cells: Cells
-    bulk: Bulk | None
-    off: float
+
+    @property
+    def file(self) -> StepFile:
+        """The file as read."""
+        return self.lump.file
 
 
 Job = Callable[[Name, Subject, Export], Check]
@@ -126,26 +125,8 @@ def _subject(export: Export, part: Part, file: StepFile, bulk: Bulk | None) -> S
     count = Counter(file.faces.names)
     place = {name: k for k, name in enumerate(file.faces.names)}
     face = np.array([place[name] if count[name] == 1 else -1 for name in ids], dtype=np.intp)
-    return Subject(
-        part.name, file, row, face, of_export(export, part.camera), bulk, export.mesh_error_mm
-    )
-
-
-def _solid(name: Name, subject: Subject, _: Export) -> Check:
-    counts, named = subject.file.counts, subject.file.solids
-    faults = abs(counts["solids"] - 1) + abs(counts["shells"] - 1) + counts["open_edges"]
-    said = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in counts.items())
-    odd = int(named != (subject.name,))
-    return at_most(name, faults + odd, 0, f"{said}; named {listed(named)}, not {subject.name}")
-
-
-def _valid(name: Name, subject: Subject, _: Export) -> Check:
-    return at_most(name, int(not subject.file.valid), 0, "the kernel's check refuses the shape")
-
-
-def _gaps(name: Name, subject: Subject, _: Export) -> Check:
-    """Corners lie on their edges and edges on their faces, before a reader widens them."""
-    return at_most(name, subject.file.gap, GAP_MM, "corners, edges and faces do not meet")
+    lump = Lump(part.name, file, bulk, export.mesh_error_mm)
+    return Subject(lump, row, face, of_export(export, part.camera))
 
 
 def _names(name: Name, subject: Subject, export: Export) -> Check:
@@ -219,67 +200,6 @@ def _front(name: Name, subject: Subject, export: Export) -> Check:
     )
 
 
-def _volume(name: Name, subject: Subject, _: Export) -> Check:
-    mesh, solid = _bulks(subject)
-    return at_most(
-        name,
-        abs(mesh.volume - solid.volume),
-        solid.area * subject.off,
-        f"STEP {solid.volume:.3f}, mesh {mesh.volume:.3f}",
-    )
-
-
-def _area(name: Name, subject: Subject, _: Export) -> Check:
-    """Facets off by h from a surface of radius r lose some 2 h / r of its area."""
-    mesh, solid = _bulks(subject)
-    radius = subject.file.faces.radius
-    least = np.nanmin(radius, initial=np.ptp([solid.low, solid.high], axis=0).max() / 2)
-    limit = solid.area * 2 * subject.off / float(least)
-    detail = f"STEP {solid.area:.3f}, mesh {mesh.area:.3f}"
-    return at_most(name, abs(mesh.area - solid.area), limit, detail)
-
-
-def _centroid(name: Name, subject: Subject, _: Export) -> Check:
-    """A layer of the mesh's error all on one side moves the middle by its share of the volume."""
-    mesh, solid = _bulks(subject)
-    wide = float(np.linalg.norm(np.subtract(solid.high, solid.low))) / 2
-    away = float(np.linalg.norm(np.subtract(mesh.centroid, solid.centroid)))
-    detail = f"STEP {_three(solid.centroid)}, mesh {_three(mesh.centroid)}"
-    return at_most(name, away, wide * solid.area * subject.off / solid.volume, detail)
-
-
-def _box(name: Name, subject: Subject, _: Export) -> Check:
-    mesh, solid = _bulks(subject)
-    away = np.abs(np.subtract([mesh.low, mesh.high], [solid.low, solid.high])).max()
-    detail = (
-        f"STEP {_three(solid.low)} to {_three(solid.high)}, "
-        f"mesh {_three(mesh.low)} to {_three(mesh.high)}"
-    )
-    return at_most(name, float(away), subject.off, detail)
-
-
-def _properties(name: Name, subject: Subject, _: Export) -> Check:
-    """The file's own claims, so that any reader can tell whether it has read what was written."""
-    claims, solid = subject.file.properties, subject.file.bulk
-    if set(claims) != {"volume", "area", "centroid"}:
-        detail = f"the file claims {listed(sorted(claims)) or 'nothing'}; all three are wanted"
-        return at_most(name, np.inf, CLAIM_SHARE, detail)
-    wide = float(np.linalg.norm(np.subtract(solid.high, solid.low)))
-    shares = (
-        abs(claims["volume"] / solid.volume - 1),
-        abs(claims["area"] / solid.area - 1),
-        float(np.linalg.norm(np.subtract(claims["centroid"], solid.centroid))) / wide,
-    )
-    detail = f"volume, area, centroid off by {', '.join(f'{share:.3g}' for share in shares)}"
-    return at_most(name, max(shares), CLAIM_SHARE, detail)
-
-
-def _bulks(subject: Subject) -> tuple[Bulk, Bulk]:
-    if subject.bulk is None:
-        raise Unknown("the mesh could not be measured")
-    return subject.bulk, subject.file.bulk
-
-
 def _of(subject: Subject, column: NDArray[Any]) -> NDArray[Any]:
     """(m, ...) the faces' figures in the order of the mirrors; NaN or empty for none."""
     taken = column[subject.face].copy()
@@ -307,11 +227,13 @@ def _worst_of(
     )
 
 
+def _plain(job: lumps.Job) -> Job:
+    """A check of any part, for one with mirrors."""
+    return lambda name, subject, _: job(name, subject.lump)
+
+
 JOBS: tuple[Job, ...] = (
-    *(_solid, _valid, _gaps, _names, _surfaces, _outward, _areas, _middles, _front),
-    *(_volume, _area, _centroid, _box, _properties),
+    *map(_plain, (lumps.solid, lumps.valid, lumps.gaps)),
+    *(_names, _surfaces, _outward, _areas, _middles, _front),
+    *map(_plain, (lumps.volume, lumps.area, lumps.centroid, lumps.box, lumps.properties)),
 )
-
-
-def _three(point: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{value:.4f}" for value in point) + ")"

@@ -9,20 +9,32 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepClass import BRepClass_FaceClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools
 from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
-from OCP.gp import gp_Dir, gp_Pln, gp_Pnt
+from OCP.gp import gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Message import Message, Message_Gravity
-from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance, ShapeAnalysis_Surface
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_FORWARD,
+    TopAbs_IN,
+    TopAbs_ON,
+    TopAbs_SHELL,
+    TopAbs_SOLID,
+)
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
@@ -30,6 +42,8 @@ from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 Row = dict[str, Any]
 
 GREATEST = 1  # of all tolerances, in the kernel's words
+NEAR_MM = 1e-6  # of a point to a face that it is on
+TURN, SLACK = 2 * np.pi, 1e-9
 FAR_MM = 1e4  # farther than any part, near enough for the digits
 
 
@@ -142,4 +156,37 @@ def _reach(shape: TopoDS_Shape, x: int, y: int, z: int) -> float:
     wall = gp_Pln(gp_Pnt(x * FAR_MM, y * FAR_MM, z * FAR_MM), gp_Dir(x, y, z))
     face = BRepBuilderAPI_MakeFace(wall, -FAR_MM, FAR_MM, -FAR_MM, FAR_MM).Face()
     distance = BRepExtrema_DistShapeShape(shape, face)
-    return FAR_MM - distance.Value() if distance.IsDone() else float("nan")
+    if not distance.IsDone():
+        return float("nan")
+    found: float = FAR_MM - distance.Value()
+    return max([found, *_tops(shape, np.array([x, y, z], dtype=np.float64), found)])
+
+
+def _tops(shape: TopoDS_Shape, axis: NDArray[np.float64], beyond: float) -> Iterator[float]:
+    """Where spheres reach farther than this along an axis, within their faces, mm.
+
+    The kernel's distance to a wall misses them now and then.
+    """
+    for face in map(TopoDS.Face_s, _each(shape, TopAbs_FACE)):
+        surface = BRepAdaptor_Surface(face)
+        if surface.GetType() == GeomAbs_Sphere:
+            sphere = surface.Sphere()
+            top = np.array(_point(sphere.Location())) + sphere.Radius() * axis
+            if top @ axis > beyond and _is_on(face, top):
+                yield float(top @ axis)
+
+
+def _is_on(face: TopoDS_Face, point: NDArray[np.float64]) -> bool:
+    """Whether a point of a face's sphere is on the face: in parameters, of which u goes round."""
+    around, up = (
+        ShapeAnalysis_Surface(BRep_Tool.Surface_s(face))
+        .ValueOfUV(gp_Pnt(*point.tolist()), NEAR_MM)
+        .Coord()
+    )
+    low, high, _, _ = BRepTools.UVBounds_s(face)
+    turns = np.arange(np.ceil((low - around) / TURN - SLACK), (high - around) / TURN + SLACK)
+    return any(
+        BRepClass_FaceClassifier(face, gp_Pnt2d(around + k * TURN, up), NEAR_MM).State()
+        in (TopAbs_IN, TopAbs_ON)
+        for k in turns.tolist()
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from tbcad_verify.files import AGAIN, Blob, read
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 WAYS = ("sphere", "plane")
+FILES = (("part", "step"), ("answer", "json"))
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
@@ -96,15 +98,45 @@ def examine(blob: Blob, seconds: float) -> StepFile:
     Raises:
         Unknown: a reading failed, crashed or took too long.
     """
-    with tempfile.TemporaryDirectory(prefix="tbcad-step-") as place:
-        copy, answer = Path(place) / "part.step", Path(place) / "answer.json"
-        blob.data.tofile(copy)
-        # -P: what lies in the current folder must not be imported.
-        command = [sys.executable, "-P", "-m", "tbcad_verify.step", str(copy), str(answer)]
-        outcome = run(command, Path(place), Limits(seconds))
-        if outcome.code != 0:
-            raise Unknown(outcome.reason or outcome.text.strip().rpartition("\n")[2])
-        value = json.loads(answer.read_text(encoding="utf-8"))
+    found = examine_all([blob], seconds)[0]
+    if isinstance(found, Unknown):
+        raise found
+    return found
+
+
+def examine_all(blobs: Sequence[Blob], seconds: float) -> list[StepFile | Unknown]:
+    """Several files in one process, which takes long to start.
+
+    Whatever that process did not come to is read once more, each file in a process of its own, so
+    that one file that crashes a reader or holds it up leaves the others known.
+    """
+    with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
+        place = Path(name)
+        for k, blob in enumerate(blobs):
+            blob.data.tofile(place / f"part{k}.step")
+        reason = _read(place, range(len(blobs)), seconds)
+        lost = [k for k in range(len(blobs)) if not (place / f"answer{k}.json").exists()]
+        reasons = dict.fromkeys(lost, reason)
+        if len(blobs) > 1:
+            reasons = {k: _read(place, [k], seconds) for k in lost}
+        return [_answer(place / f"answer{k}.json", reasons.get(k, "")) for k in range(len(blobs))]
+
+
+def _read(place: Path, which: Iterable[int], seconds: float) -> str:
+    """Let a child read some files; why it did not come to its end, or nothing."""
+    pairs = [f"{place}/{word}{k}.{end}" for k in which for word, end in FILES]
+    # -P: what lies in the current folder must not be imported.
+    command = [sys.executable, "-P", "-m", "tbcad_verify.step", *pairs]
+    outcome = run(command, place, Limits(seconds))
+    return outcome.reason or ("" if outcome.code == 0 else outcome.text.strip().rpartition("\n")[2])
+
+
+def _answer(path: Path, reason: str) -> StepFile | Unknown:
+    if not path.exists():
+        return Unknown(reason or "no answer")
+    value = json.loads(path.read_text(encoding="utf-8"))
+    if "refused" in value:
+        return Unknown(str(value["refused"]))
     return parse(value["text"], value["solid"])
 
 

@@ -1,0 +1,372 @@
+"""A small prototype made without tbcad: three balls and a cap on bars, and a plan by hand.
+
+Every mirror has a stop of its own, so nothing has to be planned; the base is made by booleans of
+meshes. Angles in degrees, lengths in mm.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import numpy as np
+from synthetic_export import PIN, B, Cells, document, mirrored, poses, rows, solid, stl, table, unit
+from synthetic_export import Design as Shell
+from synthetic_export import write as write_files
+
+TILT = np.radians(50.0)
+PAD = 2.0
+POLAR = (55.0, 80.0, 100.0, 122.0)
+AZIMUTH = (30.0, 0.0, -35.0, 40.0)
+CAP, EDGE = 3, 5.0  # the last of them, from 0; radius of its front's edge
+TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how parts lie on the bed
+BALL_COLUMNS = (
+    "number,kind,size,diameter_mm,grade,standard,mass_g,radius_mm,body_radius_mm,polar_deg,"
+    "azimuth_deg,px,py,pz,nx,ny,nz,cx,cy,cz,bx,by,bz,mirrors,pixels,pixels_shell,coverage_mm,"
+    "coverage_fixed_mm,error_deg"
+)
+
+
+@dataclass
+class Machine:
+    """What to make.
+
+    `pads` shifts pads off their balls, by ball and pad; `bump` is how deep a knob of the base
+    reaches into the first ball; `grown` grows the cap's front; `more` are boxes (low, high) to be
+    added by role and name.
+    """
+
+    target: float = 25.0
+    radius: float = 5.0
+    front: float = 10.0
+    moved: bool = True
+    shell: bool = False
+    pads: dict[tuple[int, int], float] = field(default_factory=dict)
+    bump: float = 0.0
+    grown: float = 0.0
+    stage_mm: float = 4.0
+    more: dict[str, tuple[str, Any, Any]] = field(default_factory=dict)
+
+
+def frame() -> np.ndarray:
+    axis = PIN / np.linalg.norm(PIN)
+    zero = unit(np.array([0.0, 0, 1]) - axis[2] * axis)
+    return np.stack([axis, zero, np.cross(axis, zero)])
+
+
+def direction(polar: float, azimuth: float) -> np.ndarray:
+    p, a = np.radians([polar, azimuth])
+    local = [np.cos(p), np.sin(p) * np.cos(a), np.sin(p) * np.sin(a)]
+    return np.array(local) @ frame()
+
+
+def angles(u: np.ndarray) -> np.ndarray:
+    along, zero, third = u @ frame().T
+    return np.degrees([np.arctan2(np.hypot(zero, third), along), np.arctan2(third, zero)])
+
+
+def turned(x: np.ndarray, angle: float) -> np.ndarray:
+    along, zero, third = x @ frame().T
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.array([along, c * zero - s * third, s * zero + c * third]) @ frame()
+
+
+@dataclass
+class Ball:
+    """One ball: apex, normal, radii, centres and contacts."""
+
+    p: np.ndarray
+    n: np.ndarray
+    radius: float
+    body: float
+    c: np.ndarray
+    b: np.ndarray
+    normals: np.ndarray
+
+
+def balls(machine: Machine) -> list[Ball]:
+    half = np.linalg.norm(PIN) / 2
+    made = []
+    for k, (polar, azimuth) in enumerate(zip(POLAR, AZIMUTH, strict=True)):
+        u = direction(polar, azimuth)
+        p = B**2 / (np.hypot(B, half) - half * (u @ unit(PIN))) * u
+        n = unit(unit(PIN - p) - u)
+        radius, body, depth = machine.radius, machine.radius, machine.radius
+        if k == CAP:
+            radius = machine.front
+            body, depth = np.sqrt(2) * EDGE, radius - np.sqrt(radius**2 - EDGE**2) + EDGE
+        side = unit(np.cross(n, [0.3, 0.2, 0.9]))
+        across = np.cross(n, side)
+        turn = np.radians([0.0, 120, 240])[:, None]
+        lean = np.cos(turn) * side + np.sin(turn) * across
+        normals = np.cos(TILT) * n - np.sin(TILT) * lean
+        made.append(Ball(p, n, radius, body, p - radius * n, p - depth * n, normals))
+    return made
+
+
+def cylinder(start: np.ndarray, along: np.ndarray, radius: float, length: float) -> Any:
+    """A cylinder from a point on, 48 corners round."""
+    z = unit(along)
+    x = unit(np.cross(z, [0.31, 0.83, 0.46]))
+    axes = np.stack([x, np.cross(z, x), z], axis=1)
+    upright = manifold3d.Manifold.cylinder(length, radius, radius, 48)
+    return upright.transform(np.hstack([axes, start[:, None]]))
+
+
+def base(machine: Machine, made: list[Ball]) -> Any:
+    """Bosses with three posts each, and bars between them behind the ellipsoid."""
+    bodies = []
+    for k, ball in enumerate(made):
+        back = -ball.n
+        bodies.append(cylinder(ball.b + (ball.body + 1) * back, back, 1.2 * ball.body + 2, 6.0))
+        for j, normal in enumerate(ball.normals):
+            away = ball.body + machine.pads.get((k, j), 0.0)
+            bodies.append(cylinder(ball.b - away * normal, -normal, PAD / 2, 0.6 * ball.body + 4))
+    if machine.bump:
+        ball = made[0]
+        start = ball.b + (ball.body - machine.bump) * -ball.n
+        bodies.append(cylinder(start, -ball.n, 0.5, 4.0))
+    for one, two in pairwise(made):
+        bodies += bars(one.b - (one.body + 4) * one.n, two.b - (two.body + 4) * two.n)
+    return manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
+
+
+def bars(start: np.ndarray, end: np.ndarray) -> list[Any]:
+    """Bars over an arc that keeps away from the object."""
+    share = np.linspace(0, 1, 9)[:, None]
+    way = unit((1 - share) * unit(start) + share * unit(end))
+    points = way * ((1 - share) * np.linalg.norm(start) + share * np.linalg.norm(end))
+    knots = [manifold3d.Manifold.sphere(2.0, 16).translate(point) for point in points]
+    return [manifold3d.Manifold.batch_hull(pair) for pair in pairwise(knots)]
+
+
+def cap(machine: Machine, ball: Ball) -> Any:
+    """Body and front turned about the normal, every corner on its sphere."""
+    radius = ball.radius + machine.grown
+    depth = (ball.p - ball.b) @ ball.n
+    rim = np.arcsin(EDGE / radius)
+    front = np.linspace(0, rim, 24)[1:]
+    start = np.arctan2(EDGE, depth - radius * (1 - np.cos(rim)))
+    body = np.linspace(start, np.pi, 60)[1:]
+    up = radius * np.cos(front) - ball.radius + depth
+    line = np.vstack(
+        [
+            np.stack([radius * np.sin(front), up], axis=1),
+            ball.body * np.stack([np.sin(body[:-1]), np.cos(body[:-1])], axis=1),
+        ]
+    )
+    return lathe(line, depth + machine.grown, -ball.body, ball.b, ball.n)
+
+
+def lathe(line: np.ndarray, top: float, bottom: float, at: np.ndarray, z: np.ndarray) -> Any:
+    """A line of (out, up) turned about z, closed by a point at either end; 60 corners round."""
+    x = unit(np.cross(z, [0.31, 0.83, 0.46]))
+    turn = 2 * np.pi * np.arange(60) / 60
+    round_ = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
+    rings = [out * round_ + up * z for out, up in line]
+    points = np.vstack([[top * z], *rings, [bottom * z]]) + at
+    faces, last = [], len(points) - 1
+    for k in range(60):
+        m = (k + 1) % 60
+        faces += [(0, 1 + k, 1 + m), (last, last - 60 + m, last - 60 + k)]
+        for ring in range(len(line) - 1):
+            a, b = 1 + 60 * ring, 61 + 60 * ring
+            faces += [(a + k, b + k, b + m), (a + k, b + m, a + m)]
+    mesh = manifold3d.Mesh64(points, np.array(faces, dtype=np.uint64))
+    return manifold3d.Manifold(mesh)
+
+
+def box(low: Any, high: Any) -> Any:
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    return manifold3d.Manifold.cube(high - low).translate(low)
+
+
+def facets(shape: Any) -> np.ndarray:
+    mesh = shape.to_mesh64()
+    return mesh.vert_properties[:, :3][mesh.tri_verts]
+
+
+def pictures(machine: Machine, made: list[Ball], record: list[dict[str, Any]]) -> list[list[Any]]:
+    """The plan's rows: every mirror at a stop of its own, the ball of nearest polar angle."""
+    shown = []
+    for m in record:
+        polar, azimuth = angles(m["u"])
+        k = int(np.abs(np.array(POLAR) - polar).argmin())
+        shown.append((azimuth - AZIMUTH[k], k, m))
+    shown.sort(key=lambda one: (one[0], one[2]["number"]))
+    stops = sorted({one[0] for one in shown})
+    plan: list[list[Any]] = []
+    twin = {m["number"]: image(m, record) for m in record}
+    for turn in (0, 180):
+        for angle, k, m in shown:
+            at = turned(made[k].p, angle)
+            polar, azimuth = angles(at) - angles(m["u"])
+            error = np.degrees(np.arccos(np.clip(unit(at) @ m["u"], -1, 1)))
+            chord = np.linalg.norm(unit(at) - m["u"])
+            error = np.degrees(2 * np.arcsin(chord / 2))
+            name = f"a{m['number']:04d}" if turn == 0 else f"b{twin[m['number']]:04d}"
+            azimuth = (azimuth + 180) % 360 - 180
+            row = [len(plan) + 1, turn, stops.index(angle) + 1, angle, k + 1, name]
+            plan.append([*row, polar, azimuth, error])
+    return plan
+
+
+def image(m: dict[str, Any], record: list[dict[str, Any]]) -> int:
+    """Number of camera b's mirror in the direction turned by 180 degrees about z."""
+    # Camera b's mirror number j looks along (-x, y, z) of camera a's number j.
+    wanted = m["u"] * np.array([1.0, -1, 1])
+    return min(record, key=lambda one: float(np.linalg.norm(one["u"] - wanted)))["number"]
+
+
+def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
+    out = []
+    for stop in sorted({row[2] for row in plan}):
+        here = [row for row in plan if row[2] == stop and row[1] == 0]
+        which = " ".join(str(k) for k in sorted({row[4] for row in here}))
+        worst = [max(abs(row[j]) for row in here) for j in (7, 8)]
+        out.append([stop, here[0][3], len(here), which, *worst])
+    return out
+
+
+def program(stops: list[list[Any]]) -> str:
+    lines = ["(plan)", "M0 (MSG, ready?)", "G21 G90 G94", "G92 X0.0000"]
+    for _ in range(2):
+        lines.append(f"G1 X{stops[0][1]:.4f} F900")
+        for row in stops:
+            lines += [f"G1 X{np.trunc(row[1] * 1e4) / 1e4:.4f}", "G4 P0.5", "M8", "M9"]
+    return "\n".join([*lines, "G1 X0.0000", "M2"]) + "\n"
+
+
+def ball_rows(machine: Machine, made: list[Ball], plan: list[list[Any]]) -> list[dict[str, Any]]:
+    out = []
+    for k, ball in enumerate(made):
+        mine = [row for row in plan if row[4] == k + 1 and row[1] == 0]
+        named = ("cap", "cap", None, None, None) if k == CAP else ("ball", "b", "G40", "ISO", 4.0)
+        row: dict[str, Any] = {"number": k + 1, "kind": named[0], "size": named[1]}
+        row |= {"diameter_mm": 2 * float(ball.body), "grade": named[2], "standard": named[3]}
+        row |= {"mass_g": named[4], "radius_mm": float(ball.radius)}
+        row |= {"body_radius_mm": float(ball.body)}
+        polar, azimuth = angles(unit(ball.p)).tolist()
+        row |= {"polar_deg": polar, "azimuth_deg": azimuth}
+        for name, v in {"p": ball.p, "n": ball.n, "c": ball.c, "b": ball.b}.items():
+            row |= {name + axis: x for axis, x in zip("xyz", (v + 0.0).tolist(), strict=True)}
+        row |= {"mirrors": len(mine), "pixels": 1.0, "pixels_shell": 1.0, "coverage_mm": 30.0}
+        row |= {"coverage_fixed_mm": 0.0, "error_deg": max(row[8] for row in mine)}
+        out.append(row)
+    return out
+
+
+def text(columns: str, lines: list[list[Any]]) -> bytes:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns.split(","))
+    writer.writerows(
+        [
+            ["" if x is None else repr(x) if isinstance(x, float) else x for x in line]
+            for line in lines
+        ]
+    )
+    return stream.getvalue().encode()
+
+
+def parts(machine: Machine, made: list[Ball]) -> dict[str, tuple[str, int | None, np.ndarray]]:
+    """Facets in the frame of the shell, by name, with role and ball."""
+    r = machine.stage_mm
+    shapes = {
+        "carrier": ("base", None, base(machine, made)),
+        "cap_4": ("cap", CAP + 1, cap(machine, made[CAP])),
+        "stage": ("stage", None, box([-r, -r, -8.0], [r, r, -6.0])),
+        "foot": ("frame", None, box([-140, -40, -300], [140, 40, -290])),
+        "coupon": ("tool", None, box([0, 0, 0], [20, 10, 5])),
+    }
+    shapes |= {name: (role, None, box(*ends)) for name, (role, *ends) in machine.more.items()}
+    return {name: (role, ball, facets(shape)) for name, (role, ball, shape) in shapes.items()}
+
+
+def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """prototype.json as a value, and all other files of the prototype."""
+    record, made = poses(shell_of(machine)), balls(machine)
+    plan = [
+        [float(x) if isinstance(x, np.floating) else x for x in row]
+        for row in pictures(machine, made, record)
+    ]
+    stops = stop_rows(plan)
+    rows_ = ball_rows(machine, made, plan)
+    files = {
+        "balls.csv": text(BALL_COLUMNS, [list(row.values()) for row in rows_]),
+        "rotation_plan.csv": text(
+            "order,object_turn_deg,stop,base_angle_deg,ball,mirror,polar_error_deg,"
+            "azimuth_error_deg,error_deg",
+            plan,
+        ),
+        "stops.csv": text("stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg", stops),
+        "rotation_plan.nc": program(stops).encode(),
+    }
+    entries = []
+    for name, (role, ball, corners) in parts(machine, made).items():
+        low = float((corners @ TURN)[..., 2].min())
+        origin = np.array([3.0, -2.0, -low])
+        files[f"{name}.stl"] = stl((corners @ TURN + origin).astype(np.float32))
+        entries.append(
+            {
+                "name": name,
+                "what": name,
+                "stl": f"{name}.stl",
+                "role": role,
+                "ball": ball,
+                "quantity": 1,
+                "axes": TURN.tolist(),
+                "origin_mm": origin.tolist(),
+            }
+        )
+    found = {
+        "schema": "tbcad-prototype/1",
+        "camera": "a",
+        "target_mm": machine.target,
+        "picture": "moved" if machine.moved else "fixed",
+        "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
+        "swing_deg": [stops[0][1], stops[-1][1]],
+        "target_pad_um": 10,
+        "balls": rows_,
+        "seats": [
+            {
+                "ball": k + 1,
+                "axis": (-ball.n).tolist(),
+                "normals": ball.normals.tolist(),
+                "contacts_mm": (ball.b - ball.body * ball.normals).tolist(),
+                "pad_diameter_mm": PAD,
+            }
+            for k, ball in enumerate(made)
+        ],
+        "parts": entries,
+        "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
+    }
+    return found, files
+
+
+def shell_of(machine: Machine) -> Shell:
+    return Shell(target=machine.target)
+
+
+def export(folder: Path, machine: Machine) -> Path:
+    """Write a whole export; without a shell unless asked."""
+    design = shell_of(machine)
+    record = poses(design)
+    mirrors = rows(design, record)
+    found = document(design, mirrors)
+    files: dict[str, bytes] = {"mirrors.csv": table(mirrors)}
+    if machine.shell:
+        a = solid(Cells(design, record))
+        files |= {"shell_a.stl": stl(a), "shell_b.stl": stl(mirrored(a))}
+    else:
+        found["parts"] = []
+    files["design.json"] = json.dumps(found).encode()
+    made, more = prototype(machine)
+    files |= {"prototype.json": json.dumps(made, indent=1).encode(), **more}
+    return write_files(folder, files)

@@ -1,0 +1,45 @@
+"""The axis that the base turns about: polar angles, azimuths and turns, in columns (3, N)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.vectors import cross, dot, norm, unit
+
+Floats = NDArray[np.float64]
+
+
+def frame_of(pinhole: Floats) -> Floats:
+    """(3, 3) rows: axis from the origin to the pinhole, azimuth zero (the zenith's), third."""
+    axis = pinhole / np.sqrt((pinhole**2).sum())
+    up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
+    up /= np.sqrt((up**2).sum())
+    return np.stack([axis, up, np.cross(axis, up)])
+
+
+def angles(frame: Floats, d: Floats) -> tuple[Floats, Floats]:
+    """Polar angles and azimuths (N,) of directions d (3, N), radians."""
+    along, zero, third = (dot(np.broadcast_to(row[:, None], d.shape), d) for row in frame)
+    return np.arctan2(np.hypot(zero, third), along), np.arctan2(third, zero)
+
+
+def turned(d: Floats, axis: Floats, angle: Floats) -> Floats:
+    """Columns d (3, N) turned about unit axes (3, N) or (3, 1) by angles (N,) or (), radians.
+
+    Source: Rodrigues' formula.
+    """
+    axes = np.broadcast_to(axis, d.shape)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.asarray(cosine * d + sine * cross(axes, d) + (1 - cosine) * dot(axes, d) * axes)
+
+
+def wrapped(angle: Floats) -> Floats:
+    """Angles in -pi ... pi."""
+    return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))
+
+
+def between(a: Floats, b: Floats) -> Floats:
+    """(N,) angles between columns, radians; exact for small ones too."""
+    one, two = unit(a), unit(b)
+    return np.asarray(2 * np.arctan2(norm(one - two), norm(one + two)))

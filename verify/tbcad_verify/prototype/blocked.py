@@ -1,0 +1,99 @@
+"""What stands in the light: pinhole to ball, and ball to capture sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.prototype.nearest import to_segments
+from tbcad_verify.prototype.rig import Obstacles, Rig, to_ground
+from tbcad_verify.prototype.trace import Trace, nearest
+from tbcad_verify.rays import RAYS_A_CHUNK, first_hits, in_threads, reach
+from tbcad_verify.vectors import dot, norm, slices, unit
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+LIFT_MM = 1e-3
+# What stands out of the capture sphere by less than this, as the object itself may, is no obstacle.
+GRAZE_MM = 0.01
+# A cap's facets lie this near to the sphere that they stand for.
+SKIN_MM = 0.1
+
+
+def blocked(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, tuple[str, ...]]:
+    """Which rays do not get from the pinhole by their ball to the capture sphere, and why."""
+    parts = list(slices(mirror.size, RAYS_A_CHUNK))
+    found = in_threads(lambda part: _stopped(made, mirror[part], d[:, part]), parts)
+    names = sorted({name for _, said in found for name in said})
+    return np.concatenate([stopped for stopped, _ in found]), tuple(names)
+
+
+def _stopped(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, set[str]]:
+    rig, view = made.rig, made.rig.view
+    names: set[str] = set()
+    way, lines = made.lines(mirror, d)
+    ball, angle = made.ball[mirror], made.angle[mirror]
+    start = np.broadcast_to(view.pinhole[:, None], way.shape)
+    toward = unit(lines.toward)
+    at = nearest(lines)
+    depth = np.sqrt(np.maximum((view.radius + GRAZE_MM) ** 2 - norm(at) ** 2, 0))
+    from_ball = lines.point + LIFT_MM * toward
+    goal = norm(at - from_ball) - depth
+    stopped = np.zeros(mirror.size, dtype=np.bool_)
+
+    def count(bad: Bools, name: str) -> None:
+        if bad.any():
+            names.add(name)
+        np.logical_or(stopped, bad, out=stopped)
+
+    count(~_on(rig, ball, lines.point), "nothing (beside the ball)")
+    to_ball = norm(lines.point - start)
+    legs = ((start, unit(way), to_ball - SKIN_MM), (from_ball, toward, goal))
+    count(to_segments(np.zeros_like(start), start, lines.point) < view.radius, "the capture sphere")
+    for origin, along, length in legs:
+        for k in range(rig.body_radius.size):
+            bad = _meets(rig.body[:, k], rig.body_radius[k], origin, along, length)
+            count(bad & (ball != k), f"ball {k + 1}")
+        _parts(rig.turning, origin, along, length, count)
+        ground = [to_ground(view, x, angle) for x in (origin, along)]
+        _parts(rig.standing, ground[0], ground[1], length, count)
+    return stopped, names
+
+
+def _on(made: Rig, ball: Ints, point: Floats) -> Bools:
+    """(N,) whether points on reflecting spheres are on the balls that there are."""
+    away = norm(point - made.body[:, ball])
+    return np.asarray(away <= made.body_radius[ball] + LIFT_MM)
+
+
+def _meets(centre: Floats, radius: float, origin: Floats, along: Floats, length: Floats) -> Bools:
+    """(N,) whether rays of unit directions meet a sphere within a length."""
+    away = origin - centre[:, None]
+    b = dot(away, along)
+    rest = dot(away, away) - b * b
+    return np.asarray(
+        (rest < radius**2) & (-b - np.sqrt(np.maximum(radius**2 - rest, 0)) < length) & (b < 0)
+    )
+
+
+def _parts(
+    obstacles: Obstacles,
+    origin: Floats,
+    along: Floats,
+    length: Floats,
+    count: Callable[[Bools, str], None],
+) -> None:
+    """Tell which rays meet parts within a length."""
+    if obstacles.scene is None:
+        return
+    facet = first_hits(obstacles.scene, origin, along)
+    hit = np.flatnonzero(facet >= 0)
+    at = np.full(facet.size, np.inf)
+    at[hit] = reach(obstacles.scene, facet[hit], origin[:, hit], along[:, hit])
+    bad = at < length
+    for k in np.unique(obstacles.owner[facet[bad]]).tolist():
+        count(bad & (obstacles.owner[facet] == k), obstacles.names[k])

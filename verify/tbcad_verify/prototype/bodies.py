@@ -1,0 +1,141 @@
+"""Printed parts as their files have them: read, checked as meshes, and put back in their places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.bulk import Bulk, bulk
+from tbcad_verify.checks import Check, Unknown, at_most, guarded, reason_of
+from tbcad_verify.integrity import fold_check, mesh_checks
+from tbcad_verify.mesh import Mesh, Topology, examine, joined, merge
+from tbcad_verify.prototype.made import Printed
+from tbcad_verify.segments import Edges, folds, measure_edges
+from tbcad_verify.stl import Facets
+from tbcad_verify.vectors import norm
+
+Floats = NDArray[np.float64]
+
+ROTATION = 1e-9
+BED_MM = 0.05
+# Round bosses meet ribs in grooves that run out to a few degrees; what is closer is a fold.
+FOLD_RAD = 0.02
+SOLID = {
+    "watertight": "bad edges",
+    "facets": "bad facets",
+    "outward": "mm^3",
+    "components": "solids",
+    "manifold3d": "complaints",
+    "folds": "edges",
+}
+POSE = {"print pose": "off a rotation", "on the bed": "mm"}
+
+
+@dataclass(frozen=True)
+class Body:
+    """One part.
+
+    Attributes:
+        part: its record.
+        mesh: as it lies on the bed; None where it could not be made out.
+        placed: the same in the frame of the shell, the base at angle zero.
+        topology: of the mesh.
+        bulk: of the mesh on the bed.
+        placed_bulk: of the placed mesh.
+        checks: of mesh and pose.
+        reason: why something is None.
+    """
+
+    part: Printed
+    mesh: Mesh | None
+    placed: Mesh | None
+    topology: Topology | None
+    bulk: Bulk | None
+    placed_bulk: Bulk | None
+    checks: list[Check]
+    reason: str
+
+    @property
+    def needed(self) -> Mesh:
+        """The placed mesh.
+
+        Raises:
+            Unknown: there is none.
+        """
+        if self.placed is None:
+            raise Unknown(self.reason)
+        return self.placed
+
+
+def body(part: Printed, facets: Facets) -> Body:
+    """Measure one part's mesh."""
+    try:
+        mesh = merge(facets)
+        edges = measure_edges(mesh)
+        found = examine(mesh, facets)
+        placed = put_back(mesh, part)
+        lump = replace(bulk(placed), bend=_bend(mesh, edges))
+    except Exception as error:
+        return Body(part, None, None, None, None, None, _unknown(part, error), reason_of(error))
+    checks = _checks(
+        part, lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, folds(edges, FOLD_RAD))]
+    )
+    checks += guarded([(k, part.stl, u) for k, u in POSE.items()], lambda: pose_checks(part, mesh))
+    return Body(part, mesh, placed, found, bulk(mesh), lump, checks, "")
+
+
+def put_back(mesh: Mesh, part: Printed) -> Mesh:
+    """A mesh moved from the bed to the frame of the shell."""
+    points = np.einsum("ni,ji->nj", mesh.points - part.origin, part.axes)
+    area = np.einsum("ji,in->jn", part.axes, mesh.area)
+    return replace(mesh, points=points, area=area)
+
+
+def pose_checks(part: Printed, mesh: Mesh) -> list[Check]:
+    """The pose is a rotation, without mirroring, and the part lies on the bed and not in it."""
+    gram = np.abs(part.axes @ part.axes.T - np.eye(3)).max()
+    turn, bed = ((name, part.stl, unit) for name, unit in POSE.items())
+    off = max(float(gram), abs(float(np.linalg.det(part.axes)) - 1))
+    low = float(mesh.points[:, 2].min())
+    return [
+        at_most(turn, off, ROTATION, "axes are no rotation"),
+        at_most(bed, abs(low), BED_MM, f"the lowest point lies at z = {low:.3f} mm"),
+    ]
+
+
+def of_roles(bodies: list[Body], *roles: str) -> list[Body]:
+    """Those of some roles."""
+    return [one for one in bodies if one.part.role in roles]
+
+
+def joined_bodies(bodies: list[Body]) -> tuple[Mesh, NDArray[np.intp]]:
+    """Placed meshes as one, and which body each facet is of.
+
+    Raises:
+        Unknown: one could not be made out.
+    """
+    meshes = [one.needed for one in bodies]
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
+    return joined(meshes), owner
+
+
+def _bend(mesh: Mesh, edges: Edges) -> float:
+    start = mesh.faces.ravel()[edges.half]
+    end = np.roll(mesh.faces, -1, axis=1).ravel()[edges.half]
+    length = norm((mesh.points[end] - mesh.points[start]).T)
+    return float((length * np.abs(edges.angle)).sum())
+
+
+def _checks(part: Printed, work: Callable[[], list[Check]]) -> list[Check]:
+    return guarded([(name, part.stl, unit) for name, unit in SOLID.items()], work)
+
+
+def _unknown(part: Printed, error: Exception) -> list[Check]:
+    def broken() -> list[Check]:
+        raise error
+
+    names = [(name, part.stl, unit) for name, unit in {**SOLID, **POSE}.items()]
+    return guarded(names, broken)

@@ -1,0 +1,180 @@
+"""The mirrors' cells in the camera's picture, from mirrors.csv alone.
+
+What the pinhole sees first of the union of all balls is worked out ray by ray, and each cell's
+outline by halving angles about the direction of the mirror's apex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad_verify.prototype.view import View
+from tbcad_verify.rays import in_threads, pixel_rows
+from tbcad_verify.record import Camera
+from tbcad_verify.vectors import across, dot, unit
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+AROUND = 96  # directions of an outline
+NEIGHBOURS = 20
+HALVINGS = 34
+WIDEST = 1.2  # rad, from a mirror's apex to its outline, as the pinhole sees them
+INSIDE = 0.98  # of the way to the outline, where the mirror itself must be seen
+CHUNK = 1 << 12  # rays against all balls at once
+PIXELS = 100_000  # of the sensor are looked at, about
+
+
+@dataclass(frozen=True)
+class Shell:
+    """The reflecting balls of m mirrors, as one pinhole sees them, coats included.
+
+    Attributes:
+        pinhole: (3,) mm.
+        apex: (3, m) mm.
+        centre: (3, m) mm.
+        radius: (m,) mm.
+        side: 1 where the camera's mirrors have x >= 0, else -1.
+        foot: height below which there is no mirror, mm.
+        halved: (m,) mirrors whose other half is the other camera's.
+    """
+
+    pinhole: Floats
+    apex: Floats
+    centre: Floats
+    radius: Floats
+    side: float
+    foot: float
+    halved: Bools
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """Cells' edges: AROUND directions for each of m mirrors, in order round the apex.
+
+    Attributes:
+        chief: (3, m) unit, to the apices.
+        direction: (3, m, AROUND) unit.
+        angle: (m, AROUND) from the chief, rad.
+        own: (m, AROUND) false where a halved mirror goes on beyond the seam.
+    """
+
+    chief: Floats
+    direction: Floats
+    angle: Floats
+    own: Bools
+
+    def toward(self, share: Floats) -> Floats:
+        """(3, m, AROUND) unit directions at shares (m, AROUND) of the way to the outline."""
+        edge = self.direction - np.cos(self.angle) * self.chief[:, :, None]
+        edge /= np.maximum(np.sin(self.angle), 1e-300)
+        angle = share * self.angle
+        return np.asarray(np.cos(angle) * self.chief[:, :, None] + np.sin(angle) * edge)
+
+
+def shell_of(view: View) -> Shell:
+    """The balls of the camera that the prototype serves."""
+    rows = view.export.rows.take(view.mine)
+    return Shell(
+        view.pinhole,
+        rows.columns("px", 3),
+        rows.columns("cx", 3),
+        rows.columns("radius_mm")[0],
+        float(np.sign(view.pinhole[0])),
+        view.export.foot_z_mm,
+        view.halved,
+    )
+
+
+def outlines(shell: Shell) -> Outlines:
+    """Edges of all cells; an apex that is not in its own cell has its edge on it."""
+    chief = unit(shell.apex - shell.pinhole[:, None])
+    first, second = across(chief)
+    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    out = first[:, :, None] * np.cos(turn) + second[:, :, None] * np.sin(turn)
+    near = _neighbours(shell)
+    low = np.zeros((shell.radius.size, AROUND))
+    high = np.full_like(low, WIDEST)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        d = np.cos(middle) * chief[:, :, None] + np.sin(middle) * out
+        inside = _inside(shell, near, d)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    d = np.cos(low) * chief[:, :, None] + np.sin(low) * out
+    own = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
+    return Outlines(chief, d, low, own)
+
+
+def first_mirrors(shell: Shell, d: Floats) -> Ints:
+    """(N,) the mirror that the pinhole sees first along d (3, N); -1 for none.
+
+    What lies beyond the seam or below the foot is no mirror.
+    """
+    chunks = [d[:, k : k + CHUNK] for k in range(0, d.shape[1], CHUNK)]
+    if not chunks:
+        return np.zeros(0, dtype=np.int64)
+    return np.concatenate(in_threads(lambda part: _first(shell, part), chunks))
+
+
+def sampled_pixels(camera: Camera) -> tuple[Floats, int]:
+    """Every k-th pixel of every k-th row, (3, N) directions with 1 along `forward`; and k."""
+    step = max(1, int(np.sqrt(camera.width * camera.height / PIXELS)))
+    return np.concatenate(list(_rows(camera, step)), axis=1), step
+
+
+def _rows(camera: Camera, step: int) -> Iterator[Floats]:
+    for row in range(step // 2, camera.height, step):
+        yield pixel_rows(camera, row, row + 1)[:, step // 2 :: step]
+
+
+def _first(shell: Shell, d: Floats) -> Ints:
+    away = shell.pinhole[:, None] - shell.centre
+    # No BLAS, whose rounding depends on the number of threads.
+    b = np.einsum("in,im->nm", d, away, optimize=False)
+    square = dot(d, d)[:, None]
+    under = b * b - square * (dot(away, away) - shell.radius**2)
+    with np.errstate(invalid="ignore"):
+        reach = np.where(under >= 0, -b - np.sqrt(under), np.inf)
+    mirror = reach.argmin(axis=1)
+    least = reach[np.arange(mirror.size), mirror] / square[:, 0]
+    point = shell.pinhole[:, None] + np.where(np.isfinite(least), least, 0) * d
+    good = np.isfinite(least) & (shell.side * point[0] >= 0) & (point[2] >= shell.foot)
+    return np.where(good, mirror, -1)
+
+
+def _neighbours(shell: Shell) -> Ints:
+    """(m, NEIGHBOURS) the mirrors nearest to each, without itself."""
+    count = min(NEIGHBOURS + 1, shell.radius.size)
+    found = cKDTree(unit(shell.apex).T).query(unit(shell.apex).T, k=count)[1]
+    return np.asarray(found, dtype=np.int64).reshape(shell.radius.size, count)[:, 1:]
+
+
+def _points(shell: Shell, d: Floats) -> Floats:
+    """(3, m, s) where rays d meet their own mirrors' balls first; NaN where they miss."""
+    away = (shell.pinhole[:, None] - shell.centre)[:, :, None]
+    b = (d * away).sum(axis=0)
+    rest = (away**2).sum(axis=0) - shell.radius[:, None] ** 2
+    with np.errstate(invalid="ignore"):
+        return np.asarray(shell.pinhole[:, None, None] + (-b - np.sqrt(b * b - rest)) * d)
+
+
+def _inside(shell: Shell, near: Ints, d: Floats) -> Bools:
+    """(m, s) whether rays meet their own mirror, above the foot, on its side, in no neighbour."""
+    point = _points(shell, d)
+    good = np.isfinite(point[0]) & (point[2] >= shell.foot)
+    good &= shell.halved[:, None] | (shell.side * point[0] >= 0)
+    centre, radius = shell.centre, shell.radius
+    power = (centre**2).sum(axis=0) - radius**2
+    for k in range(near.shape[1]):
+        other = near[:, k]
+        # Within the other ball: beyond the plane of all points with the same power.
+        way = 2 * (centre[:, other] - centre)
+        level = power[other] - power
+        good &= (way[:, :, None] * point).sum(axis=0) <= level[:, None]
+    return np.asarray(good)

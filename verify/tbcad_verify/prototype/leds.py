@@ -1,0 +1,55 @@
+"""The lights of the stage: in the object's place, free of the stage, and in its pockets."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.checks import Check, at_most, listed, told
+from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
+from tbcad_verify.prototype.nearest import distances
+from tbcad_verify.prototype.swing import solid_of
+from tbcad_verify.prototype.view import View
+
+Floats = NDArray[np.float64]
+
+POINT_MM = 0.02  # edge of the cube that stands for a light
+CHECKS = {
+    "leds inside": "outside the capture sphere",
+    "leds free": "in the stage",
+    "leds held": "mm",
+}
+
+
+def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
+    """Every light is inside the capture sphere and not in the stage's material.
+
+    How far the farthest is from the stage is told: a light in its pocket has a wall close by.
+    """
+    inside, free, held = ((name, files, unit) for name, unit in CHECKS.items())
+    leds = view.made.leds
+    position = np.array([led.position for led in leds]).reshape(-1, 3)
+    beyond = np.linalg.norm(position, axis=1) > view.radius
+    odd = [leds[k].name for k in np.flatnonzero(beyond).tolist()]
+    made = [at_most(inside, len(odd), 0, f"the camera may not see {listed(odd)}")]
+    stage = of_roles(bodies, "stage")
+    if not leds or not stage:
+        return [*made, told(free, 0), told(held, 0, "no light, or no stage")]
+    mesh, _ = joined_bodies(stage)
+    a, b, c = (mesh.points[mesh.faces[:, k]].T for k in range(3))
+    away = np.array([float(distances(point, (a, b, c)).min()) for point in position])
+    sunk = [led.name for led, point in zip(leds, position, strict=True) if _in(stage, point)]
+    worst = int(away.argmax())
+    return [
+        *made,
+        at_most(free, len(sunk), 0, f"in the material of the stage: {listed(sunk)}"),
+        told(held, float(away[worst]), f"{leds[worst].name} is farthest from the stage"),
+    ]
+
+
+def _in(stage: list[Body], point: Floats) -> bool:
+    """Whether a small cube about a point is in the material of a part."""
+    import manifold3d
+
+    cube = manifold3d.Manifold.cube([POINT_MM] * 3, center=True).translate(point)
+    return any((solid_of(one.needed) ^ cube).volume() > cube.volume() / 2 for one in stage)

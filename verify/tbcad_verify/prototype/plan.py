@@ -1,0 +1,167 @@
+"""The plan of rotation: every mirror has its picture, at the angle and with the error it says."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad_verify.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
+from tbcad_verify.prototype import axis, gcode
+from tbcad_verify.prototype.made import PLAN, PROGRAM, STOPS
+from tbcad_verify.prototype.view import View
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ERROR_DEG = 1e-6
+PROGRAM_DEG = 1.0001e-4  # the digits of the program
+SAME_DIRECTION = 1e-9
+TURNS = (0.0, 180.0)
+CHECKS = (
+    ("plan mirrors", PLAN, "missing, doubled or foreign"),
+    ("plan twins", PLAN, "mirrors"),
+    ("plan errors", PLAN, "deg off"),
+    ("plan stops", STOPS, "faults"),
+    ("plan program", PROGRAM, "faults"),
+)
+
+
+def checks(view: View) -> list[Check]:
+    """Hold plan, stops and program against the mirrors, the balls and each other."""
+    work = (_mirrors, _twins, _errors, _stops, _program)
+    return [
+        check
+        for name, job in zip(CHECKS, work, strict=True)
+        for check in guarded([name], lambda name=name, job=job: [job(name, view)])  # type: ignore[misc]
+    ]
+
+
+def _mirrors(name: Name, view: View) -> Check:
+    """Each of this camera's mirrors once with the object straight, all others once with it turned.
+
+    Rows are numbered, and name balls that there are.
+    """
+    plan, rows = view.made.plan, view.export.rows
+    odd: list[str] = []
+    for turn in TURNS:
+        own = (rows.camera == view.made.camera) == (turn == 0)
+        wanted = [rows.ids[k] for k in np.flatnonzero(own).tolist()]
+        given = Counter(plan.mirror[k] for k in np.flatnonzero(plan.turn == turn).tolist())
+        odd += [one for one in wanted if given[one] != 1]
+        odd += sorted(set(given) - set(wanted))
+    odd += [f"row {k + 1} turned oddly" for k in np.flatnonzero(~np.isin(plan.turn, TURNS))]
+    foreign = (plan.ball < 1) | (plan.ball > len(view.made.balls))
+    odd += [f"row {k + 1} of no ball" for k in np.flatnonzero(foreign).tolist()]
+    unordered = np.flatnonzero(plan.order != np.arange(1, len(plan) + 1))
+    odd += [f"row {k + 1} out of order" for k in unordered.tolist()]
+    served = np.bincount(np.clip(view.ball, 0, None), minlength=len(view.made.balls))
+    unlike = np.flatnonzero(served != view.made.balls.of("mirrors"))
+    odd += [f"ball {k + 1} serves {served[k]}" for k in unlike.tolist()]
+    return at_most(name, len(odd), 0, listed(odd))
+
+
+def twins(view: View) -> Ints:
+    """(m,) row of mirrors.csv of the mirror that each one shows when the object is turned.
+
+    Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
+
+    Raises:
+        Unknown: there is no mirror in that direction.
+    """
+    rows = view.export.rows
+    u = rows.columns("ux", 3)
+    others = np.flatnonzero(rows.camera != view.made.camera)
+    if not others.size:
+        raise Unknown("there is no other camera")
+    wanted = u[:, view.mine] * np.array([[-1.0], [-1.0], [1.0]])
+    away, near = map(np.asarray, cKDTree(u[:, others].T).query(wanted.T))
+    if not away.max() <= SAME_DIRECTION:
+        lost = rows.ids[int(view.mine[int(away.argmax())])]
+        raise Unknown(f"no mirror of the other camera is {lost} turned by 180 degrees")
+    return np.asarray(others[near])
+
+
+def _twins(name: Name, view: View) -> Check:
+    """The turned half goes by the same ball and stop as the mirrors it is the image of."""
+    plan, rows = view.made.plan, view.export.rows
+    turned = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
+    ids = [rows.ids[k] for k in twins(view).tolist()]
+    row = np.array([turned.get(one, -1) for one in ids])
+    first = view.pictures
+    same = (
+        (row >= 0) & (plan.ball[row] == plan.ball[first]) & (plan.angle[row] == plan.angle[first])
+    )
+    same &= (plan.stop[row] == plan.stop[first]) & (plan.errors[row] == plan.errors[first]).all(1)
+    odd = [ids[k] for k in np.flatnonzero(~same).tolist()]
+    return at_most(
+        name, len(odd), 0, f"another ball, stop or error than their images: {listed(odd)}"
+    )
+
+
+def errors(view: View) -> Floats:
+    """(m, 3) polar angle, azimuth and direction of each ball at its stop less the mirror's, rad."""
+    u = view.export.rows.columns("ux", 3)[:, view.mine]
+    apex = view.made.balls.columns("px", 3)[:, view.ball]
+    at = axis.turned(apex, view.frame[0][:, None], view.angle)
+    (mirror, phi), (ball, psi) = axis.angles(view.frame, u), axis.angles(view.frame, at)
+    return np.stack([ball - mirror, axis.wrapped(psi - phi), axis.between(at, u)], axis=1)
+
+
+def _errors(name: Name, view: View) -> Check:
+    away = np.abs(np.degrees(errors(view)) - view.made.plan.errors[view.pictures]).max(axis=1)
+    worst = np.argsort(-away, kind="stable")
+    worst = worst[~(away[worst] <= ERROR_DEG)]
+    ids = [view.export.rows.ids[k] for k in view.mine.tolist()]
+    detail = "recorded otherwise than poses make them: " + offenders(ids, away, "deg", worst, ".3g")
+    return at_most(name, float(away.max()), ERROR_DEG, detail)
+
+
+def _stops(name: Name, view: View) -> Check:
+    """Numbered, ascending, within the swing, and what the plan makes of them."""
+    stops, plan = view.made.stops, view.made.plan
+    low, high = view.made.swing
+    odd = []
+    if not (stops.stop == np.arange(1, len(stops) + 1)).all():
+        odd.append("not numbered from 1")
+    if not (np.diff(stops.angle) > 0).all():
+        odd.append("angles do not ascend")
+    beyond = np.flatnonzero((stops.angle < low) | (stops.angle > high))
+    odd += [f"stop {k + 1} beyond the swing" for k in beyond.tolist()]
+    known = (plan.stop >= 1) & (plan.stop <= len(stops))
+    at = stops.angle[np.where(known, plan.stop, 1) - 1]
+    unlike = np.flatnonzero(~known | (at != plan.angle))
+    odd += [f"row {k + 1} of the plan at another angle" for k in unlike.tolist()]
+    straight = (plan.turn == 0) & known
+    for k in range(len(stops)):
+        here = np.flatnonzero(straight & (plan.stop == k + 1))
+        odd += [] if _as_said(view, k, here) else [f"stop {k + 1} is not as the plan has it"]
+    return at_most(name, len(odd), 0, listed(odd))
+
+
+def _as_said(view: View, k: int, rows: Ints) -> bool:
+    """Whether a stop's count, balls and worst errors are those of its rows of the plan."""
+    stops, plan = view.made.stops, view.made.plan
+    if rows.size != stops.mirrors[k]:
+        return False
+    if sorted(set(plan.ball[rows].tolist())) != sorted(stops.balls[k]):
+        return False
+    worst = np.abs(plan.errors[rows][:, 1:]).max(axis=0, initial=0)
+    return bool(np.abs(worst - stops.errors[k]).max() <= ERROR_DEG)
+
+
+def _program(name: Name, view: View) -> Check:
+    """Photographs at every stop, in order, twice, and nothing driven beyond the swing."""
+    found, wanted = gcode.run(view.made.program), np.tile(view.made.stops.angle, 2)
+    odd = list(found.faults)
+    if found.photographs.shape != wanted.shape:
+        odd.append(f"{found.photographs.size} photographs, not {wanted.size}")
+    else:
+        off = np.flatnonzero(~(np.abs(found.photographs - wanted) <= PROGRAM_DEG))
+        odd += [f"photograph {k + 1} at {found.photographs[k]:.4f} deg" for k in off.tolist()]
+    low, high = view.made.swing
+    beyond = (found.moves < low - PROGRAM_DEG) | (found.moves > high + PROGRAM_DEG)
+    odd += [f"{found.moves[k]:.4f} deg is beyond the swing" for k in np.flatnonzero(beyond)]
+    return at_most(name, len(odd), 0, listed(odd))

@@ -1,0 +1,119 @@
+"""Balls where their pads put them, and everything that can stand in the light, ready for rays.
+
+All is looked at from the base: its frame stands still, and what stands on the ground is turned
+back by the base's angle. Pinhole and capture sphere lie on the axis, so they stay where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.checks import Unknown
+from tbcad_verify.prototype import axis
+from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
+from tbcad_verify.prototype.caps import Cap
+from tbcad_verify.prototype.seats import Held
+from tbcad_verify.prototype.view import View
+from tbcad_verify.rays import Scene, build
+from tbcad_verify.surfaces import Seen, Surfaces, seen_from
+from tbcad_verify.vectors import unit
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """Parts that may stand in the light.
+
+    Attributes:
+        scene: all of them; None without any.
+        owner: (F + 1,) name of each facet's part, by number; the last is nobody's.
+        names: of the parts.
+    """
+
+    scene: Scene | None
+    owner: NDArray[np.intp]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The machine as its files make it, base at angle zero.
+
+    Attributes:
+        view: the record.
+        centre: (3, K) of the reflecting spheres, mm.
+        radius: (K,) of them, mm.
+        body: (3, K) centres of what lies on the pads, mm.
+        body_radius: (K,) mm.
+        seen: the reflecting spheres from the pinhole.
+        turning: base and caps.
+        standing: stage and frame.
+    """
+
+    view: View
+    centre: Floats
+    radius: Floats
+    body: Floats
+    body_radius: Floats
+    seen: Seen
+    turning: Obstacles
+    standing: Obstacles
+
+
+def rig(view: View, held: Held, caps: list[Cap], bodies: list[Body]) -> Rig:
+    """Put balls on their pads, and caps as they were measured.
+
+    Raises:
+        Unknown: a centre, a cap or a mesh is not known.
+    """
+    balls = view.made.balls
+    if lost := [why for why in held.reason if why]:
+        raise Unknown(lost[0])
+    body, radius = held.centre.T.copy(), balls.of("radius_mm").copy()
+    centre, body_radius = body.copy(), balls.of("body_radius_mm").copy()
+    without = {*np.flatnonzero(balls.cap).tolist()} - {cap.ball for cap in caps}
+    if without:
+        raise Unknown(f"no part is the cap of ball {min(without) + 1}")
+    for cap in caps:
+        # The cap lies with its body on the pads, wherever the file has it.
+        centre[:, cap.ball] += cap.front.centre - cap.body.centre
+        radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
+    normal = unit(balls.columns("nx", 3))
+    surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
+    return Rig(
+        view,
+        centre,
+        radius,
+        body,
+        body_radius,
+        seen_from(view.pinhole, surfaces),
+        obstacles(of_roles(bodies, "base", "cap")),
+        obstacles(of_roles(bodies, "stage", "frame")),
+    )
+
+
+def obstacles(bodies: list[Body]) -> Obstacles:
+    """Parts as one scene.
+
+    Raises:
+        Unknown: a mesh is not known.
+    """
+    names = tuple(one.part.name for one in bodies)
+    if not bodies:
+        return Obstacles(None, np.zeros(1, dtype=np.intp), names)
+    mesh, owner = joined_bodies(bodies)
+    return Obstacles(build(mesh), np.append(owner, -1), names)
+
+
+def to_base(view: View, x: Floats, angle: Floats) -> Floats:
+    """Columns of the ground's frame (3, N) in the base's, which has turned by angles (N,)."""
+    return axis.turned(x, view.frame[0][:, None], -angle)
+
+
+def to_ground(view: View, x: Floats, angle: Floats) -> Floats:
+    """The way back."""
+    return axis.turned(x, view.frame[0][:, None], angle)
