@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
     from tbcad.design.spec import Spec
 
-BUILD_STAGES, PROOF_STAGES, PIPED_WIDTH = 7, 9, 160
+# Mirrors and manifest are stages too.
+BUILD_STAGES = {"shell": 5, "prototype": 6}
+PROOF_STAGES, PIPED_WIDTH = 9, 160
 
 app = typer.Typer(
     name="tbcad",
@@ -82,44 +84,57 @@ def build(
             "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
         ),
     ] = None,
+    parts: Annotated[
+        str | None,
+        typer.Option(
+            help="What to build: shell, prototype, or both with a comma between them; without, "
+            "both, but no prototype of planar mirrors."
+        ),
+    ] = None,
     verify: Annotated[bool, typer.Option(help="Prove the optics on the files written.")] = True,
     force: Annotated[
         bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
     ] = False,
 ) -> int:
-    """Compute the mirrors, build both shells, write STEP, STL and 3MF, and prove them.
+    """Compute the mirrors, build shells and prototype, write STEP, STL and 3MF, and prove them.
 
     Exit code 0: built and proved. 1: built, but the proof fails (the files stay). 2: bad input,
     nothing written.
     """
     from tbcad.design.spec import load_spec
+    from tbcad.export.everything import default_parts, parse_parts
     from tbcad.export.folder import check_target
 
+    asked = parse_parts(parts) if parts is not None else None
     options = list(settings or [])
     options += [f"optics.n={n}"] if n is not None else []
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
+    wanted = asked or default_parts(spec)
     check_target(out, force)
-    with stages(BUILD_STAGES + PROOF_STAGES * verify) as told:
-        report = _built(spec, out, force, verify, told)
+    count = sum(BUILD_STAGES[part] for part in wanted)
+    with stages(2 + count + PROOF_STAGES * verify) as told:
+        report = _built(spec, out, wanted, force, verify, told)
     if report is None:
         typer.echo(f"{out}: built, not proved: run tbcad verify {out}")
         return 0
-    typer.echo(f"{out}: shell_a and shell_b as STEP, STL and 3MF; mirrors.csv, design.json")
+    typer.echo(f"{out}: {' and '.join(wanted)} as STEP, STL and 3MF; mirrors.csv, design.json")
     _show(report)
     return 0 if report.passed else 1
 
 
-def _built(spec: "Spec", out: Path, force: bool, verify: bool, told: Stages) -> "Report | None":
+def _built(
+    spec: "Spec", out: Path, parts: tuple[str, ...], force: bool, verify: bool, told: Stages
+) -> "Report | None":
     """The stages of a build; the proof reads the files back before they replace the old ones."""
     from tbcad.design.mirrors import design
+    from tbcad.export.everything import export
     from tbcad.export.folder import replacing
-    from tbcad.export.shells import export_shells
 
     told.stage("mirrors: radii and cells")
     made = design(spec, told.detail)
     with replacing(out, force) as folder:
-        export_shells(made, folder, told.stage)
+        export(made, folder, parts, told.stage)
         return _prove(folder, told) if verify else None
 
 
@@ -181,13 +196,23 @@ def _show(report: "Report") -> None:
 @app.command()
 def picture(
     folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
-    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("shell.png"),
+    out: Annotated[
+        Path | None, typer.Option(help="PNG file to write; without, named after its subject.")
+    ] = None,
+    of: Annotated[
+        str,
+        typer.Option(
+            help="shell: both halves, from outside and as a camera looks up into the mirrors; "
+            "rig, base, seat or exploded: the prototype."
+        ),
+    ] = "shell",
 ) -> int:
-    """Draw both halves, from outside and as a camera looks up into the mirrors."""
+    """Draw the shells or the prototype from the files of an export."""
     from tbcad.report.drawing import picture as draw
 
-    draw(folder, out)
-    typer.echo(f"{out}: drawn")
+    file = out or Path(f"{of}.png")
+    draw(folder, file, of)
+    typer.echo(f"{file}: drawn")
     return 0
 
 

@@ -19,7 +19,10 @@ COMMAND = [
     "-c",
     "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))",
 ]
-SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05"]
+STAGES = ("tbcad: proof:", "tbcad: mirrors:", "tbcad: prototype:")
+SHELL = ["--parts", "shell"]
+SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05", *SHELL]
+WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SHELL]
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +37,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     assert run(arguments) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    lines = [line for line in shown.err.splitlines() if not line.startswith("tbcad: proof:")]
+    lines = [line for line in shown.err.splitlines() if not line.startswith(STAGES)]
     assert len(lines) == 1
     assert lines[0].startswith("tbcad: ")
     return lines[0]
@@ -50,7 +53,7 @@ def test_build_without_proof(export: Path) -> None:
 def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
     out = tmp_path / "exports"
-    code = run(["build", "--n", "6", "--set", "hfov_deg=110", "--out", str(out)])
+    code = run([*WIDE, "--out", str(out)])
     shown = capsys.readouterr()
     assert code == 0, shown.out
     assert "PASS" in shown.out
@@ -59,7 +62,7 @@ def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFi
     assert json.loads(proof)["pass"] is True
     assert run(["verify", str(out)]) == 0
     assert (out / "verify.json").read_bytes() == proof
-    assert run(["build", "--n", "6", "--set", "hfov_deg=110", "--out", str(out)]) == 0
+    assert run([*WIDE, "--out", str(out)]) == 0
     assert (out / "verify.json").read_bytes() == proof
 
 
@@ -67,7 +70,7 @@ def test_failed_proof_keeps_the_files_and_names_mirrors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "paper"
-    assert run(["build", "--n", "9", "--radius-rule", "paper", "--out", str(out)]) == 1
+    assert run(["build", "--n", "9", "--radius-rule", "paper", *SHELL, "--out", str(out)]) == 1
     shown = capsys.readouterr().out
     assert "FAIL" in shown
     assert "short" in shown
@@ -91,6 +94,11 @@ def test_failed_proof_keeps_the_files_and_names_mirrors(
         (["build", "--set", "optics.nn=3"], ["optics.nn", "optics.n"]),
         (["build", "--set", "wall_mm=-1"], ["shell.wall_mm", "-1"]),
         (["build", "--radius-rule", "bent"], ["bent", "traced"]),
+        (["build", "--parts", "shel"], ["--parts", "shel", "shell, prototype"]),
+        (["build", "--parts", ""], ["--parts", "nothing", "shell, prototype"]),
+        (["build", "--parts", "prototype", "--radius-rule", "flat"], ["radius_rule", "traced"]),
+        (["build", "--n", "1"], ["prototype.k", "16", "3 or less", "--parts shell"]),
+        (["picture", ".", "--of", "cat"], ["cat", "exploded"]),
         (["build", "no-such-design.toml"], ["no-such-design.toml"]),
         (["build", "--wrong-option"], ["--wrong-option"]),
         (["bulid"], ["bulid", "build"]),
@@ -135,7 +143,7 @@ def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
     assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     build = subprocess.Popen(
-        [*COMMAND, "build", "--n", "7", "--out", str(out)],
+        [*COMMAND, "build", "--n", "7", *SHELL, "--out", str(out)],
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,

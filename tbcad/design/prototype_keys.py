@@ -4,8 +4,11 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
+from tbcad.design.base_keys import Base
+from tbcad.design.drive import Motion
 from tbcad.design.errors import shown
 from tbcad.design.section import Section, as_tuple
+from tbcad.design.stage_keys import Frame, Stage
 
 MOST_BALLS = 1000
 
@@ -72,3 +75,11 @@ class Prototype(Section):
     """Largest swing of the base that the drive allows."""
     stop_error_deg: float = Field(0.5, gt=0, le=20)
     """Error of direction that a mirror may have from sharing a stop of the base with others."""
+    base: Base = Base()
+    """The printed carrier of the balls."""
+    motion: Motion = Motion()
+    """How it is driven from stop to stop."""
+    stage: Stage = Stage()
+    """What the object stands on."""
+    frame: Frame = Frame()
+    """What holds stage, base and camera."""

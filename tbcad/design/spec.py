@@ -257,10 +257,13 @@ def _option(text: str) -> tuple[str, object]:
 
 
 def _full_key(key: str) -> str:
+    """The whole key that a key or its end means: the one nearest to the top of the design."""
     known = {name for name, field in fields(Spec) if section_of(field) is None}
     if key in known:
         return key
-    match sorted(name for name in known if name.endswith("." + key)):
+    ending = [name for name in known if name.endswith("." + key)]
+    top = min((name.count(".") for name in ending), default=0)
+    match sorted(name for name in ending if name.count(".") == top):
         case [only]:
             return only
         case []:

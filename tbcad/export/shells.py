@@ -7,10 +7,9 @@ import numpy as np
 
 from tbcad.design.body import Body, body
 from tbcad.design.mirrors import Design, Half
-from tbcad.export.manifest import write_manifest
 from tbcad.export.step import write_step
 from tbcad.export.stl import write_stl
-from tbcad.export.tables import part, rows, write_design, write_mirrors
+from tbcad.export.tables import part
 from tbcad.export.threemf import write_3mf
 from tbcad.model.mesh import Mesh, mesh
 from tbcad.model.shell import shell
@@ -19,23 +18,18 @@ Progress = Callable[[str], None]
 
 
 def export_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
-    """Write the record, both shells as STEP, STL and 3MF, and the manifest into a folder.
+    """Write both shells as STEP, STL and 3MF into a folder.
 
     Raises:
         SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds a solid invalid.
     """
     first = design.halves[0]
-    records = [row for half in design.halves for row in rows(half)]
-    write_mirrors(folder / "mirrors.csv", records)
-    write_design(folder / "design.json", design, records)
     closing = body(design.spec.shell, first.body, first.ellipsoid)
     progress("facets")
     facets = mesh(design.spec, first.body, closing, distances(first))
     for half in design.halves:
         _export(design, half, closing, facets, folder, progress)
-    progress("manifest")
-    write_manifest(folder)
 
 
 def distances(half: Half) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -38,7 +38,7 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
     Raises:
         StepError: when the kernel fails.
     """
-    _quiet()
+    quiet()
     STEPControl_Controller.Init_s()
     Interface_Static.SetCVal_s("write.step.unit", "MM")
     Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
@@ -51,12 +51,12 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
         _name(finder, face, name)
     _validation_properties(writer, solid.shape)
     _name_product(writer, solid.name)
-    _head(writer, solid.name)
+    write_head(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
         raise StepError(f"{path.name}: the kernel cannot write the file")
 
 
-def _quiet() -> None:
+def quiet() -> None:
     """Keep the kernel's statistics off the screen; its failures are raised here."""
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Fail)
@@ -98,7 +98,8 @@ def _name_product(writer: STEPControl_Writer, name: str) -> None:
             entity.SetName(TCollection_HAsciiString(name))
 
 
-def _head(writer: STEPControl_Writer, name: str) -> None:
+def write_head(writer: STEPControl_Writer, name: str) -> None:
+    """Name the file; its time stamp is fixed."""
     header = APIHeaderSection_MakeHeader(writer.Model())
     header.SetName(TCollection_HAsciiString(name))
     header.SetTimeStamp(TCollection_HAsciiString(TIME_STAMP))

@@ -54,7 +54,14 @@ def write_mirrors(path: Path, records: list[Row]) -> None:
         writer.writerows(records)
 
 
-def write_design(path: Path, design: Design, records: list[Row]) -> None:
+def write_record(folder: Path, design: Design, shells: bool) -> None:
+    """Write mirrors.csv and design.json; whether the shells' files are there too is recorded."""
+    records = [row for half in design.halves for row in rows(half)]
+    write_mirrors(folder / "mirrors.csv", records)
+    write_design(folder / "design.json", design, records, shells)
+
+
+def write_design(path: Path, design: Design, records: list[Row], shells: bool = True) -> None:
     """Write design.json."""
     spec = design.spec
     document = {
@@ -64,7 +71,7 @@ def write_design(path: Path, design: Design, records: list[Row]) -> None:
         "coating_mm": spec.mirrors.coating_um / 1000,
         "foot_z_mm": design.halves[0].foot,
         "cameras": [camera(half) for half in design.halves],
-        "parts": [part(half) for half in design.halves],
+        "parts": [part(half) for half in design.halves if shells],
         "mirrors": records,
     }
     path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")

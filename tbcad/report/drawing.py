@@ -9,24 +9,39 @@ from pathlib import Path
 
 from tbcad.errors import InputError
 
+SHELL = "shell"
+RIG = ("rig", "base", "seat", "exploded")
+SUBJECTS = (SHELL, *RIG)
 NEEDED = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
+NEEDED_FOR_RIG = ("prototype.json",)
 
 
-def picture(folder: Path, file: Path) -> None:
-    """Draw both halves of an export to a PNG file, which is replaced as a whole.
+def picture(folder: Path, file: Path, subject: str = SHELL) -> None:
+    """Draw a subject of an export to a PNG file, which is replaced as a whole.
+
+    Args:
+        folder: an export.
+        file: picture to write.
+        subject: one of SUBJECTS.
 
     Raises:
         InputError: when the export or a screen is missing, or drawing fails.
     """
-    missing = [name for name in NEEDED if not (folder / name).is_file()]
+    if subject not in SUBJECTS:
+        raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
+    needed = NEEDED if subject == SHELL else NEEDED_FOR_RIG
+    missing = [name for name in needed if not (folder / name).is_file()]
     if missing:
-        raise InputError(f"{folder}: {missing[0]} is missing: name a folder that tbcad build wrote")
+        raise InputError(
+            f"{folder}: {missing[0]} is missing: name a folder that tbcad build wrote with its "
+            f"{'shell' if subject == SHELL else 'prototype'}"
+        )
     if file.suffix.lower() != ".png" or not file.parent.is_dir():
         raise InputError(f"{file}: name a .png file in a folder that exists")
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".tbcad-picture-") as place:
         drawn = Path(place) / "picture.png"
         done = subprocess.run(
-            child_command(folder, drawn), capture_output=True, text=True, check=False
+            child_command(folder, drawn, subject), capture_output=True, text=True, check=False
         )
         if done.returncode != 0 or not drawn.is_file():
             last = (done.stderr.strip() or "the process crashed").splitlines()[-1]
@@ -34,13 +49,14 @@ def picture(folder: Path, file: Path) -> None:
         drawn.replace(file)
 
 
-def child_command(folder: Path, picture: Path) -> list[str]:
+def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:
     """The command that draws in a process of its own, under a virtual screen where needed.
 
     Raises:
         InputError: when there is neither a screen nor a virtual one.
     """
-    command = [sys.executable, "-m", "tbcad.report.pictures", str(folder), str(picture)]
+    module, what = ("pictures", []) if subject == SHELL else ("rig_pictures", [subject])
+    command = [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
     if os.environ.get("DISPLAY") or sys.platform != "linux":
         return command
     virtual = shutil.which("xvfb-run")

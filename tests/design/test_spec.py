@@ -359,6 +359,9 @@ class TestPrototype:
         assert "allowed is G3 or G5" in refusal(None, "grade=G11")
         assert list(load_grades()) == list(get_args(GradeName))
 
-    def test_wall_of_the_shell_is_still_the_only_one(self) -> None:
-        """Its short name was in use before the prototype had keys."""
-        assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
+    def test_the_key_nearest_to_the_top_is_meant(self) -> None:
+        """Short names of the shell were in use before the prototype had keys."""
+        spec = load_spec(None, ["wall_mm=4", "base.relief_mm=0.5"])
+        assert spec.shell.wall_mm == 4
+        assert spec.prototype.base.relief_mm == 0.5
+        assert load_spec(None, ["magnet_gap_mm=0.4"]).prototype.base.magnet_gap_mm == 0.4

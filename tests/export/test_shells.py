@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.design.mirrors import Design, design
 from tbcad.design.spec import load_spec, spec_dict
-from tbcad.export.shells import export_shells
+from tbcad.export.everything import SHELL, export
 from tbcad.export.tables import COLUMNS
 from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 
@@ -16,7 +16,7 @@ from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 @pytest.fixture(scope="module")
 def exported(small_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
-    export_shells(small_design, folder)
+    export(small_design, folder, [SHELL])
     return folder
 
 
@@ -91,7 +91,7 @@ def test_record(exported: Path, small_design: Design) -> None:
 
 
 def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:
-    export_shells(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path)
+    export(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path, [SHELL])
     with (tmp_path / "mirrors.csv").open(newline="") as file:
         row = next(csv.DictReader(file))
     assert row["radius_mm"] == row["cx"] == ""
@@ -110,7 +110,7 @@ def test_manifest_holds_every_file(exported: Path) -> None:
 
 
 def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
-    export_shells(design(load_spec(None, ["n=6"])), tmp_path)
+    export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
     for path in exported.iterdir():
         assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
 
@@ -120,7 +120,7 @@ def test_pcurves_on_request(tmp_path: Path) -> None:
     for wanted in ("false", "true"):
         folder = tmp_path / wanted
         folder.mkdir()
-        export_shells(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder)
+        export(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder, [SHELL])
         text = (folder / "shell_a.step").read_text()
         assert ("PCURVE" in text) == (wanted == "true")
         sizes.append(len(text))

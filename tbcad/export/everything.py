@@ -1,0 +1,76 @@
+"""An export: the record, what was asked for, and the manifest."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from tbcad.design.errors import SpecError
+from tbcad.design.mirrors import Design
+from tbcad.design.spec import Spec
+from tbcad.errors import InputError
+from tbcad.export.manifest import write_manifest
+from tbcad.export.prototype import export_prototype
+from tbcad.export.shells import export_shells
+from tbcad.export.tables import write_record
+
+Progress = Callable[[str], None]
+
+SHELL, PROTOTYPE = "shell", "prototype"
+PARTS = (SHELL, PROTOTYPE)
+
+
+def parse_parts(text: str) -> tuple[str, ...]:
+    """The parts that a list with commas names, in the order they are built.
+
+    Raises:
+        InputError: it names none, or one that there is not.
+    """
+    named = {name.strip() for name in text.split(",") if name.strip()}
+    if odd := sorted(named - {*PARTS}):
+        raise InputError(f"--parts: {odd[0]!r} is no part: name {', '.join(PARTS)} or one of them")
+    if not named:
+        raise InputError(f"--parts: nothing to build: name {', '.join(PARTS)} or one of them")
+    return tuple(name for name in PARTS if name in named)
+
+
+def default_parts(spec: Spec) -> tuple[str, ...]:
+    """What is built when nobody says what: all, but no balls for planar mirrors."""
+    return (SHELL,) if spec.mirrors.radius_rule == "flat" else PARTS
+
+
+def export(
+    design: Design,
+    folder: Path,
+    parts: Sequence[str] = PARTS,
+    progress: Progress = lambda _: None,
+) -> None:
+    """Write an export into an empty folder.
+
+    Args:
+        design: of mirrors.
+        folder: to write into.
+        parts: some of PARTS.
+        progress: told of each stage.
+
+    Raises:
+        SpecError: when something does not fit; it says what to change.
+        InvalidSolidError: when the kernel fails.
+    """
+    write_record(folder, design, SHELL in parts)
+    if PROTOTYPE in parts:
+        with _or_left_out(SHELL in parts):
+            export_prototype(design, folder, progress)
+    if SHELL in parts:
+        export_shells(design, folder, progress)
+    progress("manifest")
+    write_manifest(folder)
+
+
+@contextmanager
+def _or_left_out(others: bool) -> Iterator[None]:
+    try:
+        yield
+    except SpecError as error:
+        if others:
+            raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
+        raise

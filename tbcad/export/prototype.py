@@ -1,0 +1,117 @@
+"""All files of the prototype: parts, tables, plan, record and assembly."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tbcad.design.drive import Motion
+from tbcad.design.mirrors import Design
+from tbcad.design.prototype import pictures
+from tbcad.design.stage import leds
+from tbcad.export import balls, bom, gcode, plan
+from tbcad.export.assembly import write_assembly
+from tbcad.export.glb import write_glb
+from tbcad.export.pieces import record, write_piece
+from tbcad.model.machine import Machine, machine
+from tbcad.model.rig import rig
+
+Progress = Callable[[str], None]
+
+SCHEMA = "tbcad-prototype/1"
+PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
+NAME, STEP, GLB = "prototype.json", "prototype.step", "prototype.glb"
+
+
+def export_prototype(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+    """Build the prototype and write all of its files into a folder.
+
+    Raises:
+        SpecError: when something does not fit; it says what to change.
+        InvalidSolidError: when the kernel fails.
+    """
+    built, spec = machine(design, progress), design.spec
+    progress("prototype: files")
+    for piece in built.pieces:
+        write_piece(folder, piece, spec.mesh.structure_error_mm, spec.step.pcurves)
+    _write_tables(built, design, folder)
+    progress("prototype: assembly")
+    groups = [group for group in rig(built) if group.bodies]
+    write_assembly(folder / STEP, "prototype", groups)
+    write_glb(folder / GLB, "prototype", groups)
+    text = json.dumps(document(built, design), indent=1, allow_nan=False) + "\n"
+    (folder / NAME).write_text(text, encoding="utf-8")
+
+
+def document(built: Machine, design: Design) -> dict[str, Any]:
+    """prototype.json: what is known of the prototype, in numbers."""
+    made, keys = built.made, design.spec.prototype
+    axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
+    return {
+        "schema": SCHEMA,
+        "camera": made.half.camera,
+        "target_mm": design.spec.optics.capture_diameter_mm,
+        "picture": keys.picture,
+        "target_pad_um": PAD_UM,
+        "frame": {"axis": axis, "zero": zero, "third": third},
+        "swing_deg": _swing(built, keys.motion),
+        "balls": balls.rows(made),
+        "seats": _seats(built),
+        "parts": [record(piece) for piece in built.pieces],
+        "leds": [
+            {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
+            for name, place, way in leds(built.stage)
+        ],
+        "assembly": {"step": STEP, "glb": GLB},
+        "drive": bom.drive_record(
+            built.balance, built.drive, keys.motion, built.swing, built.base.hub.disc
+        ),
+    }
+
+
+def _swing(built: Machine, motion: Motion) -> list[float]:
+    """Base angles that the program drives between: it starts below the first stop."""
+    todo = gcode.run(built.made, motion)
+    angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
+    return [min(angles), max(angles)]
+
+
+def _seats(built: Machine) -> list[dict[str, Any]]:
+    """Record of each seat: its axis, away from the light, and its three pads."""
+    seats = built.base.seats
+    return [
+        {
+            "ball": k + 1,
+            "axis": (seats.axis[k] + 0.0).tolist(),
+            "normals": (seats.pad_normals[k] + 0.0).tolist(),
+            "contacts_mm": (seats.contacts[k] + 0.0).tolist(),
+            "pad_diameter_mm": 2 * float(seats.pad[k]),
+        }
+        for k in range(len(seats))
+    ]
+
+
+def _write_tables(built: Machine, design: Design, folder: Path) -> None:
+    made, motion = built.made, design.spec.prototype.motion
+    balls.write_balls(folder / "balls.csv", balls.rows(made))
+    plan.write_plan(folder / "rotation_plan.csv", plan.rows(pictures(made)))
+    plan.write_stops(folder / "stops.csv", plan.stop_rows(made))
+    gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))
+    bom.write_bom(
+        folder / "bom.csv", bom.rows(made, built.drive, _needed(built, design), built.parts)
+    )
+
+
+def _needed(built: Machine, design: Design) -> bom.PartsNeeded:
+    keys = design.spec.prototype.base
+    return bom.PartsNeeded(
+        bought=built.bought,
+        leds=len(built.stage.leds),
+        led=built.stage.led.name,
+        printed=tuple(
+            bom.Printed(piece.name, piece.what, piece.part.volume, piece.quantity)
+            for piece in built.pieces
+            if piece.role != "cap"
+        ),
+        print_density=keys.density_g_cm3,
+    )

@@ -1,0 +1,201 @@
+"""Pictures of the prototype, drawn from an export's prototype.json, STL files and assembly.
+
+Run as a program (`python -m tbcad.report.rig_pictures DIR SUBJECT FILE`), as `pictures`.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyvista
+import trimesh
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Record = dict[str, Any]
+
+
+class _Drawn(NamedTuple):
+    """A body of the assembly: its name, its group, its surface, its colour and opacity."""
+
+    name: str
+    group: str
+    mesh: pyvista.PolyData
+    colour: Floats
+
+
+# From glTF's metres and y up to millimetres and z up.
+SHELL_FRAME = 1e3 * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+SIZE = (1600, 800)
+ANGLE_DEG = 30.0
+COLOURS = {
+    "base": "#5b7394",
+    "cap": "#d9b366",
+    "ball": "#c7ccd4",
+}
+# In the exploded view: what stands still is moved away from the object by this share of its
+# distance, balls and caps are lifted out of their seats by so many radii of the capture sphere.
+APART = 0.7
+LIFTED = 1.5
+ZOOM = 1.0
+
+
+def draw(folder: Path, subject: str, picture: Path) -> None:
+    """Draw one of SUBJECTS to a PNG file.
+
+    Args:
+        folder: an export with a prototype.
+        subject: key of SUBJECTS.
+        picture: file to write.
+    """
+    record = json.loads((folder / "prototype.json").read_text(encoding="utf-8"))
+    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
+    SUBJECTS[subject](plotter, folder, record)
+    plotter.screenshot(picture)
+    plotter.close()
+
+
+def _rig(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+    """Everything, bought parts too, from two sides."""
+    bodies = _assembly(folder, record)
+    for column, eye in enumerate(((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0))):
+        plotter.subplot(0, column)
+        for body in bodies:
+            if body.name != "camera_view":
+                _add(plotter, body, np.zeros(3))
+        _show_all(plotter, eye)
+
+
+def _base(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+    """The base with its balls, from the object and from behind."""
+    axis, zero, third = (np.array(record["frame"][key]) for key in ("axis", "zero", "third"))
+    for column, eye in enumerate((axis - zero - 0.4 * third, zero - 0.4 * axis + 0.3 * third)):
+        plotter.subplot(0, column)
+        _parts(plotter, folder, record, ("base", "cap"))
+        _balls(plotter, record)
+        _show_all(plotter, eye)
+
+
+def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+    """The seat of the largest ball that is bought: empty, and with the ball in it."""
+    balls = [ball for ball in record["balls"] if ball["kind"] == "ball"] or record["balls"]
+    ball = max(balls, key=lambda one: one["body_radius_mm"])
+    seat = record["seats"][ball["number"] - 1]
+    axis, radius = np.array(seat["axis"]), ball["body_radius_mm"]
+    middle = np.array([ball[key] for key in ("bx", "by", "bz")])
+    side = np.cross(axis, (0.0, 1.0, 0.3))
+    eye = middle - 7 * radius * axis + 2.5 * radius * side / np.linalg.norm(side)
+    for column in (0, 1):
+        plotter.subplot(0, column)
+        _parts(plotter, folder, record, ("base",))
+        for contact in seat["contacts_mm"] if column == 0 else ():
+            mark = pyvista.Sphere(radius=seat["pad_diameter_mm"] / 5, center=contact)
+            plotter.add_mesh(mark, color="red")
+        if column:
+            _balls(plotter, record, only=ball["number"])
+        _look(plotter, eye, middle + 0.3 * radius * axis)
+
+
+def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+    """All parts drawn apart: balls and caps out of their seats, the rest away from the base."""
+    unit = record["target_mm"] / 2
+    seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
+    seats |= {part["name"]: seats[f"ball_{part['ball']}"] for part in _with(record, ("cap",))}
+    bodies = [body for body in _assembly(folder, record) if body.group != "views"]
+    for column, eye in enumerate(((-0.5, -2.6, 0.8), (2.3, -1.5, 1.1))):
+        plotter.subplot(0, column)
+        for body in bodies:
+            still = body.group in ("stage", "frame", "bought")
+            out = -LIFTED * unit * seats.get(body.name, np.zeros(3))
+            _add(plotter, body, APART * np.array(body.mesh.center) if still else out)
+        _show_all(plotter, eye)
+
+
+SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Record], None]] = {
+    "rig": _rig,
+    "base": _base,
+    "seat": _seat,
+    "exploded": _exploded,
+}
+
+
+def _with(record: Record, roles: tuple[str, ...]) -> list[Record]:
+    return [part for part in record["parts"] if part["role"] in roles]
+
+
+def _parts(
+    plotter: pyvista.Plotter,
+    folder: Path,
+    record: Record,
+    roles: tuple[str, ...],
+) -> None:
+    for part in _with(record, roles):
+        mesh = _mesh(folder, part)
+        plotter.add_mesh(mesh, color=COLOURS[part["role"]], specular=0.2)
+
+
+def _mesh(folder: Path, part: Record) -> pyvista.PolyData:
+    """A part from the printer's bed back to where it stands in the rig."""
+    mesh = pyvista.read(folder / part["stl"])
+    axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
+    mesh.points = (np.asarray(mesh.points, dtype=np.float64) - origin) @ axes.T
+    return mesh.compute_normals(split_vertices=True, feature_angle=30.0)
+
+
+def _balls(plotter: pyvista.Plotter, record: Record, only: int = 0) -> None:
+    for ball in record["balls"]:
+        if ball["kind"] == "ball" and only in (0, ball["number"]):
+            middle = np.array([ball[key] for key in ("bx", "by", "bz")])
+            ball_mesh = pyvista.Sphere(
+                radius=ball["body_radius_mm"], center=middle, theta_resolution=48, phi_resolution=48
+            )
+            plotter.add_mesh(ball_mesh, color=COLOURS["ball"], smooth_shading=True, specular=0.9)
+
+
+def _assembly(folder: Path, record: Record) -> list[_Drawn]:
+    """All bodies of prototype.glb, in millimetres and z up."""
+    scene = trimesh.load_scene(folder / record["assembly"]["glb"])
+    found = []
+    for name in sorted(scene.graph.nodes_geometry):
+        place, geometry = scene.graph[name]
+        mesh = scene.geometry[geometry]
+        points = trimesh.transform_points(mesh.vertices, place) @ SHELL_FRAME
+        faces = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces])
+        surface = pyvista.PolyData(points, faces.ravel()).clean()
+        surface = surface.compute_normals(split_vertices=True, feature_angle=30.0)
+        colour = mesh.visual.material.baseColorFactor / 255
+        found.append(_Drawn(name, scene.graph.transforms.parents[name], surface, colour))
+    return found
+
+
+def _add(plotter: pyvista.Plotter, body: _Drawn, moved: Floats) -> None:
+    plotter.add_mesh(
+        body.mesh.translate(moved, inplace=False),
+        color=body.colour[:3],
+        opacity=float(body.colour[3]),
+        specular=0.3,
+    )
+
+
+def _show_all(plotter: pyvista.Plotter, eye: Sequence[float] | Floats) -> None:
+    """Look from a direction at all that is drawn."""
+    plotter.set_background("white")
+    plotter.view_vector(tuple(eye), viewup=(0.0, 0.0, 1.0))
+    plotter.camera.view_angle = ANGLE_DEG
+    plotter.reset_camera()
+    plotter.camera.zoom(ZOOM)
+
+
+def _look(plotter: pyvista.Plotter, eye: Floats, focus: Floats) -> None:
+    plotter.set_background("white")
+    plotter.camera_position = [tuple(eye), tuple(focus), (0.0, 0.0, 1.0)]
+    plotter.camera.view_angle = ANGLE_DEG
+    plotter.reset_camera_clipping_range()
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3]))
