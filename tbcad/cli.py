@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from tbcad.design.spec import Spec
 
-# Mirrors and manifest are stages too.
-BUILD_STAGES = {"shell": 5, "prototype": 6}
+# With mirrors and manifest; both together take a stage for the shells, which are built beside.
+BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
 PROOF_STAGES, PIPED_WIDTH = 9, 160
 
 app = typer.Typer(
@@ -112,8 +112,7 @@ def build(
     spec = load_spec(design, options)
     wanted = asked or default_parts(spec)
     check_target(out, force)
-    count = sum(BUILD_STAGES[part] for part in wanted)
-    with stages(2 + count + PROOF_STAGES * verify) as told:
+    with stages(BUILD_STAGES[wanted] + PROOF_STAGES * verify) as told:
         report = _built(spec, out, wanted, force, verify, told)
     if report is None:
         typer.echo(f"{out}: built, not proved: run tbcad verify {out}")

@@ -66,6 +66,20 @@ def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFi
     assert (out / "verify.json").read_bytes() == proof
 
 
+def test_build_with_prototype_is_proved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Both parts; the small design's motor stands nearer to the base than large ones may."""
+    settings = ("hfov_deg=110", "prototype.k=4", "prototype.frame.clearance_mm=1.5")
+    options = [word for setting in settings for word in ("--set", setting)]
+    out = tmp_path / "exports"
+    code = run(["build", "--n", "6", *options, "--out", str(out)])
+    shown = capsys.readouterr()
+    assert code == 0, shown.out
+    assert "prototype: 4 balls" in shown.out
+    verdict = json.loads((out / "verify.json").read_text())
+    names = {check["name"] for check in verdict["checks"] if check["pass"]}
+    assert names >= {"coverage, spheres", "coverage, balls", "light of the balls", "ball centres"}
+
+
 def test_failed_proof_keeps_the_files_and_names_mirrors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

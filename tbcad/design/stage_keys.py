@@ -49,8 +49,9 @@ class Stage(Section):
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)
     """Width of the wires' channels."""
-    wall_mm: float = Field(3.0, ge=1, le=20)
-    """Wall of the post; less in posts of less than 20 mm."""
+    wall_mm: float = Field(2.7, ge=1, le=20)
+    """Wall of the post, best a multiple of the slicer's lines (six of 0.45 mm, else they overfill
+    it); less in posts of less than 18 mm."""
 
 
 class Frame(Section):

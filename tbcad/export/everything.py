@@ -8,9 +8,10 @@ from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design
 from tbcad.design.spec import Spec
 from tbcad.errors import InputError
+from tbcad.export.beside import beside
 from tbcad.export.manifest import write_manifest
 from tbcad.export.prototype import export_prototype
-from tbcad.export.shells import export_shells
+from tbcad.export.shells import closing, export_shells
 from tbcad.export.tables import write_record
 
 Progress = Callable[[str], None]
@@ -57,20 +58,24 @@ def export(
         InvalidSolidError: when the kernel fails.
     """
     write_record(folder, design, SHELL in parts)
-    if PROTOTYPE in parts:
-        with _or_left_out(SHELL in parts):
-            export_prototype(design, folder, progress)
-    if SHELL in parts:
+    if PROTOTYPE not in parts:
         export_shells(design, folder, progress)
+    elif SHELL not in parts:
+        export_prototype(design, folder, progress)
+    else:
+        closing(design)  # flanges that do not fit are told at once
+        with beside(export_shells, design, folder):
+            with _or_left_out():
+                export_prototype(design, folder, progress)
+            progress("shells")
     progress("manifest")
     write_manifest(folder)
 
 
 @contextmanager
-def _or_left_out(others: bool) -> Iterator[None]:
+def _or_left_out() -> Iterator[None]:
+    """Say of the prototype's faults that it need not be built."""
     try:
         yield
     except SpecError as error:
-        if others:
-            raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
-        raise
+        raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None

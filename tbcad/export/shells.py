@@ -25,11 +25,21 @@ def export_shells(design: Design, folder: Path, progress: Progress = lambda _: N
         InvalidSolidError: when the kernel finds a solid invalid.
     """
     first = design.halves[0]
-    closing = body(design.spec.shell, first.body, first.ellipsoid)
+    around = closing(design)
     progress("facets")
-    facets = mesh(design.spec, first.body, closing, distances(first))
+    facets = mesh(design.spec, first.body, around, distances(first))
     for half in design.halves:
-        _export(design, half, closing, facets, folder, progress)
+        _export(design, half, around, facets, folder, progress)
+
+
+def closing(design: Design) -> Body:
+    """What closes camera a's half: back, flanges, holes.
+
+    Raises:
+        SpecError: when flanges or holes do not fit.
+    """
+    first = design.halves[0]
+    return body(design.spec.shell, first.body, first.ellipsoid)
 
 
 def distances(half: Half) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -17,7 +17,10 @@ from tbcad.export.everything import PARTS, PROTOTYPE, export, parse_parts
 from tests.helpers import area, read_mesh, read_step, volume
 
 MESH_ERROR_MM = 0.1
-OPTIONS = ["n=6", "prototype.k=4", f"structure_error_mm={MESH_ERROR_MM}"]
+OPTIONS = [
+    *("n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5"),
+    f"structure_error_mm={MESH_ERROR_MM}",
+]
 
 
 @pytest.fixture(scope="module")
