@@ -37,7 +37,7 @@ def magnets(base: Base) -> dict[str, int]:
         SpecError: when one is in no list.
     """
     parts, sizes_mm = load_parts(), base.seats.magnet.tolist()
-    return dict(Counter(_magnet(base, size, parts) for size in sizes_mm if size > 0))
+    return dict(Counter(magnet_name(base, size, parts) for size in sizes_mm if size > 0))
 
 
 def fasteners(base: Base, plan: Split) -> dict[str, int]:
@@ -55,7 +55,12 @@ def fasteners(base: Base, plan: Split) -> dict[str, int]:
     return {name: count for name, count in found.items() if count}
 
 
-def _magnet(base: Base, size: float, parts: dict[str, Part]) -> str:
+def magnet_name(base: Base, size: float, parts: dict[str, Part]) -> str:
+    """Name of the disc magnet of a diameter (mm) and of the spec's height.
+
+    Raises:
+        SpecError: when it is in no list.
+    """
     wanted = (size, base.keys.magnet_height_mm)
     for part in parts.values():
         if part.kind == "magnets" and _same(part.sizes, wanted):

@@ -52,6 +52,8 @@ class FrameNumbers:
         printed: brackets to print.
         bought: bodies of purchased parts, for the assembly.
         holes: tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2).
+        holds: bracket that each hole holds.
+        corner: the plate's, from where its holes are measured, (x, y) as the holes, mm, (2,).
         plate: part of the base plate.
         upright: part that the uprights are cut from.
         length: of the uprights, mm.
@@ -65,6 +67,8 @@ class FrameNumbers:
     printed: tuple[Item, ...]
     bought: tuple[Item, ...]
     holes: Floats
+    holds: tuple[str, ...]
+    corner: Floats
     plate: Part
     upright: Part
     length: float
@@ -101,7 +105,7 @@ def frame(
     top = head(keys, base, drive, axes, parts)
     brackets = _brackets(keys, own, made, axes, stage, top, parts)
     upright, length, bars = _uprights(keys, axes, top, parts)
-    plate, ground = _plate(keys, axes, brackets, parts)
+    plate, ground, corner = _plate(keys, axes, brackets, parts)
     bought = (ground, *bars, *top.bought, *_camera(own, made))
     printed = (top.item, *(bracket.item for bracket in brackets))
     light, swept = _clear(keys, (*printed, *bought), space)
@@ -111,6 +115,8 @@ def frame(
         printed=printed,
         bought=bought,
         holes=np.vstack([bracket.holes for bracket in brackets]),
+        holds=tuple(bracket.item.name for bracket in brackets for _ in bracket.holes),
+        corner=corner,
         plate=plate,
         upright=upright,
         length=length,
@@ -165,8 +171,8 @@ def _uprights(
 
 def _plate(
     keys: FrameKeys, axes: Floats, brackets: list[Bracket], parts: Parts
-) -> tuple[Part, Item]:
-    """The least plate under all feet, its middle under theirs, with tapped holes."""
+) -> tuple[Part, Item, Floats]:
+    """The least plate under all feet, its middle under theirs, with tapped holes; its corner."""
     feet = np.vstack([bracket.foot for bracket in brackets])
     low, high = feet.min(axis=0) - ROUND_MM, feet.max(axis=0) + ROUND_MM
     middle = (low + high) / 2
@@ -188,7 +194,8 @@ def _plate(
     corners = np.array([*(middle - half), bottom]), np.array([*(middle + half), keys.floor_mm])
     places = [np.array([*p, bottom]) @ axes for b in brackets for p in b.holes]
     holes = drilled(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
-    return part, Item("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
+    item = Item("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
+    return part, item, middle - half
 
 
 def _camera(own: Keys, made: Prototype) -> list[Item]:

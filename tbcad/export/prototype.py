@@ -9,7 +9,7 @@ from tbcad.design.drive import Motion
 from tbcad.design.mirrors import Design
 from tbcad.design.prototype import pictures
 from tbcad.design.stage import leds
-from tbcad.export import balls, bom, gcode, plan
+from tbcad.export import balls, bom, drilling, gcode, plan
 from tbcad.export.assembly import write_assembly
 from tbcad.export.glb import write_glb
 from tbcad.export.pieces import record, write_piece
@@ -62,6 +62,11 @@ def document(built: Machine, design: Design) -> dict[str, Any]:
             {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
             for name, place, way in leds(built.stage)
         ],
+        "stand": {
+            "plate": built.frame.plate.name,
+            "upright": built.frame.upright.name,
+            "uprights_cut_to_mm": built.frame.length,
+        },
         "assembly": {"step": STEP, "glb": GLB},
         "drive": bom.drive_record(
             built.balance, built.drive, keys.motion, built.swing, built.base.hub.disc
@@ -96,6 +101,7 @@ def _write_tables(built: Machine, design: Design, folder: Path) -> None:
     balls.write_balls(folder / "balls.csv", balls.rows(made))
     plan.write_plan(folder / "rotation_plan.csv", plan.rows(pictures(made)))
     plan.write_stops(folder / "stops.csv", plan.stop_rows(made))
+    drilling.write_drilling(folder / "plate_holes.csv", drilling.rows(built.frame))
     gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))
     bom.write_bom(
         folder / "bom.csv", bom.rows(made, built.drive, _needed(built, design), built.parts)

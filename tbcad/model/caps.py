@@ -3,6 +3,8 @@
 In the cap's own frame the centre of its body is the origin and its axis, away from the light, z.
 """
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRepBuilderAPI import (
@@ -14,6 +16,8 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
 from tbcad.design.base import Base
+from tbcad.design.base_bought import magnet_name
+from tbcad.design.drive import Parts
 from tbcad.design.prototype import Prototype
 from tbcad.model.bed import Part
 from tbcad.model.solids import moved, one_solid, revolved
@@ -65,6 +69,17 @@ def pocket(base: Base, k: int, depth: float) -> tuple[float, float]:
     if keys.hold == "glue" or not fitting or depth + behind < keys.magnet_height_mm + FRONT_MM:
         return 0.0, 0.0
     return max(fitting), keys.magnet_height_mm
+
+
+def magnets(base: Base, made: Prototype, parts: Parts) -> dict[str, int]:
+    """Magnets in the caps' own pockets, by name.
+
+    Raises:
+        SpecError: when one is in no list.
+    """
+    depth, play = made.balls.body_depth, base.keys.magnet_play_mm
+    radii = [pocket(base, k, float(depth[k]))[0] for k in np.flatnonzero(made.balls.cap).tolist()]
+    return dict(Counter(magnet_name(base, 2 * r - play, parts) for r in radii if r))
 
 
 def _section(base: Base, front: float, depth: float, k: int) -> TopoDS_Face:

@@ -22,7 +22,7 @@ from tbcad.model import frame as frames
 from tbcad.model import stage as stages
 from tbcad.model.base import carrier
 from tbcad.model.bed import Part
-from tbcad.model.caps import caps
+from tbcad.model.caps import caps, magnets
 from tbcad.model.coupon import coupon
 from tbcad.model.pieces import Piece
 from tbcad.model.solids import centroid
@@ -68,7 +68,9 @@ class Machine:
     def bought(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls, drive and LEDs."""
         for_base = Counter(bought_for_base(self.base, self.plan))
-        return dict(sorted((for_base + Counter(bought_parts(self.frame, self.stage))).items()))
+        in_caps = Counter(magnets(self.base, self.made, self.parts))
+        around = Counter(bought_parts(self.frame, self.stage))
+        return dict(sorted((for_base + in_caps + around).items()))
 
 
 def machine(design: Design, progress: Progress = lambda _: None) -> Machine:

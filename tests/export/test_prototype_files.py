@@ -47,6 +47,7 @@ def in_rig(folder: Path, part: dict[str, Any]) -> trimesh.Trimesh:
 def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     own = {part[kind] for part in record["parts"] for kind in ("step", "stl", "3mf")}
     tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
+    tables |= {"plate_holes.csv"}
     whole = {"prototype.json", "prototype.step", "prototype.glb"}
     records = {"design.json", "mirrors.csv", "manifest.json"}
     assert {p.name for p in folder.iterdir()} == own | tables | whole | records
@@ -98,6 +99,24 @@ def test_tables_and_record_agree(folder: Path, record: dict[str, Any]) -> None:
     with (folder / "bom.csv").open(newline="") as file:
         printed = {row["part"] for row in csv.DictReader(file) if row["from"] == "printed"}
     assert printed >= {part["name"] for part in record["parts"] if part["role"] != "cap"}
+
+
+def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any]) -> None:
+    """In the assembly's plate, as drilled, seen from above; and every foot is held by some."""
+    with (folder / "plate_holes.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["holds"] for row in rows} == {
+        part["name"] for part in record["parts"] if part["role"] == "frame"
+    } - {"bearing_head"}
+    scene = trimesh.load(folder / "prototype.glb")
+    matrix, name = scene.graph["plate"]
+    points = 1000 * trimesh.transform_points(scene.geometry[name].vertices, matrix)
+    flat = points[:, [0, 2]] * [1, -1]
+    places = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in rows])
+    for place in places + flat.min(axis=0):
+        away = np.linalg.norm(flat - place, axis=1)
+        assert away.min() == pytest.approx(2.1, abs=0.05)  # of a tapped M5 hole
+        assert (away < 2.2).sum() > 20
 
 
 def test_the_assembly_is_a_tree_of_named_coloured_bodies(
