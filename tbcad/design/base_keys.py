@@ -50,7 +50,7 @@ class Base(Section):
     """Wall below a cup's pocket."""
     hold: Hold = "magnet"
     """What holds a ball on its pads: a magnet below it, or glue in a well."""
-    magnets_mm: Magnets = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
+    magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
     """Diameters of the disc magnets on sale; each ball gets the largest that fits."""
     magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
     """Height of the magnets."""

@@ -16,14 +16,15 @@ Floats = NDArray[np.float64]
 
 DISC_MM = 3.0
 INSIDE_MM = 0.3  # how far the crown stays inside the capture sphere
-RIM_MM = 1.5  # its thickness at the rim
+RIM_MM = 1.8  # its thickness at the rim
 ARC = 8  # parts of its underside
 SHOULDER_MM = 2.0
 PLUG_MM, PLUG_PLAY_MM = 15.0, 0.1
 SET_SCREW_MM = 2.8  # hole that an M3 set screw cuts its thread in
 SEAT_MM = 1.0  # depth of the plug's hole for its end
 GROOVE_MM = 1.6
-STUD_MM, STUD_HEIGHT_MM, STUD_PLAY_MM = 2.0, 2.5, 0.15
+OPEN_MM = 0.5  # by which a groove reaches into the pillar that it comes from
+STUD_MM, STUD_HEIGHT_MM, STUD_PLAY_MM = 1.5, 2.5, 0.15
 STUDS = 0.65  # of the disc's radius
 POCKET = 0.75  # of an LED's body below the middle of its dome
 THROUGH_MM = 1.0  # tools stick out
@@ -101,7 +102,7 @@ def _pocket(
     return [
         rod(middle, np.array([*place[:2], end + THROUGH_MM]), hole),
         rod(low, middle + THROUGH_MM * np.array(UP), keys.wire_mm / 2),
-        _groove(keys, place, groove, plate + THROUGH_MM),
+        _groove(keys, place, groove, plate + OPEN_MM),
     ]
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.design.base import Base
+from tbcad.design.base_gaps import arcs, gaps
 from tbcad.design.base_seats import Seats
 from tbcad.design.base_split import Split, downs, split
 from tbcad.model import hub as hubs
@@ -74,7 +75,7 @@ def bodies(base: Base, seats: Seats, plan: Split | None = None) -> list[TopoDS_S
     labels = numbers(base, plan)
     labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
     bosses = [seat.placed(seat.boss(seats, k), seats, k) for k in range(len(seats))]
-    return [_wall(base), *_struts(base, seats, plan), *hubs.body(base.hub), *bosses, *labels]
+    return [_wall(base), *_struts(base, plan), *hubs.body(base.hub), *bosses, *labels]
 
 
 def tools(base: Base, seats: Seats) -> list[TopoDS_Shape]:
@@ -90,25 +91,42 @@ def _wall(base: Base) -> TopoDS_Shape:
     return ring(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
 
 
-def _struts(base: Base, seats: Seats, plan: Split) -> list[TopoDS_Shape]:
-    """Ribs, rings and flanges, cut away where numbers are read."""
+def _struts(base: Base, plan: Split) -> list[TopoDS_Shape]:
+    """Ribs, rings and flanges, left out where numbers are read."""
     low, high = base.sector
     # Their ends lie within the ribs at the edges, not in a plane with other faces.
     inside = base.keys.rib_mm / 2 / float(base.inner[:, 1].max())
-    rings = [ring(one, low + inside, high - low - 2 * inside) for one in base.rings]
-    ends = [seat.placed(seat.column(seats, k, COLUMN_MM), seats, k) for k in range(len(seats))]
-    joined = fused([*_ribs(base), *rings, *flanges(base, plan)])
-    return [cut(joined, [*ends, *windows(base, plan)])]
+    rings = [
+        ring(one, start, end - start)
+        for one in base.rings
+        for start, end in arcs(base, one, low + inside, high - inside)
+    ]
+    struts, joints = [*_ribs(base), *rings], flanges(base, plan)
+    if not joints:
+        return struts
+    return [cut(fused([*struts, *joints]), [*_ends(base), *windows(base, plan)])]
+
+
+def _ends(base: Base) -> list[TopoDS_Shape]:
+    seats = base.own_seats
+    return [seat.placed(seat.column(seats, k, COLUMN_MM), seats, k) for k in range(len(seats))]
 
 
 def _ribs(base: Base) -> list[TopoDS_Shape]:
     """Plates along meridians; those at the edges end with the wall."""
-    section = _rib_section(base)
+    section, thick = _rib_section(base), base.keys.rib_mm
     sides = np.full(len(base.ribs), -0.5)
     sides[0], sides[-1] = 0.0, -1.0
+    ribs = zip(base.ribs.tolist(), sides.tolist(), strict=True)
     return [
-        _plate(section, azimuth, base.keys.rib_mm, side)
-        for azimuth, side in zip(base.ribs.tolist(), sides.tolist(), strict=True)
+        cut(
+            _plate(section, azimuth, thick, side),
+            [
+                _plate(gap, azimuth, 2 * thick, (side - 0.5) / 2)
+                for gap in gaps(base, azimuth, side)
+            ],
+        )
+        for azimuth, side in ribs
     ]
 
 

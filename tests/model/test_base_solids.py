@@ -181,6 +181,19 @@ class TestCarrier:
             squares = "".join(SIGNS[str(k + 1)]).count("#")
             assert area == pytest.approx(squares * square**2, rel=1e-6)
 
+    def test_nothing_stands_over_the_numbers(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+        found = numbers.seats
+        turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+        for k in range(len(found)):
+            rings = [
+                share * found.boss[k] * np.array([np.cos(turn), np.sin(turn)]).T
+                for share in (0.3, 0.6, 0.9)
+            ]
+            start = found.centre[k] + (found.back[k] + KEYS.relief_mm + 0.01) * found.axis[k]
+            points = start + np.vstack(rings) @ found.axes[k, :2]
+            ways = np.broadcast_to(found.axis[k], points.shape)
+            assert not mesh.ray.intersects_any(points, ways).any()
+
     def test_the_hub_is_about_the_axis(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
         local = mesh.vertices @ numbers.frame.T
         assert local[:, 0].min() == pytest.approx(numbers.hub_face)

@@ -16,7 +16,7 @@ from tbcad.design.prototype import Prototype, prototype
 from tbcad.design.room import Room, room
 from tbcad.design.spec import load_spec
 from tbcad.design.stage import StageNumbers, stage
-from tbcad.design.stage_crown import DISC_MM, STUD_PLAY_MM
+from tbcad.design.stage_crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.design.stage_keys import Frame, Stage
 from tbcad.export.step import write_step
 from tbcad.model.bed import Part
@@ -72,7 +72,7 @@ class TestSolids:
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
 
     def test_volume_of_the_disc(self, solids: dict[str, Part], numbers: StageNumbers) -> None:
-        stud = min(2.0, numbers.disc / 5) + STUD_PLAY_MM
+        stud = min(STUD_MM, numbers.disc / 5) + STUD_PLAY_MM
         area = np.pi * (numbers.disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
 
