@@ -34,8 +34,7 @@ def arcs(base: Base, ring: Floats, low: float, high: float) -> list[tuple[float,
         ],
         axis=-1,
     )
-    free = ~_over_numbers(base.own_seats, points).any(axis=1)
-    return _runs(azimuth, free, SHORTEST_MM / reach)
+    return _runs(azimuth, _free(base.own_seats, points), SHORTEST_MM / reach)
 
 
 def gaps(base: Base, azimuth: float, side: float) -> list[Floats]:
@@ -55,8 +54,8 @@ def gaps(base: Base, azimuth: float, side: float) -> list[Floats]:
     widths = (side + np.linspace(0, 1, 5)) * keys.rib_mm
     points = section[..., 1, None] * out + section[..., 0, None] * np.array([0.0, 0.0, 1.0])
     points = (points[:, :, None] + widths[:, None] * across).reshape(len(place), -1, 3)
-    length = STEP_MM * np.arange(len(place))
-    kept = _runs(length, ~_over_numbers(base.own_seats, points).any(axis=1), SHORTEST_MM)
+    length = np.arange(len(place), dtype=np.float64) * STEP_MM
+    kept = _runs(length, _free(base.own_seats, points), SHORTEST_MM)
     return [_section(place, normal, deep, first, last) for first, last in _between(length, kept)]
 
 
@@ -68,13 +67,13 @@ def _filled(ring: Floats) -> Floats:
     return result
 
 
-def _over_numbers(seats: Seats, points: Floats) -> Bools:
-    """Whether points (..., 3) lie behind the end of any boss."""
+def _free(seats: Seats, points: Floats) -> Bools:
+    """Whether none of points (n, s, 3) lies behind the end of a boss, (n,)."""
     away = points[..., None, :] - (seats.centre + seats.back[:, None] * seats.axis)
     along = dot(away, seats.axis)
     beside = norm(away - along[..., None] * seats.axis)
-    result: Bools = ((along > -ROOM_MM) & (beside < seats.boss + ROOM_MM)).any(axis=-1)
-    return result
+    over = (along > -ROOM_MM) & (beside < seats.boss + ROOM_MM)
+    return np.asarray(~over.any(axis=(1, 2)))
 
 
 def _along(line: Floats) -> tuple[Floats, Floats]:
