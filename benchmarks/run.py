@@ -20,6 +20,7 @@ def rows(folder: Path, rounds: int, largest: bool) -> Iterator[list[Row]]:
     """All lines of the table, part by part."""
     # First of all, while this process is small: see builds.build.
     yield builds.small_and_large(folder, rounds)
+    yield builds.whole(folder, rounds)
     if largest:
         yield builds.largest(folder)
     yield builds.step_sizes(folder / "18")

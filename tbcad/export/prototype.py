@@ -5,9 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tbcad.design.choices import choices
 from tbcad.design.drive import Motion
 from tbcad.design.mirrors import Design
-from tbcad.design.prototype import pictures
+from tbcad.design.prototype import Prototype, pictures
+from tbcad.design.spec import Spec
 from tbcad.design.stage import leds
 from tbcad.export import balls, bom, drilling, gcode, plan
 from tbcad.export.assembly import write_assembly
@@ -56,11 +58,16 @@ def document(built: Machine, design: Design) -> dict[str, Any]:
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, keys.motion),
         "balls": balls.rows(made),
+        "choices": _choices(made, design.spec),
         "seats": _seats(built),
         "parts": [record(piece) for piece in built.pieces],
         "leds": [
             {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
             for name, place, way in leds(built.stage)
+        ],
+        "bought": [
+            {"name": item.name, "what": item.what, "part": item.part, "turns": item.turns}
+            for item in built.frame.bought
         ],
         "stand": {
             "plate": built.frame.plate.name,
@@ -72,6 +79,23 @@ def document(built: Machine, design: Design) -> dict[str, Any]:
             built.balance, built.drive, keys.motion, built.swing, built.base.hub.disc
         ),
     }
+
+
+def _choices(made: Prototype, spec: Spec) -> list[dict[str, Any]]:
+    """What each way to choose the balls from the stock would cost, the one taken among them."""
+    found = choices(spec, made.half, made.groups, made.balls.catalogue)
+    return [
+        {
+            "way": one.name,
+            "pixels": one.pixels,
+            "pixels_kept": one.kept,
+            "coverage_mm": one.least_coverage,
+            "mirrors_short": one.short,
+            "balls_mass_g": one.mass_g,
+            "caps": one.made,
+        }
+        for one in found
+    ]
 
 
 def _swing(built: Machine, motion: Motion) -> list[float]:

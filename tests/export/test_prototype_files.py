@@ -90,6 +90,14 @@ def test_pads_are_where_the_record_says(folder: Path, record: dict[str, Any]) ->
             assert np.abs((on_pad - contact) @ normal).max() < 1e-4
 
 
+def test_the_choice_that_was_taken_is_among_those_told(record: dict[str, Any]) -> None:
+    """Its pixels are those of the balls; the default is cover, with caps."""
+    (taken,) = [one for one in record["choices"] if one["way"] == "cover, with caps"]
+    assert len(record["choices"]) == 4
+    assert taken["pixels"] == pytest.approx(sum(ball["pixels"] for ball in record["balls"]))
+    assert taken["caps"] == sum(ball["kind"] == "cap" for ball in record["balls"])
+
+
 def test_tables_and_record_agree(folder: Path, record: dict[str, Any]) -> None:
     with (folder / "balls.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,16 +66,19 @@ def verify(
     before = stamps(root, listing(root))
     export = read_export(root)
     results = Results(progress)
-    if wishes.apart:
-        watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
-    else:
-        prove(export.folder, results, wishes.printers)
-    if any(part.step for part in export.parts):
-        results.stage("STEP")
-        results.checks(step_checks(export, results.bulks, wishes.seconds))
-    if export.prototype and any(part.step for part in export.prototype.parts):
-        results.stage("STEP of the prototype")
-        results.checks(steps.step_checks(export, results.bulks, wishes.seconds))
+    with ThreadPoolExecutor(1) as pool:
+        # Processes of their own, which need nothing from all that comes before their checks.
+        early = pool.submit(steps.readings, export, wishes.seconds)
+        if wishes.apart:
+            watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
+        else:
+            prove(export.folder, results, wishes.printers)
+        if any(part.step for part in export.parts):
+            results.stage("STEP")
+            results.checks(step_checks(export, results.bulks, wishes.seconds))
+        if export.prototype and any(part.step for part in export.prototype.parts):
+            results.stage("STEP of the prototype")
+            results.checks(steps.step_checks(export, results.bulks, early.result()))
     programs = _programs(export, results, wishes.seconds) if wishes.clients else []
     _refuse_changes(export, before)
     report = Report(

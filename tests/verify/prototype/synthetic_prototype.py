@@ -16,6 +16,7 @@ from typing import Any
 
 import manifold3d
 import numpy as np
+import trimesh
 from synthetic_export import PIN, B, Cells, document, mirrored, poses, rows, solid, stl, table, unit
 from synthetic_export import Design as Shell
 from synthetic_export import write as write_files
@@ -39,7 +40,8 @@ class Machine:
 
     `pads` shifts pads off their balls, by ball and pad; `bump` is how deep a knob of the base
     reaches into the first ball; `grown` grows the cap's front; `more` are boxes (low, high) to be
-    added by role and name.
+    added by role and name; `motor` is a box that is bought; `drawn_off` is how far bodies of the
+    assembly are drawn beside their places.
     """
 
     target: float = 25.0
@@ -52,6 +54,8 @@ class Machine:
     grown: float = 0.0
     stage_mm: float = 4.0
     more: dict[str, tuple[str, Any, Any]] = field(default_factory=dict)
+    motor: tuple[Any, Any] = ([300, 300, 300], [340, 340, 340])
+    drawn_off: dict[str, float] = field(default_factory=dict)
 
 
 def frame() -> np.ndarray:
@@ -309,7 +313,10 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
         "rotation_plan.nc": program(stops).encode(),
     }
     entries = []
+    drawn = {"motor": facets(box(*machine.motor))}
     for name, (role, ball, corners) in parts(machine, made).items():
+        if role != "tool":
+            drawn[name] = corners
         low = float((corners @ TURN)[..., 2].min())
         origin = np.array([3.0, -2.0, -low])
         files[f"{name}.stl"] = stl((corners @ TURN + origin).astype(np.float32))
@@ -325,6 +332,11 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
                 "origin_mm": origin.tolist(),
             }
         )
+    for k, ball_ in enumerate(made):
+        if k != CAP:
+            whole = trimesh.creation.uv_sphere(ball_.body, count=[32, 32])
+            drawn[f"ball_{k + 1}"] = whole.triangles + ball_.b
+    files["whole.glb"] = glb(machine, drawn)
     found = {
         "schema": "tbcad-prototype/1",
         "camera": "a",
@@ -346,8 +358,23 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
         ],
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
+        "bought": [{"name": "motor", "turns": False}],
+        "assembly": {"glb": "whole.glb"},
     }
     return found, files
+
+
+def glb(machine: Machine, drawn: dict[str, np.ndarray]) -> bytes:
+    """Triangles (F, 3, 3) in mm, z up, as glTF has them: metres, y up."""
+    scene = trimesh.Scene()
+    for name, corners in drawn.items():
+        away = np.add(corners, [machine.drawn_off.get(name, 0.0), 0, 0])
+        points = away.reshape(-1, 3)[:, [0, 2, 1]] * [1e-3, 1e-3, -1e-3]
+        faces = np.arange(len(points)).reshape(-1, 3)
+        scene.add_geometry(
+            trimesh.Trimesh(points, faces, process=False), node_name=name, geom_name=name
+        )
+    return bytes(trimesh.exchange.gltf.export_glb(scene))
 
 
 def shell_of(machine: Machine) -> Shell:

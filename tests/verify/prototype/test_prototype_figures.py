@@ -30,7 +30,7 @@ from tbcad_verify.prototype import (
 from tbcad_verify.prototype.bodies import Body, body, joined_bodies, of_roles
 from tbcad_verify.prototype.caps import measure
 from tbcad_verify.prototype.rig import Rig, rig
-from tbcad_verify.prototype.steps import step_checks
+from tbcad_verify.prototype.steps import readings, step_checks
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record import read_export
 from tbcad_verify.step.reading import StepFile, examine_all, load
@@ -285,7 +285,9 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
 def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None:
     view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
     bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
-    checks = {check.name: check for check in step_checks(view.export, bulks, 60)}
+    checks = {
+        check.name: check for check in step_checks(view.export, bulks, readings(view.export, 60))
+    }
     assert [name for name, check in checks.items() if not check.passed] == ["step properties"]
     assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
 
@@ -301,7 +303,7 @@ def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
     ):
         view = view_of(stepped(made, low, high))
         bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
-        checks = step_checks(view.export, bulks, 60)
+        checks = step_checks(view.export, bulks, readings(view.export, 60))
         assert {check.name for check in checks if not check.passed} == names
 
 

@@ -364,6 +364,21 @@ MACHINES: dict[str, tuple[Machine, tuple[str, ...], str]] = {
         ("swing", "light of the balls"),
         "share",
     ),
+    "motor where the base swings": (
+        Machine(motor=([-150, -150, 60], [150, 150, 62])),
+        ("swing",),
+        "motor",
+    ),
+    "a ball drawn elsewhere": (
+        Machine(drawn_off={"ball_1": 0.5}),
+        ("assembly",),
+        "ball_1",
+    ),
+    "a part drawn elsewhere": (
+        Machine(drawn_off={"foot": 1.0}),
+        ("assembly",),
+        "foot",
+    ),
     "two parts in one place": (
         Machine(more={"brick": ("frame", [-10, -10, -295], [10, 10, -250])}),
         ("parts apart",),
@@ -444,6 +459,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "picture": (deep("picture", to="blurred"), "picture must be one of"),
     "swing": (deep("swing_deg", to=[3, 2]), "swing_deg must ascend"),
     "frame": (deep("frame", to=[]), "frame must be a dict"),
+    "bought": (deep("bought", 0, "turns", to="no"), "turns"),
     "assembly": (deep("assembly", to={"step": "a/b.step"}), "plain file name"),
     "led": (deep("leds", 0, "position_mm", to=[1, 2]), "position_mm must be three"),
     "plan missing": (lambda f: (f / PLAN).unlink(), f"{PLAN}: missing"),

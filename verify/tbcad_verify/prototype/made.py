@@ -113,6 +113,14 @@ class Led:
 
 
 @dataclass(frozen=True)
+class Bought:
+    """A purchased part, whose shape only the assembly has; `turns`: whether with the base."""
+
+    name: str
+    turns: bool
+
+
+@dataclass(frozen=True)
 class Prototype:
     """The whole record.
 
@@ -127,11 +135,12 @@ class Prototype:
         seats: K of them.
         parts: printed.
         leds: of the stage.
+        bought: what is neither printed nor a ball.
         plan: every picture.
         stops: of the base.
         program: text of the controller's program.
         ball_rows: fields of balls.csv.
-        assembly: files for looking at.
+        assembly: STEP and GLB of the whole; empty: none.
         digests: file name -> (size, sha256), of what was parsed.
     """
 
@@ -145,11 +154,12 @@ class Prototype:
     seats: Seats
     parts: tuple[Printed, ...]
     leds: tuple[Led, ...]
+    bought: tuple[Bought, ...]
     plan: Plan
     stops: Stops
     program: str
     ball_rows: list[list[str]]
-    assembly: tuple[str, ...]
+    assembly: tuple[str, str]
     digests: Mapping[str, tuple[int, str]]
 
     @property

@@ -21,7 +21,7 @@ from tbcad_verify.checks import (
     reason_of,
     told,
 )
-from tbcad_verify.prototype import caps, leds, places, plan, seats, swing
+from tbcad_verify.prototype import assembly, caps, leds, places, plan, seats, swing
 from tbcad_verify.prototype.bodies import Body, body, joined_bodies, of_roles
 from tbcad_verify.prototype.made import Prototype
 from tbcad_verify.prototype.rig import Rig, rig
@@ -113,7 +113,18 @@ def _seats(view: View, bodies: list[Body], taker: Taker) -> tuple[Held | None, l
 def _swing(view: View, ready: Rig | None, reason: str, bodies: list[Body], taker: Taker) -> None:
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
-    taker.checks(guarded(names, lambda: swing.checks(_needed(ready, reason), bodies, files)))
+    found, odd = _attempt(lambda: assembly.shapes(view))
+    bought, why = _attempt(lambda: assembly.standing(view, _needed(found, odd)))
+    taker.checks(
+        guarded(
+            names,
+            lambda: swing.checks(_needed(ready, reason), bodies, _needed(bought, why), files),
+        )
+    )
+    whole = (assembly.CHECK[0], view.made.assembly[1], assembly.CHECK[1])
+    taker.checks(
+        guarded([whole], lambda: [assembly.check(whole, view, bodies, _needed(found, odd))])
+    )
     files = _files(bodies, "stage")
     names = [(name, files, unit) for name, unit in leds.CHECKS.items()]
     taker.checks(guarded(names, lambda: leds.checks(view, bodies, files)))

@@ -37,6 +37,7 @@ from tbcad_verify.prototype.made import (
     ROLES,
     STOPS,
     Balls,
+    Bought,
     Led,
     Printed,
     Prototype,
@@ -50,6 +51,7 @@ TABLES = (BALLS, PLAN, STOPS, PROGRAM)
 SCHEMA = "tbcad-prototype/1"
 PICTURES = ("moved", "fixed")
 KINDS = ("ball", "cap")
+KINDS_OF_ALL = ("step", "glb")
 MOST = 1000  # balls, parts or LEDs
 WORDS = ("size", "grade", "standard")
 
@@ -83,6 +85,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         seats=_seats(objects(found, "seats", RECORD), len(balls)),
         parts=_parts(objects(found, "parts", RECORD), balls),
         leds=_leds(found),
+        bought=_bought(found),
         plan=read_plan(texts[PLAN]),
         stops=read_stops(texts[STOPS]),
         program=texts[PROGRAM].text(),
@@ -192,11 +195,23 @@ def _leds(found: Record) -> tuple[Led, ...]:
     )
 
 
-def _assembly(found: Record) -> tuple[str, ...]:
+def _bought(found: Record) -> tuple[Bought, ...]:
+    items = objects(found, "bought", RECORD)
+    _refuse_many("bought parts", len(items), 0)
+    for item in items:
+        if not isinstance(item.get("turns"), bool):
+            raise BadExport(f"{RECORD}: turns of a bought part must be true or false; {AGAIN}")
+    return tuple(Bought(word(item, "name", RECORD), item["turns"]) for item in items)
+
+
+def _assembly(found: Record) -> tuple[str, str]:
     if found.get("assembly") is None:
-        return ()
+        return "", ""
     record = typed(found, "assembly", dict, RECORD)
-    return tuple(plain_file(record, kind, RECORD) for kind in ("step", "glb") if record.get(kind))
+    names = {
+        kind: plain_file(record, kind, RECORD) if record.get(kind) else "" for kind in KINDS_OF_ALL
+    }
+    return names["step"], names["glb"]
 
 
 def _refuse_many(what: str, count: int, least: int) -> None:

@@ -16,33 +16,48 @@ AT_ONCE = 2  # processes, each with its share of the files
 CLAIM_SHARE = 1e-5
 
 
-def step_checks(export: Export, bulks: dict[str, Bulk], seconds: float) -> list[Check]:
-    """All checks of the STEP files of a prototype's parts.
+def readings(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
+    """The STEP files of a prototype's parts, or why one is not known, by part.
 
     Args:
         export: the record.
-        bulks: figures of the meshes moved back to their places, by part.
         seconds: longest that reading one process's files may take.
 
     Raises:
         BadExport: a file is missing, foreign or truncated.
     """
-    parts = [part for part in (export.prototype.parts if export.prototype else ()) if part.step]
+    parts = _parts(export)
     # The largest first, so that both processes have about as much to do.
     blobs = [load(export.folder, part.step) for part in parts]
     order = sorted(range(len(parts)), key=lambda k: (-blobs[k].data.size, k))
     shares = [order[k::AT_ONCE] for k in range(AT_ONCE) if order[k::AT_ONCE]]
     answers = in_threads(lambda share: examine_all([blobs[k] for k in share], seconds), shares)
-    found = {
-        k: answer
+    return {
+        parts[k].name: answer
         for share, some in zip(shares, answers, strict=True)
         for k, answer in zip(share, some, strict=True)
     }
+
+
+def step_checks(
+    export: Export, bulks: dict[str, Bulk], found: dict[str, StepFile | Unknown]
+) -> list[Check]:
+    """All checks of the STEP files of a prototype's parts.
+
+    Args:
+        export: the record.
+        bulks: figures of the meshes moved back to their places, by part.
+        found: the files as read.
+    """
     return [
         check
-        for k, part in enumerate(parts)
-        for check in _part(export, part, found[k], bulks.get(part.name))
+        for part in _parts(export)
+        for check in _part(export, part, found[part.name], bulks.get(part.name))
     ]
+
+
+def _parts(export: Export) -> list[Printed]:
+    return [part for part in (export.prototype.parts if export.prototype else ()) if part.step]
 
 
 def _part(

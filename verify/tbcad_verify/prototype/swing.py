@@ -73,13 +73,21 @@ class Sweep:
     blind: float
 
 
-def checks(made: Rig, bodies: list[Body], files: str) -> list[Check]:
-    """Turn the base from end to end of its swing, and look whether parts fit at angle zero."""
+def checks(made: Rig, bodies: list[Body], bought: list[tuple[str, Any]], files: str) -> list[Check]:
+    """Turn the base from end to end of its swing, and look whether parts fit at angle zero.
+
+    Args:
+        made: the rig.
+        bodies: printed parts.
+        bought: solids of purchased parts that stand still, by name.
+        files: that all of this is from.
+    """
     swing, clearance, looks, apart, balls = ((name, files, unit) for name, unit in CHECKS.items())
     turning = [(one.part.name, one.needed) for one in of_roles(bodies, "base", "cap")]
     standing = [(one.part.name, one.needed) for one in of_roles(bodies, "stage", "frame")]
     moving = [_mover(made, name, solid_of(mesh)) for name, mesh in turning] + _balls(made)
-    still = [_mover(made, name, solid_of(mesh)) for name, mesh in standing]
+    solids = [(name, solid_of(mesh)) for name, mesh in standing]
+    still = [_mover(made, name, solid) for name, solid in [*solids, *bought]]
     found = [sweep(made, one, two) for one in moving for two in still]
     volume = max((one.volume for one in found), default=0.0)
     least = min(found, key=lambda one: one.gap, default=None)
