@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Quaternion, gp_Trsf
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
@@ -81,6 +82,23 @@ def test_box_of_a_cap(tmp_path: Path) -> None:
     wide = 6.0  # the circle 8 mm up a sphere of 10
     assert found.bulk.low == pytest.approx([-wide, -wide, 8], abs=1e-6)
     assert found.bulk.high == pytest.approx([wide, wide, 10], abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_box_of_a_turned_ball_with_a_flat(tmp_path: Path, seed: int) -> None:
+    """A ball's top is its box's, where it is not cut off; else the flat's rim is."""
+    radius, flat = 7.3, 4.0
+    turn = gp_Trsf()
+    turn.SetRotation(gp_Quaternion(*np.random.default_rng(seed).normal(size=4).tolist()))
+    upright = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
+    cut = BRepPrimAPI_MakeSphere(upright, radius, -np.pi / 2, np.arcsin(flat / radius)).Shape()
+    found = both(written(tmp_path, BRepBuilderAPI_Transform(cut, turn, True).Shape()))
+    up = gp_Dir(0, 0, 1).Transformed(turn)
+    cosine = np.outer([-1, 1], [up.X(), up.Y(), up.Z()])
+    rim = cosine * flat + np.sqrt(radius**2 - flat**2) * np.sqrt(1 - cosine**2)
+    low, high = np.where(cosine * radius <= flat, radius, rim)
+    assert found.bulk.low == pytest.approx(-low, abs=1e-6)
+    assert found.bulk.high == pytest.approx(high, abs=1e-6)
 
 
 def test_two_solids_are_counted(tmp_path: Path) -> None:
