@@ -102,7 +102,7 @@ def build(
     nothing written.
     """
     from tbcad.design.spec import load_spec
-    from tbcad.export.everything import default_parts, parse_parts
+    from tbcad.export.choice import default_parts, parse_parts
     from tbcad.export.folder import check_target
 
     asked = parse_parts(parts) if parts is not None else None

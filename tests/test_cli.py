@@ -205,8 +205,9 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
         assert word in shown
 
 
-def test_help_does_not_load_the_kernel() -> None:
-    code = "import sys; from tbcad.cli import run; run(['--help']); sys.exit('OCP' in sys.modules)"
+@pytest.mark.parametrize("words", [["--help"], ["build", "--n", "99"], ["build", "--parts", "x"]])
+def test_help_and_refusals_do_not_load_the_kernel(words: list[str]) -> None:
+    code = f"import sys; from tbcad.cli import run; run({words}); sys.exit('OCP' in sys.modules)"
     environment = {**os.environ, "COLUMNS": "100"}
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, env=environment, check=False

@@ -88,10 +88,15 @@ def _along(line: Floats) -> tuple[Floats, Floats]:
     return place, normal
 
 
+def _spans(mask: Bools) -> list[tuple[int, int]]:
+    """First and last of each run of places (n,) where it is so."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+
+
 def _runs(at: Floats, free: Bools, shortest: float) -> list[tuple[float, float]]:
     """Intervals of places (n,) that are free, without the short ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
-    pairs = zip(at[edges[::2]].tolist(), at[edges[1::2] - 1].tolist(), strict=True)
+    pairs = [(float(at[first]), float(at[last])) for first, last in _spans(free)]
     return [(low, high) for low, high in pairs if high - low >= shortest]
 
 
@@ -100,8 +105,7 @@ def _between(length: Floats, kept: list[tuple[float, float]]) -> list[tuple[int,
     keep = np.zeros(len(length), dtype=np.bool_)
     for low, high in kept:
         keep |= (length >= low) & (length <= high)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], ~keep, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+    return _spans(~keep)
 
 
 def _section(place: Floats, normal: Floats, deep: float, first: int, last: int) -> Floats:

@@ -5,14 +5,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import Literal
 
-from pydantic import Field
 from scipy.optimize import brentq
 
 from tbcad.design.errors import SpecError, shown
-from tbcad.design.section import Section
-from tbcad.design.stock import Row, _check_number, _rows
+from tbcad.design.stock import Row, check_number, table_rows
 
 COMMON = ("part", "what", "material", "mass_g")
 # What each kind of part is described by, all above zero; hole patterns are a square's side or a
@@ -49,35 +46,6 @@ NEEDED = {  # which of motor, pinion, wheel, belt and coupling a drive may have,
     "coupling": ("couplings",),
 }
 _LARGEST = 1e6
-
-
-class Motion(Section):
-    """How the base is driven from stop to stop, and what the controller is told."""
-
-    axis: Literal["X", "A"] = "X"
-    """Axis of the controller: X with a degree for a millimetre (GRBL 1.1 has X, Y and Z only),
-    or A in degrees (grblHAL and others)."""
-    trigger: Literal["coolant", "pause"] = "coolant"
-    """What takes a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
-    home_deg: float = Field(0.0, ge=-180, le=180)
-    """Base angle at which the program is started: at the base's mark, or after homing."""
-    approach_deg: float = Field(1.0, ge=0, le=30)
-    """How far below its first stop the base starts, so that all are reached from one side."""
-    feed_deg_min: float = Field(900.0, ge=1, le=100000)
-    """Speed of the base."""
-    acceleration_deg_s2: float = Field(50.0, gt=0, le=10000)
-    """Acceleration of the base; the motor is chosen for it."""
-    settle_s: float = Field(0.5, ge=0, le=60)
-    """Rest at a stop before a photograph."""
-    trigger_s: float = Field(0.2, gt=0, le=60)
-    """How long the relay is on."""
-    exposure_s: float = Field(1.0, ge=0, le=600)
-    """Rest after the relay, while the camera exposes and saves."""
-    microsteps: int = Field(16, ge=1, le=256)
-    """Microsteps of the motor's driver to a full step."""
-    safety: float = Field(2.0, ge=1, le=10)
-    """Holding torque of the motor over the greatest torque of gravity and acceleration: for
-    friction, and for what a stepper loses between full steps and at speed."""
 
 
 @dataclass(frozen=True)
@@ -283,7 +251,7 @@ def chosen(name: str, needed: float, drives: Sequence[Drive]) -> Drive:
 
 
 def _number(where: str, row: Row, column: str, most: float = _LARGEST) -> float:
-    _check_number(where, column, row[column], most)
+    check_number(where, column, row[column], most)
     return float(row[column])
 
 
@@ -295,4 +263,4 @@ def _read(
         text = (place / name).read_text(encoding="utf-8")
     except (OSError, ValueError):
         raise SpecError(f"{name}: cannot be read as UTF-8 text: check the file") from None
-    yield from _rows(name, text, columns)
+    yield from table_rows(name, text, columns)

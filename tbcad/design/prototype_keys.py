@@ -5,8 +5,8 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BeforeValidator, Field
 
 from tbcad.design.base_keys import Base
-from tbcad.design.drive import Motion
 from tbcad.design.errors import shown
+from tbcad.design.motion_keys import Motion
 from tbcad.design.section import Section, as_tuple
 from tbcad.design.stage_keys import Frame, Stage
 

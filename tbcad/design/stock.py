@@ -92,7 +92,7 @@ class Grade:
 def load_grades() -> dict[str, Grade]:
     """All grades by name, the best first."""
     text = _built_in("grades")
-    return {row["grade"]: _grade(row) for _, row in _rows("grades", text, GRADE_COLUMNS)}
+    return {row["grade"]: _grade(row) for _, row in table_rows("grades", text, GRADE_COLUMNS)}
 
 
 def _grade(row: Row) -> Grade:
@@ -141,7 +141,7 @@ def _built_in(name: str) -> str:
 def _checked(name: str) -> list[Row]:
     text = _built_in(name) if name in BUILT_IN else _read(Path(name), name)
     known, sizes, rows = set(load_grades()), set[str](), []
-    for where, row in _rows(name, text, COLUMNS):
+    for where, row in table_rows(name, text, COLUMNS):
         _check(where, row, known)
         if row["size"] in sizes:
             raise SpecError(f"{where}, column size: {shown(row['size'])} twice: remove one")
@@ -155,9 +155,9 @@ def _checked(name: str) -> list[Row]:
 def _check(where: str, row: Row, known: set[str]) -> None:
     if not row["size"]:
         raise SpecError(f"{where}, column size: empty: name the size")
-    _check_number(where, "diameter_mm", row["diameter_mm"], 1000)
+    check_number(where, "diameter_mm", row["diameter_mm"], 1000)
     if row["mass_g"]:
-        _check_number(where, "mass_g", row["mass_g"], 1e7)
+        check_number(where, "mass_g", row["mass_g"], 1e7)
     grades = row["grades"].split()
     if not grades or not known.issuperset(grades):
         raise SpecError(
@@ -166,7 +166,12 @@ def _check(where: str, row: Row, known: set[str]) -> None:
         )
 
 
-def _check_number(where: str, column: str, text: str, most: float) -> None:
+def check_number(where: str, column: str, text: str, most: float) -> None:
+    """Refuse a text that is no number above 0 to most.
+
+    Raises:
+        SpecError: it names the place, the column and what is allowed.
+    """
     try:
         value = float(text)
     except ValueError:
@@ -196,8 +201,12 @@ def _read(path: Path, name: str) -> str:
     return text
 
 
-def _rows(name: str, text: str, columns: Sequence[str]) -> Iterator[tuple[str, Row]]:
-    """Each row with its place in words; the header must be exactly the columns."""
+def table_rows(name: str, text: str, columns: Sequence[str]) -> Iterator[tuple[str, Row]]:
+    """Each row with its place in words; the header must be exactly the columns.
+
+    Raises:
+        SpecError: when the text is no such table; it names the line.
+    """
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         header = [cell.strip() for cell in next(reader, [])]

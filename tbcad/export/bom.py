@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.design.balance import Balance, cap_volume
-from tbcad.design.drive import Drive, Motion, Part, Parts
+from tbcad.design.drive import Drive, Part, Parts
 from tbcad.design.errors import SpecError, shown
+from tbcad.design.motion_keys import Motion
 from tbcad.design.prototype import Prototype
 from tbcad.export.balls import Row, Value, write_table
 
@@ -20,7 +21,6 @@ COLUMNS = (
     *("print_volume_mm3", "from"),
 )
 BOUGHT, PRINTED = "bought", "printed"
-MAGNET_G_CM3 = 7.5  # NdFeB
 ALWAYS = {"GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
 
 
@@ -47,8 +47,6 @@ class PartsNeeded:
 
     Attributes:
         bought: quantity of each purchased part, by its name in the lists.
-        magnet: diameter of the magnet behind each ball, zero: none, mm, (k,).
-        magnet_height: of all of them, mm.
         printed: parts to print, caps not among them.
         print_material: what they are printed of.
         print_density: of it, g/cm^3.
@@ -59,8 +57,6 @@ class PartsNeeded:
     """
 
     bought: dict[str, int] = field(default_factory=dict)
-    magnet: Floats = field(default_factory=lambda: np.zeros(0))
-    magnet_height: float = 3.0
     printed: tuple[Printed, ...] = ()
     print_material: str = "PETG"
     print_density: float = 1.27
@@ -82,7 +78,6 @@ def rows(made: Prototype, drive: Drive, needed: PartsNeeded, parts: Parts) -> li
     found = [
         *_balls(made),
         *_caps(made, needed),
-        *_magnets(needed),
         *(_bought(part, 1) for part in drive.parts),
         *_asked(needed, parts),
         *(_print(one, needed) for one in needed.printed if one.quantity),
@@ -174,25 +169,6 @@ def _caps(made: Prototype, needed: PartsNeeded) -> list[list[Value]]:
         values = _values(1, f"cap {j + 1}", what, own or needed.print_material, mass)
         result.append([*values, float(volume[j]), "turned" if own else PRINTED])
     return result
-
-
-def _magnets(needed: PartsNeeded) -> list[list[Value]]:
-    """Magnets by rising diameter; any size, since the seats decide which."""
-    high = needed.magnet_height
-    counts = Counter(needed.magnet[needed.magnet > 0].tolist())
-    return [
-        [
-            *_values(
-                count,
-                f"MAGNET-{wide:g}x{high:g}",
-                f"disc magnet {wide:g} x {high:g} mm",
-                "NdFeB",
-                MAGNET_G_CM3 * 1e-3 * float(np.pi) / 4 * wide**2 * high,
-            ),
-            *(None, BOUGHT),
-        ]
-        for wide, count in sorted(counts.items())
-    ]
 
 
 def _asked(needed: PartsNeeded, parts: Parts) -> list[list[Value]]:

@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.drive import Drive, Motion
+from tbcad.design.drive import Drive
 from tbcad.design.errors import SpecError
+from tbcad.design.motion_keys import Motion
 from tbcad.design.prototype import Prototype
 
 Floats = NDArray[np.float64]

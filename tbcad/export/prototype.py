@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.design.choices import choices
-from tbcad.design.drive import Motion
 from tbcad.design.mirrors import Design
+from tbcad.design.motion_keys import Motion
 from tbcad.design.prototype import Prototype, pictures
 from tbcad.design.spec import Spec
 from tbcad.design.stage import leds

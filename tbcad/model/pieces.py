@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.model.bed import Part
 from tbcad.model.mesh import Mesh
-from tbcad.model.solids import meshed
+from tbcad.model.solids import meshed, without_lost
 
 Floats = NDArray[np.float64]
 # base and cap turn with the base, stage and frame stand still; a tool is not in the rig.
@@ -63,16 +63,11 @@ def welded(mesh: Mesh) -> Mesh:
     count, of = connected_components(near, directed=False)
     first = np.zeros(count, dtype=np.int64)
     first[of[::-1]] = np.arange(size)[::-1]
-    return _without_lost(mesh.vertices[first], of.astype(np.int64)[mesh.triangles])
+    return without_lost(mesh.vertices[first], of.astype(np.int64)[mesh.triangles])
 
 
 def rounded(mesh: Mesh) -> Mesh:
     """The mesh with coordinates of 32 bits; corners that become the same are one."""
     single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
     corners, of = np.unique(single, axis=0, return_inverse=True)
-    return _without_lost(corners, of.reshape(-1)[mesh.triangles])
-
-
-def _without_lost(vertices: Floats, triangles: NDArray[np.int64]) -> Mesh:
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return Mesh(vertices, triangles[whole].astype(np.int64))
+    return without_lost(corners, of.reshape(-1)[mesh.triangles])

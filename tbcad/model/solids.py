@@ -3,7 +3,7 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from manifold3d import Manifold, Mesh64, OpType
@@ -30,7 +30,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism, BRe
 from OCP.Geom import Geom_Plane
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_ShapeEnum, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
@@ -135,20 +135,19 @@ def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
 
 def solids(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
     """All solids of a shape."""
-    explorer, found = TopExp_Explorer(shape, TopAbs_SOLID), []
-    while explorer.More():
-        found.append(TopoDS.Solid_s(explorer.Current()))
-        explorer.Next()
-    return found
+    return [TopoDS.Solid_s(one) for one in _each(shape, TopAbs_SOLID)]
 
 
 def faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
     """All faces of a shape."""
-    explorer, found = TopExp_Explorer(shape, TopAbs_FACE), []
+    return [TopoDS.Face_s(one) for one in _each(shape, TopAbs_FACE)]
+
+
+def _each(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
-        found.append(TopoDS.Face_s(explorer.Current()))
+        yield explorer.Current()
         explorer.Next()
-    return found
 
 
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
@@ -261,6 +260,10 @@ def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
 def _joined(points: Floats, triangles: Ints) -> Mesh:
     """Corners that agree to a nanometre become one; facets that lose a corner go."""
     _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
-    triangles = of.reshape(-1)[triangles]
+    return without_lost(points[first], of.reshape(-1)[triangles])
+
+
+def without_lost(vertices: Floats, triangles: Ints) -> Mesh:
+    """A mesh without the facets of which two corners became one."""
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return Mesh(points[first], triangles[whole])
+    return Mesh(vertices, triangles[whole])

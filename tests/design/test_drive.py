@@ -13,7 +13,6 @@ from tbcad.design.drive import (
     COMMON,
     SIZES,
     Drive,
-    Motion,
     belt_length,
     centre_distance,
     chosen,
@@ -22,6 +21,7 @@ from tbcad.design.drive import (
     pitch_diameter,
 )
 from tbcad.design.errors import SpecError
+from tbcad.design.motion_keys import Motion
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tbcad.design.balance import balance, ball_load, cap_volume
-from tbcad.design.drive import Drive, Motion, chosen, load_drives, load_parts
+from tbcad.design.drive import Drive, chosen, load_drives, load_parts
 from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design
+from tbcad.design.motion_keys import Motion
 from tbcad.design.prototype import Prototype, prototype
 from tbcad.design.spec import load_spec
 from tbcad.export.bom import COLUMNS, PartsNeeded, Printed, drive_record, rows, write_bom
@@ -17,8 +18,10 @@ from tbcad.export.bom import COLUMNS, PartsNeeded, Printed, drive_record, rows, 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
 NEEDED = PartsNeeded(
-    bought={"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 1},
-    magnet=np.array([4.0, 0.0, 4.0, 8.0, 8.0, 8.0]),
+    bought={
+        **{"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 1},
+        **{"MAGNET-4x3": 2, "MAGNET-8x3": 3},
+    },
     printed=(Printed("base", "carrier", 5e5), Printed("foot", "below the plate", 1e3, 4)),
 )
 Read = list[dict[str, str]]
@@ -65,9 +68,8 @@ def test_totals_are_the_sum_of_the_parts(made: Prototype, drive: Drive, read: Re
     balls = made.mass_g + 1.27e-3 * cap_volume(made.balls).sum()
     bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.bought.items())
     electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
-    magnets = 7.5e-3 * np.pi / 4 * 3 * (NEEDED.magnet**2).sum()
     printed = 1.27e-3 * (5e5 + 4e3)
-    expected = balls + bought + electronics + magnets + printed + 4 * PARTS["LED-3"].mass_g
+    expected = balls + bought + electronics + printed + 4 * PARTS["LED-3"].mass_g
     expected += sum(part.mass_g for part in drive.parts)
     assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)
 
@@ -105,6 +107,8 @@ def test_counts_add_up(read: Read) -> None:
 def test_magnets_weigh_what_the_list_says(read: Read) -> None:
     for name in ("MAGNET-4x3", "MAGNET-8x3"):
         assert float(of(read, name)["mass_g"]) == pytest.approx(PARTS[name].mass_g, rel=1e-3)
+        disc = np.pi / 4 * PARTS[name]["diameter_mm"] ** 2 * PARTS[name]["height_mm"]
+        assert float(of(read, name)["mass_g"]) == pytest.approx(7.5e-3 * disc, rel=1e-3)
 
 
 def test_drive_is_in_it(drive: Drive, read: Read) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.design.drive import Drive, Motion, chosen, load_drives, load_parts
+from tbcad.design.drive import Drive, chosen, load_drives, load_parts
 from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design
+from tbcad.design.motion_keys import Motion
 from tbcad.design.prototype import Prototype, prototype
 from tbcad.design.spec import load_spec
 from tbcad.export.gcode import DECIMALS, free, minutes, program, run, write_program

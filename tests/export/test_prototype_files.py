@@ -13,7 +13,8 @@ import trimesh
 from tbcad.design.mirrors import design
 from tbcad.design.spec import load_spec
 from tbcad.errors import InputError
-from tbcad.export.everything import PARTS, PROTOTYPE, export, parse_parts
+from tbcad.export.choice import PARTS, PROTOTYPE, parse_parts
+from tbcad.export.everything import export
 from tests.helpers import area, read_mesh, read_step, volume
 
 MESH_ERROR_MM = 0.1

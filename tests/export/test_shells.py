@@ -8,7 +8,8 @@ import pytest
 
 from tbcad.design.mirrors import Design, design
 from tbcad.design.spec import load_spec, spec_dict
-from tbcad.export.everything import SHELL, export
+from tbcad.export.choice import SHELL
+from tbcad.export.everything import export
 from tbcad.export.tables import COLUMNS
 from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Name = tuple[str, str, str]  # of a check: name, file, unit
+T = TypeVar("T")
 NAMED = 5  # how many offenders a line names
 
 
@@ -117,3 +119,22 @@ def _held(check: Name, measured: float, limit: float, good: bool, detail: str) -
 def _listed(shown: list[str], count: int) -> str:
     more = count - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+def attempt(work: Callable[[], T]) -> tuple[T | None, str]:
+    """What work gives and nothing to say, or nothing and why."""
+    try:
+        return work(), ""
+    except Exception as error:
+        return None, reason_of(error)
+
+
+def needed(value: T | None, reason: str) -> T:
+    """A value that may be missing.
+
+    Raises:
+        Unknown: it is, for this reason.
+    """
+    if value is None:
+        raise Unknown(reason)
+    return value

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from tbcad_verify import coverage, found, sensor
 from tbcad_verify.bench import Bench, pinhole_of, set_up
 from tbcad_verify.bulk import Bulk, bulk
-from tbcad_verify.checks import Check, Name, Unknown, guarded, reason_of
+from tbcad_verify.checks import Check, Name, attempt, guarded, needed
 from tbcad_verify.integrity import fold_check, manifest_checks, mesh_checks, record_checks
 from tbcad_verify.mesh import Mesh, Topology, examine, merge
 from tbcad_verify.poses import virtual_cameras
@@ -32,7 +31,6 @@ from tbcad_verify.stl import Facets, read_facets
 from tbcad_verify.threemf import read_3mf, same_check
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 STAGES = (
     "reading",
@@ -116,8 +114,8 @@ def _printing(
     part: Part | Printed, solid: Solid | Body, profiles: list[Profile], wanted: bool, taker: Taker
 ) -> None:
     def work() -> list[Check]:
-        topology = _needed(solid.topology, solid.reason)
-        mesh, lump = _needed(solid.mesh, solid.reason), _needed(solid.bulk, solid.reason)
+        topology = needed(solid.topology, solid.reason)
+        mesh, lump = needed(solid.mesh, solid.reason), needed(solid.bulk, solid.reason)
         shape = measure(mesh, topology.status, lump)
         prints = [assess(part.stl, shape, profile) for profile in profiles]
         taker.prints([to_row(one) for one in prints])
@@ -145,19 +143,19 @@ def _threemf(export: Export, part: Part | Printed, facets: Facets, taker: Taker)
 
 
 def _solid(export: Export, part: Part, facets: Facets) -> Solid:
-    mesh, reason = _attempt(lambda: merge(facets))
-    found, odd = _attempt(lambda: examine(_needed(mesh, reason), facets))
+    mesh, reason = attempt(lambda: merge(facets))
+    found, odd = attempt(lambda: examine(needed(mesh, reason), facets))
     checks = guarded(
         [(name, part.stl, "") for name in SOLID],
-        lambda: mesh_checks(part.stl, _needed(found, odd)),
+        lambda: mesh_checks(part.stl, needed(found, odd)),
     )
-    lump, off = _attempt(lambda: bulk(_needed(mesh, reason)))
-    recovery, why = _attempt(
-        lambda: recover(_needed(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
+    lump, off = attempt(lambda: bulk(needed(mesh, reason)))
+    recovery, why = attempt(
+        lambda: recover(needed(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
     )
     folds = guarded(
         [("folds", part.stl, "edges")],
-        lambda: [fold_check(part.stl, _needed(recovery, reason or why).folds)],
+        lambda: [fold_check(part.stl, needed(recovery, reason or why).folds)],
     )
     return Solid(mesh, found, lump, recovery, checks + folds, reason or why or odd or off)
 
@@ -165,21 +163,21 @@ def _solid(export: Export, part: Part, facets: Facets) -> Solid:
 def _optics(export: Export, solids: list[Solid], taker: Taker) -> None:
     files = ", ".join(part.stl for part in export.parts)
     taker.stage("optical bench")
-    bench, reason = _attempt(lambda: _bench(export, solids))
+    bench, reason = attempt(lambda: _bench(export, solids))
 
     def ready() -> Bench:
-        return _needed(bench, reason)
+        return needed(bench, reason)
 
     taker.checks(guarded(_names(found.CHECKS, files), lambda: found.checks(ready(), files)))
     if bench is not None:
         errors = bench.match.centre_error, bench.match.radius_error
         taker.mirrors(dict(zip(("centre_error_mm", "radius_error_mm"), errors, strict=True)))
     taker.stage("coverage")
-    seen, why = _attempt(lambda: coverage.measure(ready()))
+    seen, why = attempt(lambda: coverage.measure(ready()))
     taker.checks(
         guarded(
             _names(coverage.CHECKS, files),
-            lambda: coverage.checks(ready(), _needed(seen, why), files),
+            lambda: coverage.checks(ready(), needed(seen, why), files),
         )
     )
     if seen is not None:
@@ -191,8 +189,8 @@ def _optics(export: Export, solids: list[Solid], taker: Taker) -> None:
             }
         )
     taker.stage("every pixel")
-    light, why = _attempt(lambda: sensor.checks(ready(), seen, files))
-    taker.checks(guarded(_names(sensor.CHECKS, files), lambda: _needed(light, why)[1]))
+    light, why = attempt(lambda: sensor.checks(ready(), seen, files))
+    taker.checks(guarded(_names(sensor.CHECKS, files), lambda: needed(light, why)[1]))
     if light is not None:
         taker.mirrors({"pixels": light[0]})
 
@@ -203,20 +201,6 @@ def _names(units: dict[str, str], files: str) -> list[Name]:
 
 def _bench(export: Export, solids: list[Solid]) -> Bench:
     ready = [
-        (_needed(solid.mesh, solid.reason), _needed(solid.recovery, solid.reason))
-        for solid in solids
+        (needed(solid.mesh, solid.reason), needed(solid.recovery, solid.reason)) for solid in solids
     ]
     return set_up(export, [mesh for mesh, _ in ready], [recovery for _, recovery in ready])
-
-
-def _attempt(work: Callable[[], T]) -> tuple[T | None, str]:
-    try:
-        return work(), ""
-    except Exception as error:
-        return None, reason_of(error)
-
-
-def _needed(value: T | None, reason: str) -> T:
-    if value is None:
-        raise Unknown(reason)
-    return value

@@ -20,6 +20,24 @@ from tbcad_verify.checks import Check
 
 Row = dict[str, Any]
 
+# Checks that are unknown where a ball's stop is, and where its place is.
+ON_STOPS = (
+    "cells",
+    "coverage, balls",
+    "coverage, balls, off the record",
+    "light of the balls",
+    "rays of the balls",
+    "pixels kept by the balls",
+)
+ON_BALLS = (
+    *ON_STOPS,
+    "swing",
+    "swing clearance",
+    "looks over the swing",
+    "parts apart",
+    "balls apart",
+)
+
 
 def signed(folder: Path) -> Path:
     return sign(folder, sorted(p.name for p in folder.iterdir() if p.name != "manifest.json"))
@@ -201,12 +219,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
             "plan twins",
             "plan errors",
             "plan stops",
-            "cells",
-            "coverage, balls",
-            "coverage, balls, off the record",
-            "light of the balls",
-            "rays of the balls",
-            "pixels kept by the balls",
+            *ON_STOPS,
         ),
         "no a0007",
     ),
@@ -287,17 +300,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
             "cap fronts",
             "cap bodies",
             "cap form",
-            "cells",
-            "coverage, balls",
-            "coverage, balls, off the record",
-            "light of the balls",
-            "rays of the balls",
-            "pixels kept by the balls",
-            "swing",
-            "swing clearance",
-            "looks over the swing",
-            "parts apart",
-            "balls apart",
+            *ON_BALLS,
         ),
         "no sphere",
     ),
@@ -327,17 +330,7 @@ MACHINES: dict[str, tuple[Machine, tuple[str, ...], str]] = {
             "ball centres",
             "pads",
             "balls clear",
-            "cells",
-            "coverage, balls",
-            "coverage, balls, off the record",
-            "light of the balls",
-            "rays of the balls",
-            "pixels kept by the balls",
-            "swing",
-            "swing clearance",
-            "looks over the swing",
-            "parts apart",
-            "balls apart",
+            *ON_BALLS,
         ),
         "no pad",
     ),

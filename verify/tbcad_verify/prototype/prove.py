@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from tbcad_verify.checks import (
     Check,
     Name,
-    Unknown,
     at_least,
     at_most,
+    attempt,
     finite,
     guarded,
     listed,
+    needed,
     offenders,
-    reason_of,
     told,
 )
 from tbcad_verify.prototype import assembly, caps, leds, places, plan, seats, swing
@@ -35,7 +35,6 @@ from tbcad_verify.stl import Facets
 from tbcad_verify.vectors import norm
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 PRINTING = "printability of the prototype"
 STAGES = (
@@ -83,11 +82,11 @@ def prove(export: Export, made: Prototype, facets: Sequence[Facets], taker: Take
     taker.stage(STAGES[2])
     held, measured = _seats(view, bodies, taker)
     taker.stage(STAGES[3])
-    ready, reason = _attempt(lambda: rig(view, _known(held), measured, bodies))
-    shown, why = _attempt(lambda: show(_needed(ready, reason)))
+    ready, reason = attempt(lambda: rig(view, _known(held), measured, bodies))
+    shown, why = attempt(lambda: show(needed(ready, reason)))
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in LIGHT.items()]
-    taker.checks(guarded(names, lambda: _light(view, _needed(shown, reason or why), names)))
+    taker.checks(guarded(names, lambda: _light(view, needed(shown, reason or why), names)))
     taker.stage(STAGES[4])
     _swing(view, ready, reason, bodies, taker)
     taker.prototype(rows(view, held, shown))
@@ -96,34 +95,34 @@ def prove(export: Export, made: Prototype, facets: Sequence[Facets], taker: Take
 
 def _seats(view: View, bodies: list[Body], taker: Taker) -> tuple[Held | None, list[caps.Cap]]:
     files = _files(bodies, "base")
-    base, reason = _attempt(lambda: joined_bodies(of_roles(bodies, "base"))[0])
-    held, why = _attempt(lambda: seats.hold(view, _needed(base, reason)))
+    base, reason = attempt(lambda: joined_bodies(of_roles(bodies, "base"))[0])
+    held, why = attempt(lambda: seats.hold(view, needed(base, reason)))
     names = [(name, files, unit) for name, unit in seats.CHECKS.items()]
-    taker.checks(guarded(names, lambda: seats.checks(view, _needed(held, reason or why), files)))
+    taker.checks(guarded(names, lambda: seats.checks(view, needed(held, reason or why), files)))
     made = of_roles(bodies, "cap")
     if not view.made.balls.cap.any():
         return held, []
-    found, odd = _attempt(lambda: [caps.measure(view, one) for one in made])
+    found, odd = attempt(lambda: [caps.measure(view, one) for one in made])
     files = _files(bodies, "cap")
     names = [(name, files, unit) for name, unit in caps.CHECKS.items()]
-    taker.checks(guarded(names, lambda: caps.checks(view, _needed(found, odd), files)))
+    taker.checks(guarded(names, lambda: caps.checks(view, needed(found, odd), files)))
     return held, found or []
 
 
 def _swing(view: View, ready: Rig | None, reason: str, bodies: list[Body], taker: Taker) -> None:
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
-    found, odd = _attempt(lambda: assembly.shapes(view))
-    bought, why = _attempt(lambda: assembly.standing(view, _needed(found, odd)))
+    found, odd = attempt(lambda: assembly.shapes(view))
+    bought, why = attempt(lambda: assembly.standing(view, needed(found, odd)))
     taker.checks(
         guarded(
             names,
-            lambda: swing.checks(_needed(ready, reason), bodies, _needed(bought, why), files),
+            lambda: swing.checks(needed(ready, reason), bodies, needed(bought, why), files),
         )
     )
     whole = (assembly.CHECK[0], view.made.assembly[1], assembly.CHECK[1])
     taker.checks(
-        guarded([whole], lambda: [assembly.check(whole, view, bodies, _needed(found, odd))])
+        guarded([whole], lambda: [assembly.check(whole, view, bodies, needed(found, odd))])
     )
     files = _files(bodies, "stage")
     names = [(name, files, unit) for name, unit in leds.CHECKS.items()]
@@ -231,17 +230,4 @@ def _short(value: float) -> float | None:
 
 
 def _known(held: Held | None) -> Held:
-    return _needed(held, "the seats could not be measured")
-
-
-def _attempt(work: Callable[[], T]) -> tuple[T | None, str]:
-    try:
-        return work(), ""
-    except Exception as error:
-        return None, reason_of(error)
-
-
-def _needed(value: T | None, reason: str) -> T:
-    if value is None:
-        raise Unknown(reason)
-    return value
+    return needed(held, "the seats could not be measured")
