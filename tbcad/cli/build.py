@@ -1,4 +1,4 @@
-"""The command `tbcad`: thin; heavy libraries are imported inside the commands."""
+"""Build, prove and draw: heavy libraries are imported inside the commands."""
 
 import sys
 from enum import StrEnum
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad import __version__
+from tbcad.cli.app import app
 from tbcad.errors import InputError
 from tbcad.screen import Stages, stages
 
@@ -21,16 +21,6 @@ if TYPE_CHECKING:
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
 PROOF_STAGES, PIPED_WIDTH = 9, 160
 
-app = typer.Typer(
-    name="tbcad",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
-    "made, proved on the files written. Start with [bold]tbcad build --out exports[/bold].",
-)
-
 
 class RadiusRule(StrEnum):
     """How the mirrors get their radii."""
@@ -38,21 +28,6 @@ class RadiusRule(StrEnum):
     TRACED = "traced"
     PAPER = "paper"
     FLAT = "flat"
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"tbcad {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _common(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
-    ] = False,
-) -> None:
-    del version
 
 
 @app.command()
@@ -229,23 +204,3 @@ def doctor() -> int:
         table.add_row("ok" if finding.ok else "NO", finding.name, finding.detail, finding.remedy)
     Console().print(table)
     return 0 if all(finding.ok for finding in findings) else 1
-
-
-def run(arguments: list[str]) -> int:
-    """Run one command and return its exit code; bad input is told in one line on stderr."""
-    try:
-        return int(app(arguments, standalone_mode=False) or 0)
-    except typer.Exit as stop:
-        return stop.exit_code
-    except (InputError, typer.TyperException) as error:
-        text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
-        sys.stderr.write(f"tbcad: {text}\n")
-        return 2
-    except (KeyboardInterrupt, typer.Abort):
-        sys.stderr.write("tbcad: stopped; nothing was changed\n")
-        return 130
-
-
-def main() -> None:
-    """Entry point of the command."""
-    sys.exit(run(sys.argv[1:]))

@@ -1,0 +1,32 @@
+"""The command `tbcad` itself: the modules beside this one add its subcommands."""
+
+from typing import Annotated
+
+import typer
+
+from tbcad import __version__
+
+app = typer.Typer(
+    name="tbcad",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
+    "made, proved on the files written. Start with [bold]tbcad build --out exports[/bold].",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"tbcad {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    del version

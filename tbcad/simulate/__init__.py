@@ -1,0 +1,1 @@
+"""What the machine would photograph: capture, light field, views, refocusing, studies."""

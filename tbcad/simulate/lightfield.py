@@ -1,0 +1,221 @@
+"""The light field as a file: for every pixel the ray it sees along, its colour and its mirror.
+
+One HDF5 file (docs/light-field.md): every tool that matters to this field reads it, parts of it
+can be read without the rest, and it is one file to copy. A group for each camera holds arrays of
+the picture's size, in chunks, compressed:
+
+    colour     (h, w, 3)  uint8    red, green, blue
+    mirror     (h, w)     uint16   number of the mirror from 1; 0: no ray
+    origin     (h, w, 3)  float32  where the ray leaves its mirror toward the object, mm
+    direction  (h, w, 3)  float32  unit vector toward the object
+
+and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.optics.surfaces import Surfaces
+from tbcad.optics.view import View
+from tbcad.simulate.capture import BAND_ROWS, Band
+from tbcad.simulate.reflector import Reflector
+
+Floats = NDArray[np.float64]
+
+SCHEMA = "tbcad-lightfield/1"
+CHUNK = (BAND_ROWS, 256)
+PLANES: dict[str, tuple[tuple[int, ...], str]] = {
+    "colour": ((3,), "u1"),
+    "mirror": ((), "u2"),
+    "origin": ((3,), "f4"),
+    "direction": ((3,), "f4"),
+}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One camera's share of a light field; its arrays may lie in a file and are read by slices.
+
+    Attributes:
+        view: the camera.
+        u: directions of the virtual cameras, (m, 3).
+        mirrors: surfaces, (m,).
+        planes: arrays `colour`, `mirror`, `origin`, `direction` as above.
+    """
+
+    view: View
+    u: Floats
+    mirrors: Surfaces
+    planes: Mapping[str, Any]
+
+    def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
+        """All arrays of a part of the picture."""
+        return {name: np.asarray(plane[rows, columns]) for name, plane in self.planes.items()}
+
+    def image(self) -> NDArray[np.uint8]:
+        """The picture, (h, w, 3)."""
+        return np.asarray(self.planes["colour"][:])
+
+
+@dataclass(frozen=True)
+class LightField:
+    """A light field, in memory or in an open file.
+
+    Attributes:
+        frames: by camera, "a" and "b" or one of them.
+        capture_mm: diameter of the capture sphere.
+        facts: how it was made: name of the object, geometry, samples a pixel ...
+    """
+
+    frames: dict[str, Frame]
+    capture_mm: float
+    facts: dict[str, Any]
+
+    @staticmethod
+    @contextmanager
+    def open(path: Path) -> Iterator[LightField]:
+        """Open a file, or the file in a folder that `tbcad capture` wrote, for reading.
+
+        Raises:
+            InputError: it cannot be read, or is no light field of this schema.
+        """
+        file = path / "lightfield.h5" if path.is_dir() else path
+        with _opened(file) as store:
+            yield _read(file, store)
+
+    def __len__(self) -> int:
+        """Number of mirrors."""
+        return sum(len(frame.u) for frame in self.frames.values())
+
+
+@contextmanager
+def writing(path: Path, capture_mm: float, facts: Mapping[str, Any]) -> Iterator[h5py.File]:
+    """Make a file; `write` fills it camera by camera."""
+    with h5py.File(path, "w", libver=("v110", "v110")) as store:
+        store.attrs["schema"] = SCHEMA
+        store.attrs["capture_mm"] = capture_mm
+        store.attrs["facts"] = json.dumps(dict(facts), sort_keys=True)
+        yield store
+
+
+def write(store: h5py.File, at: Reflector, bands: Iterable[Band]) -> NDArray[np.uint8]:
+    """Write one camera's bands as they come, and return its picture (h, w, 3)."""
+    view, group = at.view, store.create_group(at.camera)
+    _write_view(group, view)
+    _write_mirrors(group.create_group("mirrors"), at)
+    shape = (view.height_px, view.width_px)
+    chunk = (min(CHUNK[0], shape[0]), min(CHUNK[1], shape[1]))
+    planes = {
+        name: group.create_dataset(
+            name, shape + last, kind, chunks=chunk + last, shuffle=True, compression=1
+        )
+        for name, (last, kind) in PLANES.items()
+    }
+    picture = np.zeros((*shape, 3), dtype=np.uint8)
+    for band in bands:
+        rows = slice(band.rows.start, band.rows.stop)
+        picture[rows] = band.colour
+        for name, values in arrays_of(band).items():
+            planes[name][rows] = values
+    return picture
+
+
+def arrays_of(band: Band) -> dict[str, NDArray[Any]]:
+    """The arrays of a band as the file has them."""
+    rays = band.rays
+    raw = (band.colour, rays.mirror, rays.origin, rays.direction)
+    return {
+        name: np.asarray(values, dtype=kind)
+        for (name, (_, kind)), values in zip(PLANES.items(), raw, strict=True)
+    }
+
+
+def in_memory(
+    captured: Mapping[str, tuple[Reflector, Iterable[Band]]], capture_mm: float
+) -> LightField:
+    """A light field that is in no file."""
+    frames = {}
+    for camera, (at, bands) in captured.items():
+        parts = [arrays_of(band) for band in bands]
+        planes = {name: np.concatenate([part[name] for part in parts]) for name in PLANES}
+        frames[camera] = Frame(at.view, at.u, at.mirrors, planes)
+    return LightField(frames, capture_mm, {})
+
+
+def _write_view(group: h5py.Group, view: View) -> None:
+    group.attrs["pinhole_mm"] = view.pinhole
+    group.attrs["forward"] = view.forward
+    group.attrs["right"] = view.right
+    group.attrs["hfov_rad"] = view.hfov
+
+
+def _write_mirrors(group: h5py.Group, at: Reflector) -> None:
+    mirrors = at.mirrors
+    columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature)
+    for name, values in zip(("u", "apex", "normal", "curvature"), columns, strict=True):
+        group.create_dataset(name, data=values)
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[h5py.File]:
+    if not file.is_file():
+        raise InputError(f"{file} is no file: name a folder that tbcad capture wrote")
+    try:
+        store = h5py.File(file, "r")
+    except OSError as error:
+        raise InputError(f"{file} is no light field: {error}: capture again") from error
+    with store:
+        yield store
+
+
+def _read(file: Path, store: h5py.File) -> LightField:
+    found = store.attrs.get("schema")
+    if found != SCHEMA:
+        raise InputError(
+            f"{file} has schema {found!r}, allowed is {SCHEMA!r}: capture again with this tbcad"
+        )
+    try:
+        frames = {camera: _frame(store[camera]) for camera in ("a", "b") if camera in store}
+        capture_mm = float(store.attrs["capture_mm"])
+        facts = json.loads(store.attrs["facts"])
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        raise InputError(f"{file} is a damaged light field: {error}: capture again") from error
+    if not frames or not np.isfinite(capture_mm) or capture_mm <= 0 or not isinstance(facts, dict):
+        raise InputError(f"{file} is a damaged light field, without cameras: capture again")
+    return LightField(frames, capture_mm, facts)
+
+
+def _frame(group: h5py.Group) -> Frame:
+    planes = {name: group[name] for name in PLANES}
+    height, width = planes["mirror"].shape
+    for name, (last, kind) in PLANES.items():
+        if planes[name].shape != (height, width, *last) or planes[name].dtype != np.dtype(kind):
+            raise ValueError(f"array {name} of {group.name} has another shape or kind")
+    attributes = group.attrs
+    pinhole, forward, right = (
+        _numbers(attributes[name], (3,)) for name in ("pinhole_mm", "forward", "right")
+    )
+    hfov = float(_numbers(attributes["hfov_rad"], ()))
+    table = group["mirrors"]
+    m = table["curvature"].shape[0]
+    u, apex, normal = (_numbers(table[name][:], (m, 3)) for name in ("u", "apex", "normal"))
+    mirrors = Surfaces(apex, normal, _numbers(table["curvature"][:], (m,)))
+    return Frame(View(pinhole, forward, right, width, height, hfov), u, mirrors, planes)
+
+
+def _numbers(values: Any, shape: tuple[int, ...]) -> Floats:
+    result = np.asarray(values, dtype=np.float64)
+    if result.shape != shape or not np.isfinite(result).all():
+        raise ValueError("numbers are missing or not finite")
+    return result

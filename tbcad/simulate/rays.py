@@ -1,0 +1,156 @@
+"""Where each pixel's ray meets its mirror, and where it goes from there: exact spheres."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.optics.view import View
+from tbcad.simulate.compiled import compiled
+from tbcad.simulate.reflector import Reflector, pitch
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Numbers = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays after the mirrors, of a band of h rows and w columns.
+
+    Attributes:
+        mirror: number of the mirror, from 1 in the order of the ids; 0 where there is none
+            of this camera's, (h, w).
+        origin: points on the mirrors, mm, (h, w, 3); zero where there is none.
+        direction: unit vectors after the mirror, (h, w, 3); zero where there is none.
+    """
+
+    mirror: Numbers
+    origin: Floats
+    direction: Floats
+
+    def without(self, gone: NDArray[np.bool_]) -> "Rays":
+        """These rays but for some pixels (h, w)."""
+        kept = ~gone
+        return Rays(
+            self.mirror * kept, self.origin * kept[..., None], self.direction * kept[..., None]
+        )
+
+
+def pixel_directions(view: View, rows: range, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+    """Directions (h, w, 3) through pixels, their component along `forward` one.
+
+    Args:
+        view: the camera.
+        rows: rows of the band.
+        shift: from the pixels' centres, in pixels: to the right and down.
+    """
+    width = pitch(view)
+    across = (np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]) * width
+    downward = (np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]) * width
+    down = np.cross(view.forward, view.right)
+    columns: Floats = view.forward + across[:, None] * view.right
+    return columns + (downward[:, None] * down)[:, None, :]
+
+
+def exact(at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
+    """What gives the rays of rows of a camera's picture off its exact mirrors."""
+    return partial(mirror_rays, at, at.boxes())
+
+
+def mirror_rays(
+    at: Reflector, boxes: Ints, rows: range, shift: tuple[float, float] = (0.0, 0.0)
+) -> Rays:
+    """Rays of a band of pixel rows after the exact mirrors.
+
+    Args:
+        at: camera and mirrors.
+        boxes: of the mirrors' cells in the picture, `Reflector.boxes`, (m, 4).
+        rows: of the picture.
+        shift: from the pixels' centres, in pixels.
+
+    The mirror that a ray meets first is the one whose surface it enters first, since a cell is
+    what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
+    """
+    way = pixel_directions(at.view, rows, shift)
+    mirrors = at.mirrors
+    table = np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature])
+    near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
+    in_band = boxes - [0, 0, rows.start, rows.start]
+    mirror = _first(at.view.pinhole, way, table, near, in_band, at.side, at.foot)
+    origin, direction = np.zeros_like(way), np.zeros_like(way)
+    _reflect(at.view.pinhole, way, table, mirror, origin, direction)
+    return Rays(mirror, origin, direction)
+
+
+@compiled
+def _first(
+    pinhole: Floats,
+    way: Floats,
+    table: Floats,
+    near: Ints,
+    boxes: Ints,
+    side: float,
+    foot: float,
+) -> Numbers:
+    """The surface that each ray of the band enters first, from 1, out of those near it.
+
+    On the ray x = pinhole + t d the surface's f (tbcad.optics.surfaces) is A t^2 + B t + C; the
+    ray enters at the lesser root, in the form that loses no digits and holds for planes.
+    """
+    height, width = way.shape[0], way.shape[1]
+    mirror = np.zeros((height, width), dtype=np.int32)
+    reach = np.full((height, width), np.inf)
+    for i in near:
+        px, py, pz = pinhole[0] - table[i, 0], pinhole[1] - table[i, 1], pinhole[2] - table[i, 2]
+        nx, ny, nz, k = table[i, 3], table[i, 4], table[i, 5], table[i, 6]
+        c = nx * px + ny * py + nz * pz + k / 2 * (px * px + py * py + pz * pz)
+        gx, gy, gz = nx + k * px, ny + k * py, nz + k * pz
+        for y in range(max(boxes[i, 2], 0), min(boxes[i, 3], height)):
+            for x in range(boxes[i, 0], boxes[i, 1]):
+                dx, dy, dz = way[y, x, 0], way[y, x, 1], way[y, x, 2]
+                b = gx * dx + gy * dy + gz * dz
+                root = b * b - 2 * k * c * (dx * dx + dy * dy + dz * dz)
+                if b >= 0 or root < 0:
+                    continue
+                t = 2 * c / (np.sqrt(root) - b)
+                if 0 < t < reach[y, x]:
+                    reach[y, x] = t
+                    there = side * (pinhole[0] + t * dx) >= 0 and pinhole[2] + t * dz >= foot
+                    mirror[y, x] = i + 1 if there else 0
+    return mirror
+
+
+@compiled
+def _reflect(
+    pinhole: Floats,
+    way: Floats,
+    table: Floats,
+    mirror: Numbers,
+    origin: Floats,
+    direction: Floats,
+) -> None:
+    """Fill in points on the numbered mirrors and unit directions after them."""
+    for y in range(way.shape[0]):
+        for x in range(way.shape[1]):
+            i = mirror[y, x] - 1
+            if i < 0:
+                continue
+            k, length = table[i, 6], 0.0
+            for j in range(3):
+                length += way[y, x, j] ** 2
+            length, b, c = np.sqrt(length), 0.0, 0.0
+            for j in range(3):
+                away, n = pinhole[j] - table[i, j], table[i, 3 + j]
+                c += (n + k / 2 * away) * away
+                b += (n + k * away) * way[y, x, j] / length
+            t, slope = 2 * c / (np.sqrt(b * b - 2 * k * c) - b), 0.0
+            for j in range(3):
+                d = way[y, x, j] / length
+                origin[y, x, j] = pinhole[j] + t * d
+                slope += d * (table[i, 3 + j] + k * (origin[y, x, j] - table[i, j]))
+            for j in range(3):
+                n = table[i, 3 + j] + k * (origin[y, x, j] - table[i, j])
+                direction[y, x, j] = way[y, x, j] / length - 2 * slope * n
