@@ -9,7 +9,8 @@ the picture's size, in chunks, compressed:
     origin     (h, w, 3)  float32  where the ray leaves its mirror toward the object, mm
     direction  (h, w, 3)  float32  unit vector toward the object
 
-and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64.
+and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64, and boxes (m, 4), int64:
+columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixels.
 """
 
 from __future__ import annotations
@@ -51,12 +52,14 @@ class Frame:
         view: the camera.
         u: directions of the virtual cameras, (m, 3).
         mirrors: surfaces, (m,).
+        boxes: columns x0, x1 and rows y0, y1, ends excluded, that hold each mirror, (m, 4).
         planes: arrays `colour`, `mirror`, `origin`, `direction` as above.
     """
 
     view: View
     u: Floats
     mirrors: Surfaces
+    boxes: NDArray[np.int64]
     planes: Mapping[str, Any]
 
     def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
@@ -149,7 +152,7 @@ def in_memory(
     for camera, (at, bands) in captured.items():
         parts = [arrays_of(band) for band in bands]
         planes = {name: np.concatenate([part[name] for part in parts]) for name in PLANES}
-        frames[camera] = Frame(at.view, at.u, at.mirrors, planes)
+        frames[camera] = Frame(at.view, at.u, at.mirrors, at.boxes(), planes)
     return LightField(frames, capture_mm, {})
 
 
@@ -162,8 +165,9 @@ def _write_view(group: h5py.Group, view: View) -> None:
 
 def _write_mirrors(group: h5py.Group, at: Reflector) -> None:
     mirrors = at.mirrors
-    columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature)
-    for name, values in zip(("u", "apex", "normal", "curvature"), columns, strict=True):
+    columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature, at.boxes())
+    names = ("u", "apex", "normal", "curvature", "boxes")
+    for name, values in zip(names, columns, strict=True):
         group.create_dataset(name, data=values)
 
 
@@ -211,7 +215,11 @@ def _frame(group: h5py.Group) -> Frame:
     m = table["curvature"].shape[0]
     u, apex, normal = (_numbers(table[name][:], (m, 3)) for name in ("u", "apex", "normal"))
     mirrors = Surfaces(apex, normal, _numbers(table["curvature"][:], (m,)))
-    return Frame(View(pinhole, forward, right, width, height, hfov), u, mirrors, planes)
+    boxes = table["boxes"][:]
+    inside = (boxes >= 0) & (boxes <= np.repeat([width, height], 2))
+    if boxes.shape != (m, 4) or boxes.dtype != np.int64 or not inside.all():
+        raise ValueError("boxes of mirrors lie outside of the picture")
+    return Frame(View(pinhole, forward, right, width, height, hfov), u, mirrors, boxes, planes)
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Floats:

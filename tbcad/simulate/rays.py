@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.view import View
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.reflector import Reflector, pitch
@@ -75,14 +76,22 @@ def mirror_rays(
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
     """
     way = pixel_directions(at.view, rows, shift)
-    mirrors = at.mirrors
-    table = np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature])
+    table = _table(at.mirrors)
     near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
-    in_band = boxes - [0, 0, rows.start, rows.start]
+    in_band = boxes - np.array([0, 0, rows.start, rows.start])
     mirror = _first(at.view.pinhole, way, table, near, in_band, at.side, at.foot)
+    return reflected(at.view.pinhole, way, at.mirrors, mirror)
+
+
+def reflected(pinhole: Floats, way: Floats, mirrors: Surfaces, mirror: Numbers) -> Rays:
+    """Rays along (h, w, 3) from the pinhole after mirrors of given numbers (h, w)."""
     origin, direction = np.zeros_like(way), np.zeros_like(way)
-    _reflect(at.view.pinhole, way, table, mirror, origin, direction)
+    _reflect(pinhole, way, _table(mirrors), mirror, origin, direction)
     return Rays(mirror, origin, direction)
+
+
+def _table(mirrors: Surfaces) -> Floats:
+    return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature])
 
 
 @compiled

@@ -1,0 +1,126 @@
+"""A large lens made of many pinholes (section 4.3 of the paper): the mean of their pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.optics.view import View
+from tbcad.simulate.compiled import THREADS, in_threads
+from tbcad.simulate.rays import pixel_directions
+from tbcad.simulate.slab import slab_along
+from tbcad.simulate.synthesis import Bools, Colours, Picture, Rays, colours, gather
+from tbcad.simulate.tiles import Tiles
+
+Floats = NDArray[np.float64]
+
+# The paper's 69 pinholes: so many points of a square lattice lie within this radius in its steps.
+LATTICE_RADIUS2 = 20
+
+
+@dataclass(frozen=True)
+class Focus:
+    """A lens.
+
+    Attributes:
+        aperture_mm: its diameter.
+        plane_mm: the plane that it makes sharp, across its axis, from the origin toward the lens.
+    """
+
+    aperture_mm: float
+    plane_mm: float
+
+    def check(self, view: View, capture_mm: float) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            InputError: no aperture, or the plane that is to be sharp is not near the object.
+        """
+        if not 0 < self.aperture_mm < np.inf:
+            raise InputError(f"--aperture {self.aperture_mm:g} is no diameter: give mm above 0")
+        limit = min(capture_mm, float(np.linalg.norm(view.pinhole)) - 1)
+        if not -limit <= self.plane_mm <= limit:
+            raise InputError(
+                f"--focus {self.plane_mm:g} is far from the object: allowed is "
+                f"{-limit:g} to {limit:g} mm from its middle, toward the camera"
+            )
+
+
+def pinholes(count_radius2: int = LATTICE_RADIUS2) -> Floats:
+    """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them."""
+    reach = int(np.sqrt(count_radius2))
+    x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
+    inside = x**2 + y**2 <= count_radius2
+    places: Floats = np.stack([x[inside], y[inside]], axis=1) / np.sqrt(count_radius2)
+    return places
+
+
+def rays_through(
+    view: View, focus: Focus, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
+) -> Rays:
+    """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
+
+    Args:
+        view: middle of the lens, and the picture.
+        focus: the lens.
+        place: on the lens, right and down from its middle, mm, (2,).
+        shift: from the pixels' centres, in pixels.
+
+    Returns:
+        Origins and unit directions, (h, w, 3) each.
+    """
+    down = np.cross(view.forward, view.right)
+    start = view.pinhole + place[0] * view.right + place[1] * down
+    depth = -float(view.pinhole @ view.forward) - focus.plane_mm
+    way = pixel_directions(view, range(view.height_px), shift) * depth + (view.pinhole - start)
+    way /= np.linalg.norm(way, axis=2)[..., None]
+    return np.broadcast_to(start, way.shape), way
+
+
+def refocus(tiles: Tiles, view: View, focus: Focus, places: Floats | None = None) -> Picture:
+    """The picture of a lens, as the mean of what pinholes all over it see.
+
+    Args:
+        tiles: the light field.
+        view: the middle of the lens, and the picture.
+        focus: the lens.
+        places: of the pinholes on the unit disc, (n, 2); without, the paper's 69.
+
+    Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
+    the mean is of the others.
+    """
+    points = (pinholes() if places is None else places) * focus.aperture_mm / 2
+    slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
+    edge = [_meeting(tiles, view, focus, place) for place in _outermost(points)]
+    near = gather(tiles, slab, np.concatenate([slab.points(*rays) for rays, _ in edge]))
+    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
+    count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
+
+    def one(place: Floats) -> tuple[Bools, Colours, Bools]:
+        rays, meets = _meeting(tiles, view, focus, place)
+        return meets, *colours(near, rays)
+
+    for first in range(0, len(points), 2 * THREADS):
+        for meets, found, seen in in_threads(one, points[first : first + 2 * THREADS]):
+            total[meets] += found
+            count += ~meets
+            count[meets] += seen
+    mean = total / np.maximum(count, 1)[..., None]
+    return Picture(mean.astype(np.float32), count > 0)
+
+
+def _meeting(tiles: Tiles, view: View, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
+    """Rays from a place on the lens that meet the capture sphere (n, 3), and which, (h, w)."""
+    origin, way = rays_through(view, focus, place)
+    start = origin[0, 0]
+    along = way @ start
+    meets: Bools = start @ start - along**2 <= (tiles.source.capture_mm / 2) ** 2
+    inside = way[meets]
+    return (np.broadcast_to(start, inside.shape), inside), meets
+
+
+def _outermost(points: Floats) -> Floats:
+    """The four corners of the square about places (n, 2)."""
+    reach = float(np.abs(points).max(initial=0.0))
+    return np.array([[-reach, -reach], [reach, -reach], [-reach, reach], [reach, reach]])

@@ -1,0 +1,144 @@
+"""Pictures from anywhere out of a light field: wanted rays, the mirrors near them, colours."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.optics.view import View
+from tbcad.simulate.blend import blend
+from tbcad.simulate.nearest import nearest
+from tbcad.simulate.sheaf import Sheaf, candidates, sheaf_of
+from tbcad.simulate.slab import Slab, slab_along
+from tbcad.simulate.tiles import Tiles
+from tbcad.simulate.viewpoint import directions
+
+Floats = NDArray[np.float64]
+Colours = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+Method = Literal["nearest", "blend"]
+Rays = tuple[Floats, Floats]
+"""Origins and unit directions, (n, 3) each."""
+Depth = Callable[[Floats, Floats], Floats]
+"""Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
+
+# One wanted ray of so many tells which mirrors are near.
+SPARSE = 601
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture made from a light field.
+
+    Attributes:
+        colour: (h, w, 3), 0 to 255, float32; zero where nothing was captured.
+        seen: whether a captured ray stands in, or the ray passes the capture sphere by, (h, w).
+    """
+
+    colour: Colours
+    seen: Bools
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """The picture in whole numbers, (h, w, 3)."""
+        return np.rint(self.colour).astype(np.uint8)
+
+
+def synthesise(
+    tiles: Tiles, view: View, method: Method = "nearest", depth: Depth | None = None
+) -> Picture:
+    """The picture that a pinhole camera would see.
+
+    Args:
+        tiles: the light field.
+        view: the pinhole camera.
+        method: the nearest captured ray (section 4.2), or a blend of several virtual cameras.
+        depth: the surface that a blend takes the object for; without, the plane through the
+            origin that faces the camera.
+    """
+    way = directions(view)
+    meets = np.linalg.norm(np.cross(view.pinhole, way), axis=2) <= tiles.source.capture_mm / 2
+    origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
+    slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
+    rays = (origin, way[meets])
+    found, seen = colours(gather(tiles, slab, slab.points(*rays)), rays, method, depth)
+    colour = np.zeros(way.shape, dtype=np.float32)
+    colour[meets] = found
+    every = ~meets
+    every[meets] = seen
+    return Picture(colour, every)
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The captured rays that may be near some wanted ones.
+
+    Attributes:
+        slab: what the views look along.
+        sheaf: captured rays; None where there are none.
+        limit: how far from a wanted ray a captured one may be, mm.
+    """
+
+    slab: Slab
+    sheaf: Sheaf | None
+    limit: float
+
+
+def gather(tiles: Tiles, slab: Slab, wanted: Floats) -> Gathered:
+    """The captured rays that may be near wanted points (n, 4) of a slab."""
+    limit = reach(tiles)
+    packed = tiles.packed(_near(tiles, slab, wanted, limit))
+    return Gathered(slab, None if packed is None else sheaf_of(slab, packed), limit)
+
+
+def colours(
+    near: Gathered, rays: Rays, method: Method = "nearest", depth: Depth | None = None
+) -> tuple[Colours, Bools]:
+    """Colours (n, 3) of wanted rays, and which of them were seen, (n,)."""
+    wanted = near.slab.points(*rays)
+    if near.sheaf is None:
+        return np.zeros((len(wanted), 3), dtype=np.float32), np.zeros(len(wanted), dtype=bool)
+    if method == "nearest":
+        found = nearest(near.sheaf, wanted, near.limit)
+        seen = found >= 0
+        return np.where(seen[:, None], near.sheaf.colour[found], np.float32(0)), seen
+    at = _depths(near.slab, rays, depth) / near.slab.scale
+    mixed, seen = blend(near.sheaf, wanted, at, near.limit)
+    return mixed.astype(np.float32), seen
+
+
+def reach(tiles: Tiles) -> float:
+    """How far from a wanted ray a captured one may be, in the slab, mm.
+
+    As far as neighbouring virtual cameras are apart, evenly spread over the hemisphere, and
+    neighbouring pixels, their mirror's share of the sensor evenly spread over the capture sphere.
+    """
+    capture = tiles.source.capture_mm
+    angle = np.sqrt(2 * np.pi / len(tiles.u) * 2 / np.sqrt(3))
+    size = sum(frame.view.width_px * frame.view.height_px for frame in tiles.source.frames.values())
+    pixel = capture / np.sqrt(size / len(tiles.u))
+    return float(angle * capture / 2 / np.sqrt(3) + pixel)
+
+
+def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.int64]:
+    """Mirrors (k,) whose rays may be within the limit of wanted ones (n, 4), by their apices."""
+    place = slab.place(tiles.apex) / [1, 1, slab.scale]
+    behind = np.flatnonzero(place[:, 2] < 0)
+    kept = wanted[~np.isnan(wanted[:, 0])]
+    if len(kept) == 0:
+        return behind[:0]
+    meeting = np.column_stack([place[behind], np.zeros(len(behind))])
+    return behind[candidates(meeting, kept, limit, SPARSE)]
+
+
+def _depths(slab: Slab, rays: Rays, depth: Depth | None) -> Floats:
+    """Where rays meet the surface, along the slab's direction, mm; on the plane where they miss."""
+    origin, direction = rays
+    if depth is None:
+        return np.zeros(len(direction))
+    reached = depth(origin, direction)
+    along = np.where(np.isfinite(reached), reached, 0)
+    place = (origin + along[:, None] * direction) @ slab.axes[2]
+    return np.where(np.isfinite(reached), place, 0.0)
