@@ -112,8 +112,15 @@ def writing(path: Path, capture_mm: float, facts: Mapping[str, Any]) -> Iterator
         yield store
 
 
-def write(store: h5py.File, at: Reflector, bands: Iterable[Band]) -> NDArray[np.uint8]:
-    """Write one camera's bands as they come, and return its picture (h, w, 3)."""
+def write(
+    store: h5py.File, at: Reflector, bands: Iterable[Band]
+) -> tuple[NDArray[np.uint8], dict[str, int]]:
+    """Write one camera's bands as they come.
+
+    Returns:
+        Its picture (h, w, 3), and how many of its pixels are on mirrors, and of those how many
+        rays meet the capture sphere.
+    """
     view, group = at.view, store.create_group(at.camera)
     _write_view(group, view)
     _write_mirrors(group.create_group("mirrors"), at)
@@ -126,12 +133,16 @@ def write(store: h5py.File, at: Reflector, bands: Iterable[Band]) -> NDArray[np.
         for name, (last, kind) in PLANES.items()
     }
     picture = np.zeros((*shape, 3), dtype=np.uint8)
+    counts = {"pixels_on_mirrors": 0, "pixels_that_see_the_capture_sphere": 0}
+    radius = float(store.attrs["capture_mm"]) / 2
     for band in bands:
+        counts["pixels_on_mirrors"] += int((band.rays.mirror > 0).sum())
+        counts["pixels_that_see_the_capture_sphere"] += int(band.rays.meeting(radius).sum())
         rows = slice(band.rows.start, band.rows.stop)
         picture[rows] = band.colour
         for name, values in arrays_of(band).items():
             planes[name][rows] = values
-    return picture
+    return picture, counts
 
 
 def arrays_of(band: Band) -> dict[str, NDArray[Any]]:

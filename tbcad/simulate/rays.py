@@ -32,6 +32,13 @@ class Rays:
     origin: Floats
     direction: Floats
 
+    def meeting(self, radius: float) -> NDArray[np.bool_]:
+        """Which rays meet the sphere of a radius (mm) about the origin, (h, w)."""
+        along = np.einsum("hwx,hwx->hw", self.origin, self.direction)
+        away = np.einsum("hwx,hwx->hw", self.origin, self.origin) - along**2
+        meets: NDArray[np.bool_] = (self.mirror > 0) & (along < 0) & (away <= radius**2)
+        return meets
+
     def without(self, gone: NDArray[np.bool_]) -> "Rays":
         """These rays but for some pixels (h, w)."""
         kept = ~gone

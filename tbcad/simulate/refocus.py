@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.view import View
+from tbcad.simulate.capture import Progress
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.rays import pixel_directions
 from tbcad.simulate.slab import slab_along
@@ -108,6 +109,18 @@ def refocus(tiles: Tiles, view: View, focus: Focus, places: Floats | None = None
             count[meets] += seen
     mean = total / np.maximum(count, 1)[..., None]
     return Picture(mean.astype(np.float32), count > 0)
+
+
+def refocus_sweep(
+    tiles: Tiles, view: View, aperture_mm: float, count: int, progress: Progress = lambda _: None
+) -> list[NDArray[np.uint8]]:
+    """Pictures (h, w, 3) focused on planes from the back of the capture sphere to its front."""
+    half = tiles.source.capture_mm / 2
+    pictures = []
+    for k, plane in enumerate(np.linspace(-half, half, count).tolist()):
+        progress(f"picture {k + 1} of {count}")
+        pictures.append(refocus(tiles, view, Focus(aperture_mm, plane)).image)
+    return pictures
 
 
 def _meeting(tiles: Tiles, view: View, focus: Focus, place: Floats) -> tuple[Rays, Bools]:

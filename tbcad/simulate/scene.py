@@ -1,5 +1,6 @@
 """What a ray sees of the object: Embree finds the facet, colour and light are ours."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,6 +82,15 @@ def look(scene: Scene, origin: Floats, direction: Floats) -> Seen:
     depth[rows] = found["tfar"][hit]
     colour[rows] = 255 * shaded(scene, facet, weight)
     return Seen(colour, depth)
+
+
+def depth_of(scene: Scene) -> Callable[[Floats, Floats], Floats]:
+    """What gives the distance along rays to the object, mm, infinite where there is none."""
+
+    def depth(origin: Floats, direction: Floats) -> Floats:
+        return look(scene, origin, direction).depth
+
+    return depth
 
 
 def shaded(scene: Scene, facet: Ints, weight: Floats) -> Floats:

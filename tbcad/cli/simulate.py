@@ -1,0 +1,295 @@
+"""See with a design before it is made: capture, views, refocusing."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.cli.app import app
+from tbcad.errors import InputError
+from tbcad.screen import stages
+
+if TYPE_CHECKING:
+    from tbcad.optics.view import View
+    from tbcad.simulate.geometry import Geometry
+    from tbcad.simulate.lightfield import LightField
+    from tbcad.simulate.pictures import Bytes
+    from tbcad.simulate.scene import Scene
+
+MOST_SAMPLES = 8
+WIDEST_DEG = 170
+GEOMETRIES = {
+    "spheres": "mirrors of the record",
+    "mesh": "mirrors of the meshes",
+    "prototype": "plan of the prototype",
+}
+
+Capture = Annotated[Path, typer.Argument(help="Folder written by tbcad capture.")]
+Azimuth = Annotated[float, typer.Option(help="About z from x, degrees.")]
+Elevation = Annotated[float, typer.Option(help="Above the object's horizon, 0 to 90 degrees.")]
+Distance = Annotated[float, typer.Option(help="From the middle of the object, mm.")]
+Width = Annotated[int, typer.Option(min=16, max=8192, help="Columns of the picture.")]
+Height = Annotated[int, typer.Option(min=16, max=8192, help="Rows of the picture.")]
+Fov = Annotated[
+    float | None,
+    typer.Option(help="Angle of view across, degrees; without, the capture sphere fills it."),
+]
+
+
+class Method(StrEnum):
+    """How wanted rays get their colours."""
+
+    NEAREST = "nearest"
+    BLEND = "blend"
+
+
+class Surface(StrEnum):
+    """What a blend takes the object for."""
+
+    PLANE = "plane"
+    OBJECT = "object"
+
+
+@app.command()
+def capture(
+    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    object_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--object",
+            metavar="FILE",
+            help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with "
+            "vertex colours or a texture; without, a built-in knot.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")
+    ] = Path("captures"),
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
+    ] = False,
+    pattern: Annotated[
+        bool, typer.Option("--pattern", help="Paint the built-in pattern on the object.")
+    ] = False,
+    samples: Annotated[
+        int,
+        typer.Option(
+            min=1, max=MOST_SAMPLES, help="Anti-aliasing: a pixel is the mean of N x N rays."
+        ),
+    ] = 1,
+    mesh: Annotated[
+        bool,
+        typer.Option("--mesh", help="Off the exported meshes instead of the recorded spheres."),
+    ] = False,
+    prototype: Annotated[
+        bool,
+        typer.Option(
+            "--prototype", help="With the balls, stop by stop, merged into the shell's picture."
+        ),
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
+    ] = False,
+) -> int:
+    """Photograph an object with both cameras through the mirrors of an export.
+
+    Writes both pictures at the sensors' full size, and the light field: the ray, colour and mirror
+    of every pixel.
+    """
+    from tbcad.export.folder import check_target, replacing
+    from tbcad.export.manifest import write_manifest
+    from tbcad.simulate.captured import write_capture
+    from tbcad.simulate.exported import read_export
+    from tbcad.simulate.geometry import cameras
+    from tbcad.simulate.scene import scene_of
+    from tbcad.simulate.subject import built_in, load
+
+    geometry = _geometry(mesh, prototype)
+    check_target(out, force)
+    with stages(3) as told:
+        told.stage("object")
+        export = read_export(folder)
+        size = export.capture_mm
+        subject = load(object_file, size, fit, pattern) if object_file else built_in(size)
+        told.stage(GEOMETRIES[geometry])
+        captured = cameras(export, scene_of(subject), geometry, samples, told.detail)
+        told.stage("photographs and light field")
+        facts = {
+            "design": export.spec.name,
+            "n": export.spec.optics.n,
+            "geometry": geometry,
+            "samples": samples,
+        }
+        with replacing(out, force) as place:
+            record = write_capture(place, captured, subject, size, facts)
+            write_manifest(place)
+    for camera, found in record["cameras"].items():
+        seen, on = found["pixels_that_see_the_capture_sphere"], found["pixels_on_mirrors"]
+        typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
+    typer.echo(f"{out}: {subject.name} as camera_a.png, camera_b.png and lightfield.h5")
+    return 0
+
+
+def _geometry(mesh: bool, prototype: bool) -> "Geometry":
+    if mesh and prototype:
+        raise InputError("--mesh and --prototype exclude each other: leave one out")
+    return "mesh" if mesh else "prototype" if prototype else "spheres"
+
+
+@app.command()
+def view(
+    capture_folder: Capture,
+    azimuth: Azimuth = 0.0,
+    elevation: Elevation = 30.0,
+    distance: Distance = 640.0,
+    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("view.png"),
+    method: Annotated[
+        Method,
+        typer.Option(
+            help="nearest: the nearest captured ray, as in the paper; blend: several virtual "
+            "cameras that see the same point."
+        ),
+    ] = Method.NEAREST,
+    surface: Annotated[
+        Surface,
+        typer.Option(
+            help="Where a blend takes that point: on the plane through the middle of the object, "
+            "or on the object itself."
+        ),
+    ] = Surface.PLANE,
+    width: Width = 640,
+    height: Height = 480,
+    fov: Fov = None,
+) -> int:
+    """Make the picture that a camera anywhere round the object would see.
+
+    Beside it, where the capture was simulated: the ray-traced truth, both next to each other, and
+    how like they are.
+    """
+    from tbcad.simulate.lightfield import LightField
+    from tbcad.simulate.pictures import check_place
+    from tbcad.simulate.scene import depth_of
+    from tbcad.simulate.synthesis import synthesise
+    from tbcad.simulate.tiles import Tiles
+    from tbcad.simulate.truth import pinhole_picture, whole
+
+    check_place(out)
+    with stages(3) as told, LightField.open(capture_folder) as source:
+        told.stage("light field")
+        at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
+        scene = _scene(capture_folder)
+        depth = None
+        if surface is Surface.OBJECT:
+            if scene is None:
+                raise InputError(f"{capture_folder} has no object: use --surface plane")
+            depth = depth_of(scene)
+        told.stage("view")
+        picture = synthesise(Tiles(source), at, method.value, depth).image
+        told.stage("truth")
+        truth = None if scene is None else whole(pinhole_picture(scene, at))
+    _show(out, picture, truth, (method.value, "ray-traced"))
+    return 0
+
+
+@app.command()
+def refocus(
+    capture_folder: Capture,
+    azimuth: Azimuth = 0.0,
+    elevation: Elevation = 30.0,
+    distance: Distance = 640.0,
+    aperture: Annotated[float, typer.Option(help="Diameter of the lens, mm.")] = 300.0,
+    focus: Annotated[
+        float,
+        typer.Option(help="The plane to make sharp: mm from the object's middle to the camera."),
+    ] = 0.0,
+    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("refocus.png"),
+    sweep: Annotated[
+        Path | None,
+        typer.Option(help="Also a film of the focus through the whole object: GIF, WebP or PNG."),
+    ] = None,
+    frames: Annotated[int, typer.Option(min=2, max=500, help="Pictures of the sweep.")] = 21,
+    width: Width = 640,
+    height: Height = 480,
+    fov: Fov = None,
+    truth_samples: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Rays a pixel of the real lens beside it.")
+    ] = 256,
+) -> int:
+    """Focus after the fact: the picture of a large lens, out of 69 pinholes all over it.
+
+    Beside it, where the capture was simulated: what a real lens would show.
+    """
+    from tbcad.simulate.lightfield import LightField
+    from tbcad.simulate.pictures import ANIMATED, check_place, write_animation
+    from tbcad.simulate.refocus import Focus, refocus_sweep
+    from tbcad.simulate.refocus import refocus as refocused
+    from tbcad.simulate.tiles import Tiles
+    from tbcad.simulate.truth import lens_picture, whole
+
+    check_place(out)
+    if sweep is not None:
+        check_place(sweep, ANIMATED)
+    with stages(3 + (sweep is not None)) as told, LightField.open(capture_folder) as source:
+        told.stage("light field")
+        at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
+        lens = Focus(aperture, focus)
+        lens.check(at, source.capture_mm)
+        tiles, scene = Tiles(source), _scene(capture_folder)
+        told.stage("69 pinholes")
+        picture = refocused(tiles, at, lens).image
+        told.stage("real lens")
+        truth = None
+        if scene is not None:
+            truth = whole(lens_picture(scene, at, lens, truth_samples, told.detail))
+        if sweep is not None:
+            told.stage("sweep")
+            write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, told.detail))
+    _show(out, picture, truth, ("69 pinholes", "real lens"))
+    if sweep is not None:
+        typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
+    return 0
+
+
+def _viewpoint(
+    source: "LightField",
+    place: tuple[float, float, float],
+    size: tuple[int, int],
+    fov: float | None,
+) -> "View":
+    from math import radians
+
+    from tbcad.simulate.viewpoint import viewpoint
+
+    azimuth, elevation, distance = place
+    if fov is not None and not 0 < fov < WIDEST_DEG:
+        raise InputError(f"--fov {fov:g} is no angle of view: allowed is above 0, below 170")
+    wide = None if fov is None else radians(fov)
+    return viewpoint(radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide)
+
+
+def _scene(folder: Path) -> "Scene | None":
+    """The object of a simulated capture; None where there is none, as with real photographs."""
+    from tbcad.simulate.captured import OBJECT, read_object
+    from tbcad.simulate.scene import scene_of
+
+    if not (folder / OBJECT).is_file():
+        return None
+    return scene_of(read_object(folder))
+
+
+def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]) -> None:
+    """Write the picture, and beside it the truth where it is known; say how like they are."""
+    from tbcad.simulate.pictures import beside, difference, write_stills
+    from tbcad.simulate.quality import likeness
+
+    if truth is None:
+        write_stills({out: picture})
+        typer.echo(f"{out}: drawn; no truth beside it, since the capture names no object")
+        return
+    files = [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
+    sheet = beside({names[0]: picture, names[1]: truth, "difference": difference(truth, picture)})
+    write_stills({out: picture, files[0]: truth, files[1]: sheet})
+    found = likeness(truth, picture)
+    typer.echo(f"PSNR {found.psnr_db:.2f} dB, SSIM {found.ssim:.4f} against the {names[1]} picture")
+    typer.echo(f"{out}, {files[0].name}, {files[1].name}: drawn")

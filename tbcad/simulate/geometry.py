@@ -1,0 +1,41 @@
+"""What the cameras photograph through: the recorded spheres, the meshes, or the prototype."""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Literal
+
+from tbcad.simulate.capture import Band, Progress, Tracer, photograph
+from tbcad.simulate.exported import Exported
+from tbcad.simulate.facets import on_mesh, read_shells
+from tbcad.simulate.rays import exact
+from tbcad.simulate.reflector import Reflector
+from tbcad.simulate.scene import Scene
+
+Geometry = Literal["spheres", "mesh"]
+Captured = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
+
+
+def cameras(
+    export: Exported, scene: Scene, geometry: Geometry, samples: int, progress: Progress
+) -> Captured:
+    """Both cameras, each with what takes its photograph.
+
+    Args:
+        export: the design as it was written.
+        scene: the object.
+        geometry: spheres of the record, or meshes of the shells.
+        samples: a pixel is the mean of samples x samples rays.
+        progress: told how far it has come.
+
+    Raises:
+        InputError: files of that geometry are missing or broken.
+    """
+    shells = read_shells(export) if geometry == "mesh" else None
+
+    def tracer(at: Reflector) -> Tracer:
+        return on_mesh(shells, at) if shells else exact(at)
+
+    return [
+        (at, partial(photograph, at.view, tracer(at), scene, samples, progress))
+        for at in export.reflectors
+    ]
