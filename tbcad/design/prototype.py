@@ -126,6 +126,7 @@ def prototype(spec: Spec, design: Design) -> Prototype:
         SpecError: when no balls do, or they cannot be placed; it says what to change.
     """
     keys, half = spec.prototype, _curved(design.halves[0])
+    _check_half_turn(spec)
     here, balls = _stand(spec, half)
     wanted = requests(here.groups, half.azimuth, float(np.radians(keys.stop_error_deg)))
     task = _task(spec, half, balls, wanted)
@@ -168,6 +169,15 @@ def pictures(made: Prototype) -> list[Picture]:
         for turn, ids in zip((0.0, np.pi), names, strict=True)
         for i in order
     ]
+
+
+def _check_half_turn(spec: Spec) -> None:
+    """One camera photographs both halves only if a half turn of the object swaps the cameras."""
+    if spec.optics.camera_mm[1] != 0:
+        raise SpecError(
+            f"a prototype needs cameras that a half turn about z swaps, but optics.camera_mm has "
+            f"y = {spec.optics.camera_mm[1]:g}: set it to 0, or build --parts shell"
+        )
 
 
 def _curved(half: Half) -> Half:

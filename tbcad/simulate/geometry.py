@@ -7,11 +7,14 @@ from typing import Literal
 from tbcad.simulate.capture import Band, Progress, Tracer, photograph
 from tbcad.simulate.exported import Exported
 from tbcad.simulate.facets import on_mesh, read_shells
+from tbcad.simulate.prototype.merge import merge
+from tbcad.simulate.prototype.plan import read_plan
+from tbcad.simulate.prototype.run import runs, stand_ins
 from tbcad.simulate.rays import exact
 from tbcad.simulate.reflector import Reflector
 from tbcad.simulate.scene import Scene
 
-Geometry = Literal["spheres", "mesh"]
+Geometry = Literal["spheres", "mesh", "prototype"]
 Captured = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
 
 
@@ -23,13 +26,20 @@ def cameras(
     Args:
         export: the design as it was written.
         scene: the object.
-        geometry: spheres of the record, or meshes of the shells.
+        geometry: spheres of the record, meshes of the shells, or the prototype's balls, stop by
+            stop.
         samples: a pixel is the mean of samples x samples rays.
         progress: told how far it has come.
 
     Raises:
         InputError: files of that geometry are missing or broken.
     """
+    if geometry == "prototype":
+        both = runs(export.reflectors, read_plan(export))
+        return [
+            (stand_ins(run), partial(merge, run, scene, "photograph", samples, progress))
+            for run in both
+        ]
     shells = read_shells(export) if geometry == "mesh" else None
 
     def tracer(at: Reflector) -> Tracer:

@@ -42,6 +42,7 @@ PLANES: dict[str, tuple[tuple[int, ...], str]] = {
     "origin": ((3,), "f4"),
     "direction": ((3,), "f4"),
 }
+MIRRORS = ("u", "apex", "normal", "curvature", "boxes")
 
 
 @dataclass(frozen=True)
@@ -177,8 +178,7 @@ def _write_view(group: h5py.Group, view: View) -> None:
 def _write_mirrors(group: h5py.Group, at: Reflector) -> None:
     mirrors = at.mirrors
     columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature, at.boxes())
-    names = ("u", "apex", "normal", "curvature", "boxes")
-    for name, values in zip(names, columns, strict=True):
+    for name, values in zip(MIRRORS, columns, strict=True):
         group.create_dataset(name, data=values)
 
 
@@ -201,7 +201,7 @@ def _read(file: Path, store: h5py.File) -> LightField:
             f"{file} has schema {found!r}, allowed is {SCHEMA!r}: capture again with this tbcad"
         )
     try:
-        frames = {camera: _frame(store[camera]) for camera in ("a", "b") if camera in store}
+        frames = {name: _frame(_group(store, name)) for name in ("a", "b") if name in store}
         capture_mm = float(store.attrs["capture_mm"])
         facts = json.loads(store.attrs["facts"])
     except (KeyError, ValueError, TypeError, AttributeError) as error:
@@ -211,8 +211,25 @@ def _read(file: Path, store: h5py.File) -> LightField:
     return LightField(frames, capture_mm, facts)
 
 
+def _group(store: h5py.Group, name: str) -> h5py.Group:
+    if not isinstance(store.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"group {name} is missing or lies elsewhere")
+    return store[name]
+
+
+def _inside(group: h5py.Group, name: str) -> h5py.Dataset:
+    """An array that lies in this very file: a link could name any other."""
+    link = group.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink):
+        raise ValueError(f"array {name} of {group.name} is missing or lies elsewhere")
+    found = group[name]
+    if not isinstance(found, h5py.Dataset) or found.external or found.is_virtual:
+        raise ValueError(f"array {name} of {group.name} lies elsewhere")
+    return found
+
+
 def _frame(group: h5py.Group) -> Frame:
-    planes = {name: group[name] for name in PLANES}
+    planes = {name: _inside(group, name) for name in PLANES}
     height, width = planes["mirror"].shape
     for name, (last, kind) in PLANES.items():
         if planes[name].shape != (height, width, *last) or planes[name].dtype != np.dtype(kind):
@@ -222,11 +239,12 @@ def _frame(group: h5py.Group) -> Frame:
         _numbers(attributes[name], (3,)) for name in ("pinhole_mm", "forward", "right")
     )
     hfov = float(_numbers(attributes["hfov_rad"], ()))
-    table = group["mirrors"]
-    m = table["curvature"].shape[0]
-    u, apex, normal = (_numbers(table[name][:], (m, 3)) for name in ("u", "apex", "normal"))
-    mirrors = Surfaces(apex, normal, _numbers(table["curvature"][:], (m,)))
-    boxes = table["boxes"][:]
+    table = _group(group, "mirrors")
+    columns = {name: _inside(table, name)[:] for name in MIRRORS}
+    m = len(columns["curvature"])
+    u, apex, normal = (_numbers(columns[name], (m, 3)) for name in ("u", "apex", "normal"))
+    mirrors = Surfaces(apex, normal, _numbers(columns["curvature"], (m,)))
+    boxes = columns["boxes"]
     inside = (boxes >= 0) & (boxes <= np.repeat([width, height], 2))
     if boxes.shape != (m, 4) or boxes.dtype != np.int64 or not inside.all():
         raise ValueError("boxes of mirrors lie outside of the picture")

@@ -127,7 +127,7 @@ def _meeting(tiles: Tiles, view: View, focus: Focus, place: Floats) -> tuple[Ray
     """Rays from a place on the lens that meet the capture sphere (n, 3), and which, (h, w)."""
     origin, way = rays_through(view, focus, place)
     start = origin[0, 0]
-    along = way @ start
+    along = np.einsum("hwx,x->hw", way, start)  # BLAS rounds by its own number of threads
     meets: Bools = start @ start - along**2 <= (tiles.source.capture_mm / 2) ** 2
     inside = way[meets]
     return (np.broadcast_to(start, inside.shape), inside), meets

@@ -1,0 +1,54 @@
+"""A small camera with all kinds of mirrors, an object, and the light field of it."""
+
+from pathlib import Path
+
+import pytest
+
+from tbcad.design.mirrors import Design, design
+from tbcad.design.spec import load_spec
+from tbcad.export.tables import write_record
+from tbcad.simulate.capture import photograph
+from tbcad.simulate.exported import Exported, read_export
+from tbcad.simulate.lightfield import LightField, in_memory
+from tbcad.simulate.rays import exact
+from tbcad.simulate.reflector import Reflector, reflectors
+from tbcad.simulate.scene import Scene, scene_of
+from tbcad.simulate.subject import built_in
+
+OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310"]
+CAPTURE_MM = 60.0
+
+
+@pytest.fixture(scope="session")
+def little() -> Design:
+    return design(load_spec(None, OPTIONS))
+
+
+@pytest.fixture(scope="session")
+def record(little: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the record only, as `tbcad build` writes it."""
+    folder = tmp_path_factory.mktemp("record")
+    write_record(folder, little, shells=False)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def exported(record: Path) -> Exported:
+    return read_export(record)
+
+
+@pytest.fixture(scope="session")
+def cameras(little: Design) -> tuple[Reflector, Reflector]:
+    return reflectors(little)
+
+
+@pytest.fixture(scope="session")
+def knot() -> Scene:
+    return scene_of(built_in(CAPTURE_MM))
+
+
+@pytest.fixture(scope="session")
+def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField:
+    return in_memory(
+        {at.camera: (at, photograph(at.view, exact(at), knot)) for at in cameras}, CAPTURE_MM
+    )
