@@ -37,6 +37,23 @@ Fov = Annotated[
 ]
 
 
+class Paint(StrEnum):
+    """The object's colours."""
+
+    OWN = "own"
+    PATTERN = "pattern"
+    PLAIN = "plain"
+
+
+PaintOption = Annotated[
+    Paint,
+    typer.Option(
+        help="own: the file's colours or texture, a pattern where it has none; pattern; plain: "
+        "grey."
+    ),
+]
+
+
 class Method(StrEnum):
     """How wanted rays get their colours."""
 
@@ -69,9 +86,7 @@ def capture(
     fit: Annotated[
         bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
     ] = False,
-    pattern: Annotated[
-        bool, typer.Option("--pattern", help="Paint the built-in pattern on the object.")
-    ] = False,
+    paint: PaintOption = Paint.OWN,
     samples: Annotated[
         int,
         typer.Option(
@@ -111,7 +126,7 @@ def capture(
         told.stage("object")
         export = read_export(folder)
         size = export.capture_mm
-        subject = load(object_file, size, fit, pattern) if object_file else built_in(size)
+        subject = load(object_file, size, fit, paint.value) if object_file else built_in(size)
         told.stage(GEOMETRIES[geometry])
         captured = cameras(export, scene_of(subject), geometry, samples, told.detail)
         told.stage("photographs and light field")

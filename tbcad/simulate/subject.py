@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from tbcad.errors import InputError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
+Paint = Literal["own", "pattern", "plain"]
 
 LARGEST_FILE = 1 << 30  # bytes
 MOST_FACETS = 20_000_000
@@ -53,14 +54,15 @@ class Subject:
         return float(np.linalg.norm(self.points, axis=1).max())
 
 
-def load(path: Path, capture_mm: float, fit: bool = False, pattern: bool = False) -> Subject:
+def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own") -> Subject:
     """Read a triangle mesh in millimetres, z up, about the origin.
 
     Args:
         path: any file that trimesh reads; its textures must lie beside it.
         capture_mm: diameter of the capture sphere.
         fit: move and scale it so that it just fits that sphere.
-        pattern: paint the built-in pattern on it; it is also used where the file has no colours.
+        paint: its own colours, or the built-in pattern where the file has none; the pattern in any
+            case; or plain grey.
 
     Raises:
         InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
@@ -70,10 +72,11 @@ def load(path: Path, capture_mm: float, fit: bool = False, pattern: bool = False
     faces = np.asarray(mesh.faces, dtype=np.int64)
     _check(path, points, faces)
     points = _fitted(points, faces, capture_mm) if fit else points
-    colours = {} if pattern else _colours(mesh, faces)
+    colours = _colours(mesh, faces) if paint == "own" else {}
+    patterned = not colours and paint != "plain"
     normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
     plain = np.full((len(faces), 3, 3), GREY)
-    made = Subject(path.name, points, faces, normals, plain, patterned=not colours)
+    made = Subject(path.name, points, faces, normals, plain, patterned=patterned)
     made = replace(made, **colours)
     _check_size(path, made, capture_mm)
     return made

@@ -92,11 +92,20 @@ def test_pattern_can_be_asked_for(tmp_path: Path) -> None:
     mesh = box()
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
     mesh.export(tmp_path / "box.ply")
-    subject = load(tmp_path / "box.ply", CAPTURE_MM, pattern=True)
+    assert not load(tmp_path / "box.ply", CAPTURE_MM).patterned
+    subject = load(tmp_path / "box.ply", CAPTURE_MM, paint="pattern")
     assert subject.patterned
     colour = from_above(subject, 1, 2).colour[0] / 255
     shown = pattern(np.array([[1.0, 2.0, 10.0 - 1e-9]]))[0]
     assert colour / colour.max() == pytest.approx(shown / shown.max(), abs=0.01)
+
+
+def test_plain_grey_can_be_asked_for(tmp_path: Path) -> None:
+    box().export(tmp_path / "box.stl")
+    subject = load(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
+    colours = from_above(subject, 1, 2).colour[0]
+    assert not subject.patterned
+    assert np.ptp(colours) == 0 < colours[0]
 
 
 def test_too_large_names_the_size(tmp_path: Path) -> None:

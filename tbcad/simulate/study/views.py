@@ -1,0 +1,97 @@
+"""Views all round the object, and how like the truth a light field's are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.optics.view import View
+from tbcad.simulate.quality import likeness
+from tbcad.simulate.scene import Scene, depth_of
+from tbcad.simulate.synthesis import Method, synthesise
+from tbcad.simulate.tiles import Tiles
+from tbcad.simulate.truth import pinhole_picture, whole
+from tbcad.simulate.viewpoint import viewpoint
+
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Progress = Callable[[str], None]
+
+ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
+MOST_AZIMUTHS = 360
+
+
+@dataclass(frozen=True)
+class Round:
+    """Viewpoints at some elevations, evenly all round at each.
+
+    Attributes:
+        elevation_deg: of each viewpoint, (v,).
+        azimuth_deg: of each viewpoint, (v,).
+        distance_mm: of all of them from the origin.
+    """
+
+    elevation_deg: Floats
+    azimuth_deg: Floats
+    distance_mm: float
+
+    def views(self, capture_mm: float) -> list[View]:
+        """The cameras, 640 x 480, each filled by the capture sphere."""
+        azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
+        return [
+            viewpoint(a, e, self.distance_mm, capture_mm)
+            for a, e in zip(azimuth, elevation, strict=True)
+        ]
+
+
+def round_of(elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float) -> Round:
+    """Viewpoints at elevations, so many evenly all round at each.
+
+    Raises:
+        InputError: there are none or too many.
+    """
+    if not 1 <= azimuths <= MOST_AZIMUTHS:
+        raise InputError(
+            f"--azimuths {azimuths}: allowed is 1 to {MOST_AZIMUTHS} viewpoints all round"
+        )
+    turns = np.arange(azimuths) * 360.0 / azimuths
+    elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, turns, indexing="ij"))
+    return Round(elevation, azimuth, distance_mm)
+
+
+def truths(scene: Scene, views: list[View], progress: Progress) -> list[Bytes]:
+    """What a real camera would see from each viewpoint, (h, w, 3)."""
+    pictures = []
+    for k, view in enumerate(views):
+        progress(f"truth {k + 1} of {len(views)}")
+        pictures.append(whole(pinhole_picture(scene, view)))
+    return pictures
+
+
+def scores(
+    tiles: Tiles,
+    scene: Scene,
+    views: list[View],
+    pictures: list[Bytes],
+    method: Method,
+    progress: Progress,
+) -> Floats:
+    """PSNR (dB) and SSIM of the light field's views against the truth, (v, 2).
+
+    Args:
+        tiles: the light field.
+        scene: the object, whose depth a blend takes.
+        views: the viewpoints, v of them.
+        pictures: the truth at each.
+        method: how the views are made.
+        progress: told how far it has come.
+    """
+    depth = depth_of(scene) if method == "blend" else None
+    found = []
+    for k, (view, truth) in enumerate(zip(views, pictures, strict=True)):
+        progress(f"view {k + 1} of {len(views)}")
+        alike = likeness(truth, synthesise(tiles, view, method, depth).image)
+        found.append((alike.psnr_db, alike.ssim))
+    return np.array(found)
