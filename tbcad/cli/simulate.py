@@ -61,6 +61,24 @@ class Method(StrEnum):
     BLEND = "blend"
 
 
+ObjectFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--object",
+        metavar="FILE",
+        help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with vertex "
+        "colours or a texture; without, a built-in knot.",
+    ),
+]
+MethodOption = Annotated[
+    Method,
+    typer.Option(
+        help="nearest: the nearest captured ray, as in the paper; blend: several virtual cameras "
+        "that see the same point."
+    ),
+]
+
+
 class Surface(StrEnum):
     """What a blend takes the object for."""
 
@@ -71,15 +89,7 @@ class Surface(StrEnum):
 @app.command()
 def capture(
     folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
-    object_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--object",
-            metavar="FILE",
-            help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with "
-            "vertex colours or a texture; without, a built-in knot.",
-        ),
-    ] = None,
+    object_file: ObjectFile = None,
     out: Annotated[
         Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")
     ] = Path("captures"),
@@ -159,13 +169,7 @@ def view(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("view.png"),
-    method: Annotated[
-        Method,
-        typer.Option(
-            help="nearest: the nearest captured ray, as in the paper; blend: several virtual "
-            "cameras that see the same point."
-        ),
-    ] = Method.NEAREST,
+    method: MethodOption = Method.NEAREST,
     surface: Annotated[
         Surface,
         typer.Option(

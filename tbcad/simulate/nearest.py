@@ -30,8 +30,8 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
     about = candidates(meeting, wanted, limit, SPARSE)
     near, likely = about, -1
     last = tiles[:, 3].copy()
-    # How near each mirror came when last asked, and how far the wanted rays have gone since: they
-    # cannot have come nearer by more than that.
+    # How near each mirror came, or may have come, when last asked, and how far the wanted rays have
+    # gone since: they cannot have come nearer by more than that.
     came, way = np.full(len(tiles), -np.inf), 0.0
     found = np.full(len(wanted), -1, dtype=np.int64)
     for i in range(len(wanted)):
@@ -48,7 +48,9 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
             k = likely if turn < 0 else near[turn]
             if k < 0 or last[k] < 0 or came[k] - way >= best or (turn >= 0 and k == likely):
                 continue
-            if turn >= 0 and _bound(meeting[k], ray) >= best:
+            least = _bound(meeting[k], ray) if turn >= 0 else 0.0
+            if least >= best:
+                came[k] = least + way
                 continue
             last[k] = walk(points, tiles[k], last[k], ray, 0.0, 1.0)
             away = np.sqrt(distance(points, last[k], ray, 0.0, 1.0))

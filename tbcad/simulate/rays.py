@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,9 @@ from tbcad.simulate.reflector import Reflector, pitch
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Numbers = NDArray[np.int32]
+
+# A point on the edge of two cells lies on both spheres but for rounding.
+ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True)
@@ -64,30 +66,22 @@ def pixel_directions(view: View, rows: range, shift: tuple[float, float] = (0.0,
 
 
 def exact(at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
-    """What gives the rays of rows of a camera's picture off its exact mirrors."""
-    return partial(mirror_rays, at, at.boxes())
-
-
-def mirror_rays(
-    at: Reflector, boxes: Ints, rows: range, shift: tuple[float, float] = (0.0, 0.0)
-) -> Rays:
-    """Rays of a band of pixel rows after the exact mirrors.
-
-    Args:
-        at: camera and mirrors.
-        boxes: of the mirrors' cells in the picture, `Reflector.boxes`, (m, 4).
-        rows: of the picture.
-        shift: from the pixels' centres, in pixels.
+    """What gives the rays of rows of a camera's picture off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
     """
-    way = pixel_directions(at.view, rows, shift)
-    table = _table(at.mirrors)
-    near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
-    in_band = boxes - np.array([0, 0, rows.start, rows.start])
-    mirror = _first(at.view.pinhole, way, table, near, in_band, at.side, at.foot)
-    return reflected(at.view.pinhole, way, at.mirrors, mirror)
+    boxes, beside, table = at.boxes(), at.beside_edge(), _table(at.mirrors)
+
+    def trace(rows: range, shift: tuple[float, float]) -> Rays:
+        way = pixel_directions(at.view, rows, shift)
+        near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
+        in_band = boxes - np.array([0, 0, rows.start, rows.start])
+        mirror = _first(at.view.pinhole, way, table, near, in_band, at.side, at.foot)
+        rays = reflected(at.view.pinhole, way, at.mirrors, mirror)
+        return rays.without(_covered(table, beside, mirror, rays.origin))
+
+    return trace
 
 
 def reflected(pinhole: Floats, way: Floats, mirrors: Surfaces, mirror: Numbers) -> Rays:
@@ -132,11 +126,33 @@ def _first(
                 if b >= 0 or root < 0:
                     continue
                 t = 2 * c / (np.sqrt(root) - b)
-                if 0 < t < reach[y, x]:
-                    reach[y, x] = t
-                    there = side * (pinhole[0] + t * dx) >= 0 and pinhole[2] + t * dz >= foot
-                    mirror[y, x] = i + 1 if there else 0
+                if (
+                    0 < t < reach[y, x]
+                    and side * (pinhole[0] + t * dx) >= 0
+                    and pinhole[2] + t * dz >= foot
+                ):
+                    reach[y, x], mirror[y, x] = t, i + 1
     return mirror
+
+
+@compiled
+def _covered(table: Floats, beside: Ints, mirror: Numbers, point: Floats) -> NDArray[np.bool_]:
+    """Which points (h, w, 3) on numbered mirrors lie inside the sphere of one beside the edge."""
+    inside = np.zeros(mirror.shape, dtype=np.bool_)
+    for y in range(mirror.shape[0]):
+        for x in range(mirror.shape[1]):
+            if mirror[y, x] == 0:
+                continue
+            for j in beside[mirror[y, x] - 1]:
+                if j < 0:
+                    break
+                value = 0.0
+                for axis in range(3):
+                    away = point[y, x, axis] - table[j, axis]
+                    value += (table[j, 3 + axis] + table[j, 6] / 2 * away) * away
+                if value < -ROUNDING_MM:
+                    inside[y, x] = True
+    return inside
 
 
 @compiled

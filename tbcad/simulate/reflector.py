@@ -55,27 +55,37 @@ class Reflector:
         return 1.0 if self.camera == "a" else -1.0
 
     def boxes(self) -> Ints:
-        """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4).
-
-        Those of cells at the seam or the foot are wider by their own size: beyond the edge a ray
-        enters their sphere where there is no mirror, and must not meet the next one inside it.
-        """
+        """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4)."""
         arcs, m = self.cells.arcs, len(self)
         which = np.broadcast_to(np.arange(len(arcs))[:, None], (len(arcs), len(ARC_SAMPLES)))
         places = pixels_of(self.view, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape)))
         low, high = np.full((m, 2), np.inf), np.full((m, 2), -np.inf)
-        edge = np.zeros(m, dtype=bool)
-        for faces, others in (arcs.faces.T, arcs.faces.T[::-1]):
+        for faces in (arcs.left, arcs.right):
             mine = faces < m
             np.minimum.at(low, faces[mine], places[mine].min(axis=1))
             np.maximum.at(high, faces[mine], places[mine].max(axis=1))
-            edge[faces[mine & (others >= m)]] = True
-        wider = np.where(edge[:, None], high - low, 0)
-        low, high = low - wider, high + wider
         size = np.array([self.view.width_px, self.view.height_px])
         first = np.clip(np.floor(low) - MARGIN_PX, 0, size)
         last = np.clip(np.ceil(high) + 1 + MARGIN_PX, 0, size)
         return np.stack([first, last], axis=2).reshape(m, 4).astype(np.int64)
+
+    def beside_edge(self) -> Ints:
+        """For each mirror the neighbours that the seam or the foot cuts, -1 where no more, (m, k).
+
+        A ray may enter the sphere of such a neighbour beyond the edge, where there is no mirror;
+        what it would meet inside that sphere lies in the wall.
+        """
+        faces, m = self.cells.arcs.faces, len(self)
+        cut = np.zeros(m + 2, dtype=bool)
+        cut[faces[(faces >= m).any(axis=1)].min(axis=1)] = True
+        pairs = np.concatenate([faces, faces[:, ::-1]])
+        pairs = pairs[(pairs < m).all(axis=1) & cut[pairs[:, 1]]]
+        pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+        count = np.bincount(pairs[:, 0], minlength=m)
+        place = np.arange(len(pairs)) - np.repeat(np.cumsum(count) - count, count)
+        table = np.full((m, int(count.max(initial=0))), -1)
+        table[pairs[:, 0], place] = pairs[:, 1]
+        return table
 
 
 def reflectors(design: Design) -> tuple[Reflector, Reflector]:

@@ -20,17 +20,23 @@ def every_row(at: Reflector) -> Rays:
 def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First mirror, from 1, of rays (k, 3), and how far it is, by trying all of them.
 
-    With the rows' own quadratic formula for sphere centres, not the one under test.
+    With the rows' own quadratic formula for sphere centres, not the one under test; no mirror
+    where the point lies beyond seam or foot, or inside another sphere.
     """
     mirrors = at.mirrors
     to_centre = mirrors.centre - at.view.pinhole
     along = way @ to_centre.T
     rest = mirrors.radius**2 - dot(to_centre, to_centre) + along**2
     reach = np.where((rest > 0) & (along > 0), along - np.sqrt(np.maximum(rest, 0)), np.inf)
+    finite = np.where(np.isfinite(reach), reach, 0)
+    x, z = (at.view.pinhole[i] + finite * way[:, [i]] for i in (0, 2))
+    reach[(at.side * x < 0) | (z < at.foot)] = np.inf
     first = reach.argmin(axis=1)
     t = reach[np.arange(len(way)), first]
     point = at.view.pinhole + np.where(np.isfinite(t), t, 0)[:, None] * way
-    there = (at.side * point[:, 0] >= 0) & (point[:, 2] >= at.foot) & np.isfinite(t)
+    away = [norm(point - centre) for centre in mirrors.centre]
+    inside = np.stack(away, axis=1) < mirrors.radius - 1e-7
+    there = np.isfinite(t) & ~inside.any(axis=1)
     return np.where(there, first + 1, 0), t
 
 
@@ -45,16 +51,29 @@ def test_first_mirror_is_the_one_that_a_search_finds(cameras: Cameras, camera: i
     assert norm(rays.origin.reshape(-1, 3)[on] - at.view.pinhole) == pytest.approx(reach[on])
 
 
-def test_points_lie_in_their_own_cell(cameras: Cameras) -> None:
-    """On their own surface, and in no other ball: what a cell is (DESIGN.md section 2)."""
-    at = cameras[0]
+def points_in_cells(at: Reflector) -> tuple[np.ndarray, np.ndarray]:
+    """Value of each pixel's point for its own surface, and the least for any surface."""
     rays = every_row(at)
     on = rays.mirror > 0
     points, owner = rays.origin[on], rays.mirror[on] - 1
     value = points @ at.mirrors.gradient_at_origin.T + at.mirrors.value_at_origin
     value += at.mirrors.curvature / 2 * dot(points, points)[:, None]
-    assert np.abs(value[np.arange(len(owner)), owner]).max() < 1e-9
-    assert value.min() > -1e-9
+    return value[np.arange(len(owner)), owner], value.min(axis=1)
+
+
+def test_points_lie_in_their_own_cell(cameras: Cameras) -> None:
+    """On their own surface, and in no other ball: what a cell is (DESIGN.md section 2)."""
+    own, least = points_in_cells(cameras[0])
+    assert np.abs(own).max() < 1e-9
+    assert least.min() > -1e-9
+
+
+def test_nothing_is_seen_inside_the_wall_beyond_the_foot() -> None:
+    """A wide lens sees rays that enter a mirror's sphere below the foot, where there is none."""
+    settings = ["n=6", "hfov_deg=110", "width_px=416", "height_px=310"]
+    own, least = points_in_cells(reflectors(design(load_spec(None, settings)))[0])
+    assert np.abs(own).max() < 1e-9
+    assert least.min() > -1e-9
 
 
 def test_reflection_obeys_its_law(cameras: Cameras) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.vectors import unit
-from tbcad.simulate.capture import BAND_ROWS, CENTRE, Band, Shift, shifts
+from tbcad.simulate.capture import BAND_ROWS, CENTRE, Band, Shift, Tracer, shifts
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.lightfield import LightField, in_memory
 from tbcad.simulate.prototype.photograph import resampled
@@ -30,7 +30,7 @@ from tbcad.simulate.prototype.sight import (
     places_of,
     sight,
 )
-from tbcad.simulate.rays import Rays, mirror_rays, pixel_directions
+from tbcad.simulate.rays import Rays, exact, pixel_directions
 from tbcad.simulate.reflector import MARGIN_PX, pixels_of
 from tbcad.simulate.scene import Scene
 
@@ -54,6 +54,7 @@ class Merging:
 
     Attributes:
         run: the run.
+        shell: gives the rays of rows of the shell's picture.
         boxes: columns x0, x1 and rows y0, y1, ends excluded, of the shell's picture that hold the
             object seen directly, or a mirror's cell, (1 + m, 4).
         turn: of directions, (1 + m, 3, 3).
@@ -62,6 +63,7 @@ class Merging:
     """
 
     run: Run
+    shell: Tracer
     boxes: Ints
     turn: Floats
     stop: Ints
@@ -137,6 +139,7 @@ def merge(
 def _ready(run: Run, scene: Scene) -> Merging:
     return Merging(
         run,
+        exact(run.at),
         np.vstack([_object_box(run, scene), run.at.boxes()]),
         np.concatenate([np.eye(3)[None], run.turn]),
         np.append(0, run.stop),
@@ -174,7 +177,7 @@ def _resampled(ready: Merging, scene: Scene, samples: int, progress: Progress) -
 
 
 def _mirrors(ready: Merging, rows: range) -> Numbers:
-    return mirror_rays(ready.run.at, ready.boxes[1:], rows).mirror.astype(np.uint16)
+    return ready.shell(rows, CENTRE).mirror.astype(np.uint16)
 
 
 def _fill(
@@ -229,7 +232,7 @@ def _traced(ready: Merging, scene: Scene, samples: int, rows: range) -> Bytes:
 def _part(ready: Merging, scene: Scene, rows: range, shift: Shift) -> Part:
     """The pixels of a band, each turned with its mirror's window."""
     run = ready.run
-    mirror = mirror_rays(run.at, ready.boxes[1:], rows, shift).mirror.ravel().astype(np.int64)
+    mirror = ready.shell(rows, shift).mirror.ravel().astype(np.int64)
     straight = unit(pixel_directions(run.at.view, rows, shift).reshape(-1, 3))
     way = np.einsum("nx,nxy->ny", straight, ready.turn[mirror])
     seen = sight(run, way, ready.stop[mirror])

@@ -1,0 +1,1 @@
+"""Studies: what the paper claims, measured again, as tables and plots."""

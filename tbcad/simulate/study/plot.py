@@ -1,0 +1,96 @@
+"""Plots as data, and as PNG files whose bytes repeat."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+
+PANEL_INCHES = (6.4, 4.6)
+DPI = 110
+
+
+@dataclass(frozen=True)
+class Series:
+    """Points or a line.
+
+    Attributes:
+        label: for the legend; "" for none.
+        x: values, (k,).
+        y: values, (k,); NaN where there is none.
+        style: matplotlib's letters for colour, marker and line.
+    """
+
+    label: str
+    x: Floats
+    y: Floats
+    style: str = "-"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes:
+        title: what is shown.
+        x_label: with its unit.
+        y_label: with its unit.
+        series: what is drawn, the first lowest.
+        logarithmic: axes that are: "", "x", "y" or "xy".
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+    logarithmic: str = ""
+
+
+def picture(panels: tuple[Panel, ...]) -> bytes:
+    """Panels side by side as a PNG file; the same panels give the same bytes."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    # A user's own settings must not change the picture.
+    with matplotlib.rc_context(matplotlib.rcParamsDefault):
+        width, height = PANEL_INCHES
+        figure = Figure(figsize=(width * len(panels), height), dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        for place, panel in enumerate(panels, 1):
+            _draw(figure.add_subplot(1, len(panels), place), panel)
+        file = BytesIO()
+        figure.savefig(file, format="png", metadata={"Software": None})
+    return file.getvalue()
+
+
+def _draw(axes: "Axes", panel: Panel) -> None:
+    for series in panel.series:
+        axes.plot(series.x, series.y, series.style, label=series.label or None, markersize=4)
+    for letter in panel.logarithmic:
+        _logarithmic(axes, letter)
+    axes.set_title(panel.title)
+    axes.set_xlabel(panel.x_label)
+    axes.set_ylabel(panel.y_label)
+    axes.grid(True, which="both", alpha=0.25)
+    if any(series.label for series in panel.series):
+        axes.legend(fontsize=8)
+
+
+def _logarithmic(axes: "Axes", letter: str) -> None:
+    """A logarithmic axis with plain numbers at 1, 2, 5, 10, ..."""
+    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+
+    axes.set(**{f"{letter}scale": "log"})
+    axis = axes.xaxis if letter == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    plain = ScalarFormatter()
+    plain.set_scientific(False)
+    axis.set_major_formatter(plain)
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,76 @@
+"""Designs that differ from one in a few keys, made in threads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from tbcad.design.errors import SpecError
+from tbcad.design.mirrors import Design, design
+from tbcad.design.spec import Spec
+from tbcad.errors import InputError
+from tbcad.simulate.compiled import in_threads
+
+Result = TypeVar("Result")
+Progress = Callable[[str], None]
+
+LARGEST_N = 60
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A design, or why there is none.
+
+    Attributes:
+        made: the design; None where it was refused.
+        reason: what the refusal says, else "".
+    """
+
+    made: Design | None
+    reason: str = ""
+
+
+def attempt(spec: Spec) -> Attempt:
+    """The design of a spec, or why there is none: a study goes on without it."""
+    try:
+        return Attempt(design(spec))
+    except SpecError as error:
+        return Attempt(None, str(error))
+
+
+def varied(
+    spec: Spec, n: int | None = None, rule: str | None = None, margin_mm: float | None = None
+) -> Spec:
+    """The spec with another subdivision, radius rule or margin."""
+    optics = _with(spec.optics, n=n)
+    mirrors = _with(spec.mirrors, radius_rule=rule, margin_mm=margin_mm)
+    return spec.model_copy(update={"optics": optics, "mirrors": mirrors})
+
+
+def _with(section: Any, **keys: object) -> Any:
+    return section.model_copy(update={k: v for k, v in keys.items() if v is not None})
+
+
+def numbers(first: int, last: int) -> range:
+    """The subdivisions of a sweep, both ends included.
+
+    Raises:
+        InputError: there are none, or no design may have them.
+    """
+    if not 1 <= first <= last <= LARGEST_N:
+        raise InputError(
+            f"n from {first} to {last}: allowed is 1 to {LARGEST_N}, the first no more than the "
+            "last: change --from or --to"
+        )
+    return range(first, last + 1)
+
+
+def over(work: Callable[[int], Result], ns: range, progress: Progress) -> list[Result]:
+    """Work for every n in threads, results in the order of n."""
+
+    def told(n: int) -> Result:
+        result = work(n)
+        progress(f"n = {n}")
+        return result
+
+    # The largest take longest, so they are begun first.
+    return in_threads(told, reversed(ns))[::-1]
