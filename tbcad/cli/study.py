@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.simulate import Distance, Method, MethodOption, ObjectFile, Paint, PaintOption
+from tbcad.cli.options import Distance, Method, MethodOption, ObjectFile, Paint, PaintOption
 from tbcad.screen import stages
 
 if TYPE_CHECKING:

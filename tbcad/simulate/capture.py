@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.optics.view import View
 from tbcad.simulate.compiled import THREADS, in_threads
-from tbcad.simulate.rays import Rays, pixel_directions
+from tbcad.simulate.rays import Rays, unit_directions
 from tbcad.simulate.scene import Scene, look
 
 Floats = NDArray[np.float64]
@@ -78,10 +78,8 @@ def _through(
 ) -> tuple[Rays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
-    colour = np.zeros((*rays.mirror.shape, 3), dtype=np.float32)
-    on = np.flatnonzero(rays.mirror.ravel())
-    seen = look(scene, rays.origin.reshape(-1, 3)[on], rays.direction.reshape(-1, 3)[on])
-    colour.reshape(-1, 3)[on] = seen.colour
+    seen = look(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    colour = seen.colour.reshape(*rays.mirror.shape, 3)
     return _hidden(view, rays, colour, scene, rows, shift), colour
 
 
@@ -89,13 +87,14 @@ def _hidden(
     view: View, rays: Rays, colour: Colours, scene: Scene, rows: range, shift: Shift
 ) -> Rays:
     """Paint the object where the camera sees it directly, and take the rays away there."""
-    way = pixel_directions(view, rows, shift).reshape(-1, 3)
-    way /= np.linalg.norm(way, axis=1)[:, None]
+    way = unit_directions(view, rows, shift).reshape(-1, 3)
     direct = look(scene, np.broadcast_to(view.pinhole, way.shape), way)
-    to_mirror = np.linalg.norm(rays.origin.reshape(-1, 3) - view.pinhole, axis=1)
-    on = rays.mirror.ravel() != 0
-    front = np.isfinite(direct.depth) & (~on | (direct.depth < to_mirror))
-    if not front.any():
+    met = np.flatnonzero(np.isfinite(direct.depth))
+    if len(met) == 0:
         return rays
+    to_mirror = np.linalg.norm(rays.origin.reshape(-1, 3)[met] - view.pinhole, axis=1)
+    front = met[(rays.mirror.ravel()[met] == 0) | (direct.depth[met] < to_mirror)]
     colour.reshape(-1, 3)[front] = direct.colour[front]
-    return rays.without(front.reshape(rays.mirror.shape))
+    gone = np.zeros(rays.mirror.shape, dtype=bool)
+    gone.ravel()[front] = True
+    return rays.without(gone)

@@ -14,6 +14,9 @@ from tbcad.simulate.reflector import Reflector, pitch
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Numbers = NDArray[np.int32]
+Shift = tuple[float, float]
+
+HERE = np.zeros(3)
 
 # A point on the edge of two cells lies on both spheres but for rounding.
 ROUNDING_MM = 1e-9
@@ -43,13 +46,15 @@ class Rays:
 
     def without(self, gone: NDArray[np.bool_]) -> "Rays":
         """These rays but for some pixels (h, w)."""
+        if not gone.any():
+            return self
         kept = ~gone
         return Rays(
             self.mirror * kept, self.origin * kept[..., None], self.direction * kept[..., None]
         )
 
 
-def pixel_directions(view: View, rows: range, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+def pixel_directions(view: View, rows: range, shift: Shift = (0.0, 0.0)) -> Floats:
     """Directions (h, w, 3) through pixels, their component along `forward` one.
 
     Args:
@@ -57,15 +62,49 @@ def pixel_directions(view: View, rows: range, shift: tuple[float, float] = (0.0,
         rows: rows of the band.
         shift: from the pixels' centres, in pixels: to the right and down.
     """
+    columns, lines = _lattice(view, rows, shift)
+    result: Floats = columns + lines[:, None]
+    return result
+
+
+def unit_directions(
+    view: View, rows: range, shift: Shift = (0.0, 0.0), depth: float = 1.0, aside: Floats = HERE
+) -> Floats:
+    """Unit vectors (h, w, 3) toward what pixels see at a depth, from a place beside the pinhole.
+
+    Args:
+        view: the camera.
+        rows: rows of the band.
+        shift: from the pixels' centres, in pixels: to the right and down.
+        depth: along `forward`, mm; it matters beside the pinhole only.
+        aside: place less the pinhole, mm, (3,).
+    """
+    return _toward(*_lattice(view, rows, shift), depth, aside)
+
+
+def _lattice(view: View, rows: range, shift: Shift) -> tuple[Floats, Floats]:
+    """Directions to columns (w, 3), and what rows add to them (h, 3)."""
     width = pitch(view)
     across = (np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]) * width
     downward = (np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]) * width
     down = np.cross(view.forward, view.right)
-    columns: Floats = view.forward + across[:, None] * view.right
-    return columns + (downward[:, None] * down)[:, None, :]
+    return view.forward + across[:, None] * view.right, downward[:, None] * down
 
 
-def exact(at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
+@compiled
+def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floats:
+    result = np.empty((len(lines), len(columns), 3))
+    for y in range(len(lines)):
+        for x in range(len(columns)):
+            a = (columns[x, 0] + lines[y, 0]) * depth - aside[0]
+            b = (columns[x, 1] + lines[y, 1]) * depth - aside[1]
+            c = (columns[x, 2] + lines[y, 2]) * depth - aside[2]
+            length = np.sqrt(a * a + b * b + c * c)
+            result[y, x, 0], result[y, x, 1], result[y, x, 2] = a / length, b / length, c / length
+    return result
+
+
+def exact(at: Reflector) -> Callable[[range, Shift], Rays]:
     """What gives the rays of rows of a camera's picture off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
@@ -73,7 +112,7 @@ def exact(at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
     """
     boxes, beside, table = at.boxes(), at.beside_edge(), _table(at.mirrors)
 
-    def trace(rows: range, shift: tuple[float, float]) -> Rays:
+    def trace(rows: range, shift: Shift) -> Rays:
         way = pixel_directions(at.view, rows, shift)
         near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
         in_band = boxes - np.array([0, 0, rows.start, rows.start])

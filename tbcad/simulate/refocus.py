@@ -9,7 +9,7 @@ from tbcad.errors import InputError
 from tbcad.optics.view import View
 from tbcad.simulate.capture import Progress
 from tbcad.simulate.compiled import THREADS, in_threads
-from tbcad.simulate.rays import pixel_directions
+from tbcad.simulate.rays import unit_directions
 from tbcad.simulate.slab import slab_along
 from tbcad.simulate.synthesis import Bools, Colours, Picture, Rays, colours, gather
 from tbcad.simulate.tiles import Tiles
@@ -74,8 +74,7 @@ def rays_through(
     down = np.cross(view.forward, view.right)
     start = view.pinhole + place[0] * view.right + place[1] * down
     depth = -float(view.pinhole @ view.forward) - focus.plane_mm
-    way = pixel_directions(view, range(view.height_px), shift) * depth + (view.pinhole - start)
-    way /= np.linalg.norm(way, axis=2)[..., None]
+    way = unit_directions(view, range(view.height_px), shift, depth, start - view.pinhole)
     return np.broadcast_to(start, way.shape), way
 
 

@@ -38,8 +38,8 @@ class Slab:
         return _points(
             np.ascontiguousarray(self.axes),
             self.scale,
-            np.ascontiguousarray(origin, dtype=np.float64),
-            np.ascontiguousarray(direction, dtype=np.float64),
+            np.ascontiguousarray(origin),
+            np.ascontiguousarray(direction),
         )
 
     def place(self, points: Floats) -> Floats:
@@ -54,7 +54,7 @@ def slab_along(forward: Floats, right: Floats, capture_mm: float) -> Slab:
 
 
 @compiled
-def _points(axes: Floats, scale: float, origin: Floats, direction: Floats) -> Floats:
+def _points(axes: Floats, scale: float, origin: NDArray[Any], direction: NDArray[Any]) -> Floats:
     result = np.empty((len(origin), 4))
     for i in range(len(origin)):
         depth = speed = 0.0

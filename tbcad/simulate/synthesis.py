@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.optics.view import View
 from tbcad.simulate.blend import blend
+from tbcad.simulate.compiled import compiled
 from tbcad.simulate.nearest import nearest
 from tbcad.simulate.sheaf import Sheaf, candidates, sheaf_of
 from tbcad.simulate.slab import Slab, slab_along
@@ -59,7 +60,7 @@ def synthesise(
             origin that faces the camera.
     """
     way = directions(view)
-    meets = np.linalg.norm(np.cross(view.pinhole, way), axis=2) <= tiles.source.capture_mm / 2
+    meets = _meets(view.pinhole, way, tiles.source.capture_mm / 2)
     origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
     slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
     rays = (origin, way[meets])
@@ -69,6 +70,19 @@ def synthesise(
     every = ~meets
     every[meets] = seen
     return Picture(colour, every)
+
+
+@compiled
+def _meets(pinhole: Floats, way: Floats, radius: float) -> Bools:
+    """Which unit directions (h, w, 3) from a pinhole meet the sphere about the origin, (h, w)."""
+    meets = np.empty(way.shape[:2], dtype=np.bool_)
+    a, b, c = pinhole
+    for y in range(way.shape[0]):
+        for x in range(way.shape[1]):
+            p, q, r = way[y, x]
+            i, j, k = b * r - c * q, c * p - a * r, a * q - b * p
+            meets[y, x] = np.sqrt(i * i + j * j + k * k) <= radius
+    return meets
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.view import View
-from tbcad.simulate.rays import pixel_directions
+from tbcad.simulate.rays import unit_directions
 
 Floats = NDArray[np.float64]
 
@@ -65,5 +65,4 @@ def _fitting(sine: float, size: tuple[int, int]) -> float:
 
 def directions(view: View, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
     """Unit directions (h, w, 3) of all pixels."""
-    way = pixel_directions(view, range(view.height_px), shift)
-    return np.asarray(way / np.linalg.norm(way, axis=2)[..., None])
+    return unit_directions(view, range(view.height_px), shift)

@@ -12,13 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import tbcad.simulate.compiled
 import tbcad.simulate.prototype.merge
-from tbcad.design.mirrors import Design, design
-from tbcad.design.prototype import Prototype, pictures, prototype
+from tbcad.design.prototype import Prototype
 from tbcad.design.spec import load_spec
 from tbcad.errors import InputError
-from tbcad.export.balls import rows as ball_rows
-from tbcad.export.plan import rows, write_plan
-from tbcad.export.tables import write_record
 from tbcad.optics.vectors import norm, unit
 from tbcad.simulate.capture import CENTRE, Band
 from tbcad.simulate.capture import photograph as shell_photograph
@@ -30,30 +26,14 @@ from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.prototype.run import Run, runs, stand_ins
 from tbcad.simulate.prototype.sight import directions, places_of, sight
 from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import Reflector, pixels_of, reflectors
+from tbcad.simulate.reflector import Reflector, pixels_of
 from tbcad.simulate.scene import Scene, scene_of
 from tbcad.simulate.subject import built_in
+from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 
-OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
 SPEC = load_spec(None, OPTIONS)
-CAPTURE_MM = SPEC.optics.capture_diameter_mm
 Both = tuple[Run, Run]
 Rows = list[dict[str, str]]
-
-
-@pytest.fixture(scope="module")
-def shell() -> Design:
-    return design(SPEC)
-
-
-@pytest.fixture(scope="module")
-def cameras(shell: Design) -> tuple[Reflector, Reflector]:
-    return reflectors(shell)
-
-
-@pytest.fixture(scope="module")
-def made(shell: Design) -> Prototype:
-    return prototype(SPEC, shell)
 
 
 @pytest.fixture(scope="module")
@@ -62,31 +42,13 @@ def both(made: Prototype, cameras: tuple[Reflector, Reflector]) -> Both:
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return scene_of(built_in(CAPTURE_MM))
+def scene(knot: Scene) -> Scene:
+    return knot
 
 
 @pytest.fixture(scope="module")
 def merged(both: Both, scene: Scene) -> LightField:
     return light_field(both, scene, CAPTURE_MM)
-
-
-@pytest.fixture(scope="module")
-def written(made: Prototype, shell: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the reader needs of an export, from the export's own writers."""
-    folder = tmp_path_factory.mktemp("export")
-    write_record(folder, shell, shells=False)
-    write_plan(folder / "rotation_plan.csv", rows(pictures(made)))
-    axis, zero, third = made.half.ellipsoid.frame().tolist()
-    document = {
-        "schema": "tbcad-prototype/1",
-        "camera": "a",
-        "picture": SPEC.prototype.picture,
-        "frame": {"axis": axis, "zero": zero, "third": third},
-        "balls": ball_rows(made),
-    }
-    (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
-    return folder
 
 
 def plan_of(made: Prototype) -> Plan:
