@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
 from tbcad.optics.surfaces import Surfaces
+from tbcad.simulate.embree import committed
 from tbcad.simulate.exported import AGAIN, Exported
 from tbcad.simulate.rays import Numbers, Rays, pixel_directions, reflected
 from tbcad.simulate.reflector import Reflector
@@ -66,7 +67,7 @@ def read_shells(export: Exported) -> Shells:
         owners.append(sign * (owner + 1))
         surfaces.append(recovered(at.mirrors, facets, owner).offset(coat))
     mirror = np.concatenate(owners).astype(np.int32)
-    return Shells(mirror, _embree(np.concatenate(corners)), (surfaces[0], surfaces[1]))
+    return Shells(mirror, committed(np.concatenate(corners)), (surfaces[0], surfaces[1]))
 
 
 def on_mesh(shells: Shells, at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
@@ -145,14 +146,3 @@ def _owners(bare: Surfaces, corners: Floats) -> Ints:
         on = np.abs(bare.value(i, corners[left])).max(axis=1) < OFF_MM
         owner[left[on]] = likely[left[on]]
     return owner
-
-
-def _embree(corners: Floats) -> Any:
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, corners.astype(np.float32))
-    one = np.ones((1, 3), dtype=np.float32)
-    scene.run(one, one)  # the first call commits; later ones may come from any thread
-    return scene

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled
+from tbcad.simulate.embree import committed
 from tbcad.simulate.subject import Subject, pattern
 
 Floats = NDArray[np.float64]
@@ -54,13 +55,7 @@ class Seen:
 
 def scene_of(subject: Subject) -> Scene:
     """Put an object into Embree and light it."""
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    embree = EmbreeScene(robust=True)
-    TriangleMesh(embree, subject.points.astype(np.float32), subject.faces.astype(np.int32))
-    one = np.ones((1, 3), dtype=np.float32)
-    embree.run(one, one)  # the first call commits; later ones may come from any thread
+    embree = committed(subject.points, subject.faces)
     lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
     sky = SKY_LIGHT * (0.75 + 0.25 * subject.normals[:, 2])
     return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
