@@ -11,7 +11,7 @@ from tbcad.simulate.capture import Progress
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.rays import unit_directions
 from tbcad.simulate.slab import slab_along
-from tbcad.simulate.synthesis import Bools, Colours, Picture, Rays, colours, gather
+from tbcad.simulate.synthesis import Bools, Colours, Picture, Rays, colours, gather, reach
 from tbcad.simulate.tiles import Tiles
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,8 @@ def refocus(tiles: Tiles, view: View, focus: Focus, places: Floats | None = None
     points = (pinholes() if places is None else places) * focus.aperture_mm / 2
     slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
     edge = [_meeting(tiles, view, focus, place) for place in _outermost(points)]
-    near = gather(tiles, slab, np.concatenate([slab.points(*rays) for rays, _ in edge]))
+    corners = [np.concatenate(part) for part in zip(*(rays for rays, _ in edge), strict=True)]
+    near = gather(tiles, slab, (corners[0], corners[1]), reach(tiles))
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
 

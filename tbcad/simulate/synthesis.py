@@ -64,7 +64,11 @@ def synthesise(
     origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
     slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
     rays = (origin, way[meets])
-    found, seen = colours(gather(tiles, slab, slab.points(*rays)), rays, method, depth)
+    found, seen = colours(gather(tiles, slab, rays, reach(tiles)), rays, method, depth)
+    if not seen.all():
+        rest = (origin[~seen], rays[1][~seen])
+        wide = gather(tiles, slab, rest, horizon(tiles))
+        found[~seen], seen[~seen] = colours(wide, rest, method, depth)
     colour = np.zeros(way.shape, dtype=np.float32)
     colour[meets] = found
     every = ~meets
@@ -100,10 +104,9 @@ class Gathered:
     limit: float
 
 
-def gather(tiles: Tiles, slab: Slab, wanted: Floats) -> Gathered:
-    """The captured rays that may be near wanted points (n, 4) of a slab."""
-    limit = reach(tiles)
-    packed = tiles.packed(_near(tiles, slab, wanted, limit))
+def gather(tiles: Tiles, slab: Slab, rays: Rays, limit: float) -> Gathered:
+    """The captured rays that may be within a limit (mm) of wanted ones."""
+    packed = tiles.packed(_near(tiles, slab, slab.points(*rays), limit))
     return Gathered(slab, None if packed is None else sheaf_of(slab, packed), limit)
 
 
@@ -124,7 +127,7 @@ def colours(
 
 
 def reach(tiles: Tiles) -> float:
-    """How far from a wanted ray a captured one may be, in the slab, mm.
+    """How far from a wanted ray a captured one is at most, in the slab, mm.
 
     As far as neighbouring virtual cameras are apart, evenly spread over the hemisphere, and
     neighbouring pixels, their mirror's share of the sensor evenly spread over the capture sphere.
@@ -134,6 +137,17 @@ def reach(tiles: Tiles) -> float:
     size = sum(frame.view.width_px * frame.view.height_px for frame in tiles.source.frames.values())
     pixel = capture / np.sqrt(size / len(tiles.u))
     return float(angle * capture / 2 / np.sqrt(3) + pixel)
+
+
+def horizon(tiles: Tiles) -> float:
+    """The same for rays from the horizon, which may pass a capture radius below all mirrors, mm.
+
+    A ray that passes the meeting point of a mirror's rays at distance e, at depth L, is
+    e / sqrt(1 + (L / s)^2) from the nearest of them; no mirror is nearer than the nearest apex.
+    """
+    radius = tiles.source.capture_mm / 2
+    depth = float(np.linalg.norm(tiles.apex, axis=1).min())
+    return radius / float(np.sqrt(1 + 3 * (depth / radius) ** 2))
 
 
 def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.int64]:

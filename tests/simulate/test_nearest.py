@@ -10,7 +10,7 @@ from tbcad.optics.view import View
 from tbcad.simulate.lightfield import LightField
 from tbcad.simulate.nearest import nearest
 from tbcad.simulate.slab import Slab, slab_along
-from tbcad.simulate.synthesis import gather, reach
+from tbcad.simulate.synthesis import Rays, gather, reach
 from tbcad.simulate.tiles import Tiles, meeting
 from tbcad.simulate.viewpoint import directions, viewpoint
 
@@ -32,12 +32,12 @@ def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return origin, direction, colour
 
 
-def wanted_by(view: View) -> tuple[Slab, np.ndarray]:
+def wanted_by(view: View) -> tuple[Slab, Rays]:
     slab = slab_along(view.forward, view.right, CAPTURE_MM)
     way = directions(view).reshape(-1, 3)
     meets = np.linalg.norm(np.cross(view.pinhole, way), axis=1) < CAPTURE_MM / 2
     way = way[meets]
-    return slab, slab.points(np.broadcast_to(view.pinhole, way.shape), way)
+    return slab, (np.broadcast_to(view.pinhole, way.shape), way)
 
 
 @given(
@@ -50,11 +50,12 @@ def test_equals_the_tree(
     light_field: LightField, tiles: Tiles, azimuth: float, elevation: float, distance: float
 ) -> None:
     view = viewpoint(np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120))
-    slab, wanted = wanted_by(view)
+    slab, rays = wanted_by(view)
+    wanted = slab.points(*rays)
     origin, direction, _ = every_ray(light_field)
     points = slab.points(origin, direction)
     away, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(wanted)
-    near = gather(tiles, slab, wanted)
+    near = gather(tiles, slab, rays, reach(tiles))
     assert near.sheaf is not None
     found = nearest(near.sheaf, wanted, near.limit)
     within = away < near.limit
@@ -108,7 +109,7 @@ def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: Tiles
     )
     slab = slab_along(-frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM)
     wanted = slab.points(origin, direction)
-    near = gather(tiles, slab, wanted)
+    near = gather(tiles, slab, (origin, direction), reach(tiles))
     assert near.sheaf is not None
     found = nearest(near.sheaf, wanted, near.limit)
     assert np.array_equal(near.sheaf.colour[found], colour)

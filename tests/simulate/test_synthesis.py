@@ -60,6 +60,13 @@ def test_what_no_mirror_saw_is_not_seen(light_field: LightField) -> None:
     assert not picture.colour[50:70, 70:90].any()
 
 
+@pytest.mark.parametrize("azimuth", [0.0, 90.0])
+def test_views_from_the_horizon_have_no_holes(tiles: Tiles, azimuth: float) -> None:
+    """Half of their rays come from below all mirrors: the nearest captured ones stand in."""
+    for method in ("nearest", "blend"):
+        assert synthesise(tiles, view_from(azimuth, 0), method).seen.all()
+
+
 def test_refocus_is_a_lens(tiles: Tiles, knot: Scene) -> None:
     """Nearer to a real lens of that focus than to one of another, or to a pinhole."""
     view, focus = view_from(30, 45), Focus(250, 0)
