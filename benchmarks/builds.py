@@ -1,4 +1,4 @@
-"""The whole command `tbcad build`, with exports and proof, as a user runs it: a process each."""
+"""Whole commands as a user runs them, a process each: `tbcad build`, with exports and proof."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LARGEST = ("--n", "60", "--set", "mirrors.margin_mm=1")
 
 @dataclass(frozen=True)
 class Build:
-    """What one build took: seconds on the clock and of both cores, and the most memory, GB."""
+    """What one command took: seconds on the clock and of both cores, and the most memory, GB."""
 
     seconds: float
     cpu: float
@@ -30,15 +30,21 @@ class Build:
 
 
 def build(out: Path, *options: str) -> Build:
-    """Run one build.
+    """Run one build."""
+    return run(out.parent, "build", "--out", str(out), *options)
+
+
+def run(folder: Path, *arguments: str, environment: dict[str, str] | None = None) -> Build:
+    """Run one command of tbcad; its words go to a file in the folder.
 
     To be called before anything heavy is imported: the system counts the memory of the process
     that starts another one as that one's, until it runs its own program.
     """
-    command = [sys.executable, "-c", COMMAND, "build", "--out", str(out), *options]
+    command = [sys.executable, "-c", COMMAND, *arguments]
     start = time.perf_counter()
-    with (out.parent / "log.txt").open("w+", encoding="utf-8") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=log)
+    with (folder / "log.txt").open("w+", encoding="utf-8") as log:
+        variables = {**os.environ, **(environment or {})}
+        process = subprocess.Popen(command, stdout=log, stderr=log, env=variables)
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)

@@ -11,12 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import builds
+import captures
 from timing import Row
 
 HEAD = "| what | median (least ... most) | limit | holds |\n|---|---|---|---|"
 
 
-def rows(folder: Path, rounds: int, largest: bool) -> Iterator[list[Row]]:
+def rows(folder: Path, rounds: int, largest: bool, subject: Path | None) -> Iterator[list[Row]]:
     """All lines of the table, part by part."""
     # First of all, while this process is small: see builds.build.
     yield builds.small_and_large(folder, rounds)
@@ -24,12 +25,23 @@ def rows(folder: Path, rounds: int, largest: bool) -> Iterator[list[Row]]:
     if largest:
         yield builds.largest(folder)
     yield builds.step_sizes(folder / "18")
+    yield from simulated(folder / "18", folder, rounds, subject)
     from solids import radii, solids
     from tracing import tracing
 
     yield solids(rounds)
     yield radii(rounds)
     yield tracing(folder / "18", rounds)
+
+
+def simulated(export: Path, folder: Path, rounds: int, subject: Path | None) -> Iterator[list[Row]]:
+    """Lines of the simulation: commands first, while this process is small."""
+    yield captures.captures(export, folder, rounds, subject)
+    yield captures.sharper(export, folder, subject)
+    from simulation import photographs, views
+
+    yield photographs(export, folder, rounds, subject)
+    yield views(folder / captures.FOLDER, rounds)
 
 
 def circumstances(rounds: int) -> str:
@@ -52,10 +64,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure tbcad and print a markdown table.")
     parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
     parser.add_argument("--skip-largest", action="store_true", help="leave out the build of n = 60")
+    parser.add_argument("--object", type=Path, help="mesh to photograph (default: built-in knot)")
+    parser.add_argument("--export", type=Path, help="measure the simulation alone, of this export")
     wanted = parser.parse_args()
     sys.stdout.write(f"{circumstances(wanted.rounds)}\n\n{HEAD}\n")
-    with tempfile.TemporaryDirectory() as folder:
-        for part in rows(Path(folder), wanted.rounds, not wanted.skip_largest):
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if wanted.export:
+            parts = simulated(wanted.export, folder, wanted.rounds, wanted.object)
+        else:
+            parts = rows(folder, wanted.rounds, not wanted.skip_largest, wanted.object)
+        for part in parts:
             sys.stdout.writelines(f"{row}\n" for row in part)
             sys.stdout.flush()
 

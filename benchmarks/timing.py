@@ -5,6 +5,7 @@ Nothing here is a limit that a test enforces: seconds depend on the machine and 
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
@@ -72,17 +73,31 @@ def at_least(what: str, figure: Figure, limit: float, unit: str = "") -> Row:
     return Row(what, f"{figure} {unit}".rstrip(), bound, figure.median >= limit)
 
 
+@dataclass(frozen=True)
+class Spent:
+    """What a work took, a value a round: seconds on the clock, and of all cores together."""
+
+    seconds: Figure
+    cpu: Figure
+
+
 def in_turns(works: Sequence[Work], rounds: int) -> list[Figure]:
     """Seconds of each work, once a round; every other round runs backward. One round is a warm-up.
 
     The warm-up pays for imports and first touches of memory, and is not counted.
     """
-    taken: list[list[float]] = [[] for _ in works]
+    return [spent.seconds for spent in spent_in_turns(works, rounds)]
+
+
+def spent_in_turns(works: Sequence[Work], rounds: int) -> list[Spent]:
+    """As `in_turns`, with the processor's time of this process and of those it waited for."""
+    taken: list[list[tuple[float, float]]] = [[] for _ in works]
     for turn in range(rounds + 1):
         order = range(len(works))
         for k in reversed(order) if turn % 2 else order:
             taken[k].append(_seconds(works[k]))
-    return [Figure(tuple(values[1:])) for values in taken]
+    figures = [[Figure(values) for values in zip(*rows[1:], strict=True)] for rows in taken]
+    return [Spent(*pair) for pair in figures]
 
 
 def shown(value: float) -> str:
@@ -91,9 +106,13 @@ def shown(value: float) -> str:
     return f"{value:.{digits}f}"
 
 
-def _seconds(work: Work) -> float:
-    start = time.perf_counter()
+def _seconds(work: Work) -> tuple[float, float]:
+    start, used = time.perf_counter(), _used()
     result = work()
-    end = time.perf_counter()
+    taken = time.perf_counter() - start, _used() - used
     del result  # after the clock: freeing a solid is nobody's work
-    return end - start
+    return taken
+
+
+def _used() -> float:
+    return sum(os.times()[:4])

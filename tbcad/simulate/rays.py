@@ -48,9 +48,11 @@ class Rays:
         """These rays but for some pixels (h, w)."""
         if not gone.any():
             return self
-        kept = ~gone
+        none = gone[..., None]
         return Rays(
-            self.mirror * kept, self.origin * kept[..., None], self.direction * kept[..., None]
+            np.where(gone, np.int32(0), self.mirror),
+            np.where(none, 0.0, self.origin),
+            np.where(none, 0.0, self.direction),
         )
 
 

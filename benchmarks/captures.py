@@ -1,0 +1,64 @@
+"""The commands `tbcad capture` and `tbcad view`, cold, and with a sensor of 52 million pixels."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+from builds import Build, run
+from timing import Figure, Row, at_most, told
+
+FOLDER = "capture"
+FINER = 4  # 8320 x 6208 instead of 2080 x 1552
+PLACE = ("--azimuth", "30", "--elevation", "30", "--distance", "640")
+
+
+def captures(export: Path, folder: Path, rounds: int, subject: Path | None) -> list[Row]:
+    """Both cameras, with all files; the last one's stay in `folder`/capture."""
+    with tempfile.TemporaryDirectory(dir=folder) as cache:
+        where = {"NUMBA_CACHE_DIR": cache}
+        first = run(folder, *_capture(export, folder / FOLDER, subject), environment=where)
+    runs = [run(folder, *_capture(export, folder / FOLDER, subject)) for _ in range(rounds)]
+    return [
+        at_most("tbcad capture", Figure(tuple(one.seconds for one in runs)), 5, "s"),
+        *_beside(runs),
+        told("- the first ever, with numba's compilation", Figure((first.seconds,)), "s"),
+    ]
+
+
+def sharper(export: Path, folder: Path, subject: Path | None) -> list[Row]:
+    """The same machine with a finer sensor, once, and a view out of that light field."""
+    record = folder / "finer"
+    with_sensor(export, record, FINER)
+    out = folder / "finer-capture"
+    capture = run(folder, *_capture(record, out, subject))
+    view = run(folder, "view", str(out), *PLACE, "--out", str(folder / "view.png"))
+    return [
+        told("tbcad capture, 8320 x 6208", Figure((capture.seconds,)), "s"),
+        *_beside([capture], 4),
+        told("tbcad view of it, 640 x 480, truth too", Figure((view.seconds,)), "s"),
+        *_beside([view], 4),
+    ]
+
+
+def with_sensor(export: Path, folder: Path, times: int) -> None:
+    """The record of an export, with so many times the pixels across and down."""
+    document = json.loads((export / "design.json").read_bytes())
+    for camera in (*document["cameras"], document["spec"]["camera"]):
+        camera["width_px"] *= times
+        camera["height_px"] *= times
+    folder.mkdir()
+    (folder / "design.json").write_text(json.dumps(document), encoding="utf-8")
+
+
+def _capture(export: Path, out: Path, subject: Path | None) -> list[str]:
+    chosen = ["--object", str(subject)] if subject else []
+    return ["capture", str(export), "--out", str(out), *chosen]
+
+
+def _beside(runs: list[Build], memory: float | None = None) -> list[Row]:
+    most = Figure(tuple(one.memory for one in runs))
+    cpu = told("- seconds of both cores together", Figure(tuple(one.cpu for one in runs)), "s")
+    name = "- most memory"
+    return [cpu, told(name, most, "GB") if memory is None else at_most(name, most, memory, "GB")]

@@ -1,0 +1,183 @@
+"""Photographs against POV-Ray, views against a tree over all captured rays, refocusing: warm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import povray
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from timing import Figure, Row, Spent, Work, at_least, at_most, spent_in_turns, told
+
+from tbcad.optics.view import View
+from tbcad.simulate.capture import photograph
+from tbcad.simulate.compiled import THREADS
+from tbcad.simulate.exported import read_export
+from tbcad.simulate.lightfield import LightField
+from tbcad.simulate.pictures import write_stills
+from tbcad.simulate.rays import exact
+from tbcad.simulate.reflector import Reflector
+from tbcad.simulate.refocus import Focus, pinholes, refocus
+from tbcad.simulate.scene import Scene, scene_of
+from tbcad.simulate.slab import Slab, slab_along
+from tbcad.simulate.subject import GREY, Subject, built_in, load
+from tbcad.simulate.synthesis import synthesise
+from tbcad.simulate.tiles import Tiles
+from tbcad.simulate.viewpoint import directions, viewpoint
+
+Floats = NDArray[np.float64]
+Cameras = Sequence[Reflector]
+
+PLACE = np.radians(30), np.radians(30), 640.0
+LENS = Focus(aperture_mm=300, plane_mm=5)
+PER_CENT = 100
+BOTH = "- seconds of both cores together"
+
+
+def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> list[Row]:
+    """Both cameras' pictures as PNG files, ours and POV-Ray's."""
+    made = read_export(export)
+    subject = load(file, made.capture_mm) if file else built_in(made.capture_mm)
+    grey = plain(subject)
+    works = [
+        partial(photographed, made.reflectors, scene_of(subject), folder),
+        partial(photographed, made.reflectors, scene_of(grey), folder),
+    ]
+    what = f"both photographs, {subject.name}"
+    if not povray.installed():
+        ours, _ = spent_in_turns(works, rounds)
+        return [at_most(what, ours.seconds, 5, "s"), Row("POV-Ray", "not installed")]
+    for at in made.reflectors:
+        povray.write_scene(folder / f"{at.camera}.pov", at, grey)
+    ours, greys, theirs = spent_in_turns(
+        [*works, partial(rendered, made.reflectors, folder)], rounds
+    )
+    return [
+        at_most(what, ours.seconds, 5, "s"),
+        told(BOTH, ours.cpu, "s"),
+        told("- the object grey", greys.seconds, "s"),
+        told(BOTH, greys.cpu, "s"),
+        told("POV-Ray's, the object grey", theirs.seconds, "s"),
+        told(BOTH, theirs.cpu, "s"),
+        at_least("POV-Ray's to ours, grey", theirs.seconds.over(greys.seconds), 5, "times"),
+        told(BOTH, theirs.cpu.over(greys.cpu), "times"),
+        at_least("pixels with the object, or without, alike", likeness(folder), 99.5, "%"),
+    ]
+
+
+def views(capture: Path, rounds: int) -> list[Row]:
+    """Views of one light field, the nearest ray by a tree, and refocusing."""
+    with LightField.open(capture) as source:
+        tiles, at = Tiles(source), viewpoint(*PLACE, source.capture_mm)
+        every = all_rays(source, at)
+        works: list[Work] = [
+            partial(synthesise, tiles, at),
+            partial(synthesise, tiles, at, "blend"),
+            lambda: synthesise(Tiles(source), at),
+            every.points,
+            partial(cKDTree, every.points()),
+            partial(cKDTree(every.points()).query, every.wanted, workers=THREADS),
+        ]
+        spent = spent_in_turns(works, rounds)
+        (lens,) = spent_in_turns([partial(refocus, tiles, at, LENS)], rounds)
+    return [
+        *_views(*spent[:3]),
+        *_tree(spent[0], spent[3:], every),
+        at_most(f"refocused, 640 x 480, {len(pinholes())} pinholes", lens.seconds, 5, "s"),
+        told(BOTH, lens.cpu, "s"),
+    ]
+
+
+def _views(nearest: Spent, blend: Spent, first: Spent) -> list[Row]:
+    return [
+        at_most("view, 640 x 480, nearest rays", nearest.seconds, 0.1, "s"),
+        told(BOTH, nearest.cpu, "s"),
+        told("- the first of an open light field", first.seconds, "s"),
+        told("view, 640 x 480, blend", blend.seconds, "s"),
+        told(BOTH, blend.cpu, "s"),
+    ]
+
+
+def _tree(view: Spent, stages: Sequence[Spent], every: Every) -> list[Row]:
+    points, building, asking = (one.seconds for one in stages)
+    values = [one.values for one in (points, building, asking)]
+    whole = Figure(tuple(np.sum(values, axis=0).tolist()))
+    cpu = stages[2].cpu.over(view.cpu)
+    return [
+        told(f"tree: {every.count / 1e6:.1f} million rays as points", points, "s"),
+        told("tree: building", building, "s"),
+        told(f"tree: asking for {len(every.wanted)} rays, {THREADS} threads", asking, "s"),
+        at_least("tree to view", whole.over(view.seconds), 10, "times"),
+        told("- the asking alone", asking.over(view.seconds), "times"),
+        told("- the asking alone, seconds of both cores", cpu, "times"),
+    ]
+
+
+@dataclass(frozen=True)
+class Every:
+    """All captured rays and the wanted ones of a view.
+
+    Attributes:
+        slab: along the view.
+        origin: of captured rays, (n, 3).
+        direction: of captured rays, (n, 3).
+        wanted: points of the slab, (k, 4).
+    """
+
+    slab: Slab
+    origin: NDArray[np.float32]
+    direction: NDArray[np.float32]
+    wanted: Floats
+
+    @property
+    def count(self) -> int:
+        return len(self.origin)
+
+    def points(self) -> Floats:
+        """Captured rays in the slab, without those that are too oblique."""
+        found = self.slab.points(self.origin, self.direction)
+        return found[~np.isnan(found[:, 0])]
+
+
+def all_rays(source: LightField, at: View) -> Every:
+    """What the tree is made of, and what it is asked for: rays that meet the capture sphere."""
+    parts = []
+    for frame in source.frames.values():
+        on = frame.planes["mirror"][:] > 0
+        parts.append([frame.planes[name][:][on] for name in ("origin", "direction")])
+    slab = slab_along(at.forward, at.right, source.capture_mm)
+    way = directions(at).reshape(-1, 3)
+    way = way[np.linalg.norm(np.cross(at.pinhole, way), axis=1) <= source.capture_mm / 2]
+    wanted = slab.points(np.broadcast_to(at.pinhole, way.shape), way)
+    origin, direction = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Every(slab, origin, direction, wanted)
+
+
+def plain(subject: Subject) -> Subject:
+    """The object in one grey."""
+    colour = np.full((len(subject.faces), 3, 3), GREY)
+    return replace(subject, albedo=colour, uv=None, texture=None, patterned=False)
+
+
+def photographed(cameras: Cameras, scene: Scene, folder: Path) -> None:
+    """Both pictures, written one after the other."""
+    for at in cameras:
+        bands = photograph(at.view, exact(at), scene)
+        picture = np.concatenate([band.colour for band in bands])
+        write_stills({folder / f"ours_{at.camera}.png": picture})
+
+
+def rendered(cameras: Cameras, folder: Path) -> None:
+    """POV-Ray's pictures of both, written one after the other."""
+    for at in cameras:
+        povray.render(folder / f"{at.camera}.pov", at.view)
+
+
+def likeness(folder: Path) -> Figure:
+    """Pixels that show the object in our and in POV-Ray's picture or in neither, per cent."""
+    pairs = [(folder / f"ours_{camera}.png", folder / f"{camera}.png") for camera in "ab"]
+    return Figure((PER_CENT * float(np.mean([povray.alike(*pair) for pair in pairs])),))

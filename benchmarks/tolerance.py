@@ -1,0 +1,117 @@
+"""Made machines by the fast model, against the same machines meshed, written, read and proved."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from tbcad_verify import coverage as proof
+from tbcad_verify.bench import set_up
+from tbcad_verify.files import read
+from tbcad_verify.mesh import merge
+from tbcad_verify.record import Export
+from tbcad_verify.record import read_export as read_record
+from tbcad_verify.recover import recover
+from tbcad_verify.stl import parse
+from timing import Figure, Row, at_least, at_most, in_turns, told
+
+from tbcad.design.mirrors import Design, Half, design
+from tbcad.design.spec import load_spec
+from tbcad.export.manifest import write_manifest
+from tbcad.export.shells import closing, distances
+from tbcad.export.stl import write_stl
+from tbcad.export.tables import write_record
+from tbcad.model.mesh import mesh
+from tbcad.optics.cells import Cells, cells_of
+from tbcad.optics.surfaces import Surfaces
+from tbcad.simulate.reflector import reflectors
+from tbcad.tolerance.coverage import coverage
+from tbcad.tolerance.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo import Task, simulate
+from tbcad.tolerance.nominal import Nominal, nominal
+
+COUNTS = (100, 300, 1000)
+MESHED = 10
+SEED = 1
+# Such as a mesh can show as spheres and the proof can place: spheres and coats.
+ERRORS = Errors(sphere_centre=Error(0.02), sphere_radius=Error(0.02), coating=Error(0.005))
+
+
+def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
+    """Seconds for so many machines of the paper's design, and how many times as many meshes take.
+
+    Args:
+        folder: to write meshes into.
+        rounds: how often the fast model is run.
+        meshed: machines that are meshed, once.
+    """
+    made = design(load_spec(None))
+    a, b = (nominal(at) for at in reflectors(made))
+    task = Task((a, b), ERRORS, SEED)
+    fast = in_turns([partial(simulate, task, count) for count in COUNTS], rounds)
+    each = [
+        Figure(tuple(1000 * s / n for s in one.values)) for one, n in zip(fast, COUNTS, strict=True)
+    ]
+    slow, apart = _meshes(made, draw(ERRORS, SEED, range(meshed), len(a)), folder, (a, b))
+    ratio = Figure(tuple(slow / (one / COUNTS[-1]) for one in fast[-1].values))
+    rows = [told(f"{n} machines, each", one, "ms") for n, one in zip(COUNTS, each, strict=True)]
+    return [
+        *rows,
+        at_most("1,000 machines of 1,657 virtual cameras", fast[-1], 60, "s"),
+        at_most("... a machine, against one of 100", each[-1].over(each[0]), 1.2, "times"),
+        told(
+            f"a machine meshed, written, read and measured, mean of {meshed}", Figure((slow,)), "s"
+        ),
+        at_least("... against the fast model", ratio, 100, "times"),
+        at_most("... largest difference in coverage", Figure((apart,)), 0.05, "mm"),
+    ]
+
+
+def _meshes(
+    made: Design, draws: tuple[Draws, Draws], folder: Path, halves: tuple[Nominal, Nominal]
+) -> tuple[float, float]:
+    """Seconds a machine, and the largest difference from the fast model, mm."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_record(folder, made, shells=True)
+    write_manifest(folder)
+    record, count = read_record(folder), len(draws[0])
+    found = np.empty((count, 2 * len(made.halves[0]) - int(halves[0].halved.sum())))
+
+    start = time.perf_counter()
+    for k in range(count):
+        _write(made, draws, k, folder)
+        found[k] = _measured(record)
+    seconds = time.perf_counter() - start
+    return seconds / count, float(np.abs(found - coverage(halves, draws)[0]).max())
+
+
+def _write(made: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
+    """Mesh both shells of a machine, as the exporter does."""
+    first, body = made.halves[0], closing(made)
+    for half, drawn in zip(made.halves, draws, strict=True):
+        cells = _cells(half, drawn, k)
+        cells = cells if half is first else cells.mirrored()
+        facets = mesh(made.spec, cells, body, distances(first))
+        facets = facets if half is first else facets.mirrored()
+        write_stl(folder / f"shell_{half.camera}.stl", facets)
+
+
+def _cells(half: Half, draws: Draws, k: int) -> Cells:
+    every, m, radius = half.cells.surfaces, len(half), draws.radius[k]
+    apex = half.mirrors.apex + draws.centre[k] + radius[:, None] * half.mirrors.normal
+    curvature = half.mirrors.curvature / (1 + radius * half.mirrors.curvature)
+    walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
+    spheres = Surfaces(apex, half.mirrors.normal, curvature)
+    return cells_of(spheres.joined(walls), half.cells.boundary, half.cells.triangles)
+
+
+def _measured(record: Export) -> np.ndarray:
+    """Coverage of every virtual camera by the proof: mirrors recovered, Embree for what hides."""
+    meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
+    found = [
+        recover(one, record.cameras[part.camera].pinhole, record.target_mm / 2)
+        for one, part in zip(meshes, record.parts, strict=True)
+    ]
+    return proof.measure(set_up(record, meshes, found)).fitted
