@@ -113,7 +113,39 @@ def distance(points: Floats, pixel: int, wanted: Floats, depth: float, slopes: f
 
 
 @compiled
-def walk(
+def settle(
+    points: Floats, tile: Ints, start: int, wanted: Floats, depth: float, slopes: float
+) -> int:
+    """The pixel of a tile that is nearest, by steps from one on.
+
+    Within a tile steps lead to the nearest. Its rim has steps and notches where they may end too
+    soon, so from there they are tried once more from the tile's middle.
+    """
+    pixel = _walk(points, tile, start, wanted, depth, slopes)
+    if _at_rim(points, tile, pixel):
+        other = _walk(points, tile, tile[3], wanted, depth, slopes)
+        there = distance(points, other, wanted, depth, slopes)
+        if there < distance(points, pixel, wanted, depth, slopes):
+            return other
+    return pixel
+
+
+@compiled
+def _at_rim(points: Floats, tile: Ints, pixel: int) -> bool:
+    """Whether not all neighbours of a pixel are of its tile's mirror."""
+    first, height, width = tile[0], tile[1], tile[2]
+    y, x = divmod(pixel - first, width)
+    if not (0 < y < height - 1 and 0 < x < width - 1):
+        return True
+    for row in range(y - 1, y + 2):
+        for column in range(x - 1, x + 2):
+            if np.isnan(points[first + row * width + column, 0]):
+                return True
+    return False
+
+
+@compiled
+def _walk(
     points: Floats, tile: Ints, start: int, wanted: Floats, depth: float, slopes: float
 ) -> int:
     """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""

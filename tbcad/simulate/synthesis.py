@@ -157,7 +157,7 @@ def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.
     kept = wanted[~np.isnan(wanted[:, 0])]
     if len(kept) == 0:
         return behind[:0]
-    meeting = np.column_stack([place[behind], np.zeros(len(behind))])
+    meeting = np.column_stack([place[behind], tiles.width[behind]])
     return behind[candidates(meeting, kept, limit, SPARSE)]
 
 

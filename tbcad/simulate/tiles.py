@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from tbcad.simulate.lightfield import Frame, LightField
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+NEIGHBOURS = 6
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,13 @@ class Tiles:
         source: the light field; its file must stay open.
         u: directions of the virtual cameras of all frames, one after the other, (m, 3).
         apex: of their mirrors, mm, (m, 3).
+        width: no ray of a mirror passes its apex by more, mm, (m,).
     """
 
     source: LightField
     u: Floats = field(init=False)
     apex: Floats = field(init=False)
+    width: Floats = field(init=False)
     _read: dict[int, Tile | None] = field(init=False, default_factory=dict)
     _places: list[tuple[Frame, int]] = field(init=False)
 
@@ -79,6 +84,7 @@ class Tiles:
         frames = list(self.source.frames.values())
         self.u = np.concatenate([frame.u for frame in frames])
         self.apex = np.concatenate([frame.mirrors.apex for frame in frames])
+        self.width = np.concatenate([_widths(frame.mirrors.apex) for frame in frames])
         self._places = [(frame, i) for frame in frames for i in range(len(frame.u))]
 
     def packed(self, mirrors: Ints) -> Packed | None:
@@ -103,6 +109,17 @@ class Tiles:
         if mirror not in self._read:
             self._read[mirror] = _tile(*self._places[mirror])
         return self._read[mirror]
+
+
+def _widths(apex: Floats) -> Floats:
+    """About how far corners of cells are from the apices (m, 3), rather more, (m,).
+
+    Cells of six neighbours have corners at 0.58 of the neighbours' distance; those at the edges
+    have fewer, and farther neighbours count for them.
+    """
+    away, _ = cKDTree(apex).query(apex, k=min(NEIGHBOURS + 1, len(apex)))
+    result: Floats = away.reshape(len(apex), -1)[:, -1]
+    return result
 
 
 def _tile(frame: Frame, index: int) -> Tile | None:
