@@ -118,7 +118,7 @@ def _widths(apex: Floats) -> Floats:
     have fewer, and farther neighbours count for them.
     """
     away, _ = cKDTree(apex).query(apex, k=min(NEIGHBOURS + 1, len(apex)))
-    result: Floats = away.reshape(len(apex), -1)[:, -1]
+    result: Floats = np.asarray(away).reshape(len(apex), -1)[:, -1]
     return result
 
 

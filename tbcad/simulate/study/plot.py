@@ -24,13 +24,17 @@ class Series:
         label: for the legend; "" for none.
         x: values, (k,).
         y: values, (k,); NaN where there is none.
-        style: matplotlib's letters for colour, marker and line.
+        style: matplotlib's letters for colour, marker and line; "bars" for bars from zero.
+        shade: values that colour the points, (k,); None for one colour.
+        shade_label: what they are, with their unit.
     """
 
     label: str
     x: Floats
     y: Floats
     style: str = "-"
+    shade: Floats | None = None
+    shade_label: str = ""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class Panel:
         y_label: with its unit.
         series: what is drawn, the first lowest.
         logarithmic: axes that are: "", "x", "y" or "xy".
+        names: of the places 0, 1, 2 ... on the y axis, the first on top; () for numbers.
     """
 
     title: str
@@ -50,6 +55,7 @@ class Panel:
     y_label: str
     series: tuple[Series, ...]
     logarithmic: str = ""
+    names: tuple[str, ...] = ()
 
 
 def picture(panels: tuple[Panel, ...]) -> bytes:
@@ -72,7 +78,10 @@ def picture(panels: tuple[Panel, ...]) -> bytes:
 
 def _draw(axes: "Axes", panel: Panel) -> None:
     for series in panel.series:
-        axes.plot(series.x, series.y, series.style, label=series.label or None, markersize=4)
+        _draw_series(axes, series)
+    if panel.names:
+        axes.set_yticks(range(len(panel.names)), panel.names)
+        axes.invert_yaxis()
     for letter in panel.logarithmic:
         _logarithmic(axes, letter)
     axes.set_title(panel.title)
@@ -81,6 +90,18 @@ def _draw(axes: "Axes", panel: Panel) -> None:
     axes.grid(True, which="both", alpha=0.25)
     if any(series.label for series in panel.series):
         axes.legend(fontsize=8)
+
+
+def _draw_series(axes: "Axes", series: Series) -> None:
+    label = series.label or None
+    if series.shade is not None:
+        points = axes.scatter(series.x, series.y, c=series.shade, s=9, cmap="viridis", label=label)
+        axes.figure.colorbar(points, ax=axes, label=series.shade_label)
+        axes.set_aspect("equal")
+    elif series.style == "bars":
+        axes.barh(series.y, series.x, height=0.7, label=label)
+    else:
+        axes.plot(series.x, series.y, series.style, label=label, markersize=4)
 
 
 def _logarithmic(axes: "Axes", letter: str) -> None:

@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,15 +45,15 @@ def check_target(out: Path) -> None:
             raise PermissionError(errno.EACCES, "no right to write there")
 
 
-def write(study: Study, out: Path) -> list[Path]:
-    """Write a study's CSV files, notes and plot into a folder; only these are replaced.
+def write(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> list[Path]:
+    """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
 
     All are written in full before the first takes its name.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    contents = contents_of(study)
+    contents = contents_of(study) | dict(more or {})
     with _in_words(out), ExitStack() as undo:
         out.mkdir(parents=True, exist_ok=True)
         new = [(_beside(out / name, data, undo), out / name) for name, data in contents.items()]

@@ -1,0 +1,1 @@
+"""How exactly the machine must be made: random machines, each with what it sees."""

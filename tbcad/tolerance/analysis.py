@@ -1,0 +1,260 @@
+"""What a process makes of a design: yield, sensitivity, what may be looser, what would do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad import schedule
+from tbcad.design.mirrors import Design
+from tbcad.errors import InputError
+from tbcad.simulate.exported import Exported
+from tbcad.simulate.prototype.plan import read_plan
+from tbcad.simulate.reflector import Reflector, reflectors
+from tbcad.simulate.scene import scene_of
+from tbcad.simulate.study.views import round_of, truths
+from tbcad.simulate.subject import Subject
+from tbcad.tolerance import prototype
+from tbcad.tolerance.draws import Errors, draw
+from tbcad.tolerance.margin import Margin, margin
+from tbcad.tolerance.montecarlo import Result, Task, Yield, simulate, yielded
+from tbcad.tolerance.nominal import Nominal, nominal
+from tbcad.tolerance.process import BUILT_IN, Process, errors, load_process
+from tbcad.tolerance.prototype_windows import designed
+from tbcad.tolerance.sensitivity import Alone, alone, kinds
+from tbcad.tolerance.sharpness import Sharpness, Wanted, sharpness
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+Halves = tuple[Nominal, Nominal]
+
+# Machines for each step of a search; what is told of the process itself has as many as asked for.
+TRIED = 100
+# Machines whose pictures are taken, and viewpoints of each.
+PICTURED = 2
+VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
+# Kinds of error that a shell can have; the others are the prototype's.
+SHELL = (
+    *("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis", "shell_shift"),
+    *("shell_tilt", "camera_shift", "camera_tilt", "camera_focal", "coating", "facets"),
+)
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is asked.
+
+    Attributes:
+        machines: how many.
+        seed: of all of them.
+        wanted: share that is to be good.
+        left: what a calibration leaves of a mirror's direction, radians.
+        scheduler: address of a Dask scheduler; None for this machine's cores.
+    """
+
+    machines: int = 1000
+    seed: int = 1
+    wanted: float = 0.99
+    left: float = 0.5e-3
+    scheduler: str | None = None
+
+    def checked(self) -> Wishes:
+        """These wishes.
+
+        Raises:
+            InputError: what cannot be asked.
+        """
+        if not 10 <= self.machines <= 1_000_000:
+            raise InputError(f"--machines {self.machines}: allowed is 10 to 1000000")
+        if not 0 < self.wanted < 1:
+            raise InputError(f"--yield {self.wanted:g}: allowed is above 0, below 1, like 0.99")
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: allowed is 0 or more")
+        if not 0 <= self.left < 0.1:
+            raise InputError(f"--calibrated-mrad {1000 * self.left:g}: allowed is 0 to 100")
+        return self
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A process as a choice for this design.
+
+    Attributes:
+        name: of the process.
+        yielded: with the design as it is.
+        margin: that it needs for the wanted yield.
+    """
+
+    name: str
+    yielded: Yield
+    margin: Margin
+
+
+@dataclass(frozen=True)
+class Stands:
+    """The prototype, made by the process.
+
+    Attributes:
+        plain: its machines, taken for the designed ones.
+        known: the same machines, calibrated: windows are where the balls really are.
+    """
+
+    plain: prototype.PrototypeResult
+    known: prototype.PrototypeResult
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All that is told.
+
+    Attributes:
+        process: that makes the machines.
+        wishes: what was asked.
+        target: coverage of a good machine, mm.
+        cameras: camera a and b as designed.
+        halves: the same for the fast model.
+        result: the machines.
+        alone: each kind of error by itself, the worst first.
+        choices: every built-in process.
+        margin: that this process needs.
+        sharpness: of pictures.
+        stands: the prototype; None where the export has none.
+    """
+
+    process: Process
+    wishes: Wishes
+    target: float
+    cameras: tuple[Reflector, Reflector]
+    halves: Halves
+    result: Result
+    alone: tuple[Alone, ...]
+    choices: tuple[Choice, ...]
+    margin: Margin
+    sharpness: Sharpness
+    stands: Stands | None
+
+    @property
+    def yielded(self) -> Yield:
+        """Share of good machines."""
+        return yielded(self.result.worst, self.target)
+
+
+def analyse(
+    export: Exported,
+    process: Process,
+    subject: Subject,
+    wishes: Wishes,
+    stage: Progress,
+    detail: Progress,
+) -> Analysis:
+    """Make many machines after an export by a process, and search what would do.
+
+    Args:
+        export: the design as it was written.
+        process: how it is made.
+        subject: what is photographed for the sharpness.
+        wishes: what is asked.
+        stage: told of each stage.
+        detail: told how far a stage has come.
+    """
+    made = _errors(export, process)
+    halves = _nominal(export.reflectors)
+    each = partial(_each, wishes.scheduler)
+    target = export.capture_mm
+    stage(f"{wishes.machines} machines by {process.name}")
+    result = simulate(Task(halves, made, wishes.seed), wishes.machines, each)
+
+    def worst_of(halves: Halves, errors: Errors) -> Floats:
+        return simulate(Task(halves, errors, wishes.seed), TRIED, each).worst
+
+    stage("each kind of error alone")
+    found = [
+        alone(made, kind, wishes.wanted, target, _told(partial(worst_of, halves), detail, kind))
+        for kind in kinds(made)
+        if kind in SHELL
+    ]
+    stage("every process, and the margin it needs")
+
+    def after(design: Design, errors: Errors) -> Floats:
+        return worst_of(_nominal(reflectors(design)), errors)
+
+    choices = tuple(
+        _choice(export, one, partial(worst_of, halves), after, wishes, detail) for one in BUILT_IN
+    )
+    own = next((one.margin for one in choices if load_process(one.name) == process), None)
+    needed = own or margin(export.spec, made, wishes.wanted, after, detail)
+    stage("pictures")
+    sharp = _sharpness(export, made, subject, wishes, detail)
+    stands = None
+    if (export.folder / "prototype.json").is_file():
+        stage("prototypes")
+        stands = _stands(export, made, wishes, each)
+    order = sorted(found, key=lambda one: -one.loss)
+    return Analysis(
+        process, wishes, target, export.reflectors, halves, result, tuple(order), choices, needed,
+        sharp, stands,
+    )  # fmt: skip
+
+
+def _errors(export: Exported, process: Process) -> Errors:
+    return errors(process, export.spec.mirrors.coating_um)
+
+
+def _nominal(cameras: tuple[Reflector, Reflector]) -> Halves:
+    a, b = cameras
+    return nominal(a), nominal(b)
+
+
+def _each(scheduler: str | None, work: Any, batches: Sequence[range]) -> list[Any]:
+    return schedule.run(work, batches, scheduler)
+
+
+def _told(
+    worst: Callable[[Errors], Floats], detail: Progress, kind: str
+) -> Callable[[Errors], Floats]:
+    def asked(errors: Errors) -> Floats:
+        detail(kind)
+        return worst(errors)
+
+    return asked
+
+
+def _choice(
+    export: Exported,
+    name: str,
+    worst: Callable[[Errors], Floats],
+    after: Callable[[Design, Errors], Floats],
+    wishes: Wishes,
+    detail: Progress,
+) -> Choice:
+    made = _errors(export, load_process(name))
+    detail(name)
+    share = yielded(worst(made), export.capture_mm)
+    needed = margin(export.spec, made, wishes.wanted, after, lambda text: detail(f"{name}: {text}"))
+    return Choice(name, share, needed)
+
+
+def _sharpness(
+    export: Exported, made: Errors, subject: Subject, wishes: Wishes, detail: Progress
+) -> Sharpness:
+    scene, m = scene_of(subject), len(export.reflectors[0])
+    views = round_of(*VIEWPOINTS).views(export.capture_mm)
+    wanted = Wanted(export.capture_mm, views, truths(scene, views, detail))
+    machines = draw(made, wishes.seed, range(PICTURED), m)
+    return sharpness(export.reflectors, machines, scene, wanted, wishes.left, "nearest", detail)
+
+
+def _stands(export: Exported, made: Errors, wishes: Wishes, each: Any) -> Stands:
+    at = designed(export.reflectors, read_plan(export))
+    plain, known = (
+        prototype.simulate(
+            prototype.PrototypeWork(at, made, wishes.seed, calibrated), wishes.machines, each
+        )
+        for calibrated in (False, True)
+    )
+    return Stands(plain, known)

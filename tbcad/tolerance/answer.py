@@ -1,0 +1,280 @@
+"""The answer in words, tables, plots and JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.simulate.study.plot import Panel, Series
+from tbcad.simulate.study.record import Study
+from tbcad.simulate.study.tables import Cell, Table
+from tbcad.tolerance.analysis import Analysis, Choice
+from tbcad.tolerance.coverage import virtual
+from tbcad.tolerance.montecarlo import Yield, yielded
+from tbcad.tolerance.process import process_dict
+
+Floats = NDArray[np.float64]
+
+SCHEMA = "tbcad-tolerance/1"
+SHARES = (0.01, 0.05, 0.5)
+COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
+NOTES = (
+    "Coverage of a virtual camera: twice the least distance from the object's middle of all rays "
+    "camera -> edge of its mirror -> reflected. A machine is good when every virtual camera has "
+    "the capture diameter or more. Intervals of yields: Wilson, 95 %.",
+    "Pointing: distance from the object's middle of the ray of each mirror's middle pixel, as an "
+    "uncalibrated machine takes it. Calibration makes rays known; it does not give coverage back.",
+    "Loosest: what one kind of error, alone, may be multiplied by for the wanted yield.",
+)
+
+
+def words(found: Analysis) -> str:
+    """One paragraph."""
+    process, target = found.process, found.target
+    lines = [
+        f"Made by {process.name} ({process.title}), {_share(found.yielded)} of the machines see "
+        f"{target:g} mm with every virtual camera; the worst camera of a machine sees "
+        f"{np.median(found.result.worst):.2f} mm (median; 1 % see less than "
+        f"{np.quantile(found.result.worst, 0.01):.2f})."
+    ]
+    if found.alone:
+        first = found.alone[0]
+        lines.append(
+            f"Most is lost by {_plain(first.kind)}: {first.loss:.2f} mm by itself; "
+            f"{_factor(first.times)}."
+        )
+    if found.margin.mm is not None:
+        lines.append(
+            f"A margin of {found.margin.mm:.2f} mm (tbcad build --for-process {process.name} "
+            f"--yield {found.wishes.wanted:g}) makes {found.margin.share:.1%} good."
+        )
+    else:
+        lines.append(f"No margin makes it do: {found.margin.reason}.")
+    lines.append(_which(found))
+    sharp = found.sharpness
+    lines.append(
+        f"Pictures: SSIM {sharp.designed.mean():.3f} as designed, {sharp.uncalibrated.mean():.3f} "
+        f"taken for the designed machine, {sharp.calibrated.mean():.3f} once calibrated."
+    )
+    if found.stands is not None:
+        plain, known = (
+            yielded(one.worst, target) for one in (found.stands.plain, found.stands.known)
+        )
+        lines.append(
+            f"Prototype: {_share(plain)} good without calibration, {_share(known)} with it."
+        )
+    return " ".join(lines)
+
+
+def document(found: Analysis) -> dict[str, Any]:
+    """tolerance.json."""
+    worst = found.result.worst
+    return {
+        "schema": SCHEMA,
+        "words": words(found),
+        "process": process_dict(found.process),
+        "machines": len(worst),
+        "seed": found.wishes.seed,
+        "target_mm": found.target,
+        "wanted_yield": found.wishes.wanted,
+        "yield": _yield(found.yielded),
+        "worst_camera_mm": {f"{share:g}": float(np.quantile(worst, share)) for share in SHARES},
+        "pointing_mm": _pointing(found),
+        "alone": [
+            {"kind": a.kind, "loss_mm": a.loss, "tail_mm": a.tail, "may_be_times": _finite(a.times)}
+            for a in found.alone
+        ],
+        "margin_needed_mm": found.margin.mm,
+        "margin_reason": found.margin.reason,
+        "processes": [
+            {
+                "name": choice.name,
+                "yield": _yield(choice.yielded),
+                "margin_needed_mm": choice.margin.mm,
+                "reason": choice.margin.reason,
+            }
+            for choice in found.choices
+        ],
+        "ssim": {
+            "designed": float(found.sharpness.designed.mean()),
+            "uncalibrated": float(found.sharpness.uncalibrated.mean()),
+            "calibrated": float(found.sharpness.calibrated.mean()),
+            "calibration_leaves_mrad": 1000 * found.wishes.left,
+        },
+        "prototype": _prototype(found),
+    }
+
+
+def study(found: Analysis) -> Study:
+    """Tables and plots."""
+    tables = (_machines(found), _alone(found), _choices(found), _cameras(found))
+    return Study("tolerance", _summary(found), tables, _panels(found))
+
+
+def json_text(found: Analysis) -> str:
+    """tolerance.json as text."""
+    return json.dumps(document(found), indent=1, allow_nan=False) + "\n"
+
+
+def _summary(found: Analysis) -> Table:
+    y, worst = found.yielded, found.result.worst
+    rows: list[tuple[Cell, ...]] = [
+        ("good machines", "%", 100 * y.share, None, ""),
+        ("worst camera, median", "mm", float(np.median(worst)), None, ""),
+        ("worst camera, 1 % see less", "mm", float(np.quantile(worst, 0.01)), None, ""),
+        ("margin needed", "mm", found.margin.mm, None, ""),
+    ]
+    rows += [(f"loss by {_plain(one.kind)} alone", "mm", one.loss, None, "") for one in found.alone]
+    rows += [
+        (f"good machines by {choice.name}", "%", 100 * choice.yielded.share, None, "")
+        for choice in found.choices
+    ]
+    return Table("tolerance-summary", COLUMNS, tuple(rows), (words(found), *NOTES))
+
+
+def _machines(found: Analysis) -> Table:
+    result = found.result
+    offset = np.sqrt(np.nanmean(result.offset**2, axis=1))
+    columns = zip(result.worst.tolist(), result.worst_camera.tolist(), offset.tolist(), strict=True)
+    rows = tuple((number, *row) for number, row in enumerate(columns))
+    return Table(
+        "tolerance-machines",
+        ("machine", "worst_coverage_mm", "worst_camera", "pointing_rms_mm"),
+        rows,
+    )
+
+
+def _alone(found: Analysis) -> Table:
+    process = dict(found.process)
+    rows = []
+    for one in found.alone:
+        key = next((key for key in process if key.rpartition("_")[0] == one.kind), one.kind)
+        now = float(getattr(process[key], "magnitude", math.nan))
+        may = None if math.isinf(one.times) else one.times * now
+        rows.append((key, now, one.loss, one.tail, _finite(one.times), may))
+    columns = ("kind", "magnitude", "loss_mm", "tail_mm", "may_be_times", "may_be")
+    return Table("tolerance-sensitivity", columns, tuple(rows))
+
+
+def _choices(found: Analysis) -> Table:
+    columns = ("process", "yield", "yield_low", "yield_high", "margin_needed_mm", "reason")
+    return Table(
+        "tolerance-processes",
+        columns,
+        tuple(
+            (c.name, c.yielded.share, c.yielded.low, c.yielded.high, c.margin.mm, c.margin.reason)
+            for c in found.choices
+        ),
+    )
+
+
+def _cameras(found: Analysis) -> Table:
+    coverage = found.result.coverage
+    low, middle = found.result.quantiles((0.05, 0.5))
+    short = (coverage < found.target).mean(axis=0)
+    u = _directions(found)
+    columns = ("virtual_camera", "ux", "uy", "uz", "median_mm", "five_percent_mm", "share_short")
+    numbers = np.column_stack([u, middle, low, short]).tolist()
+    rows = tuple((k, *row) for k, row in enumerate(numbers))
+    return Table("tolerance-cameras", columns, rows)
+
+
+def _directions(found: Analysis) -> Floats:
+    """Directions of the virtual cameras, (v, 3)."""
+    which = virtual(found.halves)
+    every = np.concatenate([at.u for at in found.cameras])
+    result = np.zeros((int(which.max()) + 1, 3))
+    result[which[::-1]] = every[::-1]  # the first that is of a camera counts
+    return result
+
+
+def _panels(found: Analysis) -> tuple[Panel, ...]:
+    return (_curve(found), _bars(found), _map(found))
+
+
+def _curve(found: Analysis) -> Panel:
+    worst = np.sort(found.result.worst)
+    share = 1 - np.arange(len(worst)) / len(worst)
+    at = np.array([found.target, found.target])
+    series = (
+        Series(found.process.name, worst, 100 * share, "C0-"),
+        Series(f"{found.target:g} mm", at, np.array([0.0, 100.0]), "k--"),
+    )
+    return Panel("Machines whose worst camera sees ...", "... mm or more", "% of machines", series)
+
+
+def _bars(found: Analysis) -> Panel:
+    loss = np.array([one.loss for one in found.alone])
+    names = tuple(_plain(one.kind) for one in found.alone)
+    bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
+    return Panel("What each kind of error costs alone", "mm of coverage", "", (bars,), names=names)
+
+
+def _map(found: Analysis) -> Panel:
+    u = _directions(found)
+    low = found.result.quantiles((0.05,))[0]
+    away = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
+    flat = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
+    x, y = away * u[:, 0] / flat, away * u[:, 1] / flat
+    dots = Series("", x, y, ".", low, "coverage that 5 % do not reach, mm")
+    return Panel("Virtual cameras, the zenith in the middle", "degrees", "degrees", (dots,))
+
+
+def _pointing(found: Analysis) -> dict[str, float]:
+    offset = found.result.offset
+    return {
+        "rms": float(np.sqrt(np.nanmean(offset**2))),
+        "largest_median": float(np.median(np.nanmax(offset, axis=1))),
+    }
+
+
+def _prototype(found: Analysis) -> dict[str, Any] | None:
+    if found.stands is None:
+        return None
+    return {
+        name: {
+            "yield": _yield(yielded(one.worst, found.target)),
+            "worst_camera_mm": {f"{s:g}": float(np.quantile(one.worst, s)) for s in SHARES},
+            "pointing_rms_mm": float(np.sqrt(np.nanmean(one.offset**2))),
+        }
+        for name, one in (("uncalibrated", found.stands.plain), ("calibrated", found.stands.known))
+    }
+
+
+def _which(found: Analysis) -> str:
+    """Which processes do, with which margin."""
+    do = [f"{c.name} with {c.margin.mm:.2f} mm" for c in found.choices if c.margin.mm is not None]
+    not_ = [c.name for c in found.choices if c.margin.mm is None]
+    text = f"Margins needed for {found.wishes.wanted:.0%}: {', '.join(do) or 'none does'}"
+    return text + (f"; {' and '.join(not_)} will not do with any." if not_ else ".")
+
+
+def _yield(found: Yield) -> dict[str, float]:
+    return {"share": found.share, "low": found.low, "high": found.high}
+
+
+def _share(found: Yield) -> str:
+    return f"{found.share:.1%} ({found.low:.1%} to {found.high:.1%})"
+
+
+def _factor(times: float) -> str:
+    if times == 0:
+        return "without it and all others the design itself falls short"
+    return f"alone it may be {times:.2g} times what it is" if math.isfinite(times) else "harmless"
+
+
+def _finite(times: float) -> float | None:
+    return times if math.isfinite(times) else None
+
+
+def _plain(kind: str) -> str:
+    return kind.replace("_", " ")
+
+
+def loosest_process(choices: tuple[Choice, ...], wanted: float) -> str | None:
+    """The loosest built-in process that gives the wanted yield as the design is, if any."""
+    return next((one.name for one in choices if one.yielded.share >= wanted), None)

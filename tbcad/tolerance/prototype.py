@@ -1,0 +1,112 @@
+"""Many prototypes as they might come out: what each shows, its windows fixed or moved along."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.simulate.compiled import in_threads
+from tbcad.tolerance.draws import Errors
+from tbcad.tolerance.prototype_draws import draw
+from tbcad.tolerance.prototype_windows import Designed, seen
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Machines that a worker makes in one go: few enough that all workers end together.
+BATCH = 10
+
+
+@dataclass(frozen=True)
+class PrototypeResult:
+    """What s prototypes see, in the order of their numbers, over v virtual cameras, 2 m mirrors.
+
+    Attributes:
+        coverage: exact coverage diameters, mm, (s, v).
+        offset: pointing errors at the object, mm, (s, 2 m): a's mirrors, b's.
+    """
+
+    coverage: Floats
+    offset: Floats
+
+    def __len__(self) -> int:
+        """Number of machines."""
+        return len(self.coverage)
+
+    @property
+    def worst(self) -> Floats:
+        """Least coverage of each machine, mm, (s,)."""
+        result: Floats = self.coverage.min(axis=1)
+        return result
+
+    @property
+    def worst_camera(self) -> Ints:
+        """Number of the virtual camera that sees least, of each machine, (s,)."""
+        worst: Ints = np.argmin(self.coverage, axis=1)
+        return worst
+
+    @property
+    def offset_rms(self) -> Floats:
+        """Root mean square of each machine's pointing errors, mm, (s,)."""
+        result: Floats = np.sqrt((self.offset**2).mean(axis=1))
+        return result
+
+    @property
+    def offset_worst(self) -> Floats:
+        """Greatest of each machine's pointing errors, mm, (s,)."""
+        result: Floats = self.offset.max(axis=1)
+        return result
+
+    def quantiles(self, shares: Sequence[float]) -> Floats:
+        """Coverage, mm, (k, v), that k shares of the machines do not reach at each camera."""
+        result: Floats = np.quantile(self.coverage, shares, axis=0)
+        return result
+
+
+@dataclass(frozen=True)
+class PrototypeWork:
+    """Makes prototypes; it can be sent to another process.
+
+    Attributes:
+        at: the prototype as designed.
+        errors: how exactly it is made.
+        seed: of all machines.
+        known: whether a calibration tells where camera and balls are, so that the software takes
+            every window from where it really is.
+    """
+
+    at: Designed
+    errors: Errors
+    seed: int
+    known: bool = False
+
+    def __call__(self, machines: range) -> PrototypeResult:
+        """What the machines of these numbers see."""
+        at = self.at
+        draws = draw(self.errors, self.seed, machines, at.cap, len(at.plan.angle))
+        return PrototypeResult(*seen(at, draws, self.known))
+
+
+Each = Callable[[PrototypeWork, Sequence[range]], list[PrototypeResult]]
+
+
+def simulate(
+    work: PrototypeWork, machines: int, each: Each = in_threads, first: int = 0
+) -> PrototypeResult:
+    """Make prototypes and see what they see; the same whoever works, and in what batches.
+
+    Their yield is told by tbcad.tolerance.montecarlo.yielded(result.worst, target).
+
+    Args:
+        work: what to make.
+        machines: how many, at least one.
+        each: makes batches of machines, in order: threads, processes or a cluster.
+        first: number of the first machine.
+    """
+    last = first + machines
+    parts = each(work, [range(k, min(k + BATCH, last)) for k in range(first, last, BATCH)])
+    return PrototypeResult(
+        np.concatenate([part.coverage for part in parts]),
+        np.concatenate([part.offset for part in parts]),
+    )

@@ -1,0 +1,13 @@
+"""A small machine as the fast model sees it."""
+
+import pytest
+
+from tbcad.design.mirrors import Design
+from tbcad.simulate.reflector import reflectors
+from tbcad.tolerance.nominal import Nominal, nominal
+
+
+@pytest.fixture(scope="session")
+def halves(small_design: Design) -> tuple[Nominal, Nominal]:
+    a, b = (nominal(at) for at in reflectors(small_design))
+    return a, b
