@@ -12,7 +12,7 @@ import platform
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -84,11 +84,8 @@ def run(
             client.submit(_on_worker, held, unit, expected, pure=False, retries=RETRIES)
             for unit in units
         ]
-        try:
-            return _gathered(client, sent, units, progress, scheduler, patience)
-        finally:
-            with suppress(Exception):  # the scheduler may be gone
-                client.cancel([held, *sent], force=True)
+        # However this ends, Ctrl-C among it: the client goes, and what is not done is dropped.
+        return _gathered(client, sent, units, progress, scheduler, patience)
 
 
 @cache

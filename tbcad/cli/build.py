@@ -66,6 +66,17 @@ def build(
             "both, but no prototype of planar mirrors."
         ),
     ] = None,
+    for_process: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Give the design the margin that this process needs: fdm, sls, sla, cnc, diamond, "
+            "or a TOML file; see tbcad tolerance.",
+        ),
+    ] = None,
+    wanted: Annotated[
+        float, typer.Option("--yield", help="Share of machines that --for-process makes good.")
+    ] = 0.99,
     verify: Annotated[bool, typer.Option(help="Prove the optics on the files written.")] = True,
     force: Annotated[
         bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
@@ -85,16 +96,28 @@ def build(
     options += [f"optics.n={n}"] if n is not None else []
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
-    wanted = asked or default_parts(spec)
+    made = asked or default_parts(spec)
     check_target(out, force)
-    with stages(BUILD_STAGES[wanted] + PROOF_STAGES * verify) as told:
-        report = _built(spec, out, wanted, force, verify, told)
+    with stages(BUILD_STAGES[made] + PROOF_STAGES * verify + bool(for_process)) as told:
+        if for_process is not None:
+            spec = _margined(spec, for_process, wanted, told)
+        report = _built(spec, out, made, force, verify, told)
+    if for_process is not None:
+        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {wanted:.1%} by {for_process}")
     if report is None:
         typer.echo(f"{out}: built, not proved: run tbcad verify {out}")
         return 0
-    typer.echo(f"{out}: {' and '.join(wanted)} as STEP, STL and 3MF; mirrors.csv, design.json")
+    typer.echo(f"{out}: {' and '.join(made)} as STEP, STL and 3MF; mirrors.csv, design.json")
     _show(report)
     return 0 if report.passed else 1
+
+
+def _margined(spec: "Spec", name: str, wanted: float, told: Stages) -> "Spec":
+    from tbcad.tolerance.analysis import for_process
+    from tbcad.tolerance.process import load_process
+
+    told.stage(f"margin for {name}")
+    return for_process(spec, load_process(name), wanted, told.detail)
 
 
 def _built(
