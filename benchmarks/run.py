@@ -32,6 +32,9 @@ def rows(folder: Path, rounds: int, largest: bool, subject: Path | None) -> Iter
     yield solids(rounds)
     yield radii(rounds)
     yield tracing(folder / "18", rounds)
+    from tolerance import tolerance
+
+    yield tolerance(folder / "tolerance", rounds)
 
 
 def simulated(export: Path, folder: Path, rounds: int, subject: Path | None) -> Iterator[list[Row]]:

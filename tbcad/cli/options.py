@@ -65,3 +65,13 @@ class Surface(StrEnum):
 
     PLANE = "plane"
     OBJECT = "object"
+
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Dask scheduler, like tcp://host:8786 (pip install tbcad[cluster]); without, all "
+        "cores of this machine.",
+    ),
+]

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import Distance, Method, MethodOption, ObjectFile, Paint, PaintOption
+from tbcad.cli.options import (
+    Distance,
+    Method,
+    MethodOption,
+    ObjectFile,
+    Paint,
+    PaintOption,
+    Scheduler,
+)
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
@@ -63,6 +71,7 @@ def resolution_command(
             help="Virtual cameras to pixels; repeatable. Without: 1:1, 1:4, 4:1.",
         ),
     ] = None,
+    scheduler: Scheduler = None,
 ) -> int:
     """Count virtual cameras and pixels, and where they balance (Fig. 5b, Table II)."""
     from tbcad.simulate.study.pixels import sensor_of
@@ -76,7 +85,9 @@ def resolution_command(
         design,
         settings,
         out,
-        lambda spec, told: resolution(spec, ns, given or default_sensors(spec), wanted, told),
+        lambda spec, told: resolution(
+            spec, ns, given or default_sensors(spec), wanted, told, scheduler
+        ),
     )
 
 
@@ -87,13 +98,14 @@ def capture_area_command(
     out: Out = STUDIES,
     first: First = 2,
     last: Last = 36,
+    scheduler: Scheduler = None,
 ) -> int:
     """Measure how large an object flat and convex mirrors see whole (Fig. 5c)."""
     from tbcad.simulate.study.capture_area import capture_area
     from tbcad.simulate.study.sweep import numbers
 
     ns = numbers(first, last)
-    return _run(design, settings, out, lambda spec, told: capture_area(spec, ns, told))
+    return _run(design, settings, out, lambda spec, told: capture_area(spec, ns, told, scheduler))
 
 
 @study.command("elevation")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import ObjectFile
+from tbcad.cli.options import ObjectFile, Scheduler
 from tbcad.screen import stages
 
 
@@ -35,13 +35,7 @@ def tolerance(
         float, typer.Option(help="What a calibration leaves of each mirror's direction.")
     ] = 0.5,
     object_file: ObjectFile = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Dask scheduler, like tcp://host:8786; without, all cores of this machine.",
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     out: Annotated[
         Path, typer.Option(help="Folder for the files; others in it are left as they are.")
     ] = Path("tolerance"),

@@ -153,10 +153,11 @@ def _alone(found: Analysis) -> Table:
     rows = []
     for one in found.alone:
         key = next((key for key in process if key.rpartition("_")[0] == one.kind), one.kind)
-        now = float(getattr(process[key], "magnitude", math.nan))
-        may = None if math.isinf(one.times) else one.times * now
-        rows.append((key, now, one.loss, one.tail, _finite(one.times), may))
-    columns = ("kind", "magnitude", "loss_mm", "tail_mm", "may_be_times", "may_be")
+        now = [float(getattr(process[key], name, math.nan)) for name in ("magnitude", "mean")]
+        may = [None if math.isinf(one.times) else one.times * value for value in now]
+        rows.append((key, *now, one.loss, one.tail, _finite(one.times), *may))
+    columns = ("kind", "magnitude", "mean", "loss_mm", "tail_mm", "may_be_times")
+    columns += ("may_be_magnitude", "may_be_mean")
     return Table("tolerance-sensitivity", columns, tuple(rows))
 
 

@@ -13,6 +13,7 @@ from tbcad.design import radii
 from tbcad.design.mirrors import design
 from tbcad.design.spec import load_spec
 from tbcad.errors import InputError
+from tbcad import schedule
 from tbcad.simulate import compiled
 from tbcad.simulate.study.capture_area import capture_area
 from tbcad.simulate.study.depth import Optics, depth
@@ -70,6 +71,7 @@ def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPa
     files = []
     for threads in (1, 3):
         monkeypatch.setattr(compiled, "THREADS", threads)
+        monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
         files.append(contents_of(small_resolution()))
     assert files[0] == files[1]
     assert len(files[0]) == 6

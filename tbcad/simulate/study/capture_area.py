@@ -1,5 +1,7 @@
 """How large an object the mirrors see whole, flat and convex (Fig. 5c)."""
 
+from functools import partial
+
 import numpy as np
 
 from tbcad.design.mirrors import Half
@@ -30,12 +32,21 @@ NOTES = (
 )
 
 
-def capture_area(spec: Spec, ns: range, progress: Progress = lambda _: None) -> Study:
+def capture_area(
+    spec: Spec,
+    ns: range,
+    progress: Progress = lambda _: None,
+    scheduler: str | None = None,
+) -> Study:
     """The study: coverage of flat and convex mirrors for every n."""
-    rows = over(lambda n: _row(varied(spec, n=n)), ns, progress)
+    rows = over(partial(_of, spec), ns, progress, scheduler)
     table = Table("capture-area", COLUMNS, joined(rows), NOTES)
     summary = Table("capture-area-summary", SUMMARY, _summary(table))
     return Study("capture-area", summary, (table,), (_panel(table, spec),))
+
+
+def _of(spec: Spec, n: int) -> list[Cell]:
+    return _row(varied(spec, n=n))
 
 
 def _row(spec: Spec) -> list[Cell]:

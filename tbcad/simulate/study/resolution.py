@@ -1,6 +1,7 @@
 """Virtual cameras against pixels: how many there are of each, and where they balance (Fig. 5b)."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +132,7 @@ def resolution(
     sensors: tuple[Sensor, ...],
     ratios: tuple[Ratio, ...],
     progress: Progress = lambda _: None,
+    scheduler: str | None = None,
 ) -> Study:
     """The study: counts for every n and sensor, and the n that balances them.
 
@@ -140,8 +142,9 @@ def resolution(
         sensors: in place of the design's.
         ratios: of virtual cameras to average pixels.
         progress: told how far it has come.
+        scheduler: address of a Dask scheduler; None for this machine's cores.
     """
-    found = over(lambda n: _rows(varied(spec, n=n), sensors), ns, progress)
+    found = over(partial(_of, spec, sensors), ns, progress, scheduler)
     swept = Table("resolution", COLUMNS, joined(row for rows in found for row in rows), NOTES)
     balanced = Table(
         "resolution-balance",
@@ -154,6 +157,10 @@ def resolution(
     summary = Table("resolution-summary", SUMMARY, _summary(balanced, defined))
     panels = (_panel(swept, sensors), _balance_panel(balanced, ratios))
     return Study("resolution", summary, (swept, balanced, defined), panels)
+
+
+def _of(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[tuple[Cell, ...]]:
+    return _rows(varied(spec, n=n), sensors)
 
 
 def _rows(spec: Spec, sensors: tuple[Sensor, ...]) -> list[tuple[Cell, ...]]:

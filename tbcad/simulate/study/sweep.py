@@ -8,7 +8,7 @@ from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design, design
 from tbcad.design.spec import Spec
 from tbcad.errors import InputError
-from tbcad.simulate.compiled import in_threads
+from tbcad.schedule import run
 
 Result = TypeVar("Result")
 Progress = Callable[[str], None]
@@ -64,13 +64,19 @@ def numbers(first: int, last: int) -> range:
     return range(first, last + 1)
 
 
-def over(work: Callable[[int], Result], ns: range, progress: Progress) -> list[Result]:
-    """Work for every n in threads, results in the order of n."""
+def over(
+    work: Callable[[int], Result],
+    ns: range,
+    progress: Progress,
+    scheduler: str | None = None,
+) -> list[Result]:
+    """Work for every n, results in the order of n.
 
-    def told(n: int) -> Result:
-        result = work(n)
-        progress(f"n = {n}")
-        return result
-
+    Args:
+        work: for one n; with a scheduler it must be fit for pickling.
+        ns: subdivisions.
+        progress: told of each n that is done.
+        scheduler: address of a Dask scheduler; None for this machine's cores.
+    """
     # The largest take longest, so they are begun first.
-    return in_threads(told, reversed(ns))[::-1]
+    return run(work, list(reversed(ns)), scheduler, lambda n: progress(f"n = {n}"))[::-1]
