@@ -156,8 +156,10 @@ def _alone(found: Analysis) -> Table:
         now = [float(getattr(process[key], name, math.nan)) for name in ("magnitude", "mean")]
         may = [None if math.isinf(one.times) else one.times * value for value in now]
         rows.append((key, *now, one.loss, one.tail, _finite(one.times), *may))
-    columns = ("kind", "magnitude", "mean", "loss_mm", "tail_mm", "may_be_times")
-    columns += ("may_be_magnitude", "may_be_mean")
+    columns = (
+        *("kind", "magnitude", "mean", "loss_mm", "tail_mm"),
+        *("may_be_times", "may_be_magnitude", "may_be_mean"),
+    )
     return Table("tolerance-sensitivity", columns, tuple(rows))
 
 

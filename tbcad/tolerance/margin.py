@@ -11,6 +11,7 @@ from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design, design
 from tbcad.design.spec import Spec
 from tbcad.tolerance.draws import Errors
+from tbcad.tolerance.montecarlo import reached
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -64,7 +65,7 @@ def margin(
         except SpecError as error:
             return Margin(None, share, f"mirrors of margin {now:.2f} mm: {error}")
         share = float((seen >= target).mean())
-        lacking = target - float(np.quantile(seen, 1 - wanted))
+        lacking = target - reached(seen, wanted)
         if share >= wanted and (lacking > -STEP_MM or now == 0):
             return Margin(now, share)
         now = max(0.0, ceil((now + lacking) / STEP_MM - 1e-9) * STEP_MM)

@@ -41,20 +41,14 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Result:
-    """What s machines see, in the order of their numbers, over v virtual cameras, 2 m mirrors.
+class Covered:
+    """What s machines see, in the order of their numbers, over v virtual cameras.
 
     Attributes:
         coverage: exact coverage diameters, mm, (s, v).
-        pixels: sizes of the pictures, (s, v).
-        angle: pointing errors of an uncalibrated machine, radians, (s, 2 m): a's mirrors, b's.
-        offset: distances of the same rays from the object's middle, mm, (s, 2 m).
     """
 
     coverage: Floats
-    pixels: Floats
-    angle: Floats
-    offset: Floats
 
     def __len__(self) -> int:
         """Number of machines."""
@@ -76,6 +70,21 @@ class Result:
         """Coverage, mm, (k, v), that k shares of the machines do not reach at each camera."""
         result: Floats = np.quantile(self.coverage, shares, axis=0)
         return result
+
+
+@dataclass(frozen=True)
+class Result(Covered):
+    """What s machines see, and where 2 m mirrors point: a's mirrors, b's.
+
+    Attributes:
+        pixels: sizes of the pictures, (s, v).
+        angle: pointing errors of an uncalibrated machine, radians, (s, 2 m).
+        offset: distances of the same rays from the object's middle, mm, (s, 2 m).
+    """
+
+    pixels: Floats
+    angle: Floats
+    offset: Floats
 
 
 @dataclass(frozen=True)
@@ -131,6 +140,16 @@ def joined(results: Sequence[Result]) -> Result:
     """Results of machines in order as one; at least one is needed."""
     names = [field.name for field in fields(Result)]
     return Result(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
+
+
+def reached(worst: Floats, share: float) -> float:
+    """Coverage, mm, that a share of the machines reach with their worst camera (s,).
+
+    It is the target or more exactly where that share of them is good: an order statistic, nothing
+    between two machines.
+    """
+    bad = int((1 - share) * len(worst) + 1e-9)
+    return float(np.sort(worst)[min(bad, len(worst) - 1)])
 
 
 def yielded(worst: Floats, target: float) -> Yield:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import in_threads
 from tbcad.tolerance.draws import Errors
+from tbcad.tolerance.montecarlo import Covered
 from tbcad.tolerance.prototype_draws import draw
 from tbcad.tolerance.prototype_windows import Designed, seen
 
@@ -19,32 +20,14 @@ BATCH = 10
 
 
 @dataclass(frozen=True)
-class PrototypeResult:
-    """What s prototypes see, in the order of their numbers, over v virtual cameras, 2 m mirrors.
+class PrototypeResult(Covered):
+    """What s prototypes see, and where 2 m mirrors point: a's mirrors, b's.
 
     Attributes:
-        coverage: exact coverage diameters, mm, (s, v).
-        offset: pointing errors at the object, mm, (s, 2 m): a's mirrors, b's.
+        offset: pointing errors at the object, mm, (s, 2 m).
     """
 
-    coverage: Floats
     offset: Floats
-
-    def __len__(self) -> int:
-        """Number of machines."""
-        return len(self.coverage)
-
-    @property
-    def worst(self) -> Floats:
-        """Least coverage of each machine, mm, (s,)."""
-        result: Floats = self.coverage.min(axis=1)
-        return result
-
-    @property
-    def worst_camera(self) -> Ints:
-        """Number of the virtual camera that sees least, of each machine, (s,)."""
-        worst: Ints = np.argmin(self.coverage, axis=1)
-        return worst
 
     @property
     def offset_rms(self) -> Floats:
@@ -56,11 +39,6 @@ class PrototypeResult:
     def offset_worst(self) -> Floats:
         """Greatest of each machine's pointing errors, mm, (s,)."""
         result: Floats = self.offset.max(axis=1)
-        return result
-
-    def quantiles(self, shares: Sequence[float]) -> Floats:
-        """Coverage, mm, (k, v), that k shares of the machines do not reach at each camera."""
-        result: Floats = np.quantile(self.coverage, shares, axis=0)
         return result
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tbcad.tolerance.draws import NONE, Error, Errors
+from tbcad.tolerance.montecarlo import reached
 
 Floats = NDArray[np.float64]
 Worst = Callable[[Errors], Floats]
@@ -68,7 +69,7 @@ def alone(errors: Errors, kind: str, wanted: float, target: float, worst: Worst)
     """
     mine = only(errors, kind)
     designed, seen = worst(Errors()), worst(mine)
-    tail = float(np.quantile(seen, 1 - wanted))
+    tail = reached(seen, wanted)
     return Alone(
         kind,
         float(designed.mean() - seen.mean()),
@@ -84,7 +85,7 @@ def loosest(errors: Errors, wanted: float, target: float, worst: Worst) -> float
     """
 
     def left(times: float) -> float:
-        return float(np.quantile(worst(scaled(errors, times)), 1 - wanted)) - target
+        return reached(worst(scaled(errors, times)), wanted) - target
 
     room = left(0.0)
     if room < 0:

@@ -8,12 +8,12 @@ import matplotlib
 import numpy as np
 import pytest
 
+from tbcad import schedule
 from tbcad.cli import run
 from tbcad.design import radii
 from tbcad.design.mirrors import design
 from tbcad.design.spec import load_spec
 from tbcad.errors import InputError
-from tbcad import schedule
 from tbcad.simulate import compiled
 from tbcad.simulate.study.capture_area import capture_area
 from tbcad.simulate.study.depth import Optics, depth
