@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
-from tbcad.simulate.sheaf import SPARSE, Sheaf, candidates, distance, pieces, settle
+from tbcad.simulate.sheaf import SPARSE, Sheaf, candidates, distance, pieces, walk
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,7 +68,7 @@ def _blend(
             weight = 1 - angle[j] / angle[CAMERAS]
             if k < 0 or weight <= 0:
                 continue
-            last[k] = settle(points, tiles[k], last[k], ray, z, 0.0)
+            last[k] = walk(points, tiles[k], last[k], ray, z, 0.0)
             if distance(points, last[k], ray, z, 0.0) <= limit**2:
                 _lend(points, tiles[k], colour, last[k], ray, z, weight, result[i])
         if result[i, 3] > 0:

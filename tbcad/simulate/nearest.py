@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
-from tbcad.simulate.sheaf import SPARSE, Sheaf, candidates, distance, pieces, settle
+from tbcad.simulate.sheaf import SPARSE, Sheaf, candidates, distance, pieces, walk
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,7 +52,7 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
             if least >= best:
                 came[k] = least + way
                 continue
-            last[k] = settle(points, tiles[k], last[k], ray, 0.0, 1.0)
+            last[k] = walk(points, tiles[k], last[k], ray, 0.0, 1.0)
             away = np.sqrt(distance(points, last[k], ray, 0.0, 1.0))
             came[k] = away + way
             if away < best:

@@ -45,32 +45,16 @@ class Sheaf:
 
 def sheaf_of(slab: Slab, packed: Packed) -> Sheaf:
     """Rays of tiles in a slab."""
-    points = slab.points(packed.origin, packed.direction)
-    points[~packed.valid] = np.nan
+    points = slab.points(packed.origin, packed.direction, packed.valid)
     place = slab.place(packed.pinhole) / [1, 1, slab.scale]
-    corners = np.column_stack([packed.first, packed.shape])
-    tiles = np.column_stack([corners, _middles(points, corners)])
+    start = np.where(np.isnan(points[packed.middle, 0]), -1, packed.middle)
+    tiles = np.column_stack([packed.first, packed.shape, start])
     return Sheaf(points, tiles, np.column_stack([place, packed.spread]), packed.colour)
 
 
 def pieces(count: int) -> list[slice]:
     """Slices of so many wanted rays that go through the loops together."""
     return [slice(k, k + RAYS_A_PIECE) for k in range(0, count, RAYS_A_PIECE)]
-
-
-@compiled
-def _middles(points: Floats, tiles: Ints) -> Ints:
-    start = np.full(len(tiles), -1, dtype=np.int64)
-    for i in range(len(tiles)):
-        first, height, width = tiles[i]
-        least = np.inf
-        for y in range(height):
-            for x in range(width):
-                pixel = first + y * width + x
-                away = (2 * y - height) ** 2 + (2 * x - width) ** 2
-                if away < least and not np.isnan(points[pixel, 0]):
-                    least, start[i] = away, pixel
-    return start
 
 
 @compiled
@@ -113,39 +97,7 @@ def distance(points: Floats, pixel: int, wanted: Floats, depth: float, slopes: f
 
 
 @compiled
-def settle(
-    points: Floats, tile: Ints, start: int, wanted: Floats, depth: float, slopes: float
-) -> int:
-    """The pixel of a tile that is nearest, by steps from one on.
-
-    Within a tile steps lead to the nearest. Its rim has steps and notches where they may end too
-    soon, so from there they are tried once more from the tile's middle.
-    """
-    pixel = _walk(points, tile, start, wanted, depth, slopes)
-    if _at_rim(points, tile, pixel):
-        other = _walk(points, tile, tile[3], wanted, depth, slopes)
-        there = distance(points, other, wanted, depth, slopes)
-        if there < distance(points, pixel, wanted, depth, slopes):
-            return other
-    return pixel
-
-
-@compiled
-def _at_rim(points: Floats, tile: Ints, pixel: int) -> bool:
-    """Whether not all neighbours of a pixel are of its tile's mirror."""
-    first, height, width = tile[0], tile[1], tile[2]
-    y, x = divmod(pixel - first, width)
-    if not (0 < y < height - 1 and 0 < x < width - 1):
-        return True
-    for row in range(y - 1, y + 2):
-        for column in range(x - 1, x + 2):
-            if np.isnan(points[first + row * width + column, 0]):
-                return True
-    return False
-
-
-@compiled
-def _walk(
+def walk(
     points: Floats, tile: Ints, start: int, wanted: Floats, depth: float, slopes: float
 ) -> int:
     """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""

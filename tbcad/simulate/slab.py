@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.compiled import compiled
+from tbcad.simulate.compiled import compiled, in_threads
 
 Floats = NDArray[np.float64]
 
 # A ray at more than this to the direction has no place in its slab.
 LEAST_COSINE = 0.2
+RAYS_A_PIECE = 1 << 17
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,29 @@ class Slab:
     axes: Floats
     scale: float
 
-    def points(self, origin: NDArray[Any], direction: NDArray[Any]) -> Floats:
-        """Rays with origins and unit directions (n, 3) as points (n, 4); NaN where too oblique."""
-        return _points(
-            np.ascontiguousarray(self.axes),
-            self.scale,
-            np.ascontiguousarray(origin),
-            np.ascontiguousarray(direction),
-        )
+    def points(
+        self,
+        origin: NDArray[Any],
+        direction: NDArray[Any],
+        valid: NDArray[np.bool_] | None = None,
+    ) -> Floats:
+        """Rays as points (n, 4); NaN where too oblique, or not valid.
+
+        Args:
+            origin: mm, (n, 3).
+            direction: unit vectors, (n, 3).
+            valid: which rays there are, (n,); all of them if None.
+        """
+        axes, there = np.ascontiguousarray(self.axes), np.ones(0, dtype=np.bool_)
+        starts, ways = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
+        result = np.empty((len(ways), 4))
+
+        def some(part: slice) -> None:
+            marks = there if valid is None else valid[part]
+            _points(axes, self.scale, starts[part], ways[part], marks, result[part])
+
+        in_threads(some, [slice(k, k + RAYS_A_PIECE) for k in range(0, len(ways), RAYS_A_PIECE)])
+        return result
 
     def place(self, points: Floats) -> Floats:
         """Points (n, 3) in the slab's axes, (n, 3)."""
@@ -54,9 +70,18 @@ def slab_along(forward: Floats, right: Floats, capture_mm: float) -> Slab:
 
 
 @compiled
-def _points(axes: Floats, scale: float, origin: NDArray[Any], direction: NDArray[Any]) -> Floats:
-    result = np.empty((len(origin), 4))
+def _points(
+    axes: Floats,
+    scale: float,
+    origin: NDArray[Any],
+    direction: NDArray[Any],
+    valid: NDArray[np.bool_],
+    result: Floats,
+) -> None:
     for i in range(len(origin)):
+        if len(valid) > 0 and not valid[i]:
+            result[i] = np.nan
+            continue
         depth = speed = 0.0
         for j in range(3):
             depth += axes[2, j] * origin[i, j]
@@ -72,4 +97,3 @@ def _points(axes: Floats, scale: float, origin: NDArray[Any], direction: NDArray
             slope /= speed
             result[i, k] = across - depth * slope
             result[i, 2 + k] = scale * slope
-    return result

@@ -26,6 +26,7 @@ class Tile:
         direction: (h, w, 3), float32.
         pinhole: point that its rays come nearest to, mm, (3,).
         spread: farthest that one of its rays passes by it, mm.
+        middle: number of its pixel that is nearest to the middle, row by row.
     """
 
     valid: NDArray[np.bool_]
@@ -34,6 +35,7 @@ class Tile:
     direction: NDArray[np.float32]
     pinhole: Floats
     spread: float
+    middle: int
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Packed:
         direction: (n, 3).
         pinhole: (k, 3), mm.
         spread: (k,), mm.
+        middle: pixel in the middle of each, (k,).
     """
 
     first: Ints
@@ -59,6 +62,7 @@ class Packed:
     direction: NDArray[np.float32]
     pinhole: Floats
     spread: Floats
+    middle: Ints
 
 
 @dataclass
@@ -93,9 +97,9 @@ class Tiles:
         if not tiles:
             return None
         shape = np.array([tile.valid.shape for tile in tiles])
-        ends = np.cumsum(shape.prod(axis=1))
+        first = np.concatenate([[0], np.cumsum(shape.prod(axis=1))[:-1]])
         return Packed(
-            np.concatenate([[0], ends[:-1]]),
+            first,
             shape,
             np.concatenate([tile.valid.ravel() for tile in tiles]),
             np.concatenate([tile.colour.reshape(-1, 3) for tile in tiles]),
@@ -103,6 +107,7 @@ class Tiles:
             np.concatenate([tile.direction.reshape(-1, 3) for tile in tiles]),
             np.stack([tile.pinhole for tile in tiles]),
             np.array([tile.spread for tile in tiles]),
+            first + np.array([tile.middle for tile in tiles]),
         )
 
     def _tile(self, mirror: int) -> Tile | None:
@@ -133,7 +138,15 @@ def _tile(frame: Frame, index: int) -> Tile | None:
     valid = valid[cut]
     origin, direction = part["origin"][cut], part["direction"][cut]
     pinhole, spread = meeting(origin[valid], direction[valid])
-    return Tile(valid, part["colour"][cut], origin, direction, pinhole, spread)
+    middle = _middle(valid)
+    return Tile(valid, part["colour"][cut], origin, direction, pinhole, spread, middle)
+
+
+def _middle(valid: NDArray[np.bool_]) -> int:
+    height, width = valid.shape
+    rows, columns = np.nonzero(valid)
+    away = (2 * rows - height) ** 2 + (2 * columns - width) ** 2
+    return int((rows * width + columns)[away.argmin()])
 
 
 def meeting(origin: NDArray[Any], direction: NDArray[Any]) -> tuple[Floats, float]:
