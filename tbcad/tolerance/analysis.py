@@ -164,7 +164,15 @@ def analyse(
         wishes: what is asked.
         stage: told of each stage.
         detail: told how far a stage has come.
+
+    Raises:
+        InputError: mirrors are planar, or the scheduler cannot be reached.
     """
+    if not (export.reflectors[0].mirrors.curvature > 0).all():
+        raise InputError(
+            f"{export.folder} has planar mirrors, whose tolerances are not told: build it with "
+            "--radius-rule traced"
+        )
     made = _errors(export, process)
     halves = _nominal(export.reflectors)
     each = partial(_each, wishes.scheduler)
@@ -278,7 +286,9 @@ def _sharpness(
     views = round_of(*VIEWPOINTS).views(export.capture_mm)
     wanted = Wanted(export.capture_mm, views, truths(scene, views, detail))
     machines = draw(made, wishes.seed, range(PICTURED), m)
-    return sharpness(export.reflectors, machines, scene, wanted, wishes.left, "nearest", detail)
+    return sharpness(
+        export.reflectors, machines, scene, wanted, wishes.left, wishes.seed, "nearest", detail
+    )
 
 
 def _stands(export: Exported, made: Errors, wishes: Wishes, each: Any) -> Stands:

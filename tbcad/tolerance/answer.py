@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.tables import Cell, Table
-from tbcad.tolerance.analysis import Analysis, Choice
+from tbcad.tolerance.analysis import TRIED, Analysis
 from tbcad.tolerance.coverage import virtual
 from tbcad.tolerance.montecarlo import Yield, yielded
 from tbcad.tolerance.process import process_dict
@@ -49,11 +49,11 @@ def words(found: Analysis) -> str:
         )
     if found.margin.mm is not None:
         lines.append(
-            f"A margin of {found.margin.mm:.2f} mm (tbcad build --for-process {process.name} "
-            f"--yield {found.wishes.wanted:g}) makes {found.margin.share:.1%} good."
+            f"A margin of {found.margin.mm:.2f} mm (tbcad build --radius-rule traced --set "
+            f"mirrors.margin_mm={found.margin.mm:.2f}) makes {found.margin.share:.1%} good."
         )
     else:
-        lines.append(f"No margin makes it do: {found.margin.reason}.")
+        lines.append(f"No margin was found that makes it do: {found.margin.reason}.")
     lines.append(_which(found))
     sharp = found.sharpness
     lines.append(
@@ -93,6 +93,7 @@ def document(found: Analysis) -> dict[str, Any]:
         "processes": [
             {
                 "name": choice.name,
+                "machines": TRIED,
                 "yield": _yield(choice.yielded),
                 "margin_needed_mm": choice.margin.mm,
                 "reason": choice.margin.reason,
@@ -138,7 +139,7 @@ def _summary(found: Analysis) -> Table:
 
 def _machines(found: Analysis) -> Table:
     result = found.result
-    offset = np.sqrt(np.nanmean(result.offset**2, axis=1))
+    offset = np.array([_rms(row) for row in result.offset])
     columns = zip(result.worst.tolist(), result.worst_camera.tolist(), offset.tolist(), strict=True)
     rows = tuple((number, *row) for number, row in enumerate(columns))
     return Table(
@@ -155,6 +156,8 @@ def _alone(found: Analysis) -> Table:
         key = next((key for key in process if key.rpartition("_")[0] == one.kind), one.kind)
         now = [float(getattr(process[key], name, math.nan)) for name in ("magnitude", "mean")]
         may = [None if math.isinf(one.times) else one.times * value for value in now]
+        if one.kind == "coating":
+            may[1] = None  # a part of its mean is what the design allows for
         rows.append((key, *now, one.loss, one.tail, _finite(one.times), *may))
     columns = (
         *("kind", "magnitude", "mean", "loss_mm", "tail_mm"),
@@ -164,12 +167,28 @@ def _alone(found: Analysis) -> Table:
 
 
 def _choices(found: Analysis) -> Table:
-    columns = ("process", "yield", "yield_low", "yield_high", "margin_needed_mm", "reason")
+    columns = (
+        "process",
+        "machines",
+        "yield",
+        "yield_low",
+        "yield_high",
+        "margin_needed_mm",
+        "reason",
+    )
     return Table(
         "tolerance-processes",
         columns,
         tuple(
-            (c.name, c.yielded.share, c.yielded.low, c.yielded.high, c.margin.mm, c.margin.reason)
+            (
+                c.name,
+                TRIED,
+                c.yielded.share,
+                c.yielded.low,
+                c.yielded.high,
+                c.margin.mm,
+                c.margin.reason,
+            )
             for c in found.choices
         ),
     )
@@ -230,8 +249,9 @@ def _map(found: Analysis) -> Panel:
 def _pointing(found: Analysis) -> dict[str, float]:
     offset = found.result.offset
     return {
-        "rms": float(np.sqrt(np.nanmean(offset**2))),
-        "largest_median": float(np.median(np.nanmax(offset, axis=1))),
+        "rms": _rms(offset),
+        "largest_median": float(np.median(np.where(np.isfinite(offset), offset, 0).max(axis=1))),
+        "rays_lost": float((~np.isfinite(offset)).mean()),
     }
 
 
@@ -242,18 +262,25 @@ def _prototype(found: Analysis) -> dict[str, Any] | None:
         name: {
             "yield": _yield(yielded(one.worst, found.target)),
             "worst_camera_mm": {f"{s:g}": float(np.quantile(one.worst, s)) for s in SHARES},
-            "pointing_rms_mm": float(np.sqrt(np.nanmean(one.offset**2))),
+            "pointing_rms_mm": _rms(one.offset),
+            "rays_lost": float((~np.isfinite(one.offset)).mean()),
         }
         for name, one in (("uncalibrated", found.stands.plain), ("calibrated", found.stands.known))
     }
+
+
+def _rms(offset: Floats) -> float:
+    """Root mean square, mm, of the rays that meet their mirror at all; 0 where none does."""
+    met = offset[np.isfinite(offset)]
+    return float(np.sqrt((met**2).mean())) if met.size else 0.0
 
 
 def _which(found: Analysis) -> str:
     """Which processes do, with which margin."""
     do = [f"{c.name} with {c.margin.mm:.2f} mm" for c in found.choices if c.margin.mm is not None]
     not_ = [c.name for c in found.choices if c.margin.mm is None]
-    text = f"Margins needed for {found.wishes.wanted:.0%}: {', '.join(do) or 'none does'}"
-    return text + (f"; {' and '.join(not_)} will not do with any." if not_ else ".")
+    text = f"Margins needed for {100 * found.wishes.wanted:.6g}%: {', '.join(do) or 'none found'}"
+    return text + (f"; none was found for {' and '.join(not_)}." if not_ else ".")
 
 
 def _yield(found: Yield) -> dict[str, float]:
@@ -276,8 +303,3 @@ def _finite(times: float) -> float | None:
 
 def _plain(kind: str) -> str:
     return kind.replace("_", " ")
-
-
-def loosest_process(choices: tuple[Choice, ...], wanted: float) -> str | None:
-    """The loosest built-in process that gives the wanted yield as the design is, if any."""
-    return next((one.name for one in choices if one.yielded.share >= wanted), None)

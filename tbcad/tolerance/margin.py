@@ -68,7 +68,7 @@ def margin(
         lacking = target - reached(seen, wanted)
         if share >= wanted and (lacking > -STEP_MM or now == 0):
             return Margin(now, share)
-        now = max(0.0, ceil((now + lacking) / STEP_MM - 1e-9) * STEP_MM)
+        now = max(0.0, round(ceil((now + lacking) / STEP_MM - 1e-9) * STEP_MM, 6))
         if now > MOST_MM:
             return Margin(None, share, f"it would need more than {MOST_MM:g} mm")
     return Margin(now, share) if share >= wanted else Margin(None, share, "the tries ran out")

@@ -28,6 +28,9 @@ Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Progress = Callable[[str], None]
 
+# Stream of random numbers, beside those of the kinds of error.
+LEFT_OVER = 2000
+
 
 @dataclass(frozen=True)
 class Wanted:
@@ -65,6 +68,7 @@ def sharpness(
     scene: Scene,
     wanted: Wanted,
     left: float,
+    seed: int = 1,
     method: Method = "nearest",
     progress: Progress = lambda _: None,
 ) -> Sharpness:
@@ -76,6 +80,7 @@ def sharpness(
         scene: the object.
         wanted: the views.
         left: what a calibration leaves of a mirror's direction, per axis, radians.
+        seed: of what calibration leaves.
         method: how views are made.
         progress: told how far it has come.
     """
@@ -86,7 +91,7 @@ def sharpness(
         made = tuple(actual(at, draws, k) for at, draws in zip(cameras, machines, strict=True))
         taken = _captured((made[0], made[1]), scene, wanted.capture_mm)
         scored.append(_scores(_with_rays(taken, as_designed), wanted, method))
-        known = _left_over(taken, left, k)
+        known = _left_over(taken, left, (seed, k))
         scored.append(_scores(known, wanted, method))
     table = np.array(scored)
     return Sharpness(table[0], table[1::2], table[2::2])
@@ -165,9 +170,11 @@ def _with_rays(taken: LightField, known: LightField) -> LightField:
     return replace(taken, frames=frames)
 
 
-def _left_over(taken: LightField, left: float, seed: int) -> LightField:
+def _left_over(taken: LightField, left: float, seed: tuple[int, int]) -> LightField:
     """Every mirror's rays turned by what a calibration leaves, each mirror's by its own."""
-    generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+    generator = np.random.default_rng(
+        np.random.SeedSequence(seed[0], spawn_key=(seed[1], LEFT_OVER))
+    )
     frames = {
         name: replace(frame, planes=_turned(frame, left, generator))
         for name, frame in taken.frames.items()

@@ -17,7 +17,7 @@ from tbcad.simulate.reflector import reflectors
 from tbcad.simulate.study.record import contents_of
 from tbcad.simulate.study.tables import SUMMARY
 from tbcad.tolerance.analysis import Analysis, Choice, Stands, Wishes
-from tbcad.tolerance.answer import document, json_text, loosest_process, study, words
+from tbcad.tolerance.answer import document, json_text, study, words
 from tbcad.tolerance.draws import Error, Errors
 from tbcad.tolerance.margin import Margin
 from tbcad.tolerance.montecarlo import Task, Yield, simulate, yielded
@@ -51,7 +51,7 @@ def found(little: Design) -> Analysis:
     """Real machines, some good and some not; all else made up."""
     cameras = reflectors(little)
     halves = nominal(cameras[0]), nominal(cameras[1])
-    errors = Errors(sphere_centre=Error(0.006))
+    errors = Errors(sphere_centre=Error(0.012))
     return Analysis(
         process=load_process("sla"),
         wishes=Wishes(machines=MACHINES, seed=4),
@@ -83,9 +83,7 @@ def rows_of(found: Analysis, name: str) -> list[dict[str, str]]:
 
 
 def percent(pattern: str, text: str) -> float:
-    match = re.search(pattern, text)
-    assert match, text
-    return float(match[1])
+    return float(re.findall(pattern + r"([\d.]+)%", text)[0])
 
 
 class TestWords:
@@ -93,7 +91,7 @@ class TestWords:
         said, worst = words(found), found.result.worst
         share = yielded(worst, TARGET)
         assert 0 < share.share < 1
-        assert percent(r"^Made by sla \(.*?\), ([\d.]+)%", said) == pytest.approx(
+        assert percent(r"^Made by sla \(.*?\), ", said) == pytest.approx(
             100 * share.share, abs=0.05
         )
         low, high = 100 * share.low, 100 * share.high
@@ -120,26 +118,25 @@ class TestWords:
 
     def test_margin(self, found: Analysis) -> None:
         said = words(found)
-        assert (
-            "A margin of 3.71 mm (tbcad build --for-process sla --yield 0.99) makes 99.0%" in said
-        )
+        command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
+        assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
         assert "No margin" not in said
 
     def test_no_margin(self, found: Analysis) -> None:
         said = words(replace(found, margin=CHOICES[0].margin))
-        assert "No margin makes it do: it would need more than 20 mm." in said
+        assert "No margin was found that makes it do: it would need more than 20 mm." in said
         assert "A margin of" not in said
 
     def test_processes(self, found: Analysis) -> None:
         assert (
             "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
-            "fdm will not do with any."
+            "none was found for fdm."
         ) in words(found)
         every = words(replace(found, choices=CHOICES[1:]))
         assert "diamond with 0.56 mm." in every
-        assert "not do" not in every
+        assert "none" not in every
         none = words(replace(found, choices=CHOICES[:1]))
-        assert "Margins needed for 99%: none does; fdm will not do with any." in none
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_pictures(self, found: Analysis) -> None:
         assert (
@@ -150,10 +147,9 @@ class TestWords:
     def test_prototype(self, found: Analysis) -> None:
         assert "Prototype" not in words(found)
         said = words(replace(found, stands=stands(0.0, 0.7)))
-        assert percent(r"Prototype: ([\d.]+)%", said) == 0
-        assert percent(r"without calibration, ([\d.]+)%", said) == 70
+        assert percent("Prototype: ", said) == 0
+        assert percent("without calibration, ", said) == 70
 
-    @pytest.mark.xfail(strict=True, reason="the wanted yield is rounded to whole per cents")
     @pytest.mark.parametrize(("wanted", "text"), [(0.995, "99.5%"), (0.999, "99.9%")])
     def test_wanted_yield_is_told_as_it_was_asked(
         self, found: Analysis, wanted: float, text: str
@@ -162,7 +158,6 @@ class TestWords:
         said = words(replace(found, wishes=replace(found.wishes, wanted=wanted)))
         assert f"Margins needed for {text}:" in said
 
-    @pytest.mark.xfail(strict=True, reason="the name of a changed process is that of the built-in")
     def test_changed_process_is_not_advised_under_the_old_name(self, found: Analysis) -> None:
         """The built-in process of that name would get another margin."""
         changed = load_process("sla", ["sphere_radius_um=0"])
@@ -179,11 +174,9 @@ class TestJson:
         assert (read["machines"], read["seed"], read["target_mm"]) == (MACHINES, 4, TARGET)
         assert read["yield"]["share"] == (worst >= TARGET).mean()
         assert read["worst_camera_mm"]["0.5"] == np.median(worst)
-        assert read["worst_camera_mm"]["0.01"] < read["worst_camera_mm"]["0.05"]
         assert read["margin_needed_mm"] == 3.71
         assert [one["name"] for one in read["processes"]] == ["fdm", "sla", "diamond"]
         assert read["processes"][0]["margin_needed_mm"] is None
-        assert read["processes"][0]["reason"] == "it would need more than 20 mm"
         assert read["ssim"]["calibration_leaves_mrad"] == 0.5
         assert read["prototype"] is None
 
@@ -197,10 +190,9 @@ class TestJson:
         assert 0 < json.loads(json_text(patchy))["pointing_mm"]["rms"] < offset.max()
 
     def test_what_may_be_anything_has_no_number(self, found: Analysis) -> None:
+        assert not re.search("NaN|Infinity", json_text(found))
         told = {one["kind"]: one["may_be_times"] for one in json.loads(json_text(found))["alone"]}
         assert told == {"sphere_centre": 0.375, "facets": 1.5, "camera_tilt": None}
-        assert "NaN" not in json_text(found)
-        assert "Infinity" not in json_text(found)
 
     def test_prototype(self, found: Analysis) -> None:
         read = json.loads(json_text(replace(found, stands=stands(0.1, 0.7))))["prototype"]
@@ -209,7 +201,6 @@ class TestJson:
         assert read["calibrated"]["pointing_rms_mm"] == 2
         assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
 
-    @pytest.mark.xfail(strict=True, raises=ValueError, reason="infinity is no JSON")
     def test_prototype_whose_windows_miss_balls(self, found: Analysis) -> None:
         """Its pointing error is infinite (tbcad.tolerance.prototype_windows.seen)."""
         lost = replace(found, stands=stands(0.0, 0.0, math.inf))
@@ -259,13 +250,10 @@ class TestTables:
             assert float(row["magnitude"]) == getattr(found.process, key).magnitude
             times = one["may_be_times"]
             assert row["may_be_times"] == ("" if times is None else str(times))
-        assert float(rows[0]["may_be"]) == 0.375 * 25
-        assert rows[2]["may_be"] == ""
-
-    @pytest.mark.xfail(strict=True, reason="only the magnitude is multiplied, not the mean")
-    def test_what_is_off_in_every_machine_may_be_more_than_nothing(self, found: Analysis) -> None:
-        """Facets of sla: 0.36 mm in every machine and no spread; 1.5 times that is no zero."""
-        assert rows_of(found, "sensitivity")[1]["may_be"] != "0.0"
+        assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
+        # Facets of sla: 0.36 mm in every machine and no spread; 1.5 times that is no zero.
+        may = [(row["may_be_magnitude"], row["may_be_mean"]) for row in rows]
+        assert may == [(str(0.375 * 25), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
 
     def test_processes(self, found: Analysis) -> None:
         for row, one in zip(rows_of(found, "processes"), document(found)["processes"], strict=True):
@@ -306,9 +294,3 @@ class TestTables:
         away = np.hypot(sky.series[0].x, sky.series[0].y)
         u = np.concatenate([at.u for at in found.cameras])
         assert away.max() == pytest.approx(np.degrees(np.arccos(u[:, 2].min())), abs=1e-9)
-
-
-def test_loosest_process() -> None:
-    assert loosest_process(CHOICES, 0.99) == "diamond"
-    assert loosest_process(CHOICES, 0.2) == "sla"
-    assert loosest_process(CHOICES[:2], 0.99) is None

@@ -78,19 +78,14 @@ class TestMadeUpLosses:
         found = margin(spec, Errors(), 0.99, losing(lambda m: np.full(10, 1 + 0.1 * m)))
         assert found.mm == pytest.approx(1.12, abs=1e-9)
 
-    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.95, 0.99])
-    @pytest.mark.parametrize("seed", range(8))
+    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.95, 0.975, 0.985, 0.99, 0.995, 0.999])
+    @pytest.mark.parametrize("seed", range(4))
     def test_random_losses_against_brute_force(self, spec: Spec, seed: int, wanted: float) -> None:
+        """Also with shares between those that 100 machines can have."""
         lost = np.random.default_rng(seed).normal(1.5, 0.4, 100).clip(0.05)
-        found, least = margin(spec, Errors(), wanted, losing(steady(lost))), brute(lost, wanted)
-        assert found.mm == pytest.approx(least, abs=STEP_MM + 1e-9)
-        assert found.share == (found.mm >= lost).mean() >= wanted
-
-    @pytest.mark.parametrize("wanted", [0.975, 0.985, 0.995, 0.999])
-    def test_shares_between_those_of_100_machines(self, spec: Spec, wanted: float) -> None:
-        lost = np.linspace(1.0, 16.0, 100)
         found = margin(spec, Errors(), wanted, losing(steady(lost)))
-        assert found.mm == pytest.approx(brute(lost, wanted), abs=STEP_MM + 1e-9)
+        assert found.mm == pytest.approx(brute(lost, wanted), abs=1e-9)
+        assert found.share == (found.mm >= lost).mean() >= wanted
 
     @pytest.mark.parametrize("seed", range(10))
     def test_never_a_margin_with_too_small_a_share(self, spec: Spec, seed: int) -> None:
@@ -175,8 +170,7 @@ class TestRealDesigns:
             return float((self.worst(design(load_spec(None, options)), made) >= TARGET).mean())
 
         assert share(found.mm) == found.share >= wanted
-        # Of 40 machines those about the quantile are up to a tenth of a millimetre apart.
-        assert share(found.mm - 0.2) < wanted
+        assert share(found.mm - 2 * STEP_MM) < wanted
 
     @pytest.mark.parametrize(("facets", "most"), [(0.0, 0.01), (0.36, 0.37), (1.005, 1.01)])
     def test_loss_that_is_known(self, spec: Spec, facets: float, most: float) -> None:

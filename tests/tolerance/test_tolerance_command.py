@@ -162,8 +162,8 @@ class TestWritten:
         assert read["process"]["facets_mm"]["mean"] == 1
         assert read["process"]["facets_mm"]["source"] == "set by an option"
         assert (read["seed"], read["ssim"]["calibration_leaves_mrad"]) == (7, 0)
-        diamond = read["processes"][1]
-        assert read["margin_needed_mm"] > 1 > diamond["margin_needed_mm"]
+        sla, diamond = (one["margin_needed_mm"] for one in read["processes"])
+        assert diamond < 1 < read["margin_needed_mm"] < sla
         assert read["yield"]["share"] == 0
 
 
@@ -214,7 +214,6 @@ def test_target_that_is_a_file_is_refused_at_once(
     assert (tmp_path / "file").read_text() == "mine"
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="planar mirrors end in a traceback")
 def test_planar_mirrors(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -228,7 +227,6 @@ def test_planar_mirrors(
         _one_line(capsys, "flat")
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="an infinite offset is no JSON")
 def test_camera_that_looks_past_the_balls(export: Path, tmp_path: Path) -> None:
     """68 mrad: a camera as mounted (docs/decisions/0007-how-tolerances-are-computed.md)."""
     arguments = ["tolerance", str(export), *FEW, "--set", "camera_tilt_mrad=68"]
