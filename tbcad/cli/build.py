@@ -113,7 +113,7 @@ def build(
 
 
 def _margined(spec: "Spec", name: str, wanted: float, told: Stages) -> "Spec":
-    from tbcad.tolerance.analysis import for_process
+    from tbcad.tolerance.building import for_process
     from tbcad.tolerance.process import load_process
 
     told.stage(f"margin for {name}")

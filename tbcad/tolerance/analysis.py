@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from tbcad import schedule
 from tbcad.design.mirrors import Design
-from tbcad.design.spec import Spec
 from tbcad.errors import InputError
 from tbcad.simulate.exported import Exported
 from tbcad.simulate.prototype.plan import read_plan
@@ -22,7 +21,7 @@ from tbcad.simulate.study.views import round_of, truths
 from tbcad.simulate.subject import Subject
 from tbcad.tolerance import prototype
 from tbcad.tolerance.draws import Errors, draw
-from tbcad.tolerance.margin import Margin, margin, with_margin
+from tbcad.tolerance.margin import Margin, margin
 from tbcad.tolerance.montecarlo import Result, Task, Yield, simulate, yielded
 from tbcad.tolerance.nominal import Nominal, nominal
 from tbcad.tolerance.process import BUILT_IN, Process, errors, load_process
@@ -36,8 +35,6 @@ Halves = tuple[Nominal, Nominal]
 
 # Machines for each step of a search; what is told of the process itself has as many as asked for.
 TRIED = 100
-# Machines on which the margin of a design that is to be built rests.
-FOR_BUILDING = 400
 # Machines whose pictures are taken, and viewpoints of each.
 PICTURED = 2
 VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
@@ -210,35 +207,6 @@ def analyse(
         process, wishes, target, export.reflectors, halves, result, tuple(order), choices, needed,
         sharp, stands,
     )  # fmt: skip
-
-
-def for_process(
-    spec: Spec, process: Process, wanted: float, progress: Progress = lambda _: None
-) -> Spec:
-    """The design with the least margin with which a process makes so many machines good.
-
-    Raises:
-        InputError: no margin is enough, or the radii do not follow a target.
-    """
-    if spec.mirrors.radius_rule != "traced":
-        raise InputError(
-            f"--for-process sets mirrors.margin_mm, which radii of rule "
-            f"{spec.mirrors.radius_rule} do not follow: use --radius-rule traced"
-        )
-    wishes = Wishes(wanted=wanted).checked()
-
-    def after(design: Design, errors: Errors) -> Floats:
-        task = Task(_nominal(reflectors(design)), errors, wishes.seed)
-        return simulate(task, FOR_BUILDING, partial(_each, None)).worst
-
-    made = errors(process, spec.mirrors.coating_um)
-    needed = margin(spec, made, wanted, after, progress)
-    if needed.mm is None:
-        raise InputError(
-            f"process {process.name} does not make {wanted:.1%} of the machines good with any "
-            f"margin ({needed.reason}): choose a more exact one, or see tbcad tolerance"
-        )
-    return with_margin(spec, needed.mm)
 
 
 def _errors(export: Exported, process: Process) -> Errors:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.tables import Cell, Table
 from tbcad.tolerance.analysis import TRIED, Analysis
-from tbcad.tolerance.coverage import virtual
 from tbcad.tolerance.montecarlo import Yield, yielded
+from tbcad.tolerance.panels import directions, in_words, panels
 from tbcad.tolerance.process import process_dict
 
 Floats = NDArray[np.float64]
@@ -44,7 +43,7 @@ def words(found: Analysis) -> str:
     if found.alone:
         first = found.alone[0]
         lines.append(
-            f"Most is lost by {_plain(first.kind)}: {first.loss:.2f} mm by itself; "
+            f"Most is lost by {in_words(first.kind)}: {first.loss:.2f} mm by itself; "
             f"{_factor(first.times)}."
         )
     if found.margin.mm is not None:
@@ -113,7 +112,7 @@ def document(found: Analysis) -> dict[str, Any]:
 def study(found: Analysis) -> Study:
     """Tables and plots."""
     tables = (_machines(found), _alone(found), _choices(found), _cameras(found))
-    return Study("tolerance", _summary(found), tables, _panels(found))
+    return Study("tolerance", _summary(found), tables, panels(found))
 
 
 def json_text(found: Analysis) -> str:
@@ -129,7 +128,9 @@ def _summary(found: Analysis) -> Table:
         ("worst camera, 1 % see less", "mm", float(np.quantile(worst, 0.01)), None, ""),
         ("margin needed", "mm", found.margin.mm, None, ""),
     ]
-    rows += [(f"loss by {_plain(one.kind)} alone", "mm", one.loss, None, "") for one in found.alone]
+    rows += [
+        (f"loss by {in_words(one.kind)} alone", "mm", one.loss, None, "") for one in found.alone
+    ]
     rows += [
         (f"good machines by {choice.name}", "%", 100 * choice.yielded.share, None, "")
         for choice in found.choices
@@ -198,52 +199,11 @@ def _cameras(found: Analysis) -> Table:
     coverage = found.result.coverage
     low, middle = found.result.quantiles((0.05, 0.5))
     short = (coverage < found.target).mean(axis=0)
-    u = _directions(found)
+    u = directions(found)
     columns = ("virtual_camera", "ux", "uy", "uz", "median_mm", "five_percent_mm", "share_short")
     numbers = np.column_stack([u, middle, low, short]).tolist()
     rows = tuple((k, *row) for k, row in enumerate(numbers))
     return Table("tolerance-cameras", columns, rows)
-
-
-def _directions(found: Analysis) -> Floats:
-    """Directions of the virtual cameras, (v, 3)."""
-    which = virtual(found.halves)
-    every = np.concatenate([at.u for at in found.cameras])
-    result = np.zeros((int(which.max()) + 1, 3))
-    result[which[::-1]] = every[::-1]  # the first that is of a camera counts
-    return result
-
-
-def _panels(found: Analysis) -> tuple[Panel, ...]:
-    return (_curve(found), _bars(found), _map(found))
-
-
-def _curve(found: Analysis) -> Panel:
-    worst = np.sort(found.result.worst)
-    share = 1 - np.arange(len(worst)) / len(worst)
-    at = np.array([found.target, found.target])
-    series = (
-        Series(found.process.name, worst, 100 * share, "C0-"),
-        Series(f"{found.target:g} mm", at, np.array([0.0, 100.0]), "k--"),
-    )
-    return Panel("Machines whose worst camera sees ...", "... mm or more", "% of machines", series)
-
-
-def _bars(found: Analysis) -> Panel:
-    loss = np.array([one.loss for one in found.alone])
-    names = tuple(_plain(one.kind) for one in found.alone)
-    bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
-    return Panel("What each kind of error costs alone", "mm of coverage", "", (bars,), names=names)
-
-
-def _map(found: Analysis) -> Panel:
-    u = _directions(found)
-    low = found.result.quantiles((0.05,))[0]
-    away = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
-    flat = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
-    x, y = away * u[:, 0] / flat, away * u[:, 1] / flat
-    dots = Series("", x, y, ".", low, "coverage that 5 % do not reach, mm")
-    return Panel("Virtual cameras, the zenith in the middle", "degrees", "degrees", (dots,))
 
 
 def _pointing(found: Analysis) -> dict[str, float]:
@@ -299,7 +259,3 @@ def _factor(times: float) -> str:
 
 def _finite(times: float) -> float | None:
     return times if math.isfinite(times) else None
-
-
-def _plain(kind: str) -> str:
-    return kind.replace("_", " ")

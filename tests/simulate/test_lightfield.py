@@ -143,3 +143,13 @@ def _changed(store: h5py.File, change: str) -> None:
 def test_no_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no file"), LightField.open(tmp_path):
         pass
+
+
+def test_the_reader_is_found_where_the_documentation_has_it(file: Path) -> None:
+    import tbcad.simulate
+
+    with tbcad.simulate.LightField.open(file) as source:
+        part = source.frames["a"].read(slice(100, 120), slice(100, 140))
+    assert part["origin"].shape == (20, 40, 3)
+    with pytest.raises(AttributeError, match="Nothing"):
+        tbcad.simulate.Nothing  # noqa: B018
