@@ -57,6 +57,18 @@ _LIB3MF = """
 from lib3mf import get_wrapper
 print("version", ".".join(map(str, get_wrapper().GetLibraryVersion())))
 """
+_NUMBA = """
+from numba import njit
+assert njit(lambda x: x + 1)(41) == 42
+print("a loop is compiled")
+"""
+_H5PY = """
+import h5py, numpy as np
+with h5py.File("doctor", "w", driver="core", backing_store=False) as file:
+    file.create_dataset("a", data=np.arange(9), compression=1)
+    assert file["a"][8] == 8
+print("version", h5py.version.hdf5_version)
+"""
 _PICTURE = """
 import vtkmodules.vtkRenderingOpenGL2
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
@@ -106,6 +118,8 @@ def _attempts(needs: Sequence[Requirement]) -> list[Callable[[], Finding]]:
         lambda: attempt("embreex", _EMBREE, _reinstall(["embreex"], "embreex", needs)),
         lambda: attempt("manifold3d", _MANIFOLD, _reinstall(["manifold3d"], "manifold3d", needs)),
         lambda: attempt("lib3mf", _LIB3MF, _reinstall(["lib3mf"], "lib3mf", needs)),
+        lambda: attempt("numba", _NUMBA, _reinstall(["numba", "llvmlite"], "numba", needs)),
+        lambda: attempt("h5py", _H5PY, _reinstall(["h5py"], "h5py", needs)),
         pictures,
     ]
 

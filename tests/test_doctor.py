@@ -37,6 +37,8 @@ class TestThisEnvironment:
             "embreex",
             "manifold3d",
             "lib3mf",
+            "numba",
+            "h5py",
             "memory",
             "disk",
         ],
