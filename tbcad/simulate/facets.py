@@ -31,6 +31,8 @@ LARGEST_FILE = 4 << 30  # bytes
 LIKELY = 8
 # Corners of a facet lie on its mirror but for what float32 in the file leaves.
 OFF_MM = 1e-3
+# Facets of a mirror lie along it within a few degrees, walls at its rim nearly across.
+LEAST_COSINE = 0.9
 
 
 @dataclass(frozen=True)
@@ -145,4 +147,14 @@ def _owners(bare: Surfaces, corners: Floats) -> Ints:
         i = np.repeat(likely[left, None], 3, axis=1)
         on = np.abs(bare.value(i, corners[left])).max(axis=1) < OFF_MM
         owner[left[on]] = likely[left[on]]
+    owner[~_along(bare, corners, owner)] = -1
     return owner
+
+
+def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
+    """Which facets (f, 3, 3) lie along their mirror: a wall's corners may all be on its rim."""
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = bare.gradient(owner, corners.mean(axis=1))
+    size = np.linalg.norm(area, axis=1) * np.linalg.norm(normal, axis=1)
+    along: NDArray[np.bool_] = np.abs((area * normal).sum(axis=1)) > LEAST_COSINE * size
+    return along

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from tbcad.design.mirrors import Design
 from tbcad.export.stl import write_stl
@@ -116,6 +117,18 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
             for trace in (exact(at), on_mesh(shells, at))
         ]
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
+
+
+def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: Design) -> None:
+    """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
+    corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
+    shells = read_shells(with_meshes)
+    owner = shells.mirror[: len(corners)]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.bincount(
+        np.maximum(owner, 0), weights=np.linalg.norm(sides, axis=1) / 2, minlength=len(owner)
+    )[1 : len(little.halves[0]) + 1]
+    assert area == pytest.approx(little.halves[0].area, rel=2e-3)
 
 
 def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:
