@@ -82,7 +82,7 @@ def capture(
     from tbcad.simulate.exported import read_export
     from tbcad.simulate.geometry import cameras
     from tbcad.simulate.scene import scene_of
-    from tbcad.simulate.subject import built_in, load
+    from tbcad.simulate.subject import chosen
 
     geometry = _geometry(mesh, prototype)
     check_target(out, force)
@@ -90,7 +90,7 @@ def capture(
         told.stage("object")
         export = read_export(folder)
         size = export.capture_mm
-        subject = load(object_file, size, fit, paint.value) if object_file else built_in(size)
+        subject = chosen(object_file, size, fit, paint.value)
         told.stage(GEOMETRIES[geometry])
         captured = cameras(export, scene_of(subject), geometry, samples, told.detail)
         told.stage("photographs and light field")

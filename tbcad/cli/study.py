@@ -22,7 +22,6 @@ from tbcad.screen import stages
 if TYPE_CHECKING:
     from tbcad.design.spec import Spec
     from tbcad.simulate.study.record import Study
-    from tbcad.simulate.subject import Subject
 
 PIPED_WIDTH = 160
 
@@ -151,6 +150,7 @@ def ssim_command(
     from tbcad.simulate.study.resolution import default_sensors
     from tbcad.simulate.study.ssim import ssim
     from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
+    from tbcad.simulate.subject import chosen
 
     given = tuple(sensor_of(text) for text in dict.fromkeys(sensors or ()))
     places = round_of(ELEVATIONS_DEG, azimuths, distance)
@@ -160,7 +160,7 @@ def ssim_command(
         out,
         lambda spec, told: ssim(
             spec,
-            _subject(object_file, paint, spec.optics.capture_diameter_mm),
+            chosen(object_file, spec.optics.capture_diameter_mm, paint=paint.value),
             given or default_sensors(spec),
             places,
             method.value,
@@ -186,17 +186,12 @@ def prototype_command(
     from tbcad.simulate.exported import read_export
     from tbcad.simulate.study.stand_in import stand_in
     from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
+    from tbcad.simulate.subject import chosen
 
     places = round_of(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
-    subject = _subject(object_file, paint, export.capture_mm)
+    subject = chosen(object_file, export.capture_mm, paint=paint.value)
     return _done(out, lambda told: stand_in(export, subject, places, method.value, samples, told))
-
-
-def _subject(file: Path | None, paint: Paint, capture_mm: float) -> "Subject":
-    from tbcad.simulate.subject import built_in, load
-
-    return load(file, capture_mm, paint=paint.value) if file else built_in(capture_mm)
 
 
 def _run(

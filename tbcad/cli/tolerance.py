@@ -46,7 +46,7 @@ def tolerance(
     """
     from tbcad.simulate.exported import read_export
     from tbcad.simulate.study.record import check_target, write
-    from tbcad.simulate.subject import built_in, load
+    from tbcad.simulate.subject import chosen
     from tbcad.tolerance.analysis import Wishes, analyse
     from tbcad.tolerance.answer import json_text, study, words
     from tbcad.tolerance.process import load_process
@@ -57,8 +57,7 @@ def tolerance(
     with stages(6) as told:
         told.stage("record of the export")
         export = read_export(folder)
-        size = export.capture_mm
-        subject = load(object_file, size) if object_file else built_in(size)
+        subject = chosen(object_file, export.capture_mm)
         found = analyse(export, made_by, subject, wishes, told.stage, told.detail)
         files = write(study(found), out, {"tolerance.json": json_text(found).encode()})
     typer.echo(words(found))

@@ -51,12 +51,17 @@ def photograph(
         progress: told how far it has come.
     """
     height = view.height_px
-    rows = [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
+    rows = row_bands(height)
     for first in range(0, len(rows), 2 * THREADS):
         progress(f"row {rows[first].start} of {height}")
         yield from in_threads(
             partial(_band, view, trace, scene, samples), rows[first : first + 2 * THREADS]
         )
+
+
+def row_bands(height: int) -> list[range]:
+    """Rows of a picture in bands, which are worked on one by one."""
+    return [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
 
 
 def _band(view: View, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:

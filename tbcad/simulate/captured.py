@@ -13,7 +13,7 @@ from tbcad.simulate import lightfield, pictures
 from tbcad.simulate.geometry import Captured
 from tbcad.simulate.subject import Subject
 
-LIGHT_FIELD, OBJECT, RECORD = "lightfield.h5", "object.npz", "capture.json"
+OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
 LARGEST_OBJECT = 4 << 30  # bytes, unpacked
 
@@ -31,7 +31,7 @@ def write_capture(
         facts: how the capture is made.
     """
     record: dict[str, Any] = {"schema": SCHEMA, "object": subject.name, **facts, "cameras": {}}
-    with lightfield.writing(folder / LIGHT_FIELD, capture_mm, record) as store:
+    with lightfield.writing(folder / lightfield.NAME, capture_mm, record) as store:
         for at, bands in captured:
             picture, counts = lightfield.write(store, at, bands())
             file = folder / f"camera_{at.camera}.png"

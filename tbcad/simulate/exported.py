@@ -32,11 +32,13 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Number, Number, Number]
 
 
-class _Record(BaseModel):
+class Record(BaseModel):
+    """A table of a file: what else it has is left alone."""
+
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-class _Camera(_Record):
+class _Camera(Record):
     id: Literal["a", "b"]
     pinhole_mm: Vector
     forward: Vector
@@ -46,7 +48,7 @@ class _Camera(_Record):
     hfov_deg: float = Field(ge=1, le=170)
 
 
-class _Mirror(_Record):
+class _Mirror(Record):
     id: str
     camera: Literal["a", "b"]
     ux: Number
@@ -61,7 +63,7 @@ class _Mirror(_Record):
     radius_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None
 
 
-class _Document(_Record):
+class _Document(Record):
     schema_name: Literal["tbcad-design/1"] = Field(alias="schema")
     spec: dict[str, Any]
     target_mm: float = Field(gt=0, le=1000)
@@ -70,7 +72,7 @@ class _Document(_Record):
     mirrors: list[_Mirror]
 
 
-class Exported(_Record):
+class Exported(Record):
     """An export as light meets it.
 
     Attributes:

@@ -36,6 +36,7 @@ from tbcad.simulate.reflector import Reflector
 
 Floats = NDArray[np.float64]
 
+NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
 CHUNK = (BAND_ROWS, 256)
 LEVEL = 1  # of compression: higher ones save 2 % at most
@@ -97,7 +98,7 @@ class LightField:
         Raises:
             InputError: it cannot be read, or is no light field of this schema.
         """
-        file = path / "lightfield.h5" if path.is_dir() else path
+        file = path / NAME if path.is_dir() else path
         with _opened(file) as store:
             yield _read(file, store)
 

@@ -88,6 +88,22 @@ class Reflector:
         return table
 
 
+@dataclass(frozen=True)
+class Replaced(Reflector):
+    """A camera with other surfaces in the place of its mirrors.
+
+    Attributes:
+        surfaces: of what stands there, (m,).
+    """
+
+    surfaces: Surfaces
+
+    @property
+    def mirrors(self) -> Surfaces:
+        """The reflecting surfaces."""
+        return self.surfaces
+
+
 def reflectors(design: Design) -> tuple[Reflector, Reflector]:
     """Both cameras of a design with their mirrors."""
     a, b = (Reflector(half.camera, half.view, half.u, half.cells) for half in design.halves)

@@ -48,12 +48,12 @@ class Focus:
             )
 
 
-def pinholes(count_radius2: int = LATTICE_RADIUS2) -> Floats:
+def pinholes() -> Floats:
     """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them."""
-    reach = int(np.sqrt(count_radius2))
+    reach = int(np.sqrt(LATTICE_RADIUS2))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
-    inside = x**2 + y**2 <= count_radius2
-    places: Floats = np.stack([x[inside], y[inside]], axis=1) / np.sqrt(count_radius2)
+    inside = x**2 + y**2 <= LATTICE_RADIUS2
+    places: Floats = np.stack([x[inside], y[inside]], axis=1) / np.sqrt(LATTICE_RADIUS2)
     return places
 
 
@@ -78,19 +78,18 @@ def rays_through(
     return np.broadcast_to(start, way.shape), way
 
 
-def refocus(tiles: Tiles, view: View, focus: Focus, places: Floats | None = None) -> Picture:
-    """The picture of a lens, as the mean of what pinholes all over it see.
+def refocus(tiles: Tiles, view: View, focus: Focus) -> Picture:
+    """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
     Args:
         tiles: the light field.
         view: the middle of the lens, and the picture.
         focus: the lens.
-        places: of the pinholes on the unit disc, (n, 2); without, the paper's 69.
 
     Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
     the mean is of the others.
     """
-    points = (pinholes() if places is None else places) * focus.aperture_mm / 2
+    points = pinholes() * focus.aperture_mm / 2
     slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
     edge = [_meeting(tiles, view, focus, place) for place in _outermost(points)]
     corners = [np.concatenate(part) for part in zip(*(rays for rays, _ in edge), strict=True)]

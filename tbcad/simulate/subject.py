@@ -82,6 +82,13 @@ def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own")
     return made
 
 
+def chosen(
+    path: Path | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
+) -> Subject:
+    """The object of a file, as `load` reads it, or without one the built-in one."""
+    return load(path, capture_mm, fit, paint) if path else built_in(capture_mm)
+
+
 def built_in(capture_mm: float) -> Subject:
     """A trefoil knot with a hue that runs along it: it hides parts of itself from every side."""
     t, s = (np.linspace(0, 2 * np.pi, k, endpoint=False) for k in KNOT_FACETS)

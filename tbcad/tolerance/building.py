@@ -11,9 +11,9 @@ from tbcad.design.spec import Spec
 from tbcad.errors import InputError
 from tbcad.simulate.reflector import reflectors
 from tbcad.tolerance.draws import Errors
-from tbcad.tolerance.margin import margin, with_margin
+from tbcad.tolerance.margin import check_share, margin, with_margin
 from tbcad.tolerance.montecarlo import Task, simulate
-from tbcad.tolerance.nominal import nominal
+from tbcad.tolerance.nominal import nominals
 from tbcad.tolerance.process import Process, errors
 
 Floats = NDArray[np.float64]
@@ -38,8 +38,7 @@ def for_process(
     Raises:
         InputError: no margin is enough, or the radii do not follow a target.
     """
-    if not 0 < wanted < 1:
-        raise InputError(f"--yield {wanted:g}: allowed is above 0, below 1, like 0.99")
+    check_share(wanted)
     if spec.mirrors.radius_rule != "traced":
         raise InputError(
             f"--for-process sets mirrors.margin_mm, which radii of rule "
@@ -55,5 +54,5 @@ def for_process(
 
 
 def _worst(design: Design, errors: Errors) -> Floats:
-    a, b = (nominal(at) for at in reflectors(design))
-    return simulate(Task((a, b), errors, SEED), MACHINES, schedule.run).worst
+    task = Task(nominals(reflectors(design)), errors, SEED)
+    return simulate(task, MACHINES, schedule.run).worst

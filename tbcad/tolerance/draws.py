@@ -153,9 +153,13 @@ def _drawn(errors: Errors, kind: str, seed: int, number: int, shape: tuple[int, 
     error: Error = getattr(errors, kind)
     if error.spread == 0:
         return np.full(shape, error.mean)
-    stream = list(_shapes(0)).index(kind)
+    return error.of(generator(seed, number, list(_shapes(0)).index(kind)), *shape)
+
+
+def generator(seed: int, number: int, stream: int) -> np.random.Generator:
+    """The random numbers of one machine's one kind of error."""
     key = np.random.SeedSequence(seed, spawn_key=(number, stream))
-    return error.of(np.random.Generator(np.random.Philox(key)), *shape)
+    return np.random.Generator(np.random.Philox(key))
 
 
 def _half(both: dict[str, Floats], side: int) -> dict[str, Floats]:

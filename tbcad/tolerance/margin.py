@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tbcad.design.errors import SpecError
 from tbcad.design.mirrors import Design, design
 from tbcad.design.spec import Spec
+from tbcad.errors import InputError
 from tbcad.tolerance.draws import Errors
 from tbcad.tolerance.montecarlo import reached
 
@@ -36,6 +37,16 @@ class Margin:
     mm: float | None
     share: float
     reason: str = ""
+
+
+def check_share(wanted: float) -> None:
+    """Refuse a share of good machines that cannot be asked for.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not 0 < wanted < 1:
+        raise InputError(f"--yield {wanted:g}: allowed is above 0, below 1, like 0.99")
 
 
 def margin(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from math import sqrt
 from statistics import NormalDist
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,13 +108,17 @@ def simulate(task: Task, machines: int, each: Each = in_threads, first: int = 0)
 
     Args:
         task: what to make.
-        machines: how many.
+        machines: how many, at least one.
         each: makes batches of machines, in order: threads, processes or a cluster.
         first: number of the first machine.
     """
+    return joined(each(Work(task), batches(machines, first)))
+
+
+def batches(machines: int, first: int) -> list[range]:
+    """Numbers of so many machines, as they are made together."""
     last = first + machines
-    batches = [range(k, min(k + BATCH, last)) for k in range(first, last, BATCH)]
-    return joined(each(Work(task), batches))
+    return [range(k, min(k + BATCH, last)) for k in range(first, last, BATCH)]
 
 
 @dataclass(frozen=True)
@@ -134,12 +139,14 @@ class Work:
 
 
 Each = Callable[[Work, Sequence[range]], list[Result]]
+Seen = TypeVar("Seen", bound=Covered)
 
 
-def joined(results: Sequence[Result]) -> Result:
+def joined(results: Sequence[Seen]) -> Seen:
     """Results of machines in order as one; at least one is needed."""
-    names = [field.name for field in fields(Result)]
-    return Result(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
+    kind = type(results[0])
+    names = [field.name for field in fields(kind)]
+    return kind(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
 
 
 def reached(worst: Floats, share: float) -> float:

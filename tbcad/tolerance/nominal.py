@@ -53,6 +53,12 @@ def nominal(at: Reflector) -> Nominal:
     return Nominal(at.view, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
 
 
+def nominals(cameras: tuple[Reflector, Reflector]) -> tuple[Nominal, Nominal]:
+    """The same of both cameras."""
+    a, b = cameras
+    return nominal(a), nominal(b)
+
+
 def tables(half: Nominal, draws: Draws) -> Floats:
     """The surfaces of s machines before their shells are scaled and moved, (s, m + 2, 7).
 

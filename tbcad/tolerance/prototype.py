@@ -8,15 +8,11 @@ from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import in_threads
 from tbcad.tolerance.draws import Errors
-from tbcad.tolerance.montecarlo import Covered
+from tbcad.tolerance.montecarlo import Covered, batches, joined
 from tbcad.tolerance.prototype_draws import draw
 from tbcad.tolerance.prototype_windows import Designed, seen
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-# Machines that a worker makes in one go: few enough that all workers end together.
-BATCH = 10
 
 
 @dataclass(frozen=True)
@@ -82,9 +78,4 @@ def simulate(
         each: makes batches of machines, in order: threads, processes or a cluster.
         first: number of the first machine.
     """
-    last = first + machines
-    parts = each(work, [range(k, min(k + BATCH, last)) for k in range(first, last, BATCH)])
-    return PrototypeResult(
-        np.concatenate([part.coverage for part in parts]),
-        np.concatenate([part.offset for part in parts]),
-    )
+    return joined(each(work, batches(machines, first)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.tolerance.draws import Error, Errors
+from tbcad.tolerance.draws import Error, Errors, generator
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -95,6 +95,5 @@ def _drawn(
     drawn = np.full((len(numbers), *shape), error.mean)
     if error.spread != 0:
         for row, number in enumerate(numbers):
-            key = np.random.SeedSequence(seed, spawn_key=(number, stream))
-            drawn[row] = error.of(np.random.Generator(np.random.Philox(key)), *shape)
+            drawn[row] = error.of(generator(seed, number, stream), *shape)
     return drawn

@@ -15,11 +15,11 @@ from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.view import View
 from tbcad.simulate.capture import photograph
 from tbcad.simulate.lightfield import Frame, LightField, in_memory
-from tbcad.simulate.quality import likeness
 from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import Reflector
+from tbcad.simulate.reflector import Reflector, Replaced
 from tbcad.simulate.scene import Scene
-from tbcad.simulate.synthesis import Method, synthesise
+from tbcad.simulate.study.views import scores
+from tbcad.simulate.synthesis import Method
 from tbcad.simulate.tiles import Tiles
 from tbcad.tolerance.draws import Draws
 
@@ -85,34 +85,24 @@ def sharpness(
         progress: told how far it has come.
     """
     as_designed = _captured(cameras, scene, wanted.capture_mm)
-    scored = [_scores(as_designed, wanted, method)]
+    scored = [_ssim(as_designed, scene, wanted, method)]
     for k in range(len(machines[0])):
         progress(f"machine {k + 1} of {len(machines[0])}")
         made = tuple(actual(at, draws, k) for at, draws in zip(cameras, machines, strict=True))
         taken = _captured((made[0], made[1]), scene, wanted.capture_mm)
-        scored.append(_scores(_with_rays(taken, as_designed), wanted, method))
+        scored.append(_ssim(_with_rays(taken, as_designed), scene, wanted, method))
         known = _left_over(taken, left, (seed, k))
-        scored.append(_scores(known, wanted, method))
+        scored.append(_ssim(known, scene, wanted, method))
     table = np.array(scored)
     return Sharpness(table[0], table[1::2], table[2::2])
 
 
 @dataclass(frozen=True)
-class AsMade(Reflector):
+class AsMade(Replaced):
     """A camera and its mirrors, where they have come to be.
 
     The cells are those of the design: they only say where in the picture a mirror may be.
-
-    Attributes:
-        surfaces: of the mirrors, (m,).
     """
-
-    surfaces: Surfaces
-
-    @property
-    def mirrors(self) -> Surfaces:
-        """The reflecting surfaces."""
-        return self.surfaces
 
     def boxes(self) -> Ints:
         """Columns and rows about each cell, wider by its own size on all sides, (m, 4)."""
@@ -191,9 +181,7 @@ def _turned(frame: Frame, left: float, generator: np.random.Generator) -> dict[s
     return {**frame.planes, "direction": unit.astype(np.float32)}
 
 
-def _scores(source: LightField, wanted: Wanted, method: Method) -> list[float]:
-    tiles = Tiles(source)
-    return [
-        likeness(truth, synthesise(tiles, view, method).image).ssim
-        for view, truth in zip(wanted.views, wanted.truths, strict=True)
-    ]
+def _ssim(source: LightField, scene: Scene, wanted: Wanted, method: Method) -> Floats:
+    """SSIM of each view, (v,)."""
+    found = scores(Tiles(source), scene, wanted.views, wanted.truths, method, lambda _: None)
+    return found[:, 1]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.vectors import unit
-from tbcad.simulate.capture import BAND_ROWS, CENTRE, Band, Shift, Tracer, shifts
+from tbcad.simulate.capture import CENTRE, Band, Shift, Tracer, row_bands, shifts
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.lightfield import LightField, in_memory
 from tbcad.simulate.prototype.photograph import resampled
@@ -130,7 +130,7 @@ def merge(
     photographs = resample == "photograph"
     picture = _resampled(ready, scene, samples, progress) if photographs else None
     work = partial(_band, ready, scene, samples, picture)
-    every = _bands(run)
+    every = row_bands(run.at.view.height_px)
     for first in range(0, len(every), 2 * THREADS):
         progress(f"row {every[first].start} of {run.at.view.height_px}")
         yield from in_threads(work, every[first : first + 2 * THREADS])
@@ -160,14 +160,11 @@ def _object_box(run: Run, scene: Scene) -> Ints:
     return np.asarray(ends.T.ravel(), dtype=np.int64)
 
 
-def _bands(run: Run) -> list[range]:
-    height = run.at.view.height_px
-    return [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
-
-
 def _resampled(ready: Merging, scene: Scene, samples: int, progress: Progress) -> Bytes:
     """The merged picture (h, w, 3), stop after stop."""
-    mirror = np.concatenate(in_threads(partial(_mirrors, ready), _bands(ready.run)))
+    mirror = np.concatenate(
+        in_threads(partial(_mirrors, ready), row_bands(ready.run.at.view.height_px))
+    )
     picture = np.zeros((*mirror.shape, 3), dtype=np.uint8)
     work = partial(_fill, ready, scene, samples, mirror, picture)
     for first in range(0, len(ready.run), 4 * THREADS):

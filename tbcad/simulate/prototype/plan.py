@@ -10,12 +10,12 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
 from tbcad.optics.vectors import norm
 from tbcad.optics.windows import rotated
-from tbcad.simulate.exported import Exported
+from tbcad.simulate.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,30 +23,22 @@ Model = TypeVar("Model")
 
 RECORD, PLAN = "prototype.json", "rotation_plan.csv"
 LARGEST_FILE = 100_000_000  # bytes; n = 60 takes 2 million
-AGAIN = "build it again with tbcad build"
-# Of unit vectors, and of lengths in mm, after rounding in a text file.
-ROUNDING = 1e-9
+# Of lengths in mm after rounding in a text file.
 ROUNDING_MM = 1e-6
 ERROR_DEG = 1e-6
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 """Factors that turn points and vectors by 180 degrees about z."""
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=1e6)]
-Vector = tuple[Number, Number, Number]
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore")
-
-
-class _Frame(_Record):
+class _Frame(Record):
     axis: Vector
     zero: Vector
     third: Vector
 
 
-class _Ball(_Record):
+class _Ball(Record):
     number: int
     radius_mm: Length
     body_radius_mm: Length
@@ -64,7 +56,7 @@ class _Ball(_Record):
     bz: Number
 
 
-class _Document(_Record):
+class _Document(Record):
     schema_name: Literal["tbcad-prototype/1"] = Field(alias="schema")
     camera: Literal["a"]
     picture: Literal["moved", "fixed"]
@@ -72,7 +64,7 @@ class _Document(_Record):
     balls: list[_Ball] = Field(min_length=1)
 
 
-class _Picture(_Record):
+class _Picture(Record):
     object_turn_deg: Number
     stop: int = Field(ge=1, le=1_000_000)
     base_angle_deg: float = Field(ge=-360, le=360)

@@ -18,7 +18,7 @@ from tbcad.optics.vectors import norm, unit
 from tbcad.optics.view import View
 from tbcad.optics.windows import rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.reflector import Reflector
+from tbcad.simulate.reflector import Reflector, Replaced
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -55,34 +55,19 @@ class Run:
         return len(self.balls)
 
 
-@dataclass(frozen=True)
-class StandIns(Reflector):
-    """The shell's camera and cells, with balls for mirrors, as a light field records them.
-
-    `u` are the directions of the balls: where the virtual cameras really were.
-
-    Attributes:
-        balls: that stood in, where they stood, (m,).
-    """
-
-    balls: Surfaces
-
-    @property
-    def mirrors(self) -> Surfaces:
-        """The reflecting surfaces."""
-        return self.balls
-
-
 def runs(reflectors: tuple[Reflector, Reflector], plan: Plan) -> tuple[Run, Run]:
     """Both runs: that for camera a's mirrors, and that for camera b's, the object turned."""
     a, b = reflectors
     return _run(a, a.view, plan, 0, np.ones(3)), _run(b, a.view, plan, 1, HALF_TURN)
 
 
-def stand_ins(run: Run) -> StandIns:
-    """What a light field records of the camera and mirrors of a run."""
+def stand_ins(run: Run) -> Replaced:
+    """What a light field records of a run: the shell's camera and cells, with balls for mirrors.
+
+    `u` are the directions of the balls: where the virtual cameras really were.
+    """
     at = run.at
-    return StandIns(at.camera, at.view, unit(run.stands.apex), at.cells, run.stands)
+    return Replaced(at.camera, at.view, unit(run.stands.apex), at.cells, run.stands)
 
 
 def _run(at: Reflector, view: View, plan: Plan, half: int, turn: Floats) -> Run:

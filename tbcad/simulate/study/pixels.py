@@ -10,7 +10,7 @@ from tbcad.design.mirrors import Half
 from tbcad.errors import InputError
 from tbcad.optics.vectors import dot, norm
 from tbcad.optics.view import turned_to
-from tbcad.simulate.capture import BAND_ROWS, CENTRE
+from tbcad.simulate.capture import CENTRE, row_bands
 from tbcad.simulate.rays import exact
 from tbcad.simulate.reflector import Reflector
 
@@ -114,8 +114,8 @@ def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
     """Rays on each mirror and those that go on to the capture sphere, each (m,)."""
     trace, height, m = exact(at), at.view.height_px, len(at)
     on, seen = np.zeros(m + 1), np.zeros(m + 1)
-    for first in range(0, height, BAND_ROWS):
-        rays = trace(range(first, min(first + BAND_ROWS, height)), CENTRE)
+    for rows in row_bands(height):
+        rays = trace(rows, CENTRE)
         there = rays.mirror != 0
         mirror, origin, way = rays.mirror[there], rays.origin[there], rays.direction[there]
         meets = (norm(np.cross(origin, way)) <= radius) & (dot(origin, way) < 0)

@@ -10,7 +10,7 @@ from scipy.stats import linregress
 
 from tbcad.design.spec import Spec
 from tbcad.simulate.capture import photograph
-from tbcad.simulate.lightfield import LightField, write, writing
+from tbcad.simulate.lightfield import NAME, LightField, write, writing
 from tbcad.simulate.rays import exact
 from tbcad.simulate.reflector import reflectors
 from tbcad.simulate.scene import Scene, scene_of
@@ -116,7 +116,7 @@ def _rows(
     views = places.views(spec.optics.capture_diameter_mm)
     # A light field of the largest sensor is larger than memory should be: it goes to a file.
     with tempfile.TemporaryDirectory(prefix="tbcad-study-") as folder:
-        file = Path(folder) / "lightfield.h5"
+        file = Path(folder) / NAME
         with writing(file, spec.optics.capture_diameter_mm, {}) as store:
             for at in reflectors(tried.made):
                 write(store, at, photograph(at.view, exact(at), scene, 1, progress))
