@@ -1,15 +1,12 @@
 """A small camera with all kinds of mirrors, an object, and the light field of it."""
 
-import json
 from pathlib import Path
 
 import pytest
 
 from tbcad.design.mirrors import Design, design
-from tbcad.design.prototype import Prototype, pictures, prototype
+from tbcad.design.prototype import Prototype, prototype
 from tbcad.design.spec import load_spec
-from tbcad.export.balls import rows as ball_rows
-from tbcad.export.plan import rows, write_plan
 from tbcad.export.tables import write_record
 from tbcad.simulate.capture import photograph
 from tbcad.simulate.exported import Exported, read_export
@@ -18,6 +15,7 @@ from tbcad.simulate.rays import exact
 from tbcad.simulate.reflector import Reflector, reflectors
 from tbcad.simulate.scene import Scene, scene_of
 from tbcad.simulate.subject import built_in
+from tests.prototypes import write_export
 
 OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
 CAPTURE_MM = 60.0
@@ -65,17 +63,4 @@ def made(little: Design) -> Prototype:
 
 @pytest.fixture(scope="session")
 def written(made: Prototype, little: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the simulation needs of an export with its prototype, by the export's own writers."""
-    folder = tmp_path_factory.mktemp("export")
-    write_record(folder, little, shells=False)
-    write_plan(folder / "rotation_plan.csv", rows(pictures(made)))
-    axis, zero, third = made.half.ellipsoid.frame().tolist()
-    document = {
-        "schema": "tbcad-prototype/1",
-        "camera": "a",
-        "picture": little.spec.prototype.picture,
-        "frame": {"axis": axis, "zero": zero, "third": third},
-        "balls": ball_rows(made),
-    }
-    (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
-    return folder
+    return write_export(tmp_path_factory.mktemp("export"), little, made)

@@ -29,6 +29,7 @@ from tbcad.simulate.rays import exact
 from tbcad.simulate.reflector import Reflector, pixels_of
 from tbcad.simulate.scene import Scene, scene_of
 from tbcad.simulate.subject import built_in
+from tests.prototypes import plan_of
 from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 
 SPEC = load_spec(None, OPTIONS)
@@ -49,24 +50,6 @@ def scene(knot: Scene) -> Scene:
 @pytest.fixture(scope="module")
 def merged(both: Both, scene: Scene) -> LightField:
     return light_field(both, scene, CAPTURE_MM)
-
-
-def plan_of(made: Prototype) -> Plan:
-    """The plan without the way through files."""
-    ball, stop = made.fit.ball, made.stops.stop
-    back = np.argsort(made.twin)
-    return Plan(
-        frame=made.half.ellipsoid.frame(),
-        apex=made.apices(),
-        normal=made.normals(),
-        radius=made.balls.radius,
-        body_centre=made.body_centres(),
-        body_radius=made.balls.body_radius,
-        moved=True,
-        angle=made.stops.angle,
-        ball=np.stack([ball, ball[back]]),
-        stop=np.stack([stop, stop[back]]),
-    )
 
 
 def ideal(made: Prototype, angle: float) -> Plan:

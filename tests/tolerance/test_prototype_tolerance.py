@@ -20,6 +20,7 @@ from tbcad.tolerance.prototype import PrototypeResult, PrototypeWork, simulate
 from tbcad.tolerance.prototype_draws import PrototypeDraws, draw
 from tbcad.tolerance.prototype_rays import highlights
 from tbcad.tolerance.prototype_windows import Designed, designed, seen
+from tests.prototypes import plan_of
 
 OPTIONS = ["n=6", "prototype.k=5"]
 SPREAD = {
@@ -52,19 +53,7 @@ def made(little: Design) -> Prototype:
 
 @pytest.fixture(scope="module")
 def plan(made: Prototype) -> Plan:
-    ball, stop, back = made.fit.ball, made.stops.stop, np.argsort(made.twin)
-    return Plan(
-        frame=made.half.ellipsoid.frame(),
-        apex=made.apices(),
-        normal=made.normals(),
-        radius=made.balls.radius,
-        body_centre=made.body_centres(),
-        body_radius=made.balls.body_radius,
-        moved=True,
-        angle=made.stops.angle,
-        ball=np.stack([ball, ball[back]]),
-        stop=np.stack([stop, stop[back]]),
-    )
+    return plan_of(made)
 
 
 @pytest.fixture(scope="module")

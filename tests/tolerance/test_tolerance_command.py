@@ -11,11 +11,10 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.design.mirrors import Design, design
-from tbcad.design.prototype import pictures, prototype
+from tbcad.design.prototype import prototype
 from tbcad.design.spec import load_spec
-from tbcad.export.balls import rows as ball_rows
-from tbcad.export.plan import rows, write_plan
 from tbcad.export.tables import write_record
+from tests.prototypes import write_export
 
 SMALL = ["camera.width_px=208", "camera.height_px=155"]
 FILES = {
@@ -54,17 +53,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
     little = exported(folder, "n=6", "prototype.k=5")
     made = prototype(little.spec, little)
-    write_plan(folder / "rotation_plan.csv", rows(pictures(made)))
-    axis, zero, third = made.half.ellipsoid.frame().tolist()
-    record = {
-        "schema": "tbcad-prototype/1",
-        "camera": "a",
-        "picture": little.spec.prototype.picture,
-        "frame": {"axis": axis, "zero": zero, "third": third},
-        "balls": ball_rows(made),
-    }
-    (folder / "prototype.json").write_text(json.dumps(record), encoding="utf-8")
-    return folder
+    return write_export(folder, little, made)
 
 
 @pytest.fixture(scope="module")
