@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from tbcad.optics.view import View
+from tbcad.optics.camera import View
 from tbcad.simulate.compiled import THREADS
-from tbcad.simulate.reflector import Reflector
-from tbcad.simulate.scene import LAMP_LIGHT, LAMPS, SKY_LIGHT
-from tbcad.simulate.subject import GREY, Subject
+from tbcad.simulate.scene.object import GREY, Subject
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT
 
 Floats = NDArray[np.float64]
 

@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from timing import Figure, Row, Spent, Work, at_least, at_most, spent_in_turns, told
 
-from tbcad.optics.view import View
-from tbcad.simulate.capture import photograph
+from tbcad.optics.camera import View
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.compiled import THREADS
-from tbcad.simulate.exported import read_export
-from tbcad.simulate.lightfield import LightField
-from tbcad.simulate.pictures import write_stills
-from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import Reflector
-from tbcad.simulate.refocus import Focus, pinholes, refocus
-from tbcad.simulate.scene import Scene, scene_of
-from tbcad.simulate.slab import Slab, slab_along
-from tbcad.simulate.subject import GREY, Subject, built_in, load
-from tbcad.simulate.synthesis import synthesise
-from tbcad.simulate.tiles import Tiles
-from tbcad.simulate.viewpoint import directions, viewpoint
+from tbcad.simulate.picture_files import write_stills
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.object import GREY, Subject, built_in, load
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.shading import Scene, scene_of
+from tbcad.simulate.scene.viewpoint import directions, viewpoint
+from tbcad.simulate.views.refocus import Focus, pinholes, refocus
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.tiles import Tiles
+from tbcad.simulate.views.two_plane import Slab, slab_along
 
 Floats = NDArray[np.float64]
 Cameras = Sequence[Reflector]

@@ -13,12 +13,12 @@ from OCP.gp import gp_Pnt
 from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, told
 
-from tbcad.design.body import body
-from tbcad.design.mirrors import Design, Half, design, directions
-from tbcad.design.spec import load_spec
-from tbcad.model.shell import Solid, shell
+from tbcad.mirrors.array import Design, Half, design, directions
 from tbcad.optics.cells import cells_of
-from tbcad.optics.triangulation import bounded
+from tbcad.optics.power_diagram import bounded
+from tbcad.shell.envelope import body
+from tbcad.shell.solid import Solid, shell
+from tbcad.spec.design import load_spec
 
 Floats = NDArray[np.float64]
 

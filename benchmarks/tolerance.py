@@ -7,30 +7,30 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from tbcad_verify import coverage as proof
-from tbcad_verify.bench import set_up
-from tbcad_verify.files import read
-from tbcad_verify.mesh import merge
-from tbcad_verify.record import Export
-from tbcad_verify.record import read_export as read_record
-from tbcad_verify.recover import recover
-from tbcad_verify.stl import parse
+from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.files import read
+from tbcad_verify.record.record import Export
+from tbcad_verify.record.record import read_export as read_record
+from tbcad_verify.shell import coverage as proof
+from tbcad_verify.shell.optics import set_up
+from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, told
 
-from tbcad.design.mirrors import Design, Half, design
-from tbcad.design.spec import load_spec
-from tbcad.export.manifest import write_manifest
-from tbcad.export.shells import closing, distances
-from tbcad.export.stl import write_stl
-from tbcad.export.tables import write_record
-from tbcad.model.mesh import mesh
+from tbcad.formats.stl import write_stl
+from tbcad.mirrors.array import Design, Half, design
+from tbcad.mirrors.record import write_record
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.reflector import reflectors
-from tbcad.tolerance.coverage import coverage
-from tbcad.tolerance.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo import Task, simulate
-from tbcad.tolerance.nominal import Nominal, nominal
+from tbcad.output.manifest import write_manifest
+from tbcad.shell.files import closing, distances
+from tbcad.shell.mesh import mesh
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.design import load_spec
+from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.coverage import coverage
+from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
 
 COUNTS = (100, 300, 1000)
 MESHED = 10

@@ -10,11 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tbcad_verify import light
-from tbcad_verify.bench import Bench, pinhole_of, set_up
-from tbcad_verify.files import read
-from tbcad_verify.mesh import merge
-from tbcad_verify.rays import (
+from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.rays import (
     THREADS,
     Scene,
     first_hits,
@@ -23,9 +20,12 @@ from tbcad_verify.rays import (
     reach,
     row_chunks,
 )
-from tbcad_verify.record import Camera, read_export
-from tbcad_verify.recover import recover
-from tbcad_verify.stl import parse
+from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.files import read
+from tbcad_verify.record.record import Camera, read_export
+from tbcad_verify.shell import light
+from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
+from tbcad_verify.shell.recover import recover
 from timing import Row, at_least, in_turns, told
 
 Singles = NDArray[np.float32]

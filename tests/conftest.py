@@ -2,9 +2,9 @@
 
 import pytest
 
-from tbcad.design.body import Body, body
-from tbcad.design.mirrors import Design, Half, design
-from tbcad.design.spec import load_spec
+from tbcad.mirrors.array import Design, Half, design
+from tbcad.shell.envelope import Body, body
+from tbcad.spec.design import load_spec
 
 
 @pytest.fixture(scope="session")

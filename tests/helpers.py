@@ -17,11 +17,11 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from tbcad.design.body import Body, body
-from tbcad.design.mirrors import Design, Half
-from tbcad.export.shells import distances
-from tbcad.model.mesh import Mesh, mesh
-from tbcad.model.shell import Solid, shell
+from tbcad.mirrors.array import Design, Half
+from tbcad.shell.envelope import Body, body
+from tbcad.shell.files import distances
+from tbcad.shell.mesh import Mesh, mesh
+from tbcad.shell.solid import Solid, shell
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.design.errors import allowed, fields, section_of
-from tbcad.design.mirrors import design
-from tbcad.design.spec import Spec, load_spec
+from tbcad.mirrors.array import design
+from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.errors import allowed, fields, section_of
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 PAPER = DESIGNS / "turtleback.toml"

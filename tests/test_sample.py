@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tbcad_verify.proof import verify
+from tbcad_verify.run.verify import verify
 
-from tbcad.design.mirrors import design
-from tbcad.design.spec import load_spec
-from tbcad.export.tables import COLUMNS, rows
+from tbcad.mirrors.array import design
+from tbcad.mirrors.record import COLUMNS, rows
+from tbcad.spec.design import load_spec
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "docs" / "sample"

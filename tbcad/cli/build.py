@@ -12,10 +12,10 @@ from tbcad.errors import InputError
 from tbcad.screen import Stages, stages
 
 if TYPE_CHECKING:
-    from tbcad_verify.proof import Wishes
-    from tbcad_verify.report import Report
+    from tbcad_verify.report.report import Report
+    from tbcad_verify.run.verify import Wishes
 
-    from tbcad.design.spec import Spec
+    from tbcad.spec.design import Spec
 
 # With mirrors and manifest; both together take a stage for the shells, which are built beside.
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
@@ -87,9 +87,9 @@ def build(
     Exit code 0: built and proved. 1: built, but the proof fails (the files stay). 2: bad input,
     nothing written.
     """
-    from tbcad.design.spec import load_spec
-    from tbcad.export.choice import default_parts, parse_parts
-    from tbcad.export.folder import check_target
+    from tbcad.output.folder import check_target
+    from tbcad.output.parts import default_parts, parse_parts
+    from tbcad.spec.design import load_spec
 
     asked = parse_parts(parts) if parts is not None else None
     options = list(settings or [])
@@ -113,8 +113,8 @@ def build(
 
 
 def _margined(spec: "Spec", name: str, wanted: float, told: Stages) -> "Spec":
-    from tbcad.tolerance.building import for_process
-    from tbcad.tolerance.process import load_process
+    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerance.process_design import for_process
 
     told.stage(f"margin for {name}")
     return for_process(spec, load_process(name), wanted, told.detail)
@@ -124,9 +124,9 @@ def _built(
     spec: "Spec", out: Path, parts: tuple[str, ...], force: bool, verify: bool, told: Stages
 ) -> "Report | None":
     """The stages of a build; the proof reads the files back before they replace the old ones."""
-    from tbcad.design.mirrors import design
-    from tbcad.export.everything import export
-    from tbcad.export.folder import replacing
+    from tbcad.mirrors.array import design
+    from tbcad.output.build import export
+    from tbcad.output.folder import replacing
 
     told.stage("mirrors: radii and cells")
     made = design(spec, told.detail)
@@ -161,7 +161,7 @@ def verify_command(
 
     Exit code 0: proved. 1: the proof fails. 2: not an export, or a broken one.
     """
-    from tbcad_verify.proof import Wishes
+    from tbcad_verify.run.verify import Wishes
 
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
@@ -175,7 +175,7 @@ def verify_command(
 def _prove(folder: Path, told: Stages, wishes: "Wishes | None" = None) -> "Report":
     """The proof knows nothing of tbcad; its own refusals become ours."""
     from tbcad_verify.errors import BadExport
-    from tbcad_verify.proof import Wishes, verify
+    from tbcad_verify.run.verify import Wishes, verify
 
     try:
         return verify(folder, lambda text: told.stage(f"proof: {text}"), wishes or Wishes())

@@ -25,11 +25,11 @@ from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.optics.view import View
-    from tbcad.simulate.geometry import Geometry
-    from tbcad.simulate.lightfield import LightField
-    from tbcad.simulate.pictures import Bytes
-    from tbcad.simulate.scene import Scene
+    from tbcad.optics.camera import View
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.source import Geometry
+    from tbcad.simulate.picture_files import Bytes
+    from tbcad.simulate.scene.shading import Scene
 
 MOST_SAMPLES = 8
 WIDEST_DEG = 170
@@ -76,13 +76,13 @@ def capture(
     Writes both pictures at the sensors' full size, and the light field: the ray, colour and mirror
     of every pixel.
     """
-    from tbcad.export.folder import check_target, replacing
-    from tbcad.export.manifest import write_manifest
-    from tbcad.simulate.captured import write_capture
-    from tbcad.simulate.exported import read_export
-    from tbcad.simulate.geometry import cameras
-    from tbcad.simulate.scene import scene_of
-    from tbcad.simulate.subject import chosen
+    from tbcad.output.folder import check_target, replacing
+    from tbcad.output.manifest import write_manifest
+    from tbcad.simulate.capture.files import write_capture
+    from tbcad.simulate.capture.source import cameras
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import chosen
+    from tbcad.simulate.scene.shading import scene_of
 
     geometry = _geometry(mesh, prototype)
     check_target(out, force)
@@ -140,12 +140,12 @@ def view(
     Beside it, where the capture was simulated: the ray-traced truth, both next to each other, and
     how like they are.
     """
-    from tbcad.simulate.lightfield import LightField
-    from tbcad.simulate.pictures import check_place
-    from tbcad.simulate.scene import depth_of
-    from tbcad.simulate.synthesis import synthesise
-    from tbcad.simulate.tiles import Tiles
-    from tbcad.simulate.truth import pinhole_picture, whole
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.picture_files import check_place
+    from tbcad.simulate.scene.ground_truth import pinhole_picture, whole
+    from tbcad.simulate.scene.shading import depth_of
+    from tbcad.simulate.views.synthesis import synthesise
+    from tbcad.simulate.views.tiles import Tiles
 
     check_place(out)
     with stages(3) as told, LightField.open(capture_folder) as source:
@@ -193,12 +193,12 @@ def refocus(
 
     Beside it, where the capture was simulated: what a real lens would show.
     """
-    from tbcad.simulate.lightfield import LightField
-    from tbcad.simulate.pictures import ANIMATED, check_place, write_animation
-    from tbcad.simulate.refocus import Focus, refocus_sweep
-    from tbcad.simulate.refocus import refocus as refocused
-    from tbcad.simulate.tiles import Tiles
-    from tbcad.simulate.truth import lens_picture, whole
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.picture_files import ANIMATED, check_place, write_animation
+    from tbcad.simulate.scene.ground_truth import lens_picture, whole
+    from tbcad.simulate.views.refocus import Focus, refocus_sweep
+    from tbcad.simulate.views.refocus import refocus as refocused
+    from tbcad.simulate.views.tiles import Tiles
 
     check_place(out)
     if sweep is not None:
@@ -232,7 +232,7 @@ def _viewpoint(
 ) -> "View":
     from math import radians
 
-    from tbcad.simulate.viewpoint import viewpoint
+    from tbcad.simulate.scene.viewpoint import viewpoint
 
     azimuth, elevation, distance = place
     if fov is not None and not 0 < fov < WIDEST_DEG:
@@ -243,8 +243,8 @@ def _viewpoint(
 
 def _scene(folder: Path) -> "Scene | None":
     """The object of a simulated capture; None where there is none, as with real photographs."""
-    from tbcad.simulate.captured import OBJECT, read_object
-    from tbcad.simulate.scene import scene_of
+    from tbcad.simulate.capture.files import OBJECT, read_object
+    from tbcad.simulate.scene.shading import scene_of
 
     if not (folder / OBJECT).is_file():
         return None
@@ -253,7 +253,7 @@ def _scene(folder: Path) -> "Scene | None":
 
 def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]) -> None:
     """Write the picture, and beside it the truth where it is known; say how like they are."""
-    from tbcad.simulate.pictures import beside, difference, write_stills
+    from tbcad.simulate.picture_files import beside, difference, write_stills
     from tbcad.simulate.quality import likeness
 
     if truth is None:

@@ -20,8 +20,8 @@ from tbcad.cli.options import (
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.design.spec import Spec
     from tbcad.simulate.study.record import Study
+    from tbcad.spec.design import Spec
 
 PIPED_WIDTH = 160
 
@@ -146,11 +146,11 @@ def ssim_command(
     distance: Distance = 640.0,
 ) -> int:
     """Compare views with the truth, sensor by sensor, each with its own n (Fig. 9)."""
+    from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.study.pixels import sensor_of
     from tbcad.simulate.study.resolution import default_sensors
     from tbcad.simulate.study.ssim import ssim
     from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
-    from tbcad.simulate.subject import chosen
 
     given = tuple(sensor_of(text) for text in dict.fromkeys(sensors or ()))
     places = round_of(ELEVATIONS_DEG, azimuths, distance)
@@ -183,10 +183,10 @@ def prototype_command(
     ] = 3,
 ) -> int:
     """Compare views out of the prototype's merged pictures with those of the full shell."""
-    from tbcad.simulate.exported import read_export
-    from tbcad.simulate.study.stand_in import stand_in
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import chosen
+    from tbcad.simulate.study.prototype_vs_shell import stand_in
     from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
-    from tbcad.simulate.subject import chosen
 
     places = round_of(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
@@ -201,7 +201,7 @@ def _run(
     work: "Callable[[Spec, Callable[[str], None]], Study]",
 ) -> int:
     """Do a study of a design."""
-    from tbcad.design.spec import load_spec
+    from tbcad.spec.design import load_spec
 
     spec = load_spec(design, list(settings or []))
     return _done(out, lambda told: work(spec, told))

@@ -44,12 +44,12 @@ def tolerance(
 
     Writes tolerance.json, tables, notes and plots.
     """
-    from tbcad.simulate.exported import read_export
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.study.record import check_target, write
-    from tbcad.simulate.subject import chosen
     from tbcad.tolerance.analysis import Wishes, analyse
-    from tbcad.tolerance.answer import json_text, study, words
-    from tbcad.tolerance.process import load_process
+    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerance.report import json_text, study, words
 
     wishes = Wishes(machines, seed, wanted, calibrated_mrad / 1000, scheduler).checked()
     made_by = load_process(process, list(settings or []))

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from tbcad.geometry.vectors import MIRROR, dot, norm, unit
+from tbcad.optics.power_diagram import Boundary, half_edges, radical_planes, settle
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.triangulation import Boundary, half_edges, radical_planes, settle
-from tbcad.optics.vectors import MIRROR, dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad.optics.ellipsoid import Ellipsoid
-from tbcad.optics.vectors import dot, unit
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.vectors import dot, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.vectors import norm, unit
+from tbcad.geometry.vectors import norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.vectors import MIRROR, dot
+from tbcad.geometry.vectors import MIRROR, dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Cells
-from tbcad.optics.vectors import dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import dot, unit
+from tbcad.optics.ball_light import miss_off_balls
 from tbcad.optics.cells import Cells
-from tbcad.optics.light import miss_off_balls
 from tbcad.optics.trace import counted_sides
-from tbcad.optics.vectors import dot, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

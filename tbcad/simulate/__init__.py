@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tbcad.simulate.lightfield import LightField
+    from tbcad.simulate.capture.light_field import LightField
 
 __all__ = ["LightField"]
 
@@ -11,7 +11,7 @@ __all__ = ["LightField"]
 def __getattr__(name: str) -> object:
     """Give the reader of light fields, whose libraries take a second to load, when it is wanted."""
     if name == "LightField":
-        from tbcad.simulate.lightfield import LightField
+        from tbcad.simulate.capture.light_field import LightField
 
         return LightField
     raise AttributeError(f"module {__name__} has no {name}")

@@ -11,23 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad import schedule
-from tbcad.design.mirrors import Design
 from tbcad.errors import InputError
-from tbcad.simulate.exported import Exported
+from tbcad.mirrors.array import Design
 from tbcad.simulate.prototype.plan import read_plan
-from tbcad.simulate.reflector import Reflector, reflectors
-from tbcad.simulate.scene import scene_of
+from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.shading import scene_of
 from tbcad.simulate.study.views import round_of, truths
-from tbcad.simulate.subject import Subject
-from tbcad.tolerance import prototype
-from tbcad.tolerance.draws import Errors, draw
 from tbcad.tolerance.margin import Margin, check_share, margin
-from tbcad.tolerance.montecarlo import Result, Task, Yield, simulate, yielded
-from tbcad.tolerance.nominal import Nominal, nominals
-from tbcad.tolerance.process import BUILT_IN, Process, errors, load_process
-from tbcad.tolerance.prototype_windows import designed
-from tbcad.tolerance.sensitivity import Alone, alone, kinds
-from tbcad.tolerance.sharpness import Sharpness, Wanted, sharpness
+from tbcad.tolerance.montecarlo.builds import Result, Task, Yield, simulate, yielded
+from tbcad.tolerance.montecarlo.draws import Errors, draw
+from tbcad.tolerance.montecarlo.edge_model import Nominal, nominals
+from tbcad.tolerance.montecarlo.sensitivity import Alone, alone, kinds
+from tbcad.tolerance.montecarlo.sharpness import Sharpness, Wanted, sharpness
+from tbcad.tolerance.process.process import BUILT_IN, Process, errors, load_process
+from tbcad.tolerance.prototype import builds
+from tbcad.tolerance.prototype.windows import designed
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -103,8 +103,8 @@ class Stands:
         known: the same machines, calibrated: windows are where the balls really are.
     """
 
-    plain: prototype.PrototypeResult
-    known: prototype.PrototypeResult
+    plain: builds.PrototypeResult
+    known: builds.PrototypeResult
 
 
 @dataclass(frozen=True)
@@ -259,8 +259,8 @@ def _sharpness(
 def _stands(export: Exported, made: Errors, wishes: Wishes, each: Any) -> Stands:
     at = designed(export.reflectors, read_plan(export))
     plain, known = (
-        prototype.simulate(
-            prototype.PrototypeWork(at, made, wishes.seed, calibrated), wishes.machines, each
+        builds.simulate(
+            builds.PrototypeWork(at, made, wishes.seed, calibrated), wishes.machines, each
         )
         for calibrated in (False, True)
     )

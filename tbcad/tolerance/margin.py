@@ -7,12 +7,12 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.errors import SpecError
-from tbcad.design.mirrors import Design, design
-from tbcad.design.spec import Spec
 from tbcad.errors import InputError
-from tbcad.tolerance.draws import Errors
-from tbcad.tolerance.montecarlo import reached
+from tbcad.mirrors.array import Design, design
+from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
+from tbcad.tolerance.montecarlo.builds import reached
+from tbcad.tolerance.montecarlo.draws import Errors
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]

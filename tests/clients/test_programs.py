@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tbcad_verify.checks import Check
-from tbcad_verify.child import Limits
 from tbcad_verify.programs import Wanted, admesh, client_checks, freecad, gmsh, is_skipped, prusa
-from tbcad_verify.programs.errand import on_path, room
+from tbcad_verify.programs.program_query import on_path, room
+from tbcad_verify.report.checks import Check
+from tbcad_verify.run.child import Limits
 
 from tbcad.cli import run
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tbcad.design.errors import SpecError
-from tbcad.design.mirrors import Half, design
-from tbcad.design.spec import load_spec
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.mirrors.array import Half, design
 from tbcad.optics.cells import Cells, areas, cells_of
+from tbcad.optics.power_diagram import bounded, covered
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.optics.triangulation import bounded, covered
-from tbcad.optics.vectors import dot, norm, unit
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
 
 
 def first_hit(surfaces: Surfaces, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

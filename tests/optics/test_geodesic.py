@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from tbcad.geometry.vectors import norm
 from tbcad.optics.geodesic import geodesic, icosahedron, prime_factors
-from tbcad.optics.vectors import norm
 
 
 def test_icosahedron_is_regular_and_z_is_a_two_fold_axis() -> None:

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from tbcad.design.mirrors import Half, design
-from tbcad.design.spec import load_spec
+from tbcad.geometry.vectors import norm, unit
+from tbcad.mirrors.array import Half, design
 from tbcad.optics.cells import Cells
 from tbcad.optics.trace import coverage, miss_distances, reflected
-from tbcad.optics.vectors import norm, unit
+from tbcad.spec.design import load_spec
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 

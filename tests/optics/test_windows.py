@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tbcad.design.mirrors import Half
-from tbcad.optics.light import miss_off_balls
+from tbcad.geometry.vectors import unit
+from tbcad.mirrors.array import Half
+from tbcad.optics.ball_light import miss_off_balls
 from tbcad.optics.trace import coverage
-from tbcad.optics.vectors import unit
 from tbcad.optics.windows import Pieces, Windows, rotated, windows
 
 

@@ -4,18 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.design.mirrors import Design, design
-from tbcad.design.prototype import Prototype, prototype
-from tbcad.design.spec import load_spec
-from tbcad.export.tables import write_record
-from tbcad.simulate.capture import photograph
-from tbcad.simulate.exported import Exported, read_export
-from tbcad.simulate.lightfield import LightField, in_memory
-from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import Reflector, reflectors
-from tbcad.simulate.scene import Scene, scene_of
-from tbcad.simulate.subject import built_in
-from tests.prototypes import write_export
+from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.record import write_record
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.simulate.capture.light_field import LightField, in_memory
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.scene.exported import Exported, read_export
+from tbcad.simulate.scene.object import built_in
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.shading import Scene, scene_of
+from tbcad.spec.design import load_spec
+from tests.prototype_exports import write_export
 
 OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
 CAPTURE_MM = 60.0

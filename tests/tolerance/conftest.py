@@ -2,9 +2,9 @@
 
 import pytest
 
-from tbcad.design.mirrors import Design
-from tbcad.simulate.reflector import reflectors
-from tbcad.tolerance.nominal import Nominal, nominal
+from tbcad.mirrors.array import Design
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
 
 
 @pytest.fixture(scope="session")

@@ -7,15 +7,15 @@ from math import ceil
 import numpy as np
 import pytest
 
-from tbcad.design.errors import SpecError
-from tbcad.design.mirrors import Design, design
-from tbcad.design.spec import Spec, load_spec
-from tbcad.simulate.reflector import reflectors
-from tbcad.tolerance.draws import Error, Errors
+from tbcad.mirrors.array import Design, design
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.errors import SpecError
 from tbcad.tolerance.margin import MOST_MM, STEP_MM, Margin, margin, with_margin
-from tbcad.tolerance.montecarlo import Task, simulate
-from tbcad.tolerance.nominal import nominal
-from tbcad.tolerance.process import errors, load_process
+from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.draws import Error, Errors
+from tbcad.tolerance.montecarlo.edge_model import nominal
+from tbcad.tolerance.process.process import errors, load_process
 
 TARGET = 60.0
 Loss = Callable[[float], np.ndarray]

@@ -6,11 +6,11 @@ Where an exact figure differs from one measured before, the test states both.
 import numpy as np
 import pytest
 
-from tbcad.design.mirrors import Half, design, directions
-from tbcad.design.spec import load_spec
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.mirrors.array import Half, design, directions
 from tbcad.optics import flat
-from tbcad.optics.ellipsoid import Ellipsoid
-from tbcad.optics.vectors import dot, norm, unit
+from tbcad.spec.design import load_spec
 
 ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)
 

@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tbcad_verify.record import Export
-from tbcad_verify.record import read_export as read_record
+from tbcad_verify.record.record import Export
+from tbcad_verify.record.record import read_export as read_record
 
-from tbcad.design.mirrors import Design, design
-from tbcad.design.spec import load_spec
-from tbcad.export.manifest import write_manifest
-from tbcad.export.tables import write_record
-from tbcad.simulate.reflector import reflectors
-from tbcad.tolerance.coverage import coverage, seen
-from tbcad.tolerance.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.nominal import Nominal, axes, nominal
-from tbcad.tolerance.pointing import pointing
-from tests.tolerance.made import brutally, meshed, proved, slowly
+from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.record import write_record
+from tbcad.output.manifest import write_manifest
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.design import load_spec
+from tbcad.tolerance.montecarlo.coverage import coverage, seen
+from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo.edge_model import Nominal, axes, nominal
+from tbcad.tolerance.montecarlo.pointing import pointing
+from tests.tolerance.exact_builds import brutally, meshed, proved, slowly
 
 Halves = tuple[Nominal, Nominal]
 

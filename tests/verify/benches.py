@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tbcad_verify.bench import Bench, pinhole_of, set_up
-from tbcad_verify.files import read
-from tbcad_verify.mesh import merge
-from tbcad_verify.proof import Wishes
-from tbcad_verify.record import read_export
-from tbcad_verify.recover import recover
-from tbcad_verify.stl import parse
+from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.files import read
+from tbcad_verify.record.record import read_export
+from tbcad_verify.run.verify import Wishes
+from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
+from tbcad_verify.shell.recover import recover
 
 HERE = Wishes(apart=False)  # in this process: quicker, and open to monkeypatches
 

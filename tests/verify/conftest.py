@@ -6,9 +6,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from benches import bench_of
-from synthetic_export import Cells, Design, export
-from tbcad_verify.bench import Bench
+from tbcad_verify.shell.optics import Bench
+
+from tests.verify.benches import bench_of
+from tests.verify.synthetic_export import Cells, Design, export
 
 
 @pytest.fixture(scope="session")

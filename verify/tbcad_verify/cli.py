@@ -9,8 +9,8 @@ from pathlib import Path
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
-from tbcad_verify.proof import Wishes, verify
-from tbcad_verify.watch import SECONDS
+from tbcad_verify.run.verify import Wishes, verify
+from tbcad_verify.run.watch import SECONDS
 
 ABOUT = """Prove on the files in DIR, which `tbcad build` wrote, that every virtual camera sees the
 whole object. Writes DIR/verify.json. Exit status: 0 proved, 1 not proved, 2 DIR is no export."""

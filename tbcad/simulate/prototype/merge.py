@@ -16,10 +16,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.vectors import unit
-from tbcad.simulate.capture import CENTRE, Band, Shift, Tracer, row_bands, shifts
+from tbcad.geometry.vectors import unit
+from tbcad.simulate.capture.light_field import LightField, in_memory
+from tbcad.simulate.capture.photograph import CENTRE, Band, Shift, Tracer, row_bands, shifts
 from tbcad.simulate.compiled import THREADS, in_threads
-from tbcad.simulate.lightfield import LightField, in_memory
 from tbcad.simulate.prototype.photograph import resampled
 from tbcad.simulate.prototype.run import Run, stand_ins
 from tbcad.simulate.prototype.sight import (
@@ -30,9 +30,9 @@ from tbcad.simulate.prototype.sight import (
     places_of,
     sight,
 )
-from tbcad.simulate.rays import Rays, exact, pixel_directions
-from tbcad.simulate.reflector import MARGIN_PX, pixels_of
-from tbcad.simulate.scene import Scene
+from tbcad.simulate.scene.rays import Rays, exact, pixel_directions
+from tbcad.simulate.scene.reflector import MARGIN_PX, pixels_of
+from tbcad.simulate.scene.shading import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

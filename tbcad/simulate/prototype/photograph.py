@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.capture import BAND_ROWS, shifts
+from tbcad.simulate.capture.photograph import BAND_ROWS, shifts
 from tbcad.simulate.compiled import in_threads
 from tbcad.simulate.prototype.run import Run
 from tbcad.simulate.prototype.sight import colours, directions
-from tbcad.simulate.scene import Scene
+from tbcad.simulate.scene.shading import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
-from tbcad.optics.vectors import norm
+from tbcad.geometry.vectors import norm
 from tbcad.optics.windows import rotated
-from tbcad.simulate.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
+from tbcad.simulate.scene.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

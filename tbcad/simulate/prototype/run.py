@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import norm, unit
+from tbcad.optics.camera import View
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.vectors import norm, unit
-from tbcad.optics.view import View
 from tbcad.optics.windows import rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.reflector import Reflector, Replaced
+from tbcad.simulate.scene.reflector import Reflector, Replaced
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

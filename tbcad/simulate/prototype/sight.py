@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.vectors import unit
-from tbcad.optics.view import View
+from tbcad.geometry.vectors import unit
+from tbcad.optics.camera import View
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.prototype.run import Run
-from tbcad.simulate.reflector import pitch
-from tbcad.simulate.scene import Scene, look
+from tbcad.simulate.scene.reflector import pitch
+from tbcad.simulate.scene.shading import Scene, look
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

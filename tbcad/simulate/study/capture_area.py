@@ -4,14 +4,14 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.design.mirrors import Half
-from tbcad.design.spec import Spec
+from tbcad.mirrors.array import Half
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import Attempt, Progress, attempt, over, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
+from tbcad.spec.design import Spec
 
 RULES = ("flat", "paper", "traced")
 MEASURED = ("least_mm", "median_mm", "short", "reason")

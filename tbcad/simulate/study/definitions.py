@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from tbcad.design.mirrors import Half, directions
-from tbcad.design.spec import Spec
+from tbcad.mirrors.array import Half, directions
 from tbcad.simulate.study.paper import claimed
 from tbcad.simulate.study.pixels import Sensor, counts, virtual_cameras
 from tbcad.simulate.study.sweep import attempt, varied
 from tbcad.simulate.study.tables import Cell, Table
+from tbcad.spec.design import Spec
 
 COLUMNS = ("reading", "radii", "n", "value", "paper", "other_paper", "reason")
 NOTES = (

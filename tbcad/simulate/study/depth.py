@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.mirrors import Half
-from tbcad.design.spec import Spec
 from tbcad.errors import InputError
+from tbcad.mirrors.array import Half
 from tbcad.simulate.study.images import FANS, PLACES, Images, images
 from tbcad.simulate.study.lens import Lens, Range, focal_length, lens_for, stop, stops
 from tbcad.simulate.study.paper import claimed, claims
@@ -15,6 +14,7 @@ from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import Progress, attempt, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
+from tbcad.spec.design import Spec
 
 Floats = NDArray[np.float64]
 

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.mirrors import Half, design
-from tbcad.design.spec import Spec
+from tbcad.mirrors.array import Half, design
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import Progress, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
+from tbcad.spec.design import Spec
 
 Floats = NDArray[np.float64]
 

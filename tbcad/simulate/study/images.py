@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.mirrors import Half
-from tbcad.optics.vectors import dot, norm, unit
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.mirrors.array import Half
 
 Floats = NDArray[np.float64]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.mirrors import Half
 from tbcad.errors import InputError
-from tbcad.optics.vectors import dot, norm
-from tbcad.optics.view import turned_to
-from tbcad.simulate.capture import CENTRE, row_bands
-from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import Reflector
+from tbcad.geometry.vectors import dot, norm
+from tbcad.mirrors.array import Half
+from tbcad.optics.camera import turned_to
+from tbcad.simulate.capture.photograph import CENTRE, row_bands
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.design.mirrors import Half
-from tbcad.design.spec import Spec
 from tbcad.errors import InputError
+from tbcad.mirrors.array import Half
 from tbcad.simulate.study.definitions import definitions
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import Counts, Sensor, counts, virtual_cameras
@@ -16,6 +15,7 @@ from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import Progress, attempt, over, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
+from tbcad.spec.design import Spec
 
 Floats = NDArray[np.float64]
 

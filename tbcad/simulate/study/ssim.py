@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import linregress
 
-from tbcad.design.spec import Spec
-from tbcad.simulate.capture import photograph
-from tbcad.simulate.lightfield import NAME, LightField, write, writing
-from tbcad.simulate.rays import exact
-from tbcad.simulate.reflector import reflectors
-from tbcad.simulate.scene import Scene, scene_of
+from tbcad.simulate.capture.light_field import NAME, LightField, write, writing
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import Progress, attempt, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
 from tbcad.simulate.study.views import Bytes, Round, scores, truths
-from tbcad.simulate.subject import Subject
-from tbcad.simulate.synthesis import Method
-from tbcad.simulate.tiles import Tiles
+from tbcad.simulate.views.synthesis import Method
+from tbcad.simulate.views.tiles import Tiles
+from tbcad.spec.design import Spec
 
 Floats = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from tbcad.design.errors import SpecError
-from tbcad.design.mirrors import Design, design
-from tbcad.design.spec import Spec
 from tbcad.errors import InputError
+from tbcad.mirrors.array import Design, design
 from tbcad.schedule import run
+from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
 
 Result = TypeVar("Result")
 Progress = Callable[[str], None]

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.optics.view import View
+from tbcad.optics.camera import View
 from tbcad.simulate.quality import likeness
-from tbcad.simulate.scene import Scene, depth_of
-from tbcad.simulate.synthesis import Method, synthesise
-from tbcad.simulate.tiles import Tiles
-from tbcad.simulate.truth import pinhole_picture, whole
-from tbcad.simulate.viewpoint import viewpoint
+from tbcad.simulate.scene.ground_truth import pinhole_picture, whole
+from tbcad.simulate.scene.shading import Scene, depth_of
+from tbcad.simulate.scene.viewpoint import viewpoint
+from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.simulate.views.tiles import Tiles
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -6,9 +6,9 @@ import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from corpus.copies import change, put
-from corpus.facets import MODEL, edit_3mf, zipped
-from corpus.mutation import Job, Mutation, fails, refused
+from tests.verify.corpus.copies import change, put
+from tests.verify.corpus.facets import MODEL, edit_3mf, zipped
+from tests.verify.corpus.mutation import Job, Mutation, fails, refused
 
 NAME = "shell_a.3mf"
 PLACE = "built once where it stands"

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from corpus.copies import load, put, store
-from corpus.mutation import Job, Mutation, fails, refused
+from tests.verify.corpus.copies import load, put, store
+from tests.verify.corpus.mutation import Job, Mutation, fails, refused
 
 ROWS = 40_000_000  # facets: two gigabytes
 LONG = 84 + 50 * ROWS  # bytes

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from corpus.facets import HALVES
-from corpus.mesh_changes import (
+
+from tests.verify.corpus.facets import HALVES
+from tests.verify.corpus.mesh_changes import (
     INCH,
     ascii_stl,
     backs,
@@ -39,8 +40,8 @@ from corpus.mesh_changes import (
     warped,
     without,
 )
-from corpus.mutation import Mutation, fails, refused
-from corpus.patches import fan, pushed
+from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.patches import fan, pushed
 
 BOTH = "STL, 3MF"
 FOUND = ("mirrors found", "surface error")

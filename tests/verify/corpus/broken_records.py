@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from corpus.mutation import Mutation, fails, refused
-from corpus.record_changes import (
+from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.record_changes import (
     JSON,
     RECORD,
     TABLE,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from corpus.mutation import Mutation, fails, refused
-from corpus.part21 import add, down, face, shift, swap
-from corpus.step_changes import (
+from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.part21 import add, down, face, shift, swap
+from tests.verify.corpus.step_changes import (
     KIND,
     NAME,
     back,

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from corpus.copies import put
 from numpy.typing import NDArray
+
+from tests.verify.corpus.copies import put
 
 Corners = NDArray[np.float32]  # (F, 3, 3) facet, corner, axis; mm
 HEAD = 84

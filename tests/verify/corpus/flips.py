@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from corpus import facets, part21
 from helpers import read_3mf
+
+from tests.verify.corpus import facets, part21
 
 # Nothing that the proof promises hangs on these.
 FREE = re.compile(

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from corpus.copies import digests
-from tbcad_verify.proof import Wishes
+from tbcad_verify.run.verify import Wishes
 
 from tbcad.cli import run
+from tests.verify.corpus.copies import digests
 
 HERE = Wishes(write=False, apart=False)
 SETTINGS = (

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from corpus import part21
-from corpus.copies import change, load, put
-from corpus.facets import HALVES, read, write, write_stl
-from corpus.mesh_changes import part, tetrahedron
-from corpus.mutation import Job, Mutation
-from corpus.record_changes import design
+
+from tests.verify.corpus import part21
+from tests.verify.corpus.copies import change, load, put
+from tests.verify.corpus.facets import HALVES, read, write, write_stl
+from tests.verify.corpus.mesh_changes import part, tetrahedron
+from tests.verify.corpus.mutation import Job, Mutation
+from tests.verify.corpus.record_changes import design
 
 
 def again(folder: Path) -> Sequence[str]:

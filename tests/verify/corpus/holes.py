@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from corpus.mutation import Mutation, fails
-from corpus.record_changes import JSON, Design, design, record, row
+from tests.verify.corpus.mutation import Mutation, fails
+from tests.verify.corpus.record_changes import JSON, Design, design, record, row
 
 
 def derived(value: Design, name: str) -> None:

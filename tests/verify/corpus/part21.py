@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from corpus.copies import change
+from tests.verify.corpus.copies import change
 
 Entities = dict[int, str]  # number -> what stands right of the equals sign
 DATA, ENDSEC = "DATA;\n", "ENDSEC;\nEND-ISO-10303-21;"

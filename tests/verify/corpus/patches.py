@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from corpus.copies import load
-from corpus.facets import Corners
 from numpy.typing import NDArray
+
+from tests.verify.corpus.copies import load
+from tests.verify.corpus.facets import Corners
 
 Floats = NDArray[np.float64]
 TOUCHES_MM = 2e-5  # float32, 150 mm from the origin

@@ -10,17 +10,17 @@ from contextlib import contextmanager
 from typing import Any
 from unittest import mock
 
-from tbcad_verify import prove
-from tbcad_verify.files import Blob
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.record.files import Blob
+from tbcad_verify.run import stages
 from tbcad_verify.step import checks
 
 
 @contextmanager
 def remembered() -> Iterator[None]:
     """Within, no STEP file is read twice and no mesh is put on printers twice; what fails is."""
-    step, shape = _Once(checks.examine, _bytes), _Once(prove.measure, _corners)
-    with mock.patch.object(checks, "examine", step), mock.patch.object(prove, "measure", shape):
+    step, shape = _Once(checks.examine, _bytes), _Once(stages.measure, _corners)
+    with mock.patch.object(checks, "examine", step), mock.patch.object(stages, "measure", shape):
         yield
 
 

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from corpus import part21
-from corpus.copies import change, load, put, store
-from corpus.facets import read, write
-from corpus.mutation import Job
-from corpus.patches import balls
+
+from tests.verify.corpus import part21
+from tests.verify.corpus.copies import change, load, put, store
+from tests.verify.corpus.facets import read, write
+from tests.verify.corpus.mutation import Job
+from tests.verify.corpus.patches import balls
 
 Design = dict[str, Any]
 JSON, TABLE = "design.json", "mirrors.csv"

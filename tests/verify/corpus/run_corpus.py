@@ -1,6 +1,6 @@
 """The whole corpus on copies of a given export: a table, and how many mutations were caught.
 
-python tests/verify/corpus/run_corpus.py EXPORT [--jobs 2] [--only WORD ...] [--heavy]
+python -m tests.verify.corpus.run_corpus EXPORT [--jobs 2] [--only WORD ...] [--heavy]
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # where this folder is a package
+from tbcad_verify.run.verify import Wishes
 
-from corpus.copies import digests
-from corpus.harmless import HARMLESS
-from corpus.mutation import Mutation
-from corpus.readings import remembered
-from corpus.trial import Outcome, attempt
-from corpus.whole_corpus import ALL
-from tbcad_verify.proof import Wishes
+from tests.verify.corpus.copies import digests
+from tests.verify.corpus.harmless import HARMLESS
+from tests.verify.corpus.mutation import Mutation
+from tests.verify.corpus.readings import remembered
+from tests.verify.corpus.trial import Outcome, attempt
+from tests.verify.corpus.whole_corpus import ALL
 
 HEADING = "| mutation | breaks | expected | found | caught | s |\n|---|---|---|---|---|---|"
 LONGEST = 160  # characters of a cell

@@ -6,11 +6,21 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from corpus import part21
-from corpus.copies import change, put
-from corpus.mutation import Job, Mutation
-from corpus.part21 import NUMBER, Entities, add, all_of, down, face, references, shift, swap
-from corpus.patches import balls
+from tests.verify.corpus import part21
+from tests.verify.corpus.copies import change, put
+from tests.verify.corpus.mutation import Job, Mutation
+from tests.verify.corpus.part21 import (
+    NUMBER,
+    Entities,
+    add,
+    all_of,
+    down,
+    face,
+    references,
+    shift,
+    swap,
+)
+from tests.verify.corpus.patches import balls
 
 NAME = "shell_a.step"
 MILLIMETRE = "( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) )"

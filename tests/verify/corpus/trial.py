@@ -8,11 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus.copies import copy, sign
-from corpus.mutation import Mutation
 from tbcad_verify import BadExport
-from tbcad_verify.checks import Check
-from tbcad_verify.proof import Wishes, verify
+from tbcad_verify.report.checks import Check
+from tbcad_verify.run.verify import Wishes, verify
+
+from tests.verify.corpus.copies import copy, sign
+from tests.verify.corpus.mutation import Mutation
 
 
 @dataclass(frozen=True)

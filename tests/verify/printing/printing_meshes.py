@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import trimesh
-from tbcad_verify.bulk import bulk
-from tbcad_verify.mesh import Mesh, manifold_status, merge
+from tbcad_verify.mesh.mass import bulk
+from tbcad_verify.mesh.mesh import Mesh, manifold_status, merge
+from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.printing.shape import Shape, measure
-from tbcad_verify.stl import Facets
 
 
 def mesh_of(*solids: trimesh.Trimesh) -> Mesh:

@@ -6,7 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from synthetic_prototype import Machine, export
+
+from tests.verify.prototype.synthetic_prototype import Machine, export
 
 
 @pytest.fixture(scope="session")

@@ -17,9 +17,22 @@ from typing import Any
 import manifold3d
 import numpy as np
 import trimesh
-from synthetic_export import PIN, B, Cells, document, mirrored, poses, rows, solid, stl, table, unit
-from synthetic_export import Design as Shell
-from synthetic_export import write as write_files
+
+from tests.verify.synthetic_export import (
+    PIN,
+    B,
+    Cells,
+    document,
+    mirrored,
+    poses,
+    rows,
+    solid,
+    stl,
+    table,
+    unit,
+)
+from tests.verify.synthetic_export import Design as Shell
+from tests.verify.synthetic_export import write as write_files
 
 TILT = np.radians(50.0)
 PAD = 2.0

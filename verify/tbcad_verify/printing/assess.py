@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, Name, at_most, finite, told
 from tbcad_verify.printing.placing import SLACK_MM, Placing, place, words
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.walls import thin_area
+from tbcad_verify.report.checks import Check, Name, at_most, finite, told
 
 Floats = NDArray[np.float64]
 

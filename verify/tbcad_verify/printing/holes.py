@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh import Mesh, linked
+from tbcad_verify.mesh.mesh import Mesh, linked
+from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges
+from tbcad_verify.mesh.vectors import across, dot, norm, unit
 from tbcad_verify.printing.circles import circles, gaps
-from tbcad_verify.segments import BLIND_RAD, CONCAVE_RAD, Edges
-from tbcad_verify.vectors import across, dot, norm, unit
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 

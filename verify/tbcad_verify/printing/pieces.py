@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh import Mesh, linked
+from tbcad_verify.mesh.mesh import Mesh, linked
 
 
 @dataclass(frozen=True)

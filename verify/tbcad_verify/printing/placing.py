@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.vectors import across, norm
 from tbcad_verify.printing.overhang import overhang
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.resting import Hull
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.turning import turn
-from tbcad_verify.vectors import across, norm
 
 Floats = NDArray[np.float64]
 

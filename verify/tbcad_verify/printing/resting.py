@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from tbcad_verify.checks import Unknown
-from tbcad_verify.vectors import across, norm
+from tbcad_verify.mesh.vectors import across, norm
+from tbcad_verify.report.checks import Unknown
 
 Floats = NDArray[np.float64]
 

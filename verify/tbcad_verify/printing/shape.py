@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify import rays
-from tbcad_verify.bulk import Bulk
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh import rays
+from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.segments import Edges, measure_edges
+from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.holes import Holes, holes
 from tbcad_verify.printing.pieces import Pieces, pieces
 from tbcad_verify.printing.resting import Hull, wrap
 from tbcad_verify.printing.walls import Walls, walls
-from tbcad_verify.segments import Edges, measure_edges
-from tbcad_verify.vectors import norm
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh import Mesh
-from tbcad_verify.rays import Scene, first_hits, in_threads, reach
-from tbcad_verify.segments import Edges, rounding
-from tbcad_verify.vectors import dot, norm, slices, unit
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, reach
+from tbcad_verify.mesh.segments import Edges, rounding
+from tbcad_verify.mesh.vectors import dot, norm, slices, unit
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

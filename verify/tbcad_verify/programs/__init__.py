@@ -9,6 +9,6 @@ from __future__ import annotations
 
 from tbcad_verify.programs.answers import is_skipped
 from tbcad_verify.programs.clients import client_checks
-from tbcad_verify.programs.errand import Wanted
+from tbcad_verify.programs.program_query import Wanted
 
 __all__ = ["Wanted", "client_checks", "is_skipped"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from tbcad_verify.checks import Check, Unknown, at_most
 from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.errand import Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
+from tbcad_verify.report.checks import Check, Unknown, at_most
 
 PARTS, VOLUME = "parts", "mm^3 off"
 FLAWS = (

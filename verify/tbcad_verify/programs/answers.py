@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tbcad_verify.checks import Check, Name, Unknown, at_most, finite, told, unknown
-from tbcad_verify.child import Outcome
+from tbcad_verify.report.checks import Check, Name, Unknown, at_most, finite, told, unknown
+from tbcad_verify.run.child import Outcome
 
 SKIPPED = "skipped: "
 MAX_ANSWER = 100_000  # bytes

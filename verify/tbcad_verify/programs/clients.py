@@ -7,12 +7,12 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
-from tbcad_verify.checks import Check, guarded
-from tbcad_verify.child import Limits
-from tbcad_verify.files import open_folder
 from tbcad_verify.programs import admesh, freecad, gmsh, prusa
 from tbcad_verify.programs.answers import skipped
-from tbcad_verify.programs.errand import Command, Errand, Wanted, room
+from tbcad_verify.programs.program_query import Command, Errand, Wanted, room
+from tbcad_verify.record.files import open_folder
+from tbcad_verify.report.checks import Check, guarded
+from tbcad_verify.run.child import Limits
 
 AT_ONCE = 2
 ERRANDS = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)

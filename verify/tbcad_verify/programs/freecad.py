@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tbcad_verify.checks import Check, at_most
 from tbcad_verify.programs.answers import figures
-from tbcad_verify.programs.errand import Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
 from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
+from tbcad_verify.report.checks import Check, at_most
 
 KEYS = ("solids", "invalid", "open", "loose", "spheres", "volume")
 

@@ -7,10 +7,10 @@ import re
 import sys
 from pathlib import Path
 
-from tbcad_verify.checks import Check, Unknown
 from tbcad_verify.programs.answers import figures, skipped, text_of
-from tbcad_verify.programs.errand import Command, Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import Command, Errand, Room, Wanted, on_path
 from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
+from tbcad_verify.report.checks import Check, Unknown
 
 INSTALL = "pip install gmsh"
 KEYS = ("solids", "spheres", "volume")

@@ -6,9 +6,9 @@ import math
 import re
 from pathlib import Path
 
-from tbcad_verify.checks import Check, Unknown, at_most, told, unknown
 from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.errand import Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
+from tbcad_verify.report.checks import Check, Unknown, at_most, told, unknown
 
 INSTALL = "apt install prusa-slicer"
 PARTS, VOLUME = "parts", "mm^3 off"

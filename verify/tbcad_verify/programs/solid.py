@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tbcad_verify.checks import Check, told
 from tbcad_verify.programs.answers import exactly, near
-from tbcad_verify.programs.errand import Wanted
+from tbcad_verify.programs.program_query import Wanted
+from tbcad_verify.report.checks import Check, told
 
 SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, Name, Unknown, at_most, listed
-from tbcad_verify.files import read
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.view import View
+from tbcad_verify.record.files import read
+from tbcad_verify.report.checks import Check, Name, Unknown, at_most, listed
 
 Floats = NDArray[np.float64]
 Shapes = dict[str, tuple[Floats, NDArray[np.int64]]]

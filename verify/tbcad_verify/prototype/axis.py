@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.vectors import cross, dot, norm, unit
+from tbcad_verify.mesh.vectors import cross, dot, norm, unit
 
 Floats = NDArray[np.float64]
 

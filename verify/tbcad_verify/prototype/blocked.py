@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads, reach
+from tbcad_verify.mesh.vectors import dot, norm, slices, unit
 from tbcad_verify.prototype.nearest import to_segments
 from tbcad_verify.prototype.rig import Obstacles, Rig, to_ground
 from tbcad_verify.prototype.trace import Trace, nearest
-from tbcad_verify.rays import RAYS_A_CHUNK, first_hits, in_threads, reach
-from tbcad_verify.vectors import dot, norm, slices, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

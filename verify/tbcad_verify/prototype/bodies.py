@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.bulk import Bulk, bulk
-from tbcad_verify.checks import Check, Unknown, at_most, guarded, reason_of
-from tbcad_verify.integrity import fold_check, mesh_checks
-from tbcad_verify.mesh import Mesh, Topology, examine, joined, merge
-from tbcad_verify.prototype.made import Printed
-from tbcad_verify.segments import Edges, folds, measure_edges
-from tbcad_verify.stl import Facets
-from tbcad_verify.vectors import norm
+from tbcad_verify.mesh.mass import Bulk, bulk
+from tbcad_verify.mesh.mesh import Mesh, Topology, examine, joined, merge
+from tbcad_verify.mesh.segments import Edges, folds, measure_edges
+from tbcad_verify.mesh.stl import Facets
+from tbcad_verify.mesh.vectors import norm
+from tbcad_verify.record.prototype_record import Printed
+from tbcad_verify.report.checks import Check, Unknown, at_most, guarded, reason_of
+from tbcad_verify.shell.integrity import fold_check, mesh_checks
 
 Floats = NDArray[np.float64]
 

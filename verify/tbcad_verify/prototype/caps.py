@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, Unknown, at_most
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.segments import rounding
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.bodies import Body
 from tbcad_verify.prototype.view import View
-from tbcad_verify.segments import rounding
-from tbcad_verify.vectors import dot, norm, unit
+from tbcad_verify.report.checks import Check, Unknown, at_most
 
 Floats = NDArray[np.float64]
 

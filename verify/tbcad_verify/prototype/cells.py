@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tbcad_verify.mesh.rays import in_threads, pixel_rows
+from tbcad_verify.mesh.vectors import across, dot, unit
 from tbcad_verify.prototype.view import View
-from tbcad_verify.rays import in_threads, pixel_rows
-from tbcad_verify.record import Camera
-from tbcad_verify.vectors import across, dot, unit
+from tbcad_verify.record.record import Camera
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

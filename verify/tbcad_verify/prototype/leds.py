@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, at_most, listed, told
 from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
 from tbcad_verify.prototype.nearest import distances
 from tbcad_verify.prototype.swing import solid_of
 from tbcad_verify.prototype.view import View
+from tbcad_verify.report.checks import Check, at_most, listed, told
 
 Floats = NDArray[np.float64]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, Name, at_most, guarded, listed, offenders
-from tbcad_verify.poses import POSE_MM
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.made import BALL_COLUMNS, BALLS, RECORD, Balls
-from tbcad_verify.prototype.tables import number_in
 from tbcad_verify.prototype.view import View
-from tbcad_verify.vectors import dot, norm, unit
+from tbcad_verify.record.poses import POSE_MM
+from tbcad_verify.record.prototype_record import BALL_COLUMNS, BALLS, RECORD, Balls
+from tbcad_verify.record.prototype_tables import number_in
+from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
 
 Floats = NDArray[np.float64]
 

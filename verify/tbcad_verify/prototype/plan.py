@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad_verify.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
 from tbcad_verify.prototype import axis, gcode
-from tbcad_verify.prototype.made import PLAN, PROGRAM, STOPS
 from tbcad_verify.prototype.view import View
+from tbcad_verify.record.prototype_record import PLAN, PROGRAM, STOPS
+from tbcad_verify.report.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Unknown
+from tbcad_verify.mesh.rays import Scene, build
+from tbcad_verify.mesh.surfaces import Seen, Surfaces, seen_from
+from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
 from tbcad_verify.prototype.caps import Cap
 from tbcad_verify.prototype.seats import Held
 from tbcad_verify.prototype.view import View
-from tbcad_verify.rays import Scene, build
-from tbcad_verify.surfaces import Seen, Surfaces, seen_from
-from tbcad_verify.vectors import unit
+from tbcad_verify.report.checks import Unknown
 
 Floats = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Check, Unknown, at_least, at_most, guarded, offenders, told
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.nearest import Corners, distances, to_segments
 from tbcad_verify.prototype.view import View
-from tbcad_verify.vectors import dot, norm, unit
+from tbcad_verify.report.checks import Check, Unknown, at_least, at_most, guarded, offenders, told
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad_verify.checks import Check, at_least, at_most, listed, told
-from tbcad_verify.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.rig import Rig
+from tbcad_verify.report.checks import Check, at_least, at_most, listed, told
 
 Floats = NDArray[np.float64]
 

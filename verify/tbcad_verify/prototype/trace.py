@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.rays import RAYS_A_CHUNK
+from tbcad_verify.mesh.surfaces import Lines, reflect
+from tbcad_verify.mesh.vectors import dot, slices
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.rig import Rig, to_base, to_ground
 from tbcad_verify.prototype.view import View
-from tbcad_verify.rays import RAYS_A_CHUNK
-from tbcad_verify.surfaces import Lines, reflect
-from tbcad_verify.vectors import dot, slices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

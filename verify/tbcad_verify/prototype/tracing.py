@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.surfaces import Surfaces, reflect, seen_from
+from tbcad_verify.mesh.vectors import across, dot, norm, unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.blocked import blocked
 from tbcad_verify.prototype.cells import (
@@ -22,8 +24,6 @@ from tbcad_verify.prototype.cells import (
 from tbcad_verify.prototype.nearest import to_segments
 from tbcad_verify.prototype.rig import Rig
 from tbcad_verify.prototype.trace import Trace, lengths, misses, nearest, times, trace
-from tbcad_verify.surfaces import Surfaces, reflect, seen_from
-from tbcad_verify.vectors import across, dot, norm, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.checks import Unknown
-from tbcad_verify.poses import HALVED
 from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.made import Prototype
-from tbcad_verify.record import Camera, Export
+from tbcad_verify.record.poses import HALVED
+from tbcad_verify.record.prototype_record import Prototype
+from tbcad_verify.record.record import Camera, Export
+from tbcad_verify.report.checks import Unknown
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.vectors import slices
 from tbcad_verify.step.charts import Charts, Rings, charts, rings, turned
 from tbcad_verify.step.rims import Arcs, arcs, joined
-from tbcad_verify.surfaces import Surfaces
-from tbcad_verify.vectors import slices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

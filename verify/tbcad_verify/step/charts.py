@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.surfaces import Surfaces
-from tbcad_verify.vectors import across, dot, slices
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.vectors import across, dot, slices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.bulk import Bulk
-from tbcad_verify.checks import Check, Name, at_most, guarded, listed, offenders
-from tbcad_verify.files import Blob
-from tbcad_verify.rays import in_threads
-from tbcad_verify.record import Export, Part
-from tbcad_verify.step import lumps
-from tbcad_verify.step.lumps import Lump
+from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.rays import in_threads
+from tbcad_verify.record.files import Blob
+from tbcad_verify.record.record import Export, Part
+from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
+from tbcad_verify.step import part_checks
+from tbcad_verify.step.part_checks import Lump
 from tbcad_verify.step.reading import StepFile, examine, load
 from tbcad_verify.step.union import Cells, of_export
 
@@ -227,13 +227,22 @@ def _worst_of(
     )
 
 
-def _plain(job: lumps.Job) -> Job:
+def _plain(job: part_checks.Job) -> Job:
     """A check of any part, for one with mirrors."""
     return lambda name, subject, _: job(name, subject.lump)
 
 
 JOBS: tuple[Job, ...] = (
-    *map(_plain, (lumps.solid, lumps.valid, lumps.gaps)),
+    *map(_plain, (part_checks.solid, part_checks.valid, part_checks.gaps)),
     *(_names, _surfaces, _outward, _areas, _middles, _front),
-    *map(_plain, (lumps.volume, lumps.area, lumps.centroid, lumps.box, lumps.properties)),
+    *map(
+        _plain,
+        (
+            part_checks.volume,
+            part_checks.area,
+            part_checks.centroid,
+            part_checks.box,
+            part_checks.properties,
+        ),
+    ),
 )

@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.vectors import slices
 from tbcad_verify.step.charts import Charts
 from tbcad_verify.step.rims import Arcs
-from tbcad_verify.vectors import slices
 
 Floats = NDArray[np.float64]
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.bulk import Bulk
-from tbcad_verify.checks import Unknown
-from tbcad_verify.child import Limits, run
 from tbcad_verify.errors import BadExport
-from tbcad_verify.files import AGAIN, Blob, read
+from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.record.files import AGAIN, Blob, read
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.run.child import Limits, run
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"

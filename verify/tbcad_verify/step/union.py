@@ -16,15 +16,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.record import Export
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.vectors import dot
+from tbcad_verify.record.record import Export
 from tbcad_verify.step.boxes import boxes
 from tbcad_verify.step.cells import Rims, rims
 from tbcad_verify.step.charts import lift
 from tbcad_verify.step.loops import facing, loops
 from tbcad_verify.step.moments import Moments, moments, whole_sphere
 from tbcad_verify.step.rims import Arcs
-from tbcad_verify.surfaces import Surfaces
-from tbcad_verify.vectors import dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

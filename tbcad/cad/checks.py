@@ -1,0 +1,76 @@
+"""Checks of solids that a boolean of the kernel made: it can fail and pass for valid."""
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+
+from tbcad.cad.solids import meshed, one_solid, plane_faces, volume
+from tbcad.geometry.vectors import norm
+from tbcad.shell.mesh import Mesh
+from tbcad.shell.solid import InvalidSolidError
+
+Floats = NDArray[np.float64]
+
+NEAR_MM = 1e-4
+COARSE_MM = 0.05
+VOLUME_ERROR = 1e-3
+
+
+def checked(
+    name: str, shape: TopoDS_Shape, expected: float, contacts: Floats, radius: Floats
+) -> TopoDS_Solid:
+    """The one solid that a shape must be, of a volume (mm^3), with its pads.
+
+    Args:
+        name: for errors.
+        shape: to be checked.
+        expected: its volume by booleans of meshes, mm^3.
+        contacts: middles of the pads, mm, (p, 3).
+        radius: of the pads, mm, (p,).
+
+    Raises:
+        InvalidSolidError: when it is something else.
+    """
+    solid = one_solid(name, shape)
+    check_mesh(name, meshed(solid, COARSE_MM))  # a face may be valid and yet have no mesh
+    check_volume(name, solid, expected)
+    check_pads(name, solid, contacts, radius)
+    return solid
+
+
+def check_mesh(name: str, mesh: Mesh) -> None:
+    """Refuse a mesh that is not closed: faces that share an edge may end some nanometres apart.
+
+    Raises:
+        InvalidSolidError: as said.
+    """
+    edges = np.sort(np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=-1))
+    _, count = np.unique(edges.reshape(-1, 2), axis=0, return_counts=True)
+    if (count != 2).any():
+        raise InvalidSolidError(f"{name}: the kernel's mesh of the solid is not closed")
+
+
+def check_volume(name: str, solid: TopoDS_Solid, expected: float) -> None:
+    """Refuse a solid whose volume is not what booleans of meshes give.
+
+    A boolean of the kernel can lose bodies so that its result passes for valid.
+
+    Raises:
+        InvalidSolidError: as said.
+    """
+    if abs((found := volume(solid)) - expected) > VOLUME_ERROR * expected:
+        raise InvalidSolidError(f"{name}: the kernel made {found:.0f} mm^3 of {expected:.0f}")
+
+
+def check_pads(name: str, shape: TopoDS_Shape, contacts: Floats, radius: Floats) -> None:
+    """Refuse a shape whose pads are not whole discs about the contacts (p, 3), radii (p,).
+
+    Raises:
+        InvalidSolidError: as said.
+    """
+    middle, area = plane_faces(shape)
+    near = norm(contacts[:, None] - middle).argmin(axis=1)
+    away = norm(contacts - middle[near])
+    bad = (away > NEAR_MM) | (np.abs(area[near] - np.pi * radius**2) > NEAR_MM)
+    if bad.any():
+        raise InvalidSolidError(f"{name}: the kernel lost pad {int(bad.argmax()) + 1}")

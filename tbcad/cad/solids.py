@@ -1,0 +1,269 @@
+"""Solids by revolution, extrusion and booleans, and their meshes: a thin layer over the kernel.
+
+Booleans take lists: one general fuse of many bodies is faster than one after the other.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from manifold3d import Manifold, Mesh64, OpType
+from numpy.typing import NDArray
+from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Tool
+from OCP.BRepAlgoAPI import (
+    BRepAlgoAPI_BooleanOperation,
+    BRepAlgoAPI_Common,
+    BRepAlgoAPI_Cut,
+    BRepAlgoAPI_Fuse,
+)
+from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_Copy,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_Transform,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+from OCP.Geom import Geom_Plane
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.GProp import GProp_GProps
+from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopTools import TopTools_ListOfShape
+
+from tbcad.shell.mesh import Mesh
+from tbcad.shell.solid import InvalidSolidError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
+# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
+ANGLE = 0.2
+# With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
+SAME_MM = 1e-6
+# Booleans of more shapes than this are done in threads.
+FEW = 8
+
+
+def polygon(points: Floats) -> TopoDS_Face:
+    """Plane face inside a closed polygon (n, 3), its normal by the right-hand rule."""
+    wire = BRepBuilderAPI_MakePolygon()
+    for p in points.tolist():
+        wire.Add(gp_Pnt(*p))
+    wire.Close()
+    return BRepBuilderAPI_MakeFace(wire.Wire(), True).Face()
+
+
+def revolved(face: TopoDS_Face, angle: float = 2 * np.pi) -> TopoDS_Shape:
+    """Solid that a face sweeps when turned about z."""
+    return BRepPrimAPI_MakeRevol(face, gp_Ax1(ORIGIN, UP), angle).Shape()
+
+
+def ring(profile: Floats, start: float, angle: float) -> TopoDS_Shape:
+    """Solid of revolution about z of a polygon (n, 2) of (z, r), between two azimuths."""
+    z, r = profile.T
+    at = np.stack([r * np.cos(start), r * np.sin(start), z], axis=1)
+    return revolved(polygon(at), angle)
+
+
+def prism(face: TopoDS_Face, along: Floats) -> TopoDS_Shape:
+    """Solid that a face sweeps when moved."""
+    return BRepPrimAPI_MakePrism(face, gp_Vec(*along.tolist())).Shape()
+
+
+def cylinder(start: Floats, axis: Floats, radius: float, length: float) -> TopoDS_Shape:
+    """Solid cylinder from a point along a unit axis."""
+    frame = gp_Ax2(gp_Pnt(*start.tolist()), gp_Dir(*axis.tolist()))
+    return BRepPrimAPI_MakeCylinder(frame, radius, length).Shape()
+
+
+def moved(shape: TopoDS_Shape, axes: Floats, origin: Floats) -> TopoDS_Shape:
+    """Rigid move: axes (3, 3) are what x, y and z become, as rows; origin what 0 becomes."""
+    matrix = np.column_stack([axes.T, origin])
+    move = gp_Trsf()
+    move.SetValues(*matrix.ravel().tolist())
+    return BRepBuilderAPI_Transform(shape, move, True).Shape()
+
+
+def fused(shapes: Sequence[TopoDS_Shape], same: float = SAME_MM) -> TopoDS_Shape:
+    """Union of shapes; what is nearer than this (mm) is taken for the same."""
+    return _boolean(BRepAlgoAPI_Fuse(), shapes[:1], shapes[1:], same)
+
+
+def cut(shape: TopoDS_Shape, tools: Sequence[TopoDS_Shape], same: float = SAME_MM) -> TopoDS_Shape:
+    """A shape without others; what is nearer than this (mm) is taken for the same."""
+    return _boolean(BRepAlgoAPI_Cut(), [shape], tools, same)
+
+
+def common(one: TopoDS_Shape, other: TopoDS_Shape) -> TopoDS_Shape:
+    """What two shapes have in common."""
+    return _boolean(BRepAlgoAPI_Common(), [one], [other], SAME_MM)
+
+
+def _boolean(
+    operation: BRepAlgoAPI_BooleanOperation,
+    first: Sequence[TopoDS_Shape],
+    second: Sequence[TopoDS_Shape],
+    same: float,
+) -> TopoDS_Shape:
+    if not second:
+        return first[0]
+    operation.SetArguments(_list(first))
+    operation.SetTools(_list(second))
+    operation.SetFuzzyValue(same)
+    # Both only spare time: faces come in the same order, tests compare the bytes.
+    operation.SetRunParallel(len(first) + len(second) > FEW)
+    operation.SetUseOBB(True)
+    operation.Build()
+    if not operation.IsDone():
+        raise InvalidSolidError("the kernel cannot join or cut these solids")
+    return operation.Shape()
+
+
+def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
+    result = TopTools_ListOfShape()
+    for shape in shapes:
+        result.Append(shape)
+    return result
+
+
+def solids(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
+    """All solids of a shape."""
+    return [TopoDS.Solid_s(one) for one in _each(shape, TopAbs_SOLID)]
+
+
+def faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    """All faces of a shape."""
+    return [TopoDS.Face_s(one) for one in _each(shape, TopAbs_FACE)]
+
+
+def _each(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
+    """The one closed solid that a shape must be.
+
+    Raises:
+        InvalidSolidError: when it is several, or the kernel's check finds it invalid.
+    """
+    found = solids(shape)
+    if len(found) != 1:
+        raise InvalidSolidError(f"{name}: {len(found)} solids where one should be")
+    if not BRepCheck_Analyzer(found[0]).IsValid():
+        raise InvalidSolidError(f"{name}: the kernel's check finds the solid invalid")
+    return found[0]
+
+
+def volume(shape: TopoDS_Shape) -> float:
+    """Volume, mm^3."""
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    return float(properties.Mass())
+
+
+def centroid(shape: TopoDS_Shape) -> Floats:
+    """Centre of gravity of an even solid, mm, (3,)."""
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    centre = properties.CentreOfMass()
+    return np.array([centre.X(), centre.Y(), centre.Z()])
+
+
+def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
+    """Middles (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
+    middle, area = [], []
+    for face in faces(shape):
+        if isinstance(BRep_Tool.Surface_s(face), Geom_Plane):
+            properties = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(face, properties)
+            centre = properties.CentreOfMass()
+            middle.append((centre.X(), centre.Y(), centre.Z()))
+            area.append(properties.Mass())
+    return np.array(middle).reshape(-1, 3), np.array(area)
+
+
+def volume_by_meshes(
+    bodies: Sequence[TopoDS_Shape], tools: Sequence[TopoDS_Shape], tolerance: float
+) -> float:
+    """Volume of a union without tools, by booleans of meshes: another way to the same figure."""
+    union = Manifold.batch_boolean([_manifold(one, tolerance) for one in bodies], OpType.Add)
+    removed = [_manifold(one, tolerance) for one in tools]
+    return float(Manifold.batch_boolean([union, *removed], OpType.Subtract).volume())
+
+
+def volume_by_cut_mesh(
+    shape: TopoDS_Shape, planes: Floats, tools: Sequence[TopoDS_Shape], tolerance: float
+) -> float:
+    """Volume of a shape below planes (h, 4), unit normal and level, and without tools."""
+    net = _manifold(shape, tolerance)
+    for *normal, level in (-planes).tolist():
+        net = net.trim_by_plane(normal, level)
+    removed = [_manifold(one, tolerance) for one in tools]
+    return float(Manifold.batch_boolean([net, *removed], OpType.Subtract).volume())
+
+
+def _manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
+    net = meshed(shape, tolerance)
+    return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
+
+
+def bounds(shape: TopoDS_Shape) -> Floats:
+    """Least and largest coordinates, mm, (2, 3)."""
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return np.array(box.Get()).reshape(2, 3)
+
+
+def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:
+    """Mesh by the kernel's mesher; corners that faces share are one, degenerate facets dropped.
+
+    Args:
+        shape: a solid; its own facets are left alone.
+        tolerance: largest distance of facets from the surface, mm.
+        angle: largest turn of the surface along a facet's edge, radians.
+    """
+    copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
+    BRepMesh_IncrementalMesh(copy, tolerance, False, angle, False)
+    points, triangles, start = [], [], 0
+    for face in faces(copy):
+        corner, facet = _facets(face)
+        points.append(corner)
+        triangles.append(facet + start)
+        start += len(corner)
+    return _joined(np.concatenate(points), np.concatenate(triangles))
+
+
+def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
+    place = TopLoc_Location()
+    net = BRep_Tool.Triangulation_s(face, place)
+    if net is None:
+        raise InvalidSolidError("the kernel cannot mesh a face")
+    move = place.Transformation()
+    corners = [net.Node(i).Transformed(move) for i in range(1, net.NbNodes() + 1)]
+    facets = [net.Triangle(i).Get() for i in range(1, net.NbTriangles() + 1)]
+    triangle = np.array(facets, dtype=np.int64).reshape(-1, 3) - 1
+    if face.Orientation() == TopAbs_REVERSED:
+        triangle = triangle[:, ::-1]
+    return np.array([(p.X(), p.Y(), p.Z()) for p in corners]), triangle
+
+
+def _joined(points: Floats, triangles: Ints) -> Mesh:
+    """Corners that agree to a nanometre become one; facets that lose a corner go."""
+    _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
+    return without_lost(points[first], of.reshape(-1)[triangles])
+
+
+def without_lost(vertices: Floats, triangles: Ints) -> Mesh:
+    """A mesh without the facets of which two corners became one."""
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Mesh(vertices, triangles[whole])

@@ -1,1 +1,0 @@
-"""What to build: the spec, and the mirrors that follow from it."""

@@ -1,1 +1,0 @@
-"""One small file for each artefact that tbcad writes."""

@@ -1,0 +1,52 @@
+"""prototype.glb: the same tree to look at in a browser; metres and y up, as glTF demands."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from tbcad.cad.solids import meshed
+from tbcad.prototype.assembly import Body, Group
+
+# Only to look at: parts are meshed finely in their own files.
+COARSE_MM, COARSE_ANGLE = 0.1, 0.25
+# Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
+UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
+METAL, ROUGH = 0.1, 0.6
+
+
+def write_glb(path: Path, name: str, groups: Sequence[Group]) -> None:
+    """Write groups of bodies as a binary glTF 2.0 file, a node for each group and each body."""
+    scene = trimesh.Scene(base_frame="world")
+    scene.graph.update(name, "world", matrix=UPRIGHT)
+    for group in groups:
+        scene.graph.update(group.name, name, matrix=np.eye(4))
+        for body in group.bodies:
+            scene.add_geometry(
+                _drawn(body),
+                node_name=body.name,
+                geom_name=body.name,
+                parent_node_name=group.name,
+            )
+    path.write_bytes(export_glb(scene, include_normals=True))
+
+
+def _drawn(body: Body) -> trimesh.Trimesh:
+    mesh = meshed(body.shape, COARSE_MM, COARSE_ANGLE)
+    drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+    # Corners of flat faces are not smoothed over.
+    drawn.unmerge_vertices()
+    drawn.visual = TextureVisuals(
+        material=PBRMaterial(
+            name=body.name,
+            baseColorFactor=[*body.colour[:3], body.colour[3]],
+            metallicFactor=METAL,
+            roughnessFactor=ROUGH,
+            alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",
+        )
+    )
+    return drawn

@@ -1,0 +1,108 @@
+"""STEP: the exact solid, its faces named, the same bytes for the same design."""
+
+from pathlib import Path
+
+from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
+from OCP.Message import Message, Message_Gravity
+from OCP.StepBasic import StepBasic_Product
+from OCP.STEPConstruct import STEPConstruct, STEPConstruct_ValidationProps
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+from OCP.StepShape import StepShape_ManifoldSolidBrep
+from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
+from OCP.Transfer import Transfer_FinderProcess
+
+from tbcad.shell.solid import Solid
+
+# A fixed time stamp: the file's bytes then depend on the design alone.
+TIME_STAMP = "2022-11-01T00:00:00"
+
+
+class StepError(RuntimeError):
+    """The kernel did not write a STEP file: a fault of tbcad or of the disk."""
+
+
+def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
+    """Write one solid as AP214 in millimetres.
+
+    Args:
+        path: file to write.
+        solid: with the names of its faces, which become the names of the advanced faces; its
+            volume, area and centroid go along as validation properties.
+        pcurves: write curves in the surfaces' parameters too; readers make their own.
+
+    Raises:
+        StepError: when the kernel fails.
+    """
+    quiet()
+    STEPControl_Controller.Init_s()
+    Interface_Static.SetCVal_s("write.step.unit", "MM")
+    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
+    Interface_Static.SetIVal_s("write.surfacecurve.mode", int(pcurves))
+    writer = STEPControl_Writer()
+    if writer.Transfer(solid.shape, STEPControl_AsIs) != IFSelect_RetDone:
+        raise StepError(f"{path.name}: the kernel cannot translate the solid")
+    finder = writer.WS().TransferWriter().FinderProcess()
+    for name, face in solid.faces:
+        _name(finder, face, name)
+    _validation_properties(writer, solid.shape)
+    _name_product(writer, solid.name)
+    write_head(writer, solid.name)
+    if writer.Write(str(path)) != IFSelect_RetDone:
+        raise StepError(f"{path.name}: the kernel cannot write the file")
+
+
+def quiet() -> None:
+    """Keep the kernel's statistics off the screen; its failures are raised here."""
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Gravity.Message_Fail)
+
+
+def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:
+    item = STEPConstruct.FindEntity_s(finder, face)
+    if item is None:
+        raise StepError(f"the kernel lost face {name}")
+    item.SetName(TCollection_HAsciiString(name))
+
+
+def _validation_properties(writer: STEPControl_Writer, solid: TopoDS_Solid) -> None:
+    """Volume, area and centroid, for readers to compare with what they have read.
+
+    Source: CAx-IF, Recommended Practices for Geometric and Assembly Validation Properties.
+    """
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, volume)
+    BRepGProp.SurfaceProperties_s(solid, area)
+    properties = STEPConstruct_ValidationProps(writer.WS())
+    written = (
+        properties.AddVolume(solid, volume.Mass())
+        and properties.AddArea(solid, area.Mass())
+        and properties.AddCentroid(solid, volume.CentreOfMass())
+    )
+    if not written:
+        raise StepError("the kernel cannot write the validation properties")
+
+
+def _name_product(writer: STEPControl_Writer, name: str) -> None:
+    """Name the product and its solid; the kernel's own name counts up with every file."""
+    model = writer.Model()
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        if isinstance(entity, StepBasic_Product):
+            entity.SetId(TCollection_HAsciiString(name))
+        if isinstance(entity, (StepBasic_Product, StepShape_ManifoldSolidBrep)):
+            entity.SetName(TCollection_HAsciiString(name))
+
+
+def write_head(writer: STEPControl_Writer, name: str) -> None:
+    """Name the file; its time stamp is fixed."""
+    header = APIHeaderSection_MakeHeader(writer.Model())
+    header.SetName(TCollection_HAsciiString(name))
+    header.SetTimeStamp(TCollection_HAsciiString(TIME_STAMP))
+    header.SetOriginatingSystem(TCollection_HAsciiString("tbcad"))
+    header.SetAuthorValue(1, TCollection_HAsciiString(""))
+    header.SetOrganizationValue(1, TCollection_HAsciiString(""))

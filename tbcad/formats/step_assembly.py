@@ -1,0 +1,116 @@
+"""prototype.step: all parts in one tree of named, coloured solids; the same bytes each time."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cadquery
+from cadquery.occ_impl.assembly import toCAF
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
+from OCP.TCollection import TCollection_HAsciiString
+from OCP.XSControl import XSControl_WorkSession
+
+from tbcad.formats.step import StepError, quiet, write_head
+from tbcad.prototype.assembly import Body, Colour, Group
+
+END = "ENDSEC;\nEND-ISO-10303-21;"
+
+
+def write_assembly(path: Path, name: str, groups: Sequence[Group]) -> None:
+    """Write groups of bodies as one AP214 assembly in millimetres, everything where it stands.
+
+    The kernel's own order of colours is that of addresses in memory, so they are written here.
+
+    Raises:
+        StepError: when the kernel fails.
+    """
+    quiet()
+    _, document = toCAF(_tree(name, groups), True)
+    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
+    writer.SetColorMode(False)
+    writer.SetNameMode(True)
+    Interface_Static.SetCVal_s("write.step.unit", "MM")
+    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
+    Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
+    if not writer.Transfer(document, STEPControl_AsIs):
+        raise StepError(f"{path.name}: the kernel cannot translate the assembly")
+    plain = writer.ChangeWriter()
+    _count_anew(plain)
+    write_head(plain, name)
+    colours = _colours(plain, [body for group in groups for body in group.bodies])
+    if writer.Write(str(path)) != IFSelect_RetDone:
+        raise StepError(f"{path.name}: the kernel cannot write the file")
+    text, found, rest = path.read_text(encoding="ascii").rpartition(END)
+    path.write_text(text + colours + found + rest, encoding="ascii")
+
+
+def _tree(name: str, groups: Sequence[Group]) -> cadquery.Assembly:
+    tree = cadquery.Assembly(name=name)
+    for group in groups:
+        branch = cadquery.Assembly(name=group.name)
+        for body in group.bodies:
+            branch.add(cadquery.Shape.cast(body.shape), name=body.name)
+        tree.add(branch)
+    return tree
+
+
+def _count_anew(writer: STEPControl_Writer) -> None:
+    """Number and name the places in the assembly; the kernel counts on from file to file."""
+    model, count = writer.Model(), 0
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+            count += 1
+            entity.SetId(TCollection_HAsciiString(str(count)))
+            entity.SetName(entity.RelatedProductDefinition().Formation().OfProduct().Name())
+
+
+def _colours(writer: STEPControl_Writer, bodies: Sequence[Body]) -> str:
+    """Text of the styled items of all bodies.
+
+    Source: CAx-IF, Recommended Practices for Model Styling and Organization, section 4.
+    """
+    styles, model = STEPConstruct_Styles(writer.WS()), writer.Model()
+    # The binding's model.Number finds nothing; the same entity is the same object here, though.
+    entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]
+    place = {id(entity): k for k, entity in enumerate(entities, 1)}
+    number = len(entities) + 1
+    lines, items = [], []
+    for body in bodies:
+        entity = STEPConstruct.FindEntity_s(styles.FinderProcess(), body.shape)
+        if id(entity) not in place:
+            raise StepError(f"the kernel lost {body.name}")
+        own = list(_style(number, place[id(entity)], body.colour))
+        items.append(f"#{number}")
+        number += len(own)
+        lines += own
+    context = place[id(styles.FindContext(bodies[0].shape))]
+    drawn, listed = "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION", ",\n".join(items)
+    lines.append(f"#{number}={drawn}('',\n({listed}),#{context});")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _style(first: int, item: int, colour: Colour) -> Iterator[str]:
+    """Entities from number first on that give an item its colour, the first the styled item."""
+    *mixed, opaque = (f"{value:.6f}" for value in colour)
+    yield f"#{first}=STYLED_ITEM('color',(#{first + 1}),#{item});"
+    yield f"#{first + 1}=PRESENTATION_STYLE_ASSIGNMENT((#{first + 2}));"
+    yield f"#{first + 2}=SURFACE_STYLE_USAGE(.BOTH.,#{first + 3});"
+    clear = float(opaque) < 1
+    rendered = f",#{first + 8}" if clear else ""
+    yield f"#{first + 3}=SURFACE_SIDE_STYLE('',(#{first + 4}{rendered}));"
+    yield f"#{first + 4}=SURFACE_STYLE_FILL_AREA(#{first + 5});"
+    yield f"#{first + 5}=FILL_AREA_STYLE('',(#{first + 6}));"
+    yield f"#{first + 6}=FILL_AREA_STYLE_COLOUR('',#{first + 7});"
+    yield f"#{first + 7}=COLOUR_RGB('',{','.join(mixed)});"
+    if clear:
+        properties = f"(#{first + 9})"
+        yield (
+            f"#{first + 8}=SURFACE_STYLE_RENDERING_WITH_PROPERTIES(.NORMAL_SHADING.,"
+            f"#{first + 7},{properties});"
+        )
+        yield f"#{first + 9}=SURFACE_STYLE_TRANSPARENT({1 - float(opaque):.6f});"

@@ -1,0 +1,42 @@
+"""3MF: vertices and triangles in a zip, millimetres, the same bytes for the same mesh."""
+
+from pathlib import Path
+from uuid import NAMESPACE_URL, uuid5
+
+import lib3mf
+import numpy as np
+
+from tbcad.shell.mesh import Mesh
+
+DECIMALS = 6
+
+
+def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
+    """Write one named object.
+
+    The library makes up identifiers, which would differ each time; they are derived from the name.
+    """
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.MilliMeter)
+    part = model.AddMeshObject()
+    part.SetName(name)
+    part.SetGeometry(
+        (lib3mf.Position * len(mesh.vertices)).from_buffer_copy(
+            np.ascontiguousarray(mesh.vertices, dtype=np.float32).tobytes()
+        ),
+        (lib3mf.Triangle * len(mesh.triangles)).from_buffer_copy(
+            np.ascontiguousarray(mesh.triangles, dtype=np.uint32).tobytes()
+        ),
+    )
+    item = model.AddBuildItem(part, wrapper.GetIdentityTransform())
+    part.SetUUID(_identifier(name, "part"))
+    item.SetUUID(_identifier(name, "item"))
+    model.SetBuildUUID(_identifier(name, "build"))
+    writer = model.QueryWriter("3mf")
+    writer.SetDecimalPrecision(DECIMALS)
+    writer.WriteToFile(str(path))
+
+
+def _identifier(name: str, what: str) -> str:
+    return str(uuid5(NAMESPACE_URL, f"tbcad:{name}:{what}"))

@@ -1,0 +1,1 @@
+"""Vectors, ellipsoids, cones and simple bodies: numbers only (numpy, scipy)."""

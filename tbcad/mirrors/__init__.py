@@ -1,0 +1,1 @@
+"""The mirrors of both cameras: poses, radii, cells, and the record of them."""

@@ -1,0 +1,191 @@
+"""The mirrors of both cameras: poses, radii, cells, and the record the files are written from."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.vectors import MIRROR
+from tbcad.mirrors.radii import Progress, Task, solve
+from tbcad.optics import flat
+from tbcad.optics.camera import View, turned_to
+from tbcad.optics.cells import Cells, areas, cells_of
+from tbcad.optics.geodesic import geodesic
+from tbcad.optics.power_diagram import bounded
+from tbcad.optics.surfaces import Surfaces, planes
+from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Half:
+    """One camera with its m mirrors, as arrays over mirrors in the order of their ids.
+
+    Attributes:
+        camera: "a" or "b".
+        view: the camera itself.
+        ellipsoid: of this camera.
+        u: directions of the virtual cameras, (m, 3).
+        theta0: half angle a flat mirror would see, radians, (m,).
+        theta1: half angle wanted by eq. 1, radians, (m,).
+        size: half width l, mm, (m,).
+        polar: polar angle about w, radians, (m,).
+        azimuth: azimuth about w, radians, (m,).
+        cells: of the reflecting surfaces, coat included.
+        body: cells of the modelled surfaces, under the coat.
+        area: of the cells, mm^2, (m,).
+        coverage: exact coverage diameter, mm, (m,).
+    """
+
+    camera: str
+    view: View
+    ellipsoid: Ellipsoid
+    u: Floats
+    theta0: Floats
+    theta1: Floats
+    size: Floats
+    polar: Floats
+    azimuth: Floats
+    cells: Cells
+    body: Cells
+    area: Floats
+    coverage: Floats
+
+    def __len__(self) -> int:
+        return len(self.u)
+
+    @property
+    def ids(self) -> list[str]:
+        """Names of the mirrors: a0001, a0002 ...; b's mirror of the same number mirrors it."""
+        return [f"{self.camera}{i + 1:04d}" for i in range(len(self))]
+
+    @property
+    def mirrors(self) -> Surfaces:
+        """The reflecting surfaces, coat included."""
+        every = self.cells.surfaces
+        m = len(self)
+        return Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+
+    @property
+    def foot(self) -> float:
+        """Height z of the foot plane, mm."""
+        return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
+
+    def mirrored(self) -> "Half":
+        """The other camera's half."""
+        return replace(
+            self,
+            camera="b",
+            view=self.view.mirrored(),
+            ellipsoid=Ellipsoid(self.ellipsoid.pinhole * MIRROR, self.ellipsoid.semi_minor),
+            u=self.u * MIRROR,
+            azimuth=-self.azimuth,
+            cells=self.cells.mirrored(),
+            body=self.body.mirrored(),
+        )
+
+
+@dataclass(frozen=True)
+class Design:
+    """The spec and the two halves that follow from it."""
+
+    spec: Spec
+    halves: tuple[Half, Half]
+
+
+def design(spec: Spec, progress: Progress = lambda _: None) -> Design:
+    """Poses, radii and cells of all mirrors.
+
+    Raises:
+        SpecError: when the spec's mirrors cannot be made; it names them.
+    """
+    half = _half_a(spec, progress)
+    return Design(spec, (half, half.mirrored()))
+
+
+def ordered(u: Floats) -> Ints:
+    """Order of the mirrors' numbers: from the zenith down, then by azimuth about z."""
+    height = np.round(u[:, 2], 9)
+    turn = np.round(np.arctan2(u[:, 1], u[:, 0]), 9)
+    return np.lexsort((turn, -height))
+
+
+def directions(n: int) -> tuple[Floats, Ints]:
+    """All geodesic directions, camera a's first in the order of their ids, and all faces."""
+    u, faces = geodesic(n)
+    mine = (u[:, 0] >= 0) & (u[:, 2] >= 0)
+    first = np.flatnonzero(mine)[ordered(u[mine])]
+    order = np.concatenate([first, np.flatnonzero(~mine)])
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return u[order], place[faces]
+
+
+def _half_a(spec: Spec, progress: Progress) -> Half:
+    optics = spec.optics
+    ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
+    every, faces = directions(optics.n)
+    kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
+    u = every[kept]
+    theta0 = flat.half_angles(ellipsoid, u, every)
+    size = flat.half_widths(ellipsoid, u, theta0)
+    theta1 = flat.wanted_angles(ellipsoid, u, size, optics.capture_diameter_mm / 2)
+    # The equatorial mirrors stay whole: the foot plane lies the greatest half width below them.
+    foot = -float(size[u[:, 2] == 0].max())
+    triangles, boundary = bounded(faces, every, kept)
+    task = Task(
+        mirrors=Surfaces(
+            ellipsoid.apices(u), ellipsoid.normals(u), flat.paper_curvatures(theta0, theta1, size)
+        ),
+        planes=planes(np.array([[0, 0, 0], [0, 0, foot]]), np.array([[1, 0, 0], [0, 0, 1]])),
+        boundary=boundary,
+        triangles=triangles,
+        pinhole=ellipsoid.pinhole,
+        least=1 / (spec.mirrors.max_radius_widths * size),
+        target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
+    )
+    cells, covered = solve(spec.mirrors.radius_rule, task, progress)
+    polar, azimuth = ellipsoid.polar_azimuth(u)
+    camera = spec.camera
+    return Half(
+        camera="a",
+        view=turned_to(
+            ellipsoid.pinhole,
+            cells.corners,
+            camera.width_px,
+            camera.height_px,
+            float(np.radians(camera.hfov_deg)),
+        ),
+        ellipsoid=ellipsoid,
+        u=u,
+        theta0=theta0,
+        theta1=theta1,
+        size=size,
+        polar=polar,
+        azimuth=azimuth,
+        cells=cells,
+        body=_under_coat(cells, spec.mirrors.coating_um / 1000),
+        area=areas(cells),
+        coverage=covered,
+    )
+
+
+def _under_coat(cells: Cells, coating: float) -> Cells:
+    """Cells of the surfaces that a coat of this thickness (mm) turns into the reflecting ones."""
+    if coating == 0:
+        return cells
+    m = cells.mirrors
+    every = cells.surfaces
+    mirrors = Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+    if np.any(mirrors.curvature * coating >= 1):
+        raise SpecError(
+            f"mirrors.coating_um {coating * 1000:g} is more than the least mirror radius "
+            f"{np.nanmin(mirrors.radius):.3g} mm: make the coat thinner"
+        )
+    bounds = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
+    body = mirrors.offset(-coating).joined(bounds)
+    return cells_of(body, cells.boundary, cells.triangles)

@@ -1,1 +1,0 @@
-"""Solids: the only package that uses the CAD kernel to build shapes."""

@@ -1,0 +1,94 @@
+"""A pinhole camera turned so that all its mirrors are in the frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from tbcad.geometry.vectors import MIRROR, unit
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class View:
+    """Pinhole camera with square pixels.
+
+    Attributes:
+        pinhole: mm, (3,).
+        forward: unit vector along the optical axis, (3,).
+        right: unit vector along the rows, (3,); down the columns is forward x right.
+        width_px: columns.
+        height_px: rows.
+        hfov: angle of view across the columns, radians.
+    """
+
+    pinhole: Floats
+    forward: Floats
+    right: Floats
+    width_px: int
+    height_px: int
+    hfov: float
+
+    @property
+    def half_sizes(self) -> Floats:
+        """Half width and half height of the image at unit distance, (2,)."""
+        half = np.tan(self.hfov / 2)
+        return np.array([half, half * self.height_px / self.width_px])
+
+    def fill(self, points: Floats) -> float:
+        """How far points (k, 3) fill the frame: 1 when the outermost is on its edge.
+
+        Infinite when a point is not in front of the camera.
+        """
+        return _fill(self.forward, self.right, self.half_sizes, points - self.pinhole)
+
+    def mirrored(self) -> "View":
+        """The other camera: mirror image in the plane x = 0, its rows running the other way."""
+        return View(
+            self.pinhole * MIRROR,
+            self.forward * MIRROR,
+            -self.right * MIRROR,
+            self.width_px,
+            self.height_px,
+            self.hfov,
+        )
+
+
+def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> float:
+    depth = rays @ forward
+    if depth.min() <= 0:
+        return np.inf
+    across = rays @ np.column_stack([right, np.cross(forward, right)])
+    return float(np.max(np.abs(across) / depth[:, None] / half_sizes))
+
+
+def turned_to(pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float) -> View:
+    """The camera turned so that points (k, 3) fill the least share of its frame.
+
+    The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
+    """
+    rays = unit(points - pinhole)
+    middle = unit(rays.mean(axis=0))
+    across = unit(np.cross([0.0, 0.0, 1.0], -pinhole))
+    along = np.cross(middle, across)
+    half = np.tan(hfov / 2)
+    half_sizes = np.array([half, half * height_px / width_px])
+
+    def axes(turn: Floats) -> tuple[Floats, Floats]:
+        forward = unit(middle + turn[0] * across + turn[1] * along)
+        return forward, unit(across - (across @ forward) * forward)
+
+    def fill(turn: Floats) -> float:
+        return min(_fill(*axes(turn), half_sizes, rays), 1e3)
+
+    found = minimize(
+        fill,
+        np.zeros(2),
+        method="Nelder-Mead",
+        options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},
+    )
+    # What is left of the search beyond this is noise: a symmetric array gets a symmetric camera.
+    forward, right = axes(np.round(found.x, 8) + 0.0)
+    return View(pinhole, forward, right, width_px, height_px, hfov)

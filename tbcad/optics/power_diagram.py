@@ -1,0 +1,240 @@
+"""Which three mirrors meet at a corner: the dual triangulation of the cells, kept valid by flips.
+
+The dual triangulation starts as the geodesic polyhedron and is changed only by edge flips, so it
+is a proper triangulation at every step. Where four cells meet in one point either diagonal will
+do: the two corners then coincide. No tolerance decides the topology, only its stopping.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.geometry.vectors import dot
+from tbcad.optics.surfaces import Surfaces
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# A corner counts as covered when another sphere lies deeper than this over it, mm. It only keeps
+# rounding from flipping an edge to and fro; arcs this short are merged later.
+COVERED = 1e-9
+# Flips settle within some ten rounds; a search that runs on is going in circles.
+MAX_ROUNDS = 200
+MAX_STEPS = 64
+# Rounding in the test against all mirrors, mm.
+TOUCHING = 1e-7
+# Pairs of point and surface looked at in one go: bounds the memory.
+CHUNK = 4_000_000
+
+
+class UnsettledError(ArithmeticError):
+    """The cells' topology was not found."""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Indices of the two planes that bound an array of m mirrors: they follow the mirrors."""
+
+    seam: int
+    foot: int
+
+
+def bounded(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints, Boundary]:
+    """Part of a triangulation on the kept directions, closed by a seam and a foot vertex.
+
+    Args:
+        triangles: outward triangles over all directions, (t, 3).
+        u: all directions, (k, 3).
+        kept: which directions are kept, (k,); their new indices count them in order.
+
+    Returns:
+        Triangles over the m kept directions and the two planes, and the planes' indices.
+    """
+    new = np.cumsum(kept) - 1
+    inner = new[triangles[kept[triangles].all(axis=1)]]
+    m = int(kept.sum())
+    boundary = Boundary(seam=m, foot=m + 1)
+    half = np.concatenate([inner[:, [0, 1]], inner[:, [1, 2]], inner[:, [2, 0]]])
+    key = half[:, 0] * m + half[:, 1]
+    rim = half[~np.isin(key, half[:, 1] * m + half[:, 0])]
+    middle = u[kept][rim].sum(axis=1)
+    plane = np.where(middle[:, 0] < middle[:, 2], boundary.seam, boundary.foot)
+    closing = np.column_stack([rim[:, 1], rim[:, 0], plane])
+    return np.concatenate([inner, closing, _ends(rim, plane)]), boundary
+
+
+def _ends(rim: Ints, plane: Ints) -> Ints:
+    """Triangles (mirror, seam, foot) where the rim goes from one plane to the other."""
+    follows = np.empty(rim.max() + 1, dtype=np.int64)
+    follows[rim[:, 0]] = plane
+    after = follows[rim[:, 1]]
+    change = after != plane
+    return np.column_stack([rim[change, 1], plane[change], after[change]])
+
+
+def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
+    """Directed edges (3 t, 2), edge 3 t + k running from corner k to k + 1 of t, and their twins.
+
+    Returns:
+        Ends (3 t, 2) and the index (3 t,) of the opposite directed edge.
+    """
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    order = np.lexsort((high, low))
+    twin = np.empty(len(ends), dtype=np.int64)
+    twin[order[0::2]], twin[order[1::2]] = order[1::2], order[0::2]
+    return ends, twin
+
+
+def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+    """Points where three surfaces meet on the light's side, in closed form, mm, (t, 3).
+
+    Two planes of equal power (radical planes) give a line; it meets the sphere of the greatest
+    curvature there, at the point nearer to the mirrors' apices. NaN where there is no common
+    point. Indices from `mirrors` on are bounding planes.
+    """
+    pivot = np.argmax(surfaces.curvature[triangles], axis=1)
+    row = np.arange(len(triangles))
+    p, q, s = (triangles[row, (pivot + k) % 3] for k in range(3))
+    gq, hq = radical_planes(surfaces, p, q)
+    gs, hs = radical_planes(surfaces, p, s)
+    line = np.cross(gq, gs)
+    length = np.linalg.norm(line, axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
+        line = line / length
+        start = _between(surfaces, triangles, mirrors)
+        point += dot(line, start)[:, None] * line
+        gradient = surfaces.gradient(p, point)
+        slope = dot(line, gradient)
+        value = surfaces.value(p, point)
+        root = np.copysign(np.sqrt(slope**2 - 2 * surfaces.curvature[p] * value), slope)
+        result: Floats = point - (2 * value / (slope + root))[:, None] * line
+    return result
+
+
+def _between(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+    """Mean of the apices of those faces of each corner that are mirrors."""
+    mirror = (triangles < mirrors)[:, :, None]
+    mean: Floats = np.mean(surfaces.apex[triangles], axis=1, where=mirror)
+    return mean
+
+
+def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
+    """Planes g . x + h = 0 that hold what surfaces p and q have in common, curvature of p >= q."""
+    kp, kq = surfaces.curvature[p], surfaces.curvature[q]
+    ratio = np.divide(kq, kp, out=np.zeros_like(kp), where=kp > 0)
+    g, h = surfaces.gradient_at_origin, surfaces.value_at_origin
+    return g[q] - ratio[:, None] * g[p], h[q] - ratio * h[p]
+
+
+def settle(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tuple[Ints, Floats]:
+    """Flip edges until no corner is covered by the mirror across an edge.
+
+    Args:
+        surfaces: the mirrors, followed by the bounding planes.
+        triangles: a triangulation to start from, (t, 3).
+        mirrors: number of mirrors; higher indices are planes, which are never joined anew.
+
+    Returns:
+        Triangles (t, 3) and their corners (t, 3).
+
+    Raises:
+        UnsettledError: when no sequence of flips was found.
+    """
+    steps = 1
+    while steps <= MAX_STEPS:
+        try:
+            return _follow(surfaces, triangles, mirrors, steps)
+        except UnsettledError:
+            steps *= 4
+    raise UnsettledError(f"the cells do not settle in {MAX_STEPS} steps from flat mirrors")
+
+
+def _follow(surfaces: Surfaces, start: Ints, mirrors: int, steps: int) -> tuple[Ints, Floats]:
+    """Settle directly, or along mirrors that grow from flat to their curvature in some steps.
+
+    Tangent planes of an ellipsoid always bound proper cells; in small steps of curvature each
+    flip is then between corners that all but coincide, where it is sure to be right.
+    """
+    triangles = start.copy()
+    for share in np.linspace(0, 1, steps + 1) if steps > 1 else [1.0]:
+        scaled = surfaces.with_curvature(share * surfaces.curvature)
+        points = _settle_once(scaled, triangles, mirrors)
+    return triangles, points
+
+
+def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+    """Flip the triangles in place until settled, and return their corners."""
+    points = corners(surfaces, triangles, mirrors)
+    for _ in range(MAX_ROUNDS):
+        edge, twin = _flips(surfaces, triangles, points, mirrors)
+        if not len(edge):
+            break
+        changed = _flip(triangles, edge, twin)
+        points[changed] = corners(surfaces, triangles[changed], mirrors)
+    deepest = covered(surfaces, points)
+    if not deepest > -TOUCHING:
+        raise UnsettledError(f"a corner lies {-deepest:.3g} mm inside another mirror")
+    return points
+
+
+def covered(surfaces: Surfaces, points: Floats) -> float:
+    """Least value of any f_j at points (t, 3): below zero some surface covers a point, mm.
+
+    It looks at all pairs, so it is the proof of what the flips found by looking at neighbours.
+    """
+    terms = np.column_stack(
+        [surfaces.gradient_at_origin, surfaces.curvature / 2, surfaces.value_at_origin]
+    )
+    squared = dot(points, points)
+    lifted = np.column_stack([points, squared, np.ones(len(points))])
+    rows = max(1, CHUNK // len(surfaces))
+    least = [np.min(lifted[k : k + rows] @ terms.T) for k in range(0, len(points), rows)]
+    return float(np.min(least))
+
+
+def _flips(surfaces: Surfaces, triangles: Ints, points: Floats, mirrors: int) -> tuple[Ints, Ints]:
+    """Directed edges to flip, at most one in any triangle, and their twins; worst first."""
+    ends, twin = half_edges(triangles)
+    edge = np.flatnonzero(np.arange(len(ends)) < twin)
+    across = twin[edge]
+    here, there = _opposite(triangles, edge), _opposite(triangles, across)
+    depth = np.minimum(
+        surfaces.value(there, points[edge // 3]), surfaces.value(here, points[across // 3])
+    )
+    low, high = np.minimum(here, there), np.maximum(here, there)
+    wanted = (np.nan_to_num(depth, nan=0.0) < -COVERED) & (low < mirrors) & (low != high)
+    size = len(surfaces)
+    wanted[wanted] = ~np.isin(
+        (low * size + high)[wanted], ends.min(axis=1) * size + ends.max(axis=1)
+    )
+    chosen = np.flatnonzero(wanted)
+    chosen = chosen[np.argsort(depth[chosen], kind="stable")]
+    rank = np.full(len(triangles), len(chosen))
+    order = np.arange(len(chosen))
+    np.minimum.at(rank, edge[chosen] // 3, order)
+    np.minimum.at(rank, across[chosen] // 3, order)
+    free = (rank[edge[chosen] // 3] == order) & (rank[across[chosen] // 3] == order)
+    # Flips of neighbouring triangles could make the same new edge twice.
+    new_edge = (low * size + high)[chosen[free]]
+    _, first = np.unique(new_edge, return_index=True)
+    picked = chosen[free][np.sort(first)]
+    return edge[picked], across[picked]
+
+
+def _opposite(triangles: Ints, edge: Ints) -> Ints:
+    result: Ints = triangles[edge // 3, (edge + 2) % 3]
+    return result
+
+
+def _flip(triangles: Ints, edge: Ints, twin: Ints) -> Ints:
+    """Replace triangles (i, j, k) and (j, i, l) by (k, i, l) and (l, j, k), in place."""
+    t, s = edge // 3, twin // 3
+    i, j = triangles[t, edge % 3], triangles[t, (edge + 1) % 3]
+    k, far = _opposite(triangles, edge), _opposite(triangles, twin)
+    triangles[t] = np.column_stack([k, i, far])
+    triangles[s] = np.column_stack([far, j, k])
+    return np.concatenate([t, s])

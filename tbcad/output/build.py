@@ -1,0 +1,58 @@
+"""An export: the record, what was asked for, and the manifest."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from tbcad.mirrors.array import Design
+from tbcad.mirrors.record import write_record
+from tbcad.output.background import beside
+from tbcad.output.manifest import write_manifest
+from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
+from tbcad.prototype.files.write import export_prototype
+from tbcad.shell.files import closing, export_shells
+from tbcad.spec.errors import SpecError
+
+Progress = Callable[[str], None]
+
+
+def export(
+    design: Design,
+    folder: Path,
+    parts: Sequence[str] = PARTS,
+    progress: Progress = lambda _: None,
+) -> None:
+    """Write an export into an empty folder.
+
+    Args:
+        design: of mirrors.
+        folder: to write into.
+        parts: some of PARTS.
+        progress: told of each stage.
+
+    Raises:
+        SpecError: when something does not fit; it says what to change.
+        InvalidSolidError: when the kernel fails.
+    """
+    write_record(folder, design, SHELL in parts)
+    if PROTOTYPE not in parts:
+        export_shells(design, folder, progress)
+    elif SHELL not in parts:
+        export_prototype(design, folder, progress)
+    else:
+        closing(design)  # flanges that do not fit are told at once
+        with beside(export_shells, design, folder):
+            with _or_left_out():
+                export_prototype(design, folder, progress)
+            progress("shells")
+    progress("manifest")
+    write_manifest(folder)
+
+
+@contextmanager
+def _or_left_out() -> Iterator[None]:
+    """Say of the prototype's faults that it need not be built."""
+    try:
+        yield
+    except SpecError as error:
+        raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None

@@ -1,0 +1,1 @@
+"""The balls: which ones, in which place, and at which stop each shows which mirror."""

@@ -1,0 +1,131 @@
+"""The hub: a disc and a boss about the axis, and the holes of what drives it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import Drive
+from tbcad.spec.errors import SpecError
+
+Floats = NDArray[np.float64]
+
+WALL_MM = 3.0  # round holes that take a load
+SCREW_MM = 3.4  # clearance hole of an M3 screw (ISO 273, medium)
+SLIT_MM = 2.0
+DISC_MM = 10.0
+BOSS_MM = 20.0
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Holes of a purchased part, on a circle about the axis.
+
+    Attributes:
+        circle: diameter, mm.
+        hole: diameter of the holes; zero: inserts of the spec.
+        head: diameter and depth of the counterbore on the side of the object, mm; zero: none.
+        boss: whether the hub has a boss with a shaft bore that is locked.
+        source: where the pattern is from.
+    """
+
+    circle: float
+    hole: float
+    head: tuple[float, float]
+    boss: bool
+    source: str
+
+
+PATTERNS: dict[Drive, Pattern] = {
+    # There is no standard for bolted GT2 wheels: the wheel is made to this circle.
+    "nema17-belt": Pattern(28.0, 0.0, (0.0, 0.0), True, "own: a GT2 wheel made to fit"),
+    # Sold as "5 mm flange coupling": flange 22 mm, four M3 holes on 16 mm, collar 10 mm.
+    "nema17-direct": Pattern(16.0, 0.0, (0.0, 0.0), True, "flange couplings on sale, 22 x 16 mm"),
+    # Stage tops with tapped M6 holes on the 25 mm grid of optical tables, one of them central.
+    "stage-60": Pattern(
+        50.0, 6.6, (11.0, 6.5), False, "25 mm grid of optical tables, M6 (ISO 273)"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Hub:
+    """The hub about the axis; z along the axis, toward the camera, mm.
+
+    Attributes:
+        front: z of the disc's face toward the object.
+        back: z of the disc's other face.
+        face: z of the outer face, where the drive is bolted on.
+        disc: radius of the disc.
+        boss: radius of the boss between back and face; zero: none.
+        bore: radius of the shaft's bore, through.
+        holes: places (h, 2) of the drive's holes across the axis, first toward azimuth zero.
+        hole: their diameter.
+        depth: their depth from the outer face.
+        head: diameter and depth of their counterbores from the front; zero: none.
+        lock: how the shaft is held; None without a boss.
+        cross: z of the lock's screws.
+        source: where the pattern of holes is from.
+    """
+
+    front: float
+    back: float
+    face: float
+    disc: float
+    boss: float
+    bore: float
+    holes: Floats
+    hole: float
+    depth: float
+    head: tuple[float, float]
+    lock: str | None
+    cross: float
+    source: str
+
+
+def hub(keys: Keys, front: float) -> Hub:
+    """The hub whose disc begins at z = front.
+
+    Raises:
+        SpecError: when the shaft's bore meets the holes of the drive.
+    """
+    pattern, bore = PATTERNS[keys.drive], keys.shaft_mm / 2
+    hole = pattern.hole or keys.insert_hole_mm
+    _check(keys, pattern, hole)
+    reach = pattern.circle / 2 + max(hole, pattern.head[0]) / 2 + WALL_MM
+    boss = max(reach, bore + WALL_MM + keys.insert_depth_mm) if pattern.boss else 0.0
+    disc = max(boss + 8.0, 30.0) if pattern.boss else reach
+    thick = DISC_MM if pattern.boss else max(DISC_MM, pattern.head[1] + 6.0)
+    back = front - thick
+    face = back - BOSS_MM if pattern.boss else back
+    return Hub(
+        front=front,
+        back=back,
+        face=face,
+        disc=disc,
+        boss=boss,
+        bore=bore,
+        holes=_circle(pattern.circle / 2),
+        hole=hole,
+        depth=keys.insert_depth_mm if pattern.boss else thick,
+        head=pattern.head,
+        lock=keys.lock if pattern.boss else None,
+        cross=(back + face + keys.insert_depth_mm) / 2 if pattern.boss else face,
+        source=pattern.source,
+    )
+
+
+def _check(keys: Keys, pattern: Pattern, hole: float) -> None:
+    least = 1.5
+    most = pattern.circle - max(hole, pattern.head[0]) - 2 * least
+    if keys.shaft_mm > most:
+        raise SpecError(
+            f"a shaft of {keys.shaft_mm:g} mm leaves no wall to the holes of drive {keys.drive}: "
+            f"make prototype.base.shaft_mm {most:g} or less"
+        )
+
+
+def _circle(radius: float) -> Floats:
+    turn = np.pi / 4 + np.arange(4) * np.pi / 2
+    return radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)

@@ -1,0 +1,159 @@
+"""The carrier as a solid: wall, ribs, rings, hub and bosses in one fuse, the hollows in one cut.
+
+Built about z with azimuth zero along x, then moved into the frame of the shell.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+
+from tbcad.cad.checks import COARSE_MM, checked
+from tbcad.cad.glyphs import fitting, relief
+from tbcad.cad.solids import cut, fused, polygon, prism, ring, volume_by_meshes
+from tbcad.prototype.base import hub_solids as hubs
+from tbcad.prototype.base import seat_solids as seat
+from tbcad.prototype.base.gaps import arcs, gaps
+from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.seats import Seats
+from tbcad.prototype.base.split import Split, downs, split
+from tbcad.prototype.base.split_solids import flanges, numbers, pieces, windows
+from tbcad.prototype.printing.placing import Part, laid
+from tbcad.shell.solid import InvalidSolidError
+
+Floats = NDArray[np.float64]
+
+SUNK_MM = 0.4
+# Tried in turn, mm; at 1e-6 meshes have gaps of some nanometres more often than not.
+SAME = (1e-5, 1e-6, 1e-4)
+COLUMN_MM = 80.0
+# Of the hub's radius, to where ribs go in it.
+ROOT = 0.6
+LABEL_ROOM = 0.85  # of a boss's end
+
+
+def carrier(base: Base, plan: Split | None = None) -> list[Part]:
+    """The carrier laid on the bed: in one piece where it fits, else in as few as can be.
+
+    Args:
+        base: in numbers.
+        plan: how it is cut; without, it is found.
+
+    Raises:
+        SpecError: when it cannot be cut to fit; it says how large the bed must be.
+        InvalidSolidError: when the kernel fails.
+    """
+    plan = plan or split(base)
+    solid = whole(base, plan)
+    if plan.joints:
+        return pieces(base, plan, solid)
+    return [laid("carrier", solid, downs(base, plan.pieces[0]), base.axes, base.keys)]
+
+
+def whole(base: Base, plan: Split | None = None) -> TopoDS_Solid:
+    """The carrier before it is cut up, about z, with the flanges of its joints.
+
+    Raises:
+        InvalidSolidError: when the kernel fails, whatever it takes for the same point.
+    """
+    seats = base.own_seats
+    added, removed = bodies(base, seats, plan), tools(base, seats)
+    expected = volume_by_meshes(added, removed, COARSE_MM)
+    contacts, pads = seats.contacts.reshape(-1, 3), np.repeat(seats.pad, 3)
+    faults = []
+    for same in SAME:
+        try:
+            shape = cut(fused(added, same), removed, same)
+            return checked("carrier", shape, expected, contacts, pads)
+        except InvalidSolidError as fault:
+            faults.append(fault)
+    raise faults[0]
+
+
+def bodies(base: Base, seats: Seats, plan: Split | None = None) -> list[TopoDS_Shape]:
+    """What the carrier is the union of."""
+    plan = plan or Split((np.zeros((0, 4)),), ())
+    labels = numbers(base, plan)
+    labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
+    bosses = [seat.placed(seat.boss(seats, k), seats, k) for k in range(len(seats))]
+    return [_wall(base), *_struts(base, plan), *hubs.body(base.hub), *bosses, *labels]
+
+
+def tools(base: Base, seats: Seats) -> list[TopoDS_Shape]:
+    """What is cut out of that union: cups with their pockets, ways of the balls, holes."""
+    own = [(seat.hollow(seats, k), k) for k in range(len(seats))]
+    own += [(seat.way(seats, k), k) for k in range(len(seats))]
+    placed = [seat.placed(shape, seats, k) for shape, k in own]
+    return [*placed, *hubs.holes(base.hub, base.keys)]
+
+
+def _wall(base: Base) -> TopoDS_Shape:
+    low, high = base.sector
+    return ring(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
+
+
+def _struts(base: Base, plan: Split) -> list[TopoDS_Shape]:
+    """Ribs, rings and flanges, left out where numbers are read."""
+    low, high = base.sector
+    # Their ends lie within the ribs at the edges, not in a plane with other faces.
+    inside = base.keys.rib_mm / 2 / float(base.inner[:, 1].max())
+    rings = [
+        ring(one, start, end - start)
+        for one in base.rings
+        for start, end in arcs(base, one, low + inside, high - inside)
+    ]
+    struts, joints = [*_ribs(base), *rings], flanges(base, plan)
+    if not joints:
+        return struts
+    return [cut(fused([*struts, *joints]), [*_ends(base), *windows(base, plan)])]
+
+
+def _ends(base: Base) -> list[TopoDS_Shape]:
+    seats = base.own_seats
+    return [seat.placed(seat.column(seats, k, COLUMN_MM), seats, k) for k in range(len(seats))]
+
+
+def _ribs(base: Base) -> list[TopoDS_Shape]:
+    """Plates along meridians; those at the edges end with the wall."""
+    section, thick = _rib_section(base), base.keys.rib_mm
+    sides = np.full(len(base.ribs), -0.5)
+    sides[0], sides[-1] = 0.0, -1.0
+    ribs = zip(base.ribs.tolist(), sides.tolist(), strict=True)
+    return [
+        cut(
+            _plate(section, azimuth, thick, side),
+            [
+                _plate(gap, azimuth, 2 * thick, (side - 0.5) / 2)
+                for gap in gaps(base, azimuth, side)
+            ],
+        )
+        for azimuth, side in ribs
+    ]
+
+
+def _rib_section(base: Base) -> Floats:
+    """Polygon (n, 2) of (z, r): from the middle of the wall to the ribs' outline."""
+    held, middle = base.hub, base.middle
+    reach = ROOT * (held.boss or held.disc)
+    # Where ribs meet, their faces lie in one plane across the axis, or not nearly so.
+    root = [[middle[0, 0], reach], [base.outline[0, 0], reach]]
+    return np.vstack([root, base.outline, middle[::-1]])
+
+
+def _plate(section: Floats, azimuth: float, thickness: float, side: float) -> TopoDS_Shape:
+    """A polygon (z, r) at an azimuth made thick; side -0.5 is evenly to both sides."""
+    z, r = section.T
+    out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    across = np.array([-out[1], out[0], 0.0])
+    at = r[:, None] * out + side * thickness * across
+    at[:, 2] = z
+    return prism(polygon(at), thickness * across)
+
+
+def _number(base: Base, seats: Seats, k: int) -> list[TopoDS_Shape]:
+    """The ball's number, from 1, on the end of its boss; its top is toward the camera."""
+    text, room = str(k + 1), LABEL_ROOM * float(seats.boss[k])
+    up, _, out = seats.axes[k]
+    right = np.cross(up, out)
+    height = fitting(text, base.keys.digit_mm, room)
+    at = seats.centre[k] + seats.back[k] * out
+    return relief(text, height, base.keys.relief_mm, SUNK_MM, np.stack([right, up, out]), at)

@@ -1,0 +1,1 @@
+"""What turns the base, and the load that it bears."""

@@ -1,0 +1,1 @@
+"""The files of the prototype: parts, tables, program and record."""

@@ -1,0 +1,93 @@
+"""balls.csv: every ball, where it stands with the base at angle zero, and what it shows."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.prototype.balls.layout import Prototype
+
+Floats = NDArray[np.float64]
+Value = str | int | float | None
+Row = dict[str, Value]
+
+COLUMNS = (
+    *("number", "kind", "size", "diameter_mm", "grade", "standard", "mass_g"),
+    *("radius_mm", "body_radius_mm", "polar_deg", "azimuth_deg"),
+    *("px", "py", "pz", "nx", "ny", "nz", "cx", "cy", "cz", "bx", "by", "bz"),
+    *("mirrors", "pixels", "pixels_shell", "coverage_mm", "coverage_fixed_mm", "error_deg"),
+)
+
+
+def rows(made: Prototype) -> list[Row]:
+    """One record for each ball, in the order of COLUMNS, numbered from 1.
+
+    p is the apex, n the inward normal there, c the centre of the reflecting sphere and b that of
+    the sphere in the seat, mm, in the frame of the shell with the base at angle zero. Diameter is
+    the body's. Coverages are the least of all mirrors that the ball stands in for, within cells
+    moved along with the ball and within fixed ones; pixels are the sums. A cap has no grade, and
+    no mass, which is its maker's.
+    """
+    served = np.bincount(made.fit.ball, minlength=len(made)).tolist()
+    cells = zip(_pose(made).tolist(), served, _shown(made).tolist(), strict=True)
+    return [
+        dict(zip(COLUMNS, [*_names(made, j), *pose, count, *shown], strict=True))
+        for j, (pose, count, shown) in enumerate(cells)
+    ]
+
+
+def write_balls(path: Path, records: list[Row]) -> None:
+    """Write balls.csv with full double precision; what does not exist is left empty."""
+    write_table(path, COLUMNS, records)
+
+
+def write_table(path: Path, columns: tuple[str, ...], records: list[Row]) -> None:
+    """Write records as CSV: UTF-8, one header line, numbers in full double precision."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(records)
+
+
+def _names(made: Prototype, j: int) -> list[Value]:
+    balls = made.balls
+    diameter, size = 2 * float(balls.body_radius[j]), balls.size[j]
+    if balls.cap[j]:
+        return [j + 1, "cap", size, diameter, None, None, None]
+    standard = balls.catalogue.standard[balls.stock[j]]
+    return [j + 1, "ball", size, diameter, made.grade.grade, standard, float(balls.mass_g[j])]
+
+
+def _pose(made: Prototype) -> Floats:
+    """Radii, angles, apex, normal and both centres, (k, 16)."""
+    balls = made.balls
+    table: Floats = np.column_stack(
+        [
+            balls.radius,
+            balls.body_radius,
+            np.degrees(balls.at.polar),
+            np.degrees(made.placement.azimuth),
+            made.apices(),
+            made.normals(),
+            made.centres(),
+            made.body_centres(),
+        ]
+    )
+    return table + 0.0  # no negative zeros
+
+
+def _shown(made: Prototype) -> Floats:
+    """Pixels kept and the shell's, least coverages, largest error of direction, (k, 5)."""
+    fit, k = made.fit, len(made)
+    error = np.zeros(k)
+    np.maximum.at(error, fit.ball, np.degrees(made.stops.error))
+    return np.column_stack(
+        [
+            np.bincount(fit.ball, fit.pixels, k),
+            np.bincount(fit.ball, fit.pixels_shell, k),
+            made.groups.least(fit.coverage),
+            made.groups.least(fit.coverage_fixed),
+            error,
+        ]
+    )

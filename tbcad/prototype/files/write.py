@@ -1,0 +1,147 @@
+"""All files of the prototype: parts, tables, plan, record and assembly."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tbcad.formats.glb import write_glb
+from tbcad.formats.step_assembly import write_assembly
+from tbcad.mirrors.array import Design
+from tbcad.prototype.assembly import rig
+from tbcad.prototype.balls.alternatives import choices
+from tbcad.prototype.balls.layout import Prototype, pictures
+from tbcad.prototype.files import balls_csv, bom_csv, drilling, gcode, plan_csv
+from tbcad.prototype.files.part_files import record, write_piece
+from tbcad.prototype.machine import Machine, machine
+from tbcad.prototype.stage.layout import leds
+from tbcad.spec.design import Spec
+from tbcad.spec.motion_keys import Motion
+
+Progress = Callable[[str], None]
+
+SCHEMA = "tbcad-prototype/1"
+PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
+NAME, STEP, GLB = "prototype.json", "prototype.step", "prototype.glb"
+
+
+def export_prototype(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+    """Build the prototype and write all of its files into a folder.
+
+    Raises:
+        SpecError: when something does not fit; it says what to change.
+        InvalidSolidError: when the kernel fails.
+    """
+    built, spec = machine(design, progress), design.spec
+    progress("prototype: files")
+    for piece in built.pieces:
+        write_piece(folder, piece, spec.mesh.structure_error_mm, spec.step.pcurves)
+    _write_tables(built, design, folder)
+    progress("prototype: assembly")
+    groups = [group for group in rig(built) if group.bodies]
+    write_assembly(folder / STEP, "prototype", groups)
+    write_glb(folder / GLB, "prototype", groups)
+    text = json.dumps(document(built, design), indent=1, allow_nan=False) + "\n"
+    (folder / NAME).write_text(text, encoding="utf-8")
+
+
+def document(built: Machine, design: Design) -> dict[str, Any]:
+    """prototype.json: what is known of the prototype, in numbers."""
+    made, keys = built.made, design.spec.prototype
+    axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
+    return {
+        "schema": SCHEMA,
+        "camera": made.half.camera,
+        "target_mm": design.spec.optics.capture_diameter_mm,
+        "picture": keys.picture,
+        "target_pad_um": PAD_UM,
+        "frame": {"axis": axis, "zero": zero, "third": third},
+        "swing_deg": _swing(built, keys.motion),
+        "balls": balls_csv.rows(made),
+        "choices": _choices(made, design.spec),
+        "seats": _seats(built),
+        "parts": [record(piece) for piece in built.pieces],
+        "leds": [
+            {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
+            for name, place, way in leds(built.stage)
+        ],
+        "bought": [
+            {"name": item.name, "what": item.what, "part": item.part, "turns": item.turns}
+            for item in built.frame.bought
+        ],
+        "stand": {
+            "plate": built.frame.plate.name,
+            "upright": built.frame.upright.name,
+            "uprights_cut_to_mm": built.frame.length,
+        },
+        "assembly": {"step": STEP, "glb": GLB},
+        "drive": bom_csv.drive_record(
+            built.balance, built.drive, keys.motion, built.swing, built.base.hub.disc
+        ),
+    }
+
+
+def _choices(made: Prototype, spec: Spec) -> list[dict[str, Any]]:
+    """What each way to choose the balls from the stock would cost, the one taken among them."""
+    found = choices(spec, made.half, made.groups, made.balls.catalogue)
+    return [
+        {
+            "way": one.name,
+            "pixels": one.pixels,
+            "pixels_kept": one.kept,
+            "coverage_mm": one.least_coverage,
+            "mirrors_short": one.short,
+            "balls_mass_g": one.mass_g,
+            "caps": one.made,
+        }
+        for one in found
+    ]
+
+
+def _swing(built: Machine, motion: Motion) -> list[float]:
+    """Base angles that the program drives between: it starts below the first stop."""
+    todo = gcode.run(built.made, motion)
+    angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
+    return [min(angles), max(angles)]
+
+
+def _seats(built: Machine) -> list[dict[str, Any]]:
+    """Record of each seat: its axis, away from the light, and its three pads."""
+    seats = built.base.seats
+    return [
+        {
+            "ball": k + 1,
+            "axis": (seats.axis[k] + 0.0).tolist(),
+            "normals": (seats.pad_normals[k] + 0.0).tolist(),
+            "contacts_mm": (seats.contacts[k] + 0.0).tolist(),
+            "pad_diameter_mm": 2 * float(seats.pad[k]),
+        }
+        for k in range(len(seats))
+    ]
+
+
+def _write_tables(built: Machine, design: Design, folder: Path) -> None:
+    made, motion = built.made, design.spec.prototype.motion
+    balls_csv.write_balls(folder / "balls.csv", balls_csv.rows(made))
+    plan_csv.write_plan(folder / "rotation_plan.csv", plan_csv.rows(pictures(made)))
+    plan_csv.write_stops(folder / "stops.csv", plan_csv.stop_rows(made))
+    drilling.write_drilling(folder / "plate_holes.csv", drilling.rows(built.frame))
+    gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))
+    bom_csv.write_bom(
+        folder / "bom.csv", bom_csv.rows(made, built.drive, _needed(built, design), built.parts)
+    )
+
+
+def _needed(built: Machine, design: Design) -> bom_csv.PartsNeeded:
+    keys = design.spec.prototype.base
+    return bom_csv.PartsNeeded(
+        bought=built.bought,
+        leds=len(built.stage.leds),
+        led=built.stage.led.name,
+        printed=tuple(
+            bom_csv.Printed(piece.name, piece.what, piece.part.volume, piece.quantity)
+            for piece in built.pieces
+            if piece.role != "cap"
+        ),
+        print_density=keys.density_g_cm3,
+    )

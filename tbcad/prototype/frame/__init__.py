@@ -1,0 +1,1 @@
+"""The frame: base plate, uprights, bearings, motor and camera brackets."""

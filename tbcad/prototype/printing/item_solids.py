@@ -1,0 +1,70 @@
+"""Solids of bodies: added ones fused, removed ones cut out."""
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+
+from tbcad.cad.solids import (
+    cut,
+    cylinder,
+    fused,
+    one_solid,
+    polygon,
+    prism,
+    ring,
+    volume,
+    volume_by_meshes,
+)
+from tbcad.geometry.primitives import Body, Item, Rod, Turned
+from tbcad.geometry.primitives import Prism as Straight
+from tbcad.prototype.printing.placing import Part, laid
+from tbcad.shell.solid import InvalidSolidError
+from tbcad.spec.base_keys import Base as Keys
+
+Floats = NDArray[np.float64]
+
+COARSE_MM = 0.02
+VOLUME_ERROR = 2e-3
+
+
+def shape(body: Body) -> TopoDS_Shape:
+    """The solid of a body."""
+    if isinstance(body, Rod):
+        return cylinder(body.start, body.axis, body.radius, body.length)
+    if isinstance(body, Turned):
+        return ring(body.profile, 0.0, 2 * np.pi)
+    return prism(polygon(_upward(body)), body.along)
+
+
+def solid(item: Item) -> TopoDS_Solid:
+    """The one solid of a part, in the frame of the shell.
+
+    Raises:
+        InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
+    """
+    added = [shape(body) for body in item.added]
+    removed = [shape(body) for body in item.removed]
+    found = one_solid(item.name, cut(fused(added), removed))
+    expected = volume_by_meshes(added, removed, COARSE_MM)
+    if abs(volume(found) - expected) > VOLUME_ERROR * expected:
+        raise InvalidSolidError(
+            f"{item.name}: the kernel made {volume(found):.0f} mm^3 of {expected:.0f}"
+        )
+    return found
+
+
+def printed(item: Item, keys: Keys) -> Part:
+    """A part laid on the printer's bed.
+
+    Raises:
+        SpecError: when it does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    downs = [np.array(down) for down in item.downs]
+    return laid(item.name, solid(item), downs, np.eye(3), keys)
+
+
+def _upward(body: Straight) -> Floats:
+    """The corners with their normal along the prism, so that the solid is not inside out."""
+    a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
+    return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]

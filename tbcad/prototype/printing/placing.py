@@ -1,0 +1,100 @@
+"""How a part is laid on the printer's bed: the first way that fits with the least to support."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from scipy.spatial import ConvexHull
+
+from tbcad.cad.solids import meshed, moved, one_solid, volume
+from tbcad.geometry.vectors import norm
+from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
+from tbcad.shell.mesh import Mesh
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.errors import SpecError
+
+Floats = NDArray[np.float64]
+
+# Only to measure with; the parts themselves are meshed finely when they are written.
+COARSE_MM, COARSE_ANGLE = SLACK_MM / 2, 0.4
+STEEP = np.cos(np.radians(45))
+TOUCHING_MM = 0.05
+
+
+@dataclass(frozen=True)
+class Part:
+    """A printed part.
+
+    Attributes:
+        name: of the part.
+        shape: one closed solid in the frame of the shell, the base at angle zero.
+        axes: what x, y and z become on the printer's bed, as rows, (3, 3).
+        origin: where the origin comes to lie on the bed, mm, (3,).
+    """
+
+    name: str
+    shape: TopoDS_Solid
+    axes: Floats
+    origin: Floats
+
+    @property
+    def on_bed(self) -> TopoDS_Solid:
+        """The part as it is printed: above z = 0, about the middle of the bed."""
+        return one_solid(self.name, moved(self.shape, self.axes, self.origin))
+
+    @property
+    def volume(self) -> float:
+        """Volume, mm^3."""
+        return volume(self.shape)
+
+    def mass_g(self, density: float) -> float:
+        """Mass when printed solid, grams, for a density in g/cm^3."""
+        return self.volume / 1000 * density
+
+
+def laid(name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, keys: Keys) -> Part:
+    """A part on the bed, the way round that needs the least support of those that fit.
+
+    Args:
+        name: of the part.
+        shape: about z, in the carrier's own frame.
+        downs: directions of that frame that may point down, as (3,) unit vectors.
+        axes: of that frame in the frame of the shell, as rows.
+        keys: the bed.
+
+    Raises:
+        SpecError: when it fits no way round.
+        InvalidSolidError: when it is not one closed solid.
+    """
+    coarse = meshed(shape, COARSE_MM, COARSE_ANGLE)
+    corners = coarse.vertices[ConvexHull(coarse.vertices).vertices]
+    ways = [way for down in downs if (way := fitting(corners, down, keys)) is not None]
+    if not ways:
+        raise SpecError(_too_large(name, corners, downs, keys))
+    best = ways[int(np.argmin([round(_overhang(coarse, way), 3) for way in ways]))]
+    placed = coarse.vertices @ best
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    origin = -np.array([*(low + high)[:2] / 2, low[2]])
+    solid = one_solid(name, moved(shape, axes, np.zeros(3)))
+    return Part(name, solid, axes.T @ best, origin)
+
+
+def _too_large(name: str, corners: Floats, downs: Sequence[Floats], keys: Keys) -> str:
+    """What to say of a part that does not fit: the bed that the nearest way needs."""
+    bed = as_text(needed(corners, downs, keys))
+    return (
+        f"{name} does not fit on the printer's bed: make prototype.base.bed_mm at least {bed}, or "
+        "prototype.largest_ball_mm or prototype.k smaller"
+    )
+
+
+def _overhang(mesh: Mesh, way: Floats) -> float:
+    """Area that hangs over by more than 45 degrees and does not lie on the bed, mm^2."""
+    corner = (mesh.vertices @ way)[mesh.triangles]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = norm(across) / 2
+    height = corner[..., 2].max(axis=1) - corner[..., 2].min()
+    hangs = (-across[:, 2] > STEEP * 2 * area) & (height > TOUCHING_MM)
+    return float(area[hangs].sum())

@@ -1,0 +1,1 @@
+"""Purchased parts, from CSV files."""

@@ -1,0 +1,1 @@
+"""The object stage: post, crown with LEDs, turning disc."""

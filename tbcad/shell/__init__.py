@@ -1,0 +1,1 @@
+"""The shell: the convex mirrors of one camera as one thick solid."""

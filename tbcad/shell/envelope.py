@@ -1,0 +1,178 @@
+"""The body behind the mirrors: back, flanges and holes, as points and exact curves.
+
+Every edge is a straight line, a circle, or a plane section of a spheroid, so that the solid and
+the mesh are both built from the same closed forms and no boolean operation is needed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.geometry.conics import EllipseArc, Spheroid, offset_beyond, offset_to_hold
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.optics.cells import Cells
+from tbcad.spec.design import Flange, Shell
+from tbcad.spec.errors import SpecError
+
+Floats = NDArray[np.float64]
+
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+# The foot flange reaches past the ends of the seam flange, which stands on it, by this much.
+STEP_MM = 1.0
+# Points on each arc that are looked at for the deepest valley.
+VALLEY_SAMPLES = 5
+
+
+@dataclass(frozen=True)
+class Holes:
+    """Round through holes in a flange.
+
+    Attributes:
+        centre: on the joining face, mm, (k, 3).
+        direction: into the flange, length its thickness, mm, (3,).
+        radius: mm, (k,).
+    """
+
+    centre: Floats
+    direction: Floats
+    radius: Floats
+
+
+@dataclass(frozen=True)
+class Body:
+    """What closes camera a's cells to a solid; all arcs run from lower to higher y.
+
+    The joining faces are x = 0 (seam) and z = foot; the seam flange stands on the foot flange.
+
+    Attributes:
+        back: the spheroid of the smooth back.
+        foot: height of the foot plane, mm.
+        seam_back: edge of back and seam flange, in x = seam thickness.
+        foot_back: edge of back and foot flange, in z = foot + thickness.
+        seam_rim: outer edge of the seam flange at x = 0; at x = thickness it is moved.
+        foot_rim: outer edge of the foot flange at z = foot; on top it is moved.
+        seam_holes: holes along x.
+        foot_holes: holes along z.
+    """
+
+    back: Spheroid
+    foot: float
+    seam_back: EllipseArc
+    foot_back: EllipseArc
+    seam_rim: EllipseArc
+    foot_rim: EllipseArc
+    seam_holes: Holes
+    foot_holes: Holes
+
+    @property
+    def seam_thickness(self) -> Floats:
+        """Vector through the seam flange, mm, (3,)."""
+        return self.seam_holes.direction
+
+    @property
+    def foot_thickness(self) -> Floats:
+        """Vector through the foot flange, mm, (3,)."""
+        return self.foot_holes.direction
+
+
+def body(shell: Shell, cells: Cells, ellipsoid: Ellipsoid) -> Body:
+    """Back, flanges and holes round camera a's cells.
+
+    Raises:
+        SpecError: when holes or flanges do not fit.
+    """
+    foot = float(cells.surfaces.apex[cells.boundary.foot, 2])
+    deepest = offset_to_hold(ellipsoid, _valleys(cells))
+    back = Spheroid(ellipsoid, offset_beyond(ellipsoid, deepest, shell.wall_mm))
+    x, z = shell.seam_flange.thickness_mm, foot + shell.foot_flange.thickness_mm
+    try:
+        return _flanged(shell, back, foot, x, z)
+    except ValueError as error:
+        raise SpecError(
+            f"the flanges miss the shell ({error}): make shell.seam_flange.thickness_mm and "
+            "shell.foot_flange.thickness_mm smaller"
+        ) from None
+
+
+def _valleys(cells: Cells) -> Floats:
+    arcs = cells.arcs
+    t = np.linspace(0, 1, VALLEY_SAMPLES)
+    arc, share = np.broadcast_arrays(np.arange(len(arcs))[:, None], t)
+    return arcs.at(arc, share).reshape(-1, 3)
+
+
+def _flanged(shell: Shell, back: Spheroid, foot: float, x: float, z: float) -> Body:
+    seam, base = shell.seam_flange, shell.foot_flange
+    rim = _wider(back, seam.width_mm)
+    outer = _wider(back, _foot_width(base, back, rim, foot, x, z))
+    return Body(
+        back=back,
+        foot=foot,
+        seam_back=_over(back, x, z),
+        foot_back=_round(back, x, z, z),
+        seam_rim=_over(rim, x, z).moved(-x * X),
+        foot_rim=_round(outer, 0.0, foot, foot),
+        seam_holes=_holes(
+            seam, _over(_wider(back, seam.width_mm / 2), x, z).moved(-x * X), x * X, seam.width_mm
+        ),
+        foot_holes=_holes(
+            base,
+            _round(_wider(back, base.width_mm / 2), x + seam.width_mm / 2, foot, foot),
+            (z - foot) * Z,
+            base.width_mm / 2,
+        ),
+    )
+
+
+def _wider(back: Spheroid, width: float) -> Spheroid:
+    return Spheroid(back.ellipsoid, back.offset + width)
+
+
+def _over(spheroid: Spheroid, x: float, z: float) -> EllipseArc:
+    """Arc over the top in the plane x, between the points at height z."""
+    low, high = spheroid.crossing(x, z)
+    top = spheroid.centre + 1e6 * Z
+    return spheroid.section(X, x).arc(low, high, top)
+
+
+def _round(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
+    """Arc round the mirrors in the plane z = plane, between the points at x."""
+    low, high = spheroid.crossing(x, z)
+    return spheroid.section(Z, plane).arc(low, high, spheroid.centre + 1e6 * X)
+
+
+def _foot_width(
+    base: Flange, back: Spheroid, rim: Spheroid, foot: float, x: float, z: float
+) -> float:
+    """Width of the foot flange, at least so much that the seam flange stands on it."""
+    low, high = rim.crossing(x, z)[:, 1]
+    width = base.width_mm
+    for _ in range(100):
+        ends = _wider(back, width).crossing(0.0, foot)[:, 1]
+        short = max(high - ends[1], ends[0] - low) + STEP_MM
+        if short <= 0:
+            return width
+        width += short
+    raise SpecError(
+        "the seam flange does not stand on the foot flange: make shell.seam_flange.width_mm "
+        "smaller or shell.foot_flange.width_mm larger"
+    )
+
+
+def _holes(flange: Flange, line: EllipseArc, direction: Floats, margin: float) -> Holes:
+    """Bolts and dowels at even distances along a line, dowels near its ends and between."""
+    count = flange.bolts + flange.dowels
+    pitch = (line.length - 2 * margin) / (count - 1)
+    largest = max(flange.bolt_hole_mm, flange.dowel_hole_mm if flange.dowels else 0.0)
+    if pitch < 2 * largest:
+        raise SpecError(
+            f"{count} holes of up to {largest:g} mm do not fit along a flange of "
+            f"{line.length:.0f} mm: lower bolts or dowels under shell.seam_flange or "
+            "shell.foot_flange"
+        )
+    share = (margin + pitch * np.arange(count)) / line.length
+    dowel = np.zeros(count, dtype=bool)
+    dowel[np.round(np.linspace(1, count - 2, flange.dowels)).astype(int)] = True
+    radius = np.where(dowel, flange.dowel_hole_mm, flange.bolt_hole_mm) / 2
+    return Holes(line.by_length(share), direction, radius)

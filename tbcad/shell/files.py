@@ -1,0 +1,61 @@
+"""All files of both shells, from a design to a folder."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.formats.step import write_step
+from tbcad.formats.stl import write_stl
+from tbcad.formats.threemf import write_3mf
+from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.record import part
+from tbcad.shell.envelope import Body, body
+from tbcad.shell.mesh import Mesh, mesh
+from tbcad.shell.solid import shell
+
+Progress = Callable[[str], None]
+
+
+def export_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+    """Write both shells as STEP, STL and 3MF into a folder.
+
+    Raises:
+        SpecError: when flanges or holes do not fit.
+        InvalidSolidError: when the kernel finds a solid invalid.
+    """
+    first = design.halves[0]
+    around = closing(design)
+    progress("facets")
+    facets = mesh(design.spec, first.body, around, distances(first))
+    for half in design.halves:
+        _export(design, half, around, facets, folder, progress)
+
+
+def closing(design: Design) -> Body:
+    """What closes camera a's half: back, flanges, holes.
+
+    Raises:
+        SpecError: when flanges or holes do not fit.
+    """
+    first = design.halves[0]
+    return body(design.spec.shell, first.body, first.ellipsoid)
+
+
+def distances(half: Half) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Distance of each mirror from the object, mm, (m,)."""
+    return half.ellipsoid.radial_distance(half.u)
+
+
+def _export(
+    design: Design, half: Half, closing: Body, facets: Mesh, folder: Path, progress: Progress
+) -> None:
+    """Write one half; closing and facets are camera a's."""
+    files, mirrored = part(half), half.camera == "b"
+    progress(f"{files['name']}: solid")
+    own = facets.mirrored() if mirrored else facets
+    solid = shell(files["name"], half.ids, design.halves[0].body, closing, mirrored)
+    progress(f"{files['name']}: files")
+    write_step(folder / files["step"], solid, design.spec.step.pcurves)
+    write_stl(folder / files["stl"], own)
+    write_3mf(folder / files["3mf"], files["name"], own)

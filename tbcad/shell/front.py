@@ -1,0 +1,106 @@
+"""The mirrors' faces, on vertices and edges that neighbours share."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
+
+from tbcad.cad.brep import Maker, Side
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.optics.cells import Arcs, Cells
+from tbcad.shell.boundary import boundary_chain
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Front:
+    """Kernel vertices and edges of camera a's cells.
+
+    Attributes:
+        maker: that made them.
+        cells: they are of.
+        vertices: by corner index.
+        edges: by arc index.
+    """
+
+    maker: Maker
+    cells: Cells
+    vertices: dict[int, TopoDS_Vertex]
+    edges: list[TopoDS_Edge]
+
+    def faces(self) -> list[TopoDS_Face]:
+        """One face for each cell, on its sphere or plane, in the order of the mirrors."""
+        surfaces = self.cells.surfaces
+        poses = zip(surfaces.apex, surfaces.normal, surfaces.radius, strict=True)
+        return [self._face(*pose, ring) for pose, ring in zip(poses, self._rings(), strict=False)]
+
+    def _rings(self) -> list[list[Side]]:
+        """Edges round each cell, counter-clockwise seen from the light, the solid's outer side."""
+        offsets, sides = self.cells.rings
+        every = [(self.edges[side // 2], bool(side % 2)) for side in sides.tolist()]
+        return [every[a:b][::-1] for a, b in pairwise(offsets.tolist())]
+
+    def _face(self, apex: Floats, normal: Floats, radius: float, ring: list[Side]) -> TopoDS_Face:
+        maker = self.maker
+        if np.isnan(radius):
+            return maker.face(maker.plane(apex, normal), [ring], natural=True)
+        sphere = maker.sphere(apex - radius * normal, radius, normal)
+        face = maker.face(sphere, [ring], natural=True)
+        maker.add_pcurves(face, ring)
+        return face
+
+    def chain(self, plane: int) -> list[Side]:
+        """Edges along the seam or the foot, from low to high y."""
+        return [(self.edges[arc], forward) for arc, forward in boundary_chain(self.cells, plane)]
+
+
+def front(maker: Maker, cells: Cells) -> Front:
+    """Vertices at the corners and an edge for each arc."""
+    arcs = cells.arcs
+    used = np.unique(np.concatenate([arcs.start, arcs.end])).tolist()
+    vertices = {corner: maker.vertex(cells.corners[corner]) for corner in used}
+    circles = _circles(arcs)
+    ends = zip(arcs.start.tolist(), arcs.end.tolist(), strict=True)
+    edges = [
+        _edge(maker, circles, arcs.points[k], k, vertices[start], vertices[end])
+        for k, (start, end) in enumerate(ends)
+    ]
+    return Front(maker, cells, vertices, edges)
+
+
+@dataclass(frozen=True)
+class _Circles:
+    """Circles of e arcs, each from centre + radius x by an angle toward y; straight ones: 0."""
+
+    centre: Floats
+    x: Floats
+    y: Floats
+    radius: Floats
+    angle: Floats
+
+
+def _edge(
+    maker: Maker, c: _Circles, points: Floats, k: int, start: TopoDS_Vertex, end: TopoDS_Vertex
+) -> TopoDS_Edge:
+    if c.angle[k] == 0:
+        return maker.line(points[0], points[2], start, end)
+    return maker.circle(c.centre[k], c.x[k], c.y[k], c.radius[k], c.angle[k], start, end)
+
+
+def _circles(arcs: Arcs) -> _Circles:
+    """Circles of the arcs from their control polygons."""
+    start, control, end = (arcs.points[:, k] for k in range(3))
+    along = unit(control - start)
+    half = norm(end - start) / 2
+    straight = arcs.weight == 1
+    sine = np.sqrt(1 - arcs.weight**2)
+    radius = np.divide(half, sine, out=np.ones_like(half), where=~straight)
+    chord = (end - start) / (2 * half[:, None])
+    outward = unit(along - dot(along, chord)[:, None] * chord)
+    x = arcs.weight[:, None] * outward - sine[:, None] * chord
+    angle = np.where(straight, 0.0, 2 * np.arcsin(np.minimum(sine, 1)))
+    return _Circles(start - radius[:, None] * x, x, along, radius, angle)

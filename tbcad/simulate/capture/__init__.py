@@ -1,0 +1,1 @@
+"""Simulated photographs and the light field made from them."""

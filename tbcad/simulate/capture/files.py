@@ -1,0 +1,94 @@
+"""A folder of captures: both photographs, the light field, and the object they are of."""
+
+import json
+import zipfile
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.simulate import picture_files
+from tbcad.simulate.capture import light_field
+from tbcad.simulate.capture.source import Captured
+from tbcad.simulate.scene.object import Subject
+
+OBJECT, RECORD = "object.npz", "capture.json"
+SCHEMA = "tbcad-capture/1"
+LARGEST_OBJECT = 4 << 30  # bytes, unpacked
+
+
+def write_capture(
+    folder: Path, captured: Captured, subject: Subject, capture_mm: float, facts: dict[str, Any]
+) -> dict[str, Any]:
+    """Write all files of a capture into a folder, and return its record.
+
+    Args:
+        folder: exists, and is the caller's to replace.
+        captured: each camera with what gives its bands.
+        subject: the object before the cameras.
+        capture_mm: diameter of the capture sphere.
+        facts: how the capture is made.
+    """
+    record: dict[str, Any] = {"schema": SCHEMA, "object": subject.name, **facts, "cameras": {}}
+    with light_field.writing(folder / light_field.NAME, capture_mm, record) as store:
+        for at, bands in captured:
+            picture, counts = light_field.write(store, at, bands())
+            file = folder / f"camera_{at.camera}.png"
+            picture_files.write_stills({file: picture})
+            record["cameras"][at.camera] = {"picture": file.name, **counts}
+    write_object(folder / OBJECT, subject)
+    text = json.dumps(record, indent=1) + "\n"
+    (folder / RECORD).write_text(text, encoding="utf-8")
+    return record
+
+
+def write_object(path: Path, subject: Subject) -> None:
+    """Write an object with all that gives its colours; the bytes are the same each time."""
+    values = {field.name: getattr(subject, field.name) for field in fields(subject)}
+    arrays = {name: np.asarray(value) for name, value in values.items() if value is not None}
+    np.savez_compressed(path, allow_pickle=False, **arrays)
+
+
+def read_object(folder: Path) -> Subject:
+    """Read the object of a capture.
+
+    Raises:
+        InputError: there is none, or it is damaged.
+    """
+    path = folder / OBJECT
+    if not path.is_file():
+        raise InputError(f"{path} is not there: without it there is no ground truth")
+    try:
+        with zipfile.ZipFile(path) as packed:
+            if sum(entry.file_size for entry in packed.infolist()) > LARGEST_OBJECT:
+                raise InputError(f"{path} unpacks to over 4 GiB: capture again")
+        with np.load(path, allow_pickle=False) as arrays:
+            return _subject({name: arrays[name] for name in arrays.files})
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path} is damaged: {error}: capture again") from error
+
+
+def _subject(arrays: dict[str, Any]) -> Subject:
+    made = Subject(
+        name=str(arrays["name"]),
+        points=arrays["points"].astype(np.float64),
+        faces=arrays["faces"].astype(np.int64),
+        normals=arrays["normals"].astype(np.float64),
+        albedo=arrays["albedo"].astype(np.float64),
+        uv=arrays.get("uv"),
+        texture=arrays.get("texture"),
+        patterned=bool(arrays["patterned"]),
+    )
+    v, f = len(made.points), len(made.faces)
+    shapes = (made.points.shape, made.faces.shape, made.normals.shape, made.albedo.shape)
+    if shapes != ((v, 3), (f, 3), (v, 3), (f, 3, 3)) or f == 0:
+        raise ValueError("arrays do not belong together")
+    if made.faces.min() < 0 or made.faces.max() >= v or not np.isfinite(made.points).all():
+        raise ValueError("facets have corners that do not exist")
+    if (made.uv is None) != (made.texture is None):
+        raise ValueError("a texture without its places")
+    if made.uv is not None and made.uv.shape != (f, 3, 2):
+        raise ValueError("a texture without its places")
+    return made

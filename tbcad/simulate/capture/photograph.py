@@ -1,0 +1,105 @@
+"""A camera's photograph through its mirrors, band after band of pixel rows."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.optics.camera import View
+from tbcad.simulate.compiled import THREADS, in_threads
+from tbcad.simulate.scene.rays import Rays, unit_directions
+from tbcad.simulate.scene.shading import Scene, look
+
+Floats = NDArray[np.float64]
+Colours = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+Shift = tuple[float, float]
+Tracer = Callable[[range, Shift], Rays]
+Progress = Callable[[str], None]
+
+BAND_ROWS = 64  # also the height of a chunk of the light field's file
+CENTRE: Shift = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Band:
+    """Rows of a photograph.
+
+    Attributes:
+        rows: which, from the top.
+        rays: through the pixels' centres; none where the object itself stands in front.
+        colour: red, green, blue, (h, w, 3).
+    """
+
+    rows: range
+    rays: Rays
+    colour: Bytes
+
+
+def photograph(
+    view: View, trace: Tracer, scene: Scene, samples: int = 1, progress: Progress = lambda _: None
+) -> Iterator[Band]:
+    """The bands of a camera's picture from top to bottom; few are in memory at a time.
+
+    Args:
+        view: the camera.
+        trace: gives the rays of rows after the mirrors.
+        scene: the object.
+        samples: a pixel is the mean of samples x samples rays.
+        progress: told how far it has come.
+    """
+    height = view.height_px
+    rows = row_bands(height)
+    for first in range(0, len(rows), 2 * THREADS):
+        progress(f"row {rows[first].start} of {height}")
+        yield from in_threads(
+            partial(_band, view, trace, scene, samples), rows[first : first + 2 * THREADS]
+        )
+
+
+def row_bands(height: int) -> list[range]:
+    """Rows of a picture in bands, which are worked on one by one."""
+    return [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
+
+
+def _band(view: View, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
+    rays, colour = _through(view, trace, scene, rows, CENTRE)
+    if samples > 1:
+        taken = (_through(view, trace, scene, rows, shift)[1] for shift in shifts(samples))
+        colour = sum(taken, np.zeros_like(colour)) / np.float32(samples**2)
+    return Band(rows, rays, np.rint(colour).astype(np.uint8))
+
+
+def shifts(samples: int) -> list[Shift]:
+    """Places of samples x samples rays in a pixel, from its centre."""
+    places = ((np.arange(samples) + 0.5) / samples - 0.5).tolist()
+    return [(x, y) for y in places for x in places]
+
+
+def _through(
+    view: View, trace: Tracer, scene: Scene, rows: range, shift: Shift
+) -> tuple[Rays, Colours]:
+    """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
+    rays = trace(rows, shift)
+    seen = look(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    colour = seen.colour.reshape(*rays.mirror.shape, 3)
+    return _hidden(view, rays, colour, scene, rows, shift), colour
+
+
+def _hidden(
+    view: View, rays: Rays, colour: Colours, scene: Scene, rows: range, shift: Shift
+) -> Rays:
+    """Paint the object where the camera sees it directly, and take the rays away there."""
+    way = unit_directions(view, rows, shift).reshape(-1, 3)
+    direct = look(scene, np.broadcast_to(view.pinhole, way.shape), way)
+    met = np.flatnonzero(np.isfinite(direct.depth))
+    if len(met) == 0:
+        return rays
+    to_mirror = np.linalg.norm(rays.origin.reshape(-1, 3)[met] - view.pinhole, axis=1)
+    front = met[(rays.mirror.ravel()[met] == 0) | (direct.depth[met] < to_mirror)]
+    colour.reshape(-1, 3)[front] = direct.colour[front]
+    gone = np.zeros(rays.mirror.shape, dtype=bool)
+    gone.ravel()[front] = True
+    return rays.without(gone)

@@ -1,0 +1,1 @@
+"""What the simulated light meets: object, mirrors and cameras."""

@@ -1,0 +1,160 @@
+"""The exported mesh: which mirror each pixel's ray meets, on spheres recovered from its vertices.
+
+A facet reflects like a flat mirror, which turns rays by some 2 mm at the object
+(docs/decisions/0003). Its vertices lie on the sphere, though: so facets say what stands where, and
+the spheres through the vertices of each mirror's facets say where light goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad.errors import InputError
+from tbcad.optics.surfaces import Surfaces
+from tbcad.simulate.scene.embree import committed
+from tbcad.simulate.scene.exported import AGAIN, Exported
+from tbcad.simulate.scene.rays import Numbers, Rays, pixel_directions, reflected
+from tbcad.simulate.scene.reflector import Reflector
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LARGEST_FILE = 4 << 30  # bytes
+# Mirrors whose apices are nearest to a facet, out of which the one it lies on is found.
+LIKELY = 8
+# Corners of a facet lie on its mirror but for what float32 in the file leaves.
+OFF_MM = 1e-3
+# Facets of a mirror lie along it within a few degrees, walls at its rim nearly across.
+LEAST_COSINE = 0.9
+
+
+@dataclass(frozen=True)
+class Shells:
+    """Both shells' facets.
+
+    Attributes:
+        mirror: number of the mirror that each facet is of, from 1; less than 0 for those of
+            camera b; 0 for none, (f,).
+        embree: the facets, committed.
+        surfaces: of camera a's and of camera b's mirrors, recovered from the facets, coat on.
+    """
+
+    mirror: Numbers
+    embree: Any
+    surfaces: tuple[Surfaces, Surfaces]
+
+
+def read_shells(export: Exported) -> Shells:
+    """Read both shells' STL files.
+
+    Raises:
+        InputError: they are not there, cannot be read, or lack mirrors.
+    """
+    coat = export.spec.mirrors.coating_um / 1000
+    corners, owners, surfaces = [], [], []
+    for at, sign in zip(export.reflectors, (1, -1), strict=True):
+        path = export.folder / f"shell_{at.camera}.stl"
+        facets = _facets(path)
+        owner = _owners(at.mirrors.offset(-coat), facets)
+        if len(lost := np.setdiff1d(np.arange(len(at)), owner)):
+            raise InputError(f"{path} has no facets of {len(lost)} mirrors of the record: {AGAIN}")
+        corners.append(facets)
+        owners.append(sign * (owner + 1))
+        surfaces.append(recovered(at.mirrors, facets, owner).offset(coat))
+    mirror = np.concatenate(owners).astype(np.int32)
+    return Shells(mirror, committed(np.concatenate(corners)), (surfaces[0], surfaces[1]))
+
+
+def on_mesh(shells: Shells, at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
+    """What gives the rays of rows of a camera's picture off the mirrors of the mesh."""
+    sign, surfaces = (1, shells.surfaces[0]) if at.camera == "a" else (-1, shells.surfaces[1])
+
+    def trace(rows: range, shift: tuple[float, float]) -> Rays:
+        way = pixel_directions(at.view, rows, shift)
+        start = np.empty((way.shape[0] * way.shape[1], 3), dtype=np.float32)
+        start[:] = at.view.pinhole
+        facet = np.asarray(shells.embree.run(start, way.reshape(-1, 3).astype(np.float32)))
+        mirror = np.where(facet >= 0, np.maximum(sign * shells.mirror[facet], 0), 0)
+        numbers = mirror.reshape(way.shape[:2]).astype(np.int32)
+        return reflected(at.view.pinhole, way, surfaces, numbers)
+
+    return trace
+
+
+def recovered(meant: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
+    """The surfaces (m,) that fit the corners (f, 3, 3) of facets of owners (f,) best; -1: none.
+
+    In a frame with z along the meant normal, at the meant apex, a surface is
+    z = h + a x + b y - k/2 (x^2 + y^2 + z^2): least squares in (h, a, b, k), spheres and planes
+    alike. Each facet's corners count, so vertices count by the facets about them.
+    """
+    mine = owner >= 0
+    i = np.repeat(owner[mine], 3)
+    frames = _frames(meant.normal)
+    local = np.einsum("nkx,nx->nk", frames[i], corners[mine].reshape(-1, 3) - meant.apex[i])
+    terms = np.column_stack([np.ones(len(i)), local[:, :2], -(local**2).sum(axis=1) / 2])
+    products = np.einsum("nj,nk->njk", terms, np.column_stack([terms, local[:, 2]]))
+    sums = np.zeros((len(meant), 4, 5))
+    np.add.at(sums, i, products)
+    h, a, b, k = np.linalg.solve(sums[:, :, :4], sums[:, :, 4:])[..., 0].T
+    slope = np.stack([-a, -b, np.ones_like(a)], axis=1)
+    steep = (slope**2).sum(axis=1)
+    size = np.sqrt(steep + 2 * k * h)
+    foot = (2 * h / (steep + np.sqrt(steep) * size))[:, None] * slope
+    normal = (slope + k[:, None] * foot) / size[:, None]
+    back = np.swapaxes(frames, 1, 2)
+    apex = meant.apex + np.einsum("mxk,mk->mx", back, foot)
+    return Surfaces(apex, np.einsum("mxk,mk->mx", back, normal), k / size)
+
+
+def _frames(normal: Floats) -> Floats:
+    """Rows (m, 3, 3): two unit vectors across each normal (m, 3), and the normal."""
+    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    across = np.cross(normal, least)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    return np.stack([across, np.cross(normal, across), normal], axis=1)
+
+
+def _facets(path: Path) -> Floats:
+    import trimesh
+
+    if not path.is_file():
+        raise InputError(f"{path} is not there: build the shell too, or leave --mesh out")
+    if path.stat().st_size > LARGEST_FILE:
+        raise InputError(f"{path} is over 4 GiB: {AGAIN}")
+    try:
+        corners = np.asarray(trimesh.load_mesh(path, process=False).triangles, dtype=np.float64)
+    except Exception as error:  # trimesh's readers raise whatever their libraries do
+        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from error
+    if len(corners) == 0 or not np.isfinite(corners).all():
+        raise InputError(f"{path} has no facets, or some that are not finite: {AGAIN}")
+    return corners
+
+
+def _owners(bare: Surfaces, corners: Floats) -> Ints:
+    """The mirror (f,) on whose surface all corners (f, 3, 3) of a facet lie; -1 for none."""
+    _, near = cKDTree(bare.apex).query(corners.mean(axis=1), k=min(LIKELY, len(bare)), workers=-1)
+    owner = np.full(len(corners), -1)
+    for likely in near.reshape(len(corners), -1).T:
+        left = np.flatnonzero(owner < 0)
+        i = np.repeat(likely[left, None], 3, axis=1)
+        on = np.abs(bare.value(i, corners[left])).max(axis=1) < OFF_MM
+        owner[left[on]] = likely[left[on]]
+    owner[~_along(bare, corners, owner)] = -1
+    return owner
+
+
+def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
+    """Which facets (f, 3, 3) lie along their mirror: a wall's corners may all be on its rim."""
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = bare.gradient(owner, corners.mean(axis=1))
+    size = np.linalg.norm(area, axis=1) * np.linalg.norm(normal, axis=1)
+    along: NDArray[np.bool_] = np.abs((area * normal).sum(axis=1)) > LEAST_COSINE * size
+    return along

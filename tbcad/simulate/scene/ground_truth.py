@@ -1,0 +1,76 @@
+"""What a real camera in the same place would photograph, ray-traced: the ground truth."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.optics.camera import View
+from tbcad.simulate.capture.photograph import shifts
+from tbcad.simulate.compiled import in_threads
+from tbcad.simulate.scene.shading import Scene, look
+from tbcad.simulate.scene.viewpoint import directions
+from tbcad.simulate.views.refocus import Focus, rays_through
+
+Floats = NDArray[np.float64]
+Colours = NDArray[np.float32]
+Progress = Callable[[str], None]
+
+RAYS_A_PIECE = 1 << 15
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+
+
+def pinhole_picture(scene: Scene, view: View, samples: int = 4) -> Colours:
+    """The picture (h, w, 3), 0 to 255, of a pinhole camera, samples x samples rays a pixel."""
+    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
+    for shift in shifts(samples):
+        way = directions(view, shift)
+        total += _seen(scene, np.broadcast_to(view.pinhole, way.shape), way)
+    return total / np.float32(samples**2)
+
+
+def lens_picture(
+    scene: Scene, view: View, focus: Focus, samples: int = 256, progress: Progress = lambda _: None
+) -> Colours:
+    """The picture (h, w, 3), 0 to 255, of a camera with a thin lens.
+
+    Args:
+        scene: the object.
+        view: the middle of the lens, and the picture.
+        focus: diameter of the lens, and the plane that it makes sharp.
+        samples: rays a pixel, each through another point of the lens and of the pixel.
+        progress: told how far it has come.
+    """
+    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
+    for k, (point, shift) in enumerate(zip(_disc(samples), _square(samples), strict=True)):
+        progress(f"ray {k + 1} of {samples}")
+        total += _seen(scene, *rays_through(view, focus, point * focus.aperture_mm / 2, shift))
+    return total / np.float32(samples)
+
+
+def whole(picture: Colours) -> NDArray[np.uint8]:
+    """A picture in whole numbers."""
+    return np.rint(picture).astype(np.uint8)
+
+
+def _disc(count: int) -> Floats:
+    """Points (n, 2) spread evenly over the unit disc, on Vogel's spiral."""
+    k = np.arange(count)
+    radius, turn = np.sqrt((k + 0.5) / count), GOLDEN_ANGLE * k
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+
+
+def _square(count: int) -> list[tuple[float, float]]:
+    """Points spread evenly over a pixel, from its centre (the R2 sequence of M. Roberts, 2018)."""
+    plastic = 1.324717957244746
+    steps = np.arange(count)[:, None] / np.array([plastic, plastic**2])
+    places = (0.5 + steps) % 1 - 0.5
+    return [(float(x), float(y)) for x, y in places]
+
+
+def _seen(scene: Scene, origin: Floats, way: Floats) -> Colours:
+    """Colours (h, w, 3) along rays (h, w, 3)."""
+    flat, start = way.reshape(-1, 3), origin.reshape(-1, 3)
+    pieces = [slice(k, k + RAYS_A_PIECE) for k in range(0, len(flat), RAYS_A_PIECE)]
+    found = in_threads(lambda part: look(scene, start[part], flat[part]).colour, pieces)
+    return np.concatenate(found).reshape(way.shape)

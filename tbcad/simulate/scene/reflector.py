@@ -1,0 +1,125 @@
+"""One camera with its mirrors: all that light needs to know of a design."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.mirrors.array import Design
+from tbcad.optics.camera import View
+from tbcad.optics.cells import Cells
+from tbcad.optics.surfaces import Surfaces
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Boxes about cells in the picture are widened by so many pixels: an arc may bulge beyond samples.
+MARGIN_PX = 2
+ARC_SAMPLES = np.linspace(0, 1, 9)
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """One camera and its m mirrors, in the order of their ids.
+
+    Attributes:
+        camera: "a" or "b".
+        view: the camera itself.
+        u: directions of the virtual cameras, (m, 3).
+        cells: of the reflecting surfaces.
+    """
+
+    camera: str
+    view: View
+    u: Floats
+    cells: Cells
+
+    def __len__(self) -> int:
+        """Number of mirrors."""
+        return len(self.u)
+
+    @property
+    def mirrors(self) -> Surfaces:
+        """The reflecting surfaces without the seam and the foot plane."""
+        every, m = self.cells.surfaces, len(self)
+        return Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+
+    @property
+    def foot(self) -> float:
+        """Height z of the foot plane, mm."""
+        return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
+
+    @property
+    def side(self) -> float:
+        """Sign of x on the side of the seam where the mirrors are."""
+        return 1.0 if self.camera == "a" else -1.0
+
+    def boxes(self) -> Ints:
+        """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4)."""
+        arcs, m = self.cells.arcs, len(self)
+        which = np.broadcast_to(np.arange(len(arcs))[:, None], (len(arcs), len(ARC_SAMPLES)))
+        places = pixels_of(self.view, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape)))
+        low, high = np.full((m, 2), np.inf), np.full((m, 2), -np.inf)
+        for faces in (arcs.left, arcs.right):
+            mine = faces < m
+            np.minimum.at(low, faces[mine], places[mine].min(axis=1))
+            np.maximum.at(high, faces[mine], places[mine].max(axis=1))
+        size = np.array([self.view.width_px, self.view.height_px])
+        first = np.clip(np.floor(low) - MARGIN_PX, 0, size)
+        last = np.clip(np.ceil(high) + 1 + MARGIN_PX, 0, size)
+        return np.stack([first, last], axis=2).reshape(m, 4).astype(np.int64)
+
+    def beside_edge(self) -> Ints:
+        """For each mirror the neighbours that the seam or the foot cuts, -1 where no more, (m, k).
+
+        A ray may enter the sphere of such a neighbour beyond the edge, where there is no mirror;
+        what it would meet inside that sphere lies in the wall.
+        """
+        faces, m = self.cells.arcs.faces, len(self)
+        cut = np.zeros(m + 2, dtype=bool)
+        cut[faces[(faces >= m).any(axis=1)].min(axis=1)] = True
+        pairs = np.concatenate([faces, faces[:, ::-1]])
+        pairs = pairs[(pairs < m).all(axis=1) & cut[pairs[:, 1]]]
+        pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+        count = np.bincount(pairs[:, 0], minlength=m)
+        place = np.arange(len(pairs)) - np.repeat(np.cumsum(count) - count, count)
+        table = np.full((m, int(count.max(initial=0))), -1)
+        table[pairs[:, 0], place] = pairs[:, 1]
+        return table
+
+
+@dataclass(frozen=True)
+class Replaced(Reflector):
+    """A camera with other surfaces in the place of its mirrors.
+
+    Attributes:
+        surfaces: of what stands there, (m,).
+    """
+
+    surfaces: Surfaces
+
+    @property
+    def mirrors(self) -> Surfaces:
+        """The reflecting surfaces."""
+        return self.surfaces
+
+
+def reflectors(design: Design) -> tuple[Reflector, Reflector]:
+    """Both cameras of a design with their mirrors."""
+    a, b = (Reflector(half.camera, half.view, half.u, half.cells) for half in design.halves)
+    return a, b
+
+
+def pixels_of(view: View, points: Floats) -> Floats:
+    """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
+    ray = points - view.pinhole
+    across = np.stack([view.right, np.cross(view.forward, view.right)])
+    plane = (ray @ across.T) / (ray @ view.forward)[..., None]
+    size = np.array([view.width_px, view.height_px])
+    result: Floats = plane / pitch(view) + (size - 1) / 2
+    return result
+
+
+def pitch(view: View) -> float:
+    """Width of a pixel at unit distance."""
+    return float(2 * view.half_sizes[0] / view.width_px)

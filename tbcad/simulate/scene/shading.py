@@ -1,0 +1,140 @@
+"""What a ray sees of the object: Embree finds the facet, colour and light are ours."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.simulate.compiled import compiled
+from tbcad.simulate.scene.embree import committed
+from tbcad.simulate.scene.object import Subject, pattern
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+# Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
+# the same in all directions, as light-field rendering presumes. No cast shadows.
+LAMPS = np.array([[0.48, 0.36, 0.8], [-0.6, 0.64, 0.48]])
+LAMP_LIGHT = np.array([0.55, 0.2])
+SKY_LIGHT = 0.35
+BACKGROUND = 0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """An object ready to be looked at from several threads.
+
+    Attributes:
+        subject: the object.
+        embree: its facets, committed; queries release the interpreter's lock.
+        shade: light at each corner, 0 to 1, (v,).
+        radius: of the sphere about the origin that holds it, mm.
+    """
+
+    subject: Subject
+    embree: Any
+    shade: Floats
+    radius: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What n rays see.
+
+    Attributes:
+        colour: red, green, blue, 0 to 255, (n, 3), float32; the background where nothing is.
+        depth: mm along the ray, infinite where nothing is, (n,).
+    """
+
+    colour: NDArray[np.float32]
+    depth: Floats
+
+
+def scene_of(subject: Subject) -> Scene:
+    """Put an object into Embree and light it."""
+    embree = committed(subject.points, subject.faces)
+    lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
+    sky = SKY_LIGHT * (0.75 + 0.25 * subject.normals[:, 2])
+    return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
+
+
+def look(scene: Scene, origin: Floats, direction: Floats) -> Seen:
+    """What rays from origins (n, 3) along unit directions (n, 3) see."""
+    colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
+    depth = np.full(len(origin), np.inf)
+    near = _near(origin, direction, scene.radius)
+    if len(near) == 0:
+        return Seen(colour, depth)
+    found = scene.embree.run(
+        origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
+    )
+    hit = found["primID"] >= 0
+    rows, facet = near[hit], found["primID"][hit].astype(np.int64)
+    weight = _weights(found["u"][hit], found["v"][hit])
+    depth[rows] = found["tfar"][hit]
+    colour[rows] = 255 * shaded(scene, facet, weight)
+    return Seen(colour, depth)
+
+
+def depth_of(scene: Scene) -> Callable[[Floats, Floats], Floats]:
+    """What gives the distance along rays to the object, mm, infinite where there is none."""
+
+    def depth(origin: Floats, direction: Floats) -> Floats:
+        return look(scene, origin, direction).depth
+
+    return depth
+
+
+def shaded(scene: Scene, facet: Ints, weight: Floats) -> Floats:
+    """Colours (n, 3), 0 to 1, at barycentric weights (n, 3) on facets (n,)."""
+    subject = scene.subject
+    light = (scene.shade[subject.faces[facet]] * weight).sum(axis=1)
+    return np.asarray(_albedo(subject, facet, weight) * light[:, None])
+
+
+def _albedo(subject: Subject, facet: Ints, weight: Floats) -> Floats:
+    if subject.patterned:
+        corners = subject.points[subject.faces[facet]]
+        return pattern(np.einsum("nk,nkx->nx", weight, corners))
+    if subject.texture is not None and subject.uv is not None:
+        return _texels(subject.texture, np.einsum("nk,nkx->nx", weight, subject.uv[facet]))
+    return np.asarray(np.einsum("nk,nkx->nx", weight, subject.albedo[facet]))
+
+
+def _texels(picture: Bytes, uv: Floats) -> Floats:
+    """Colours (n, 3) of a picture that repeats, between its four nearest texels."""
+    height, width = picture.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
+    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    across, down = (x - left)[:, None], (y - top)[:, None]
+    rows, columns = (top % height, (top + 1) % height), (left % width, (left + 1) % width)
+    upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
+    lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
+    result: Floats = (upper * (1 - down) + lower * down) / 255
+    return result
+
+
+def _weights(u: NDArray[np.float32], v: NDArray[np.float32]) -> Floats:
+    return np.column_stack([1 - u - v, u, v]).astype(np.float64)
+
+
+@compiled
+def _near(origin: Floats, direction: Floats, radius: float) -> Ints:
+    """Indices of the rays whose line meets the sphere about the origin and goes toward it."""
+    kept = np.empty(len(origin), dtype=np.int64)
+    count = 0
+    for i in range(len(origin)):
+        ox, oy, oz = origin[i, 0], origin[i, 1], origin[i, 2]
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        along = ox * dx + oy * dy + oz * dz
+        away = ox * ox + oy * oy + oz * oz
+        outside = away > radius * radius
+        if dx * dx + dy * dy + dz * dz == 0 or (along >= 0 and outside):
+            continue
+        if away - along * along <= radius * radius:
+            kept[count] = i
+            count += 1
+    return kept[:count]

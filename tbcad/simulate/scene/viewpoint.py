@@ -1,0 +1,68 @@
+"""Where a picture is wanted from: a pinhole that looks at the middle of the object."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.optics.camera import View
+from tbcad.simulate.scene.rays import unit_directions
+
+Floats = NDArray[np.float64]
+
+# Room about the capture sphere in a picture.
+ROOM = 1.05
+
+
+def viewpoint(
+    azimuth: float,
+    elevation: float,
+    distance: float,
+    capture_mm: float,
+    size: tuple[int, int] = (640, 480),
+    hfov: float | None = None,
+) -> View:
+    """A pinhole camera that looks at the origin, z up.
+
+    Args:
+        azimuth: about z from x, radians.
+        elevation: above the plane z = 0, radians.
+        distance: from the origin, mm.
+        capture_mm: diameter of the capture sphere.
+        size: columns and rows.
+        hfov: angle of view across the columns, radians; without, the capture sphere fills the
+            shorter side but for a little room.
+
+    Raises:
+        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
+    """
+    if not 0 <= elevation <= np.pi / 2:
+        raise InputError(
+            f"--elevation {np.degrees(elevation):g} is not on the hemisphere that the mirrors "
+            "see: allowed is 0 to 90 degrees"
+        )
+    if not capture_mm / 2 < distance < np.inf:
+        raise InputError(
+            f"--distance {distance:g} is inside the object's capture sphere: allowed is more than "
+            f"{capture_mm / 2:g} mm"
+        )
+    if not np.isfinite(azimuth):
+        raise InputError("--azimuth is not a number: give degrees")
+    forward, right = _axes(azimuth, elevation)
+    wide = hfov if hfov is not None else _fitting(capture_mm / 2 / distance, size)
+    return View(-distance * forward, forward, right, *size, wide)
+
+
+def _axes(azimuth: float, elevation: float) -> tuple[Floats, Floats]:
+    flat = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    toward = np.cos(elevation) * flat + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
+    return -toward, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+
+
+def _fitting(sine: float, size: tuple[int, int]) -> float:
+    half = ROOM * np.tan(np.arcsin(sine)) * size[0] / min(size)
+    return float(2 * np.arctan(half))
+
+
+def directions(view: View, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+    """Unit directions (h, w, 3) of all pixels."""
+    return unit_directions(view, range(view.height_px), shift)

@@ -1,0 +1,1 @@
+"""Views and refocused pictures, synthesised from a light field."""

@@ -1,0 +1,172 @@
+"""Pictures from anywhere out of a light field: wanted rays, the mirrors near them, colours."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.optics.camera import View
+from tbcad.simulate.compiled import compiled
+from tbcad.simulate.scene.viewpoint import directions
+from tbcad.simulate.views.blend import blend
+from tbcad.simulate.views.nearest import nearest
+from tbcad.simulate.views.ray_bundle import Sheaf, candidates, sheaf_of
+from tbcad.simulate.views.tiles import Tiles
+from tbcad.simulate.views.two_plane import Slab, slab_along
+
+Floats = NDArray[np.float64]
+Colours = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+Method = Literal["nearest", "blend"]
+Rays = tuple[Floats, Floats]
+"""Origins and unit directions, (n, 3) each."""
+Depth = Callable[[Floats, Floats], Floats]
+"""Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
+
+# One wanted ray of so many tells which mirrors are near.
+SPARSE = 601
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture made from a light field.
+
+    Attributes:
+        colour: (h, w, 3), 0 to 255, float32; zero where nothing was captured.
+        seen: whether a captured ray stands in, or the ray passes the capture sphere by, (h, w).
+    """
+
+    colour: Colours
+    seen: Bools
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """The picture in whole numbers, (h, w, 3)."""
+        return np.rint(self.colour).astype(np.uint8)
+
+
+def synthesise(
+    tiles: Tiles, view: View, method: Method = "nearest", depth: Depth | None = None
+) -> Picture:
+    """The picture that a pinhole camera would see.
+
+    Args:
+        tiles: the light field.
+        view: the pinhole camera.
+        method: the nearest captured ray (section 4.2), or a blend of several virtual cameras.
+        depth: the surface that a blend takes the object for; without, the plane through the
+            origin that faces the camera.
+    """
+    way = directions(view)
+    meets = _meets(view.pinhole, way, tiles.source.capture_mm / 2)
+    origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
+    slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
+    rays = (origin, way[meets])
+    found, seen = colours(gather(tiles, slab, rays, reach(tiles)), rays, method, depth)
+    if not seen.all():
+        rest = (origin[~seen], rays[1][~seen])
+        wide = gather(tiles, slab, rest, horizon(tiles))
+        found[~seen], seen[~seen] = colours(wide, rest, method, depth)
+    colour = np.zeros(way.shape, dtype=np.float32)
+    colour[meets] = found
+    every = ~meets
+    every[meets] = seen
+    return Picture(colour, every)
+
+
+@compiled
+def _meets(pinhole: Floats, way: Floats, radius: float) -> Bools:
+    """Which unit directions (h, w, 3) from a pinhole meet the sphere about the origin, (h, w)."""
+    meets = np.empty(way.shape[:2], dtype=np.bool_)
+    a, b, c = pinhole
+    for y in range(way.shape[0]):
+        for x in range(way.shape[1]):
+            p, q, r = way[y, x]
+            i, j, k = b * r - c * q, c * p - a * r, a * q - b * p
+            meets[y, x] = np.sqrt(i * i + j * j + k * k) <= radius
+    return meets
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The captured rays that may be near some wanted ones.
+
+    Attributes:
+        slab: what the views look along.
+        sheaf: captured rays; None where there are none.
+        limit: how far from a wanted ray a captured one may be, mm.
+    """
+
+    slab: Slab
+    sheaf: Sheaf | None
+    limit: float
+
+
+def gather(tiles: Tiles, slab: Slab, rays: Rays, limit: float) -> Gathered:
+    """The captured rays that may be within a limit (mm) of wanted ones."""
+    packed = tiles.packed(_near(tiles, slab, slab.points(*rays), limit))
+    return Gathered(slab, None if packed is None else sheaf_of(slab, packed), limit)
+
+
+def colours(
+    near: Gathered, rays: Rays, method: Method = "nearest", depth: Depth | None = None
+) -> tuple[Colours, Bools]:
+    """Colours (n, 3) of wanted rays, and which of them were seen, (n,)."""
+    wanted = near.slab.points(*rays)
+    if near.sheaf is None:
+        return np.zeros((len(wanted), 3), dtype=np.float32), np.zeros(len(wanted), dtype=bool)
+    if method == "nearest":
+        found = nearest(near.sheaf, wanted, near.limit)
+        seen = found >= 0
+        return np.where(seen[:, None], near.sheaf.colour[found], np.float32(0)), seen
+    at = _depths(near.slab, rays, depth) / near.slab.scale
+    mixed, seen = blend(near.sheaf, wanted, at, near.limit)
+    return mixed.astype(np.float32), seen
+
+
+def reach(tiles: Tiles) -> float:
+    """How far from a wanted ray a captured one is at most, in the slab, mm.
+
+    As far as neighbouring virtual cameras are apart, evenly spread over the hemisphere, and
+    neighbouring pixels, their mirror's share of the sensor evenly spread over the capture sphere.
+    """
+    capture = tiles.source.capture_mm
+    angle = np.sqrt(2 * np.pi / len(tiles.u) * 2 / np.sqrt(3))
+    size = sum(frame.view.width_px * frame.view.height_px for frame in tiles.source.frames.values())
+    pixel = capture / np.sqrt(size / len(tiles.u))
+    return float(angle * capture / 2 / np.sqrt(3) + pixel)
+
+
+def horizon(tiles: Tiles) -> float:
+    """The same for rays from the horizon, which may pass a capture radius below all mirrors, mm.
+
+    A ray that passes the meeting point of a mirror's rays at distance e, at depth L, is
+    e / sqrt(1 + (L / s)^2) from the nearest of them; no mirror is nearer than the nearest apex.
+    """
+    radius = tiles.source.capture_mm / 2
+    depth = float(np.linalg.norm(tiles.apex, axis=1).min())
+    return radius / float(np.sqrt(1 + 3 * (depth / radius) ** 2))
+
+
+def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.int64]:
+    """Mirrors (k,) whose rays may be within the limit of wanted ones (n, 4), by their apices."""
+    place = slab.place(tiles.apex) / [1, 1, slab.scale]
+    behind = np.flatnonzero(place[:, 2] < 0)
+    kept = wanted[~np.isnan(wanted[:, 0])]
+    if len(kept) == 0:
+        return behind[:0]
+    meeting = np.column_stack([place[behind], tiles.width[behind]])
+    return behind[candidates(meeting, kept, limit, SPARSE)]
+
+
+def _depths(slab: Slab, rays: Rays, depth: Depth | None) -> Floats:
+    """Where rays meet the surface, along the slab's direction, mm; on the plane where they miss."""
+    origin, direction = rays
+    if depth is None:
+        return np.zeros(len(direction))
+    reached = depth(origin, direction)
+    along = np.where(np.isfinite(reached), reached, 0)
+    place = (origin + along[:, None] * direction) @ slab.axes[2]
+    return np.where(np.isfinite(reached), place, 0.0)

@@ -1,0 +1,1 @@
+"""Simulated builds of the shell: what each one's virtual cameras see."""

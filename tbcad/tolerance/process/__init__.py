@@ -1,0 +1,1 @@
+"""Manufacturing processes and the errors that they bring."""

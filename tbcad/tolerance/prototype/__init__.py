@@ -1,0 +1,1 @@
+"""Simulated builds of the prototype: what each one's balls show."""

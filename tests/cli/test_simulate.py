@@ -1,0 +1,147 @@
+"""tbcad capture, view and refocus from the command line."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from tbcad.cli import run
+from tbcad.simulate.capture.light_field import LightField
+
+
+@pytest.fixture(scope="module")
+def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("captures") / "knot"
+    assert run(["capture", str(record), "--out", str(out)]) == 0
+    return out
+
+
+def digest(folder: Path) -> dict[str, str]:
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
+
+
+def test_capture_writes_pictures_and_light_field(captured: Path) -> None:
+    names = ["camera_a.png", "camera_b.png", "capture.json", "lightfield.h5", "manifest.json",
+             "object.npz"]  # fmt: skip
+    assert sorted(path.name for path in captured.iterdir()) == names
+    record = json.loads((captured / "capture.json").read_text())
+    assert record["object"] == "trefoil knot"
+    assert record["geometry"] == "spheres"
+    with LightField.open(captured) as source:
+        for camera, frame in source.frames.items():
+            picture = np.asarray(Image.open(captured / f"camera_{camera}.png"))
+            assert np.array_equal(picture, frame.image())
+            on = int((frame.planes["mirror"][:] > 0).sum())
+            assert record["cameras"][camera]["pixels_on_mirrors"] == on
+
+
+def test_capture_repeats_and_replaces(captured: Path, record: Path) -> None:
+    before = digest(captured)
+    assert run(["capture", str(record), "--out", str(captured)]) == 0
+    assert digest(captured) == before
+
+
+def test_capture_keeps_what_is_not_its_own(
+    captured: Path, record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = captured / "notes.txt"
+    mine.write_text("mine")
+    assert run(["capture", str(record), "--out", str(captured)]) == 2
+    assert "notes.txt" in capsys.readouterr().err
+    assert mine.read_text() == "mine"
+    mine.unlink()
+
+
+def test_capture_of_a_mesh_that_is_too_large(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trimesh.creation.box((100, 10, 10)).export(tmp_path / "box.stl")
+    arguments = ["capture", str(record), "--object", str(tmp_path / "box.stl")]
+    assert run([*arguments, "--out", str(tmp_path / "out")]) == 2
+    assert "100 x 10 x 10 mm" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert run([*arguments, "--fit", "--out", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        (["--mesh"], "shell_a.stl"),
+        (["--prototype"], "prototype.json"),
+        (["--mesh", "--prototype"], "exclude each other"),
+        (["--samples", "0"], "samples"),
+        (["--object", "absent.ply"], "absent.ply"),
+        (["--paint", "gold"], "paint"),
+    ],
+)
+def test_captures_that_cannot_be(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
+) -> None:
+    assert run(["capture", str(record), "--out", str(tmp_path / "out"), *more]) == 2
+    said = capsys.readouterr().err
+    assert wrong in said
+    assert "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("more", [[], ["--method", "blend"], ["--method", "blend", "--surface",
+                                                               "object"]])  # fmt: skip
+def test_view(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str]
+) -> None:
+    out = tmp_path / "view.png"
+    arguments = ["view", str(captured), "--azimuth", "30", "--elevation", "15", "--out", str(out)]
+    assert run([*arguments, "--width", "160", "--height", "120", *more]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "view-beside.png", "view-truth.png", "view.png"
+    ]  # fmt: skip
+    assert Image.open(out).size == (160, 120)
+    assert "PSNR" in capsys.readouterr().out
+
+
+def test_view_without_an_object_has_no_truth(captured: Path, tmp_path: Path) -> None:
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    (alone / "lightfield.h5").write_bytes((captured / "lightfield.h5").read_bytes())
+    out = tmp_path / "view.png"
+    small = ["--width", "64", "--height", "48", "--out", str(out)]
+    assert run(["view", str(alone), *small]) == 0
+    assert not (tmp_path / "view-truth.png").exists()
+    assert run(["view", str(alone), *small, "--method", "blend", "--surface", "object"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        (["--elevation", "-3"], "--elevation -3"),
+        (["--distance", "10"], "--distance 10"),
+        (["--fov", "180"], "--fov 180"),
+        (["--out", "view.jpg"], ".png"),
+        (["--width", "1"], "width"),
+    ],
+)
+def test_views_that_cannot_be(
+    captured: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
+) -> None:
+    before = digest(captured)
+    assert run(["view", str(captured), *more]) == 2
+    assert wrong in capsys.readouterr().err
+    assert digest(captured) == before
+
+
+def test_refocus_and_sweep(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["refocus", str(captured), "--elevation", "45", "--width", "96", "--height", "72"]
+    arguments += ["--out", str(tmp_path / "f.png"), "--sweep", str(tmp_path / "f.gif")]
+    assert run([*arguments, "--frames", "3", "--truth-samples", "16"]) == 0
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "f.png", "f-truth.png", "f-beside.png", "f.gif"
+    }  # fmt: skip
+    assert "PSNR" in capsys.readouterr().out
+    assert run([*arguments[:2], "--aperture", "-1"]) == 2
+    assert "--aperture -1" in capsys.readouterr().err

@@ -1,0 +1,126 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tbcad.mirrors.array import Half, design, directions
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+
+
+def half_of(*settings: str) -> Half:
+    return design(load_spec(None, settings)).halves[0]
+
+
+def attempt(*settings: str) -> tuple[Half | None, str]:
+    """The half, or what the refusal says."""
+    try:
+        return half_of(*settings), ""
+    except SpecError as error:
+        return None, str(error)
+
+
+@pytest.mark.parametrize("n", [*range(1, 13), 17, 24, 36])
+def test_traced_mirrors_all_see_the_target(n: int) -> None:
+    half = half_of(f"n={n}")
+    curved = half.mirrors.radius < 29.9999 * half.size
+    assert half.coverage.min() > 60.6 - 0.01
+    assert half.coverage[curved].max(initial=0) < 60.6 + 0.01
+    assert (half.mirrors.radius > 0).all()
+    assert np.isfinite(half.mirrors.radius).all()
+
+
+def test_mirrors_that_see_enough_are_nearly_flat() -> None:
+    """n = 4 and below: the radius stops at a stated multiple of the half width."""
+    half = half_of("n=4")
+    nearly_flat = np.isclose(half.mirrors.radius, 30 * half.size)
+    assert nearly_flat.sum() > 5
+    assert (half.coverage[nearly_flat] >= 60.6 - 0.01).all()
+
+
+def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
+    half = half_of("n=4", "radius_rule=paper")
+    assert (half.mirrors.radius > 0).all()
+    assert half.mirrors.radius.max() == pytest.approx((30 * half.size).max(), rel=0.5)
+
+
+def test_margin_is_added_to_the_target() -> None:
+    assert half_of("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
+
+
+def test_coat_is_an_offset_of_the_radius() -> None:
+    bare, coated = half_of("n=8"), half_of("n=8", "coating_um=40")
+    assert coated.mirrors.radius == pytest.approx(bare.mirrors.radius, rel=1e-12)
+    m = len(coated)
+    body = coated.body.surfaces
+    assert 1 / body.curvature[:m] == pytest.approx(coated.mirrors.radius - 0.04, rel=1e-12)
+    assert body.centre[:m] == pytest.approx(coated.mirrors.centre, abs=1e-9)
+
+
+def test_coat_thicker_than_a_mirror_is_refused() -> None:
+    with pytest.raises(SpecError, match="coating_um"):
+        half_of(
+            "n=18",
+            "coating_um=500",
+            "optics.camera_mm=[5,0,-5]",
+            "semi_minor_mm=6",
+            "capture_diameter_mm=5",
+        )
+
+
+def test_other_half_is_the_mirror_image(small_design: object) -> None:
+    a, b = small_design.halves  # type: ignore[attr-defined]
+    flip = [-1, 1, 1]
+    assert np.array_equal(a.u * flip, b.u)
+    assert np.array_equal(a.mirrors.centre * flip, b.mirrors.centre)
+    assert a.ids[6] == "a0007"
+    assert b.ids[6] == "b0007"
+    seam = a.u[:, 0] == 0
+    assert np.array_equal(a.u[seam], b.u[seam])  # the same virtual camera
+    assert np.array_equal(a.area, b.area)
+
+
+def test_numbers_run_from_the_zenith_down() -> None:
+    every, faces = directions(6)
+    mine = every[(every[:, 0] >= 0) & (every[:, 2] >= 0)]
+    assert mine[0] == pytest.approx([0, 0, 1])
+    assert (np.diff(mine[:, 2]) < 1e-8).all()
+    triple = np.linalg.det(every[faces])
+    assert triple.min() > 0
+
+
+def test_hopeless_targets_name_the_mirrors() -> None:
+    """So long an ellipsoid leaves its outer spheres no radius at which they still meet."""
+    with pytest.raises(SpecError, match=r"a\d{4} \(\d+\.\d+ mm\)") as caught:
+        half_of("n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+    assert "\n" not in str(caught.value)
+    assert "change optics.n" in str(caught.value)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    n=st.integers(1, 10),
+    x=st.floats(60, 250),
+    y=st.floats(-30, 30),
+    z=st.floats(-250, -60),
+    b=st.floats(70, 160),
+    capture=st.floats(10, 60),
+)
+def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
+    n: int, x: float, y: float, z: float, b: float, capture: float
+) -> None:
+    options = [
+        f"n={n}",
+        f"camera_mm=[{x}, {y}, {z}]",
+        f"semi_minor_mm={b}",
+        f"capture_diameter_mm={capture}",
+    ]
+    half, told = attempt(*options)
+    if half is None:
+        assert "\n" not in told
+        assert re.search("change|make|bring", told)
+        return
+    assert half.coverage.min() > capture + 0.6 - 0.01
+    assert (half.area > 0).all()

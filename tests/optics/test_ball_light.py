@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+
+from tbcad.geometry.round_cones import RoundCones
+from tbcad.geometry.vectors import norm, unit
+from tbcad.mirrors.array import Half
+from tbcad.optics import ball_light
+from tbcad.optics.trace import miss_distances, reflected
+
+CAPTURE = 30.0
+
+
+@pytest.fixture(scope="module")
+def some(paper_half: Half) -> np.ndarray:
+    return np.arange(0, len(paper_half), 60)
+
+
+@pytest.fixture(scope="module")
+def outline(paper_half: Half, some: np.ndarray) -> np.ndarray:
+    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[some])
+    pinhole = norm(paper_half.view.pinhole)
+    return ball_light.outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
+
+
+def test_poses_turned_are_the_mirrors(paper_half: Half) -> None:
+    ellipsoid, mirrors = paper_half.ellipsoid, paper_half.mirrors
+    at = ball_light.poses(ellipsoid, paper_half.polar)
+    frame = ellipsoid.frame()
+    assert ball_light.turned(at.apex, paper_half.azimuth) @ frame == pytest.approx(mirrors.apex)
+    assert ball_light.turned(at.normal, paper_half.azimuth) @ frame == pytest.approx(mirrors.normal)
+
+
+def test_rays_off_the_outline_touch_the_capture_sphere(
+    paper_half: Half, some: np.ndarray, outline: np.ndarray
+) -> None:
+    mirrors, azimuth = paper_half.mirrors, paper_half.azimuth[some]
+    point = ball_light.turned(outline, azimuth[:, None]) @ paper_half.ellipsoid.frame()
+    centre, radius = mirrors.centre[some][:, None], mirrors.radius[some][:, None]
+    assert norm(point - centre) == pytest.approx(np.broadcast_to(radius, point.shape[:2]))
+    miss = miss_distances(paper_half.view.pinhole, point, unit(point - centre))
+    assert miss == pytest.approx(CAPTURE, abs=1e-6)
+
+
+def test_light_lies_in_its_hulls(paper_half: Half, some: np.ndarray, outline: np.ndarray) -> None:
+    """Rays over all of the part in use, by points along them."""
+    pinhole = norm(paper_half.view.pinhole)
+    camera = np.array([pinhole, 0.0, 0.0])
+    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[some])
+    radius = paper_half.mirrors.radius[some][:, None, None]
+    centre = (at.apex - radius[:, 0] * at.normal)[:, None]
+    to_object, to_camera = ball_light.light(outline, pinhole, CAPTURE)
+    for share in (0.0, 0.4, 0.8, 1.0):
+        inner = at.apex[:, None] + share * (outline - at.apex[:, None])
+        point = centre + radius * unit(inner - centre)
+        out = reflected(camera, point, (point - centre) / radius)
+        end = point - (point * out).sum(axis=-1, keepdims=True) * out
+        for t in np.linspace(0, 1, 11):
+            assert outside(to_camera, point + t * (camera - point)) < 1e-9
+            assert outside(to_object, point + t * (end - point)) < 1e-9
+
+
+def outside(cones: RoundCones, point: np.ndarray) -> float:
+    """How far points (m, s, 3) lie outside their hull, by 2001 spheres of it."""
+    flat = np.concatenate([cones.start, cones.end], axis=1)
+    share = np.linspace(0, 1, 2001)[:, None]
+    worst = -np.inf
+    for (a, b, c, d), r, s, own in zip(
+        flat, cones.start_radius, cones.end_radius, point, strict=True
+    ):
+        spine = np.concatenate([a + share * (c - a), b + share * (d - b), 0 * share], axis=1)
+        gap = norm(own[:, None] - spine) - (r + share * (s - r))[:, 0]
+        worst = max(worst, float(gap.min(axis=1).max()))
+    return worst
+
+
+@pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (3.0, 1.5)])
+def test_area_of_an_ellipse(a: float, b: float) -> None:
+    turn = 2 * np.pi * np.arange(ball_light.POINTS) / ball_light.POINTS
+    curve = np.stack([7 + a * np.cos(turn), b * np.sin(turn) - 2], axis=-1)[None]
+    assert ball_light.enclosed(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
+
+
+def test_pixels_against_counting(paper_half: Half) -> None:
+    """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
+    view, mirrors, i = paper_half.view, paper_half.mirrors, 400
+    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[[i]])
+    shape = ball_light.outlines(at, mirrors.radius[[i]], norm(view.pinhole), CAPTURE)
+    frame = paper_half.ellipsoid.frame()
+    found = ball_light.pixels(view, frame, shape, paper_half.azimuth[[i]])[0]
+    size = 2 * view.half_sizes[0] / view.width_px / 4  # sixteen rays a pixel
+    way = mirrors.apex[i] - view.pinhole
+    down = np.cross(view.forward, view.right)
+    place = np.array([way @ view.right, way @ down]) / (way @ view.forward)
+    x, y = np.meshgrid(*(p + size * np.arange(-400, 401) for p in place))
+    ray = unit(view.forward + x[..., None] * view.right + y[..., None] * down)
+    miss = ball_light.miss_off_balls(
+        view.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i])
+    )
+    assert found == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
+
+
+def test_rays_past_a_ball_miss_by_infinity() -> None:
+    camera, centre = np.zeros(3), np.array([100.0, 0.0, 0.0])
+    ray = unit(np.array([[1.0, 0.2, 0.0], [1.0, 0.0, 0.0]]))
+    miss = ball_light.miss_off_balls(camera, ray, centre, np.array(10.0))
+    assert miss[0] == np.inf
+    assert miss[1] == 0
+
+
+def test_facing_an_apex(paper_half: Half) -> None:
+    """By the scalar product with the axis."""
+    pinhole = paper_half.view.pinhole
+    way = unit(paper_half.mirrors.apex - pinhole)
+    expected = np.arccos(way @ unit(-pinhole))
+    assert ball_light.facing(paper_half.ellipsoid, paper_half.polar) == pytest.approx(expected)

@@ -1,0 +1,445 @@
+"""Replacing an output folder: whole or not at all, and never a user's file lost."""
+
+import errno
+import json
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.output import folder as folder_module
+from tbcad.output import foreign_files as leftovers_module
+from tbcad.output.folder import check_target, replacing
+from tbcad.output.manifest import write_manifest
+
+ROOT = Path(__file__).parents[2]
+NAMES = ("design.json", "mirrors.csv", "shell_a.stl")
+
+
+def fill(folder: Path, version: int) -> None:
+    """Write an export all of whose files tell its version, as tbcad writes one."""
+    for name in NAMES:
+        (folder / name).write_text(f"{name} of version {version}\n" * 50)
+    document = {"schema": "tbcad-manifest/1", "files": {}}
+    document["files"] = {name: leftovers_module.fingerprint(folder / name) for name in NAMES}
+    (folder / "manifest.json").write_text(json.dumps(document))
+    (folder / "verify.json").write_text(str(version))
+
+
+def fill_late(new: Path, out: Path) -> None:
+    fill(new, 2)
+    (out / "late.txt").write_text("mine")
+
+
+def export(out: Path, version: int, *, force: bool = False) -> None:
+    with replacing(out, force) as new:
+        fill(new, version)
+
+
+def version_of(out: Path) -> int:
+    """The version of an export that is whole; fails when it is not."""
+    version = int((out / "verify.json").read_text())
+    for name in NAMES:
+        assert (out / name).read_text() == f"{name} of version {version}\n" * 50
+    assert set(NAMES) <= json.loads((out / "manifest.json").read_text())["files"].keys()
+    return version
+
+
+def hidden(parent: Path) -> list[str]:
+    return [path.name for path in parent.iterdir() if path.name.startswith(".tbcad-")]
+
+
+def tree(folder: Path) -> dict[str, bytes | None]:
+    """Every path below a folder, with the content of the plain files."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if leftovers_module.is_file(path) else None
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def no_exchange(*_: object) -> bool:
+    return False
+
+
+@pytest.fixture(params=["exchange", "two moves"])
+def swap(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "two moves":
+        monkeypatch.setattr(folder_module, "_exchange", no_exchange)
+    return str(request.param)
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "exports"
+
+
+@pytest.mark.usefixtures("swap")
+class TestReplacing:
+    def test_makes_and_replaces(self, out: Path) -> None:
+        for version in (1, 2, 3):
+            export(out, version)
+            assert version_of(out) == version
+            assert hidden(out.parent) == []
+
+    def test_leaves_no_file_of_the_old_export(self, out: Path) -> None:
+        export(out, 1)
+        with replacing(out, force=False) as new:
+            (new / "other.txt").write_text("new")
+        assert [path.name for path in out.iterdir()] == ["other.txt"]
+
+    def test_an_error_leaves_the_old_export(self, out: Path) -> None:
+        export(out, 1)
+        with pytest.raises(ZeroDivisionError), replacing(out, force=False) as new:
+            (new / "design.json").write_text(f"version {2 // 0}")
+        assert version_of(out) == 1
+        assert hidden(out.parent) == []
+
+    def test_keeps_what_the_user_has(self, out: Path, tmp_path: Path) -> None:
+        export(out, 1)
+        (out / "notes.txt").write_text("mine")
+        (out / "sub" / "deep").mkdir(parents=True)
+        (out / "sub" / "deep" / "a.txt").write_text("deep")
+        (out / "empty").mkdir()
+        (tmp_path / "far.txt").write_text("far")
+        (out / "link").symlink_to(tmp_path / "far.txt")
+        (out / "sub" / "dangling").symlink_to("nowhere")
+        (out / "all").symlink_to(tmp_path)
+        (out / "sub").chmod(0o750)
+
+        with pytest.raises(InputError, match=r"\(all, empty, link and 2 more\).*--force"):
+            export(out, 2)
+        export(out, 2, force=True)
+
+        assert version_of(out) == 2
+        assert (out / "notes.txt").read_text() == "mine"
+        assert (out / "sub" / "deep" / "a.txt").read_text() == "deep"
+        assert (out / "sub").stat().st_mode & 0o777 == 0o750
+        assert (out / "empty").is_dir()
+        assert (out / "link").readlink() == tmp_path / "far.txt"
+        assert (out / "sub" / "dangling").is_symlink()
+        assert (out / "all").is_symlink()
+        assert (tmp_path / "far.txt").read_text() == "far"
+        assert hidden(out.parent) == []
+
+    def test_changed_files_are_the_users_and_kept_beside_the_new(self, out: Path) -> None:
+        export(out, 1)
+        stl = out / "shell_a.stl"
+        same_size = stl.read_text().replace("version 1", "version 9")
+        stl.write_text(same_size)
+        (out / "shell_a.stl.kept").write_text("from before")
+        (out / "design.json").write_text("edited")
+
+        with pytest.raises(InputError, match=r"\(design.json, shell_a.stl, shell_a.stl.kept\)"):
+            export(out, 2)
+        export(out, 2, force=True)
+
+        assert version_of(out) == 2
+        assert (out / "design.json.kept").read_text() == "edited"
+        kept = {path.read_text() for path in out.glob("shell_a.stl.kept*")}
+        assert kept == {same_size, "from before"}
+
+    def test_a_file_that_comes_while_building_is_not_lost(self, out: Path) -> None:
+        export(out, 1)
+        with pytest.raises(InputError, match=r"late\.txt"), replacing(out, force=False) as new:
+            fill_late(new, out)
+        assert version_of(out) == 1
+        assert (out / "late.txt").read_text() == "mine"
+
+    def test_keeps_the_folders_mode(self, out: Path) -> None:
+        export(out, 1)
+        out.chmod(0o2775)
+        export(out, 2)
+        assert out.stat().st_mode & 0o7777 == 0o2775
+
+    def test_replaces_what_a_link_points_to(self, out: Path, tmp_path: Path) -> None:
+        (tmp_path / "disk").mkdir()
+        out.symlink_to("disk/real")
+        for version in (1, 2):
+            export(out, version)
+            assert out.readlink() == Path("disk/real")
+            assert version_of(tmp_path / "disk" / "real") == version
+
+    def test_copies_where_links_cannot_be_made(
+        self, out: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        export(out, 1)
+        (out / "notes.txt").write_text("mine")
+        (out / "link").symlink_to("notes.txt")
+
+        def link(*_: object, **__: object) -> None:
+            raise OSError(errno.EPERM, "no hard links here")
+
+        monkeypatch.setattr(os, "link", link)
+        export(out, 2, force=True)
+        assert (out / "notes.txt").read_text() == "mine"
+        assert (out / "link").readlink() == Path("notes.txt")
+
+
+def test_a_failed_second_move_puts_the_old_export_back(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export(out, 1)
+    monkeypatch.setattr(folder_module, "_exchange", no_exchange)
+    rename = Path.rename
+
+    def failing(path: Path, to: Path) -> Path:
+        if path.suffix == ".new":
+            raise OSError(errno.EIO, "the disk is broken")
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, "rename", failing)
+    with pytest.raises(InputError, match="the disk is broken"):
+        export(out, 2)
+    assert version_of(out) == 1
+    assert hidden(out.parent) == []
+
+
+def test_the_system_exchanges_folders(tmp_path: Path) -> None:
+    one, other = tmp_path / "one", tmp_path / "other"
+    one.mkdir()
+    other.mkdir()
+    (one / "a").touch()
+    if not folder_module._exchange(one, other):
+        pytest.skip("this file system has no exchange")
+    assert (other / "a").exists()
+    assert not (one / "a").exists()
+    with pytest.raises(FileNotFoundError):
+        folder_module._exchange(one, tmp_path / "missing")
+
+
+class TestParents:
+    def test_are_made(self, tmp_path: Path) -> None:
+        export(tmp_path / "a" / "b" / "exports", 1)
+        assert version_of(tmp_path / "a" / "b" / "exports") == 1
+
+    def test_are_removed_again_on_failure(self, tmp_path: Path) -> None:
+        (tmp_path / "a").mkdir()
+        with pytest.raises(ZeroDivisionError), replacing(tmp_path / "a/b/c/exports", False) as new:
+            fill(new, 1 // 0)
+        assert list(tmp_path.rglob("*")) == [tmp_path / "a"]
+
+    def test_a_check_makes_nothing(self, tmp_path: Path) -> None:
+        check_target(tmp_path / "a" / "b", force=False)
+        assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("refuse", [check_target, export], ids=["check", "replace"])
+class TestRefused:
+    def test_a_file(self, out: Path, refuse: Callable[..., None]) -> None:
+        out.write_text("mine")
+        self.refused(out, refuse, "is a file")
+        assert out.read_text() == "mine"
+
+    def test_a_file_above(self, out: Path, refuse: Callable[..., None]) -> None:
+        out.write_text("mine")
+        self.refused(out / "deeper" / "still", refuse, "is a file")
+
+    def test_where_the_user_is(
+        self, tmp_path: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "work" / "deep").mkdir(parents=True)
+        monkeypatch.chdir(tmp_path / "work" / "deep")
+        self.refused(Path(), refuse, "the folder you are in")
+        self.refused(Path(".."), refuse, "a folder above")
+        self.refused(Path("/"), refuse, "a folder above")
+
+    def test_home(
+        self, tmp_path: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "homes" / "me").mkdir(parents=True)
+        monkeypatch.setenv("HOME", str(tmp_path / "homes" / "me"))
+        self.refused(tmp_path / "homes" / "me", refuse, "your home")
+        self.refused(tmp_path / "homes", refuse, "your home")
+
+    def test_a_mount_point(
+        self, out: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        out.mkdir()
+        monkeypatch.setattr(os.path, "ismount", lambda path: path == out.resolve())
+        self.refused(out, refuse, "mount point")
+
+    @pytest.mark.parametrize("read_only", ["exports", ""])
+    def test_read_only(
+        self,
+        out: Path,
+        refuse: Callable[..., None],
+        monkeypatch: pytest.MonkeyPatch,
+        read_only: str,
+    ) -> None:
+        out.mkdir()
+        shut = out.parent / read_only
+        monkeypatch.setattr(os, "access", lambda path, _mode: path != shut)
+        self.refused(out, refuse, "read-only")
+
+    def test_a_loop_of_links(self, out: Path, refuse: Callable[..., None]) -> None:
+        out.symlink_to(out)
+        self.refused(out, refuse, "exports")
+
+    def test_a_name_no_file_can_have(self, out: Path, refuse: Callable[..., None]) -> None:
+        self.refused(out.parent / "a\0b", refuse, "cannot be written")
+        self.refused(out.parent / ("a" * 300), refuse, "cannot be written")
+
+    @pytest.mark.parametrize("content", ["folder", "fifo", "link", "file"])
+    def test_what_tbcad_did_not_write(
+        self, out: Path, refuse: Callable[..., None], content: str
+    ) -> None:
+        export(out, 1)
+        mine = out / "mine"
+        {
+            "folder": mine.mkdir,
+            "fifo": lambda: os.mkfifo(mine),
+            "link": lambda: mine.symlink_to("design.json"),
+            "file": mine.touch,
+        }[content]()
+        self.refused(out, refuse, "mine")
+
+    @pytest.mark.parametrize(
+        "manifest",
+        [
+            b"",
+            b"{",
+            b"[" * 100_000,
+            b"\xff",
+            b"[]",
+            b'{"name": "a web page", "files": {}}',
+            b'{"schema": "tbcad-manifest/1", "files": []}',
+            b'{"schema": "tbcad-manifest/1", "files": {"../a": {"sha256": "%s", "size": 1}}}'
+            % (b"0" * 64),
+            b'{"schema": "tbcad-manifest/1", "files": {"a": {"sha256": "%s", "size": true}}}'
+            % (b"0" * 64),
+            b'{"schema": "tbcad-manifest/1", "files": {"a": {"sha256": "%s", "size": 1}}}'
+            % (b"0" * 63),
+            b'{"schema": "tbcad-manifest/1", "files": {}}' + b" " * 4_000_000,
+        ],
+    )
+    def test_a_manifest_that_is_none(
+        self, out: Path, refuse: Callable[..., None], manifest: bytes
+    ) -> None:
+        export(out, 1)
+        (out / "manifest.json").write_bytes(manifest)
+        self.refused(out, refuse, "manifest.json")
+        export(out, 2, force=True)
+        assert (out / "manifest.json.kept").read_bytes() == manifest
+        assert version_of(out) == 2
+
+    def test_a_second_writer(self, out: Path, refuse: Callable[..., None]) -> None:
+        with replacing(out, force=False) as new:
+            fill(new, 1)
+            self.refused(out, refuse, "another tbcad")
+            check_target(out.parent / "elsewhere", force=False)
+        assert version_of(out) == 1
+        export(out, 2)
+        assert version_of(out) == 2
+
+    def refused(self, out: Path, refuse: Callable[..., None], words: str) -> None:
+        before = tree(self.tmp_path)
+        with pytest.raises(InputError, match=words) as error:
+            refuse(out, False) if refuse is check_target else export(out, 9)
+        assert "\n" not in str(error.value)
+        assert tree(self.tmp_path) == before
+
+    @pytest.fixture(autouse=True)
+    def _place(self, tmp_path: Path) -> None:
+        self.tmp_path = tmp_path
+
+
+def test_the_manifest_that_tbcad_writes_is_known(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
+    with replacing(out, force=False) as new:
+        (new / "shell_a.stl").write_text("solid")
+        write_manifest(new)
+        (new / "verify.json").write_text("{}")
+    check_target(out, force=False)
+
+
+KILLED = '''
+import os, signal, sys
+sys.path[:0] = [{root!r}]
+from pathlib import Path
+from tbcad.output import folder
+from tests.output.test_folder import check_target, export, fill, replacing, version_of
+
+os.fsync = lambda _: None  # which only a power cut could tell from the real one
+if {moves}:
+    folder._exchange = lambda *_: False
+out = Path({out!r})
+
+def dies_at(limit):
+    """Replace the export in a child that kills itself at a number of calls; tell whether it did."""
+    child = os.fork()
+    if child:
+        return os.WIFSIGNALED(os.waitpid(child, 0)[1])
+    calls = 0
+    def count(*_):
+        nonlocal calls
+        calls += 1
+        if calls == limit:
+            os.kill(os.getpid(), signal.SIGKILL)
+    with replacing(out, True) as new:
+        fill(new, 2)
+        sys.setprofile(count)
+    os._exit(0)
+
+limit, seen = 1, set()
+export(out, 1)
+(out / "mine").write_text("mine")
+while dies_at(limit):
+    if {moves} and not out.exists():
+        seen.add("missing")
+        check_target(out, True)
+    seen.add(version_of(out))
+    assert (out / "mine").read_text() == "mine"
+    export(out, 1, force=True)
+    assert [p.name for p in out.parent.iterdir()] == [out.name], list(out.parent.iterdir())
+    limit += {step}
+print(limit, sorted(map(str, seen)))
+'''
+
+
+@pytest.mark.parametrize(("moves", "seen"), [(False, ["1", "2"]), (True, ["1", "2", "missing"])])
+def test_a_kill_at_any_call_leaves_one_whole_export(
+    out: Path, moves: bool, seen: list[str]
+) -> None:
+    script = KILLED.format(root=str(ROOT), out=str(out), moves=moves, step=11)
+    run = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split(maxsplit=1)[1].strip() == str(seen), run.stdout
+
+
+ENDLESS = """
+import sys
+sys.path[:0] = [{root!r}]
+from pathlib import Path
+from tests.output.test_folder import export
+for version in range(1, 10**9):
+    export(Path({out!r}), version)
+    print(version, flush=True)
+"""
+
+
+def test_a_kill_at_a_random_moment_leaves_one_whole_export(out: Path) -> None:
+    script = ENDLESS.format(root=str(ROOT), out=str(out))
+    moments = random.Random(2022)
+    for _ in range(6):
+        with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as run:
+            assert run.stdout is not None
+            assert run.stdout.readline() == b"1\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                run.wait(moments.uniform(0, 0.05))
+            run.kill()
+            run.wait()
+            lines = run.stdout.read().split()
+        # At most one export more than was told can be in place.
+        told = int(lines[-1]) if lines else 1
+        assert version_of(out) in (told, told + 1)
+        export(out, 0)
+        assert hidden(out.parent) == []

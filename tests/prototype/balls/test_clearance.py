@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.mirrors.array import Half
+from tbcad.optics.ball_light import turned
+from tbcad.optics.trace import reflected
+from tbcad.prototype.balls.catalogue import load_catalogue
+from tbcad.prototype.balls.clearance import BETWEEN, apart, edges, free, obstacles
+from tbcad.prototype.balls.groups import clusters
+from tbcad.prototype.balls.selection import Balls, balls_of, stand
+from tbcad.spec.design import load_spec
+
+KEYS = load_spec(None).prototype
+K = 12
+
+
+@pytest.fixture(scope="module")
+def balls(paper_half: Half) -> Balls:
+    """As large as stock has them, so that they stand in each other's light too."""
+    groups = clusters(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
+    here = stand(paper_half, groups, 60.0)
+    catalogue = load_catalogue(["metric"])
+    stock = np.full(K, len(catalogue) - 1)
+    return balls_of(here, np.full(K, 30.0), stock, catalogue, 2.0)
+
+
+def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the light's segments (s, 3) at ball j, at azimuth zero."""
+    camera = np.array([pinhole, 0.0, 0.0])
+    share = np.linspace(0, 1, 15)[:, None, None]
+    inner = balls.at.apex[j] + share * (balls.outline[j] - balls.at.apex[j])
+    normal = unit(inner.reshape(-1, 3) - balls.centre[j])
+    point = balls.centre[j] + balls.radius[j] * normal
+    out = reflected(camera, point, normal)
+    end = point - dot(point, out)[:, None] * out
+    return np.tile(point, (2, 1)), np.concatenate([end, np.broadcast_to(camera, end.shape)])
+
+
+def gaps(start: np.ndarray, end: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Least distance (a,) of points (a, 3) from segments (s, 3)."""
+    way, to = (end - start)[:, None], centre - start[:, None]
+    share = np.clip((to * way).sum(axis=-1) / (way**2).sum(axis=-1), 0, 1)
+    result: np.ndarray = norm(to - share[..., None] * way).min(axis=0)
+    return result
+
+
+def test_light_passes_beyond_the_angle_and_hardly_within(paper_half: Half, balls: Balls) -> None:
+    """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
+    pinhole = norm(paper_half.view.pinhole)
+    _, dark = apart(balls, KEYS, pinhole, 30.0)
+    turn = np.radians(np.arange(0, 60, 0.5))
+    nearest = np.full((K, K), np.inf)
+    for j in range(K):
+        start, end = rays(balls, j, pinhole)
+        for i in set(range(K)) - {j}:
+            place = np.concatenate([[dark[i, j]], turn[turn > dark[i, j]]])
+            centre = turned(np.broadcast_to(balls.body_centre[i], (len(place), 3)), place)
+            gap = gaps(start, end, centre) - balls.body_radius[i] - KEYS.light_margin_mm
+            assert gap.min() > 0
+            nearest[i, j] = gap[0]
+    # The light of one of the two sets the angle.
+    nearest = np.minimum(nearest, nearest.T)[dark > 0]
+    assert len(nearest) > 10
+    assert nearest.max() < 2.6
+
+
+def test_balls_touch_within_the_angle(paper_half: Half, balls: Balls) -> None:
+    touch, _ = apart(balls, KEYS, norm(paper_half.view.pinhole), 30.0)
+    assert (touch == touch.T).all()
+    for i, j in ((0, 1), (3, 5), (6, 7)):
+        other = turned(balls.body_centre[i], np.array(touch[i, j] - BETWEEN))
+        assert norm(other - balls.body_centre[j]) == pytest.approx(60 + KEYS.ball_wall_mm)
+
+
+def test_post_lies_straight_below(paper_half: Half, balls: Balls) -> None:
+    """Its half-plane is opposite to the mirrors; only the lowest polar angles come near it."""
+    frame = paper_half.ellipsoid.frame()
+    post, camera = obstacles(KEYS, frame, paper_half.view, 400.0)
+    assert post.azimuth == pytest.approx(np.pi)
+    assert post.cone.end[0] == pytest.approx(400 * np.array([1, 1]) / np.sqrt(2))
+    assert camera.cone.start[0] == pytest.approx([np.sqrt(2) * 100, 0])
+    floor, ceiling = free(balls, KEYS, [post])
+    assert floor == pytest.approx(-ceiling)
+    near = ceiling < np.pi
+    assert near[0]
+    assert not near[-1]
+    at = turned(balls.body_centre[0], np.array(ceiling[0])) @ frame
+    away = np.hypot(at[0], at[1])
+    assert away == pytest.approx(30 + KEYS.post_diameter_mm / 2 + KEYS.ball_wall_mm)
+
+
+def test_edges_are_tangents_from_the_axis(balls: Balls) -> None:
+    expected = np.arcsin((balls.body_radius + 3) / balls.body_centre[:, 1])
+    assert edges(balls, 3.0) == pytest.approx(expected)

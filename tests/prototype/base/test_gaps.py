@@ -1,0 +1,52 @@
+"""Where ribs and rings are left out: not where numbers are, and no short rest is left."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import prototype
+from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, arcs, gaps
+from tbcad.prototype.base.layout import Base, base
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.design import load_spec
+
+
+@pytest.fixture(scope="module")
+def whole(paper_design: Design) -> Base:
+    return base(Keys(), prototype(load_spec(None), paper_design))
+
+
+def test_arcs_miss_every_number(whole: Base) -> None:
+    seats = whole.own_seats
+    for ring in whole.rings:
+        z, r = ring.mean(axis=0)
+        for low, high in arcs(whole, ring, *whole.sector):
+            assert (high - low) * ring[:, 1].max() >= SHORTEST_MM - STEP_MM
+            azimuth = np.linspace(low, high, 500)
+            points = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), 0 * azimuth + z], axis=1)
+            for k in range(len(seats)):
+                away = points - (seats.centre[k] + seats.back[k] * seats.axis[k])
+                along = away @ seats.axis[k]
+                beside = np.linalg.norm(away - along[:, None] * seats.axis[k], axis=1)
+                assert not ((along > 0) & (beside < seats.boss[k])).any()
+
+
+def test_a_rib_without_bosses_is_whole_and_others_are_not(whole: Base) -> None:
+    sides = [0.0, -0.5, -0.5, -1.0]
+    counts = [len(gaps(whole, a, s)) for a, s in zip(whole.ribs.tolist(), sides, strict=True)]
+    assert counts[0] == counts[-1] == 0  # the edges' ribs stand beyond all bosses
+    assert max(counts) > 0
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=60), st.floats(0.1, 10))
+def test_runs_are_the_free_places_without_the_short_ones(free: list[bool], shortest: float) -> None:
+    at = np.arange(len(free), dtype=float)
+    found = _runs(at, np.array(free), shortest)
+    for low, high in found:
+        assert all(free[int(low) : int(high) + 1])
+        assert high - low >= shortest
+        assert low == 0 or not free[int(low) - 1]
+    text = "".join("x" if one else " " for one in free)
+    assert len(found) == sum(len(run) - 1 >= shortest for run in text.split())

@@ -1,0 +1,219 @@
+"""The base in numbers: seats, cross-section, hub, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tbcad.geometry.vectors import dot, norm
+from tbcad.mirrors.array import Design
+from tbcad.optics.ball_light import light
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.base.hub import hub
+from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import _sector as sector
+from tbcad.prototype.base.profile import Light, hull, offset, outside, thinned, trimmed
+from tbcad.prototype.base.seats import APART_MM, free_of_ways, resized, seats
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+
+KEYS = Keys()
+
+
+def keys(**changed: object) -> Keys:
+    return Keys.model_validate(KEYS.model_dump() | changed)
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+
+
+@pytest.fixture(scope="module")
+def paper(paper_design: Design) -> Prototype:
+    return prototype(load_spec(None), paper_design)
+
+
+@pytest.fixture(scope="module")
+def whole(paper: Prototype) -> Base:
+    return base(KEYS, paper)
+
+
+class TestSeats:
+    def test_pads_are_tangent_to_the_bodies(self, whole: Base, paper: Prototype) -> None:
+        seat = whole.seats
+        away = dot(seat.contacts - paper.body_centres()[:, None], seat.pad_normals)
+        assert np.abs(away + paper.balls.body_radius[:, None]).max() < 1e-9
+        assert np.abs(norm(seat.pad_normals) - 1).max() < 1e-12
+
+    def test_pads_stand_at_the_angle_of_the_spec_a_third_of_a_turn_apart(
+        self, whole: Base, paper: Prototype
+    ) -> None:
+        normal = whole.seats.pad_normals
+        tilt = dot(normal, paper.normals()[:, None])
+        assert np.degrees(np.arccos(tilt)) == pytest.approx(np.full(tilt.shape, 50.0))
+        pairs = dot(normal, np.roll(normal, 1, axis=1))
+        apart = np.cos(np.radians(50)) ** 2 - np.sin(np.radians(50)) ** 2 / 2
+        assert pairs == pytest.approx(np.full(pairs.shape, apart))
+
+    def test_frames_are_right_handed_and_their_first_row_points_to_the_camera(
+        self, whole: Base
+    ) -> None:
+        axes = whole.seats.axes
+        assert np.linalg.det(axes) == pytest.approx(np.ones(len(axes)))
+        assert (axes[:, 0] @ whole.frame[0] > 0).all()
+
+    def test_magnets_do_not_touch(self, whole: Base) -> None:
+        seat = whole.seats
+        top = seat.bottom - KEYS.magnet_height_mm
+        assert top - seat.radius == pytest.approx(np.full(len(seat), KEYS.magnet_gap_mm))
+        pads = seat.radius * np.sin(seat.tilt) - seat.pad * np.cos(seat.tilt)
+        assert (seat.pocket < pads).all()
+
+    def test_glue_needs_no_magnet(self, made: Prototype) -> None:
+        seat = seats(keys(hold="glue"), made)
+        assert (seat.magnet == 0).all()
+        assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
+
+    def test_balls_go_in_past_the_pads_of_others(self, whole: Base) -> None:
+        assert free_of_ways(whole.seats).min() > APART_MM
+
+    def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
+        self, paper_design: Design
+    ) -> None:
+        made = prototype(load_spec(None, ["prototype.k=10"]), paper_design)
+        seat = seats(KEYS, made)
+        slant = np.degrees(np.arccos(np.clip(-dot(seat.way, seat.axis) / norm(seat.way), -1, 1)))
+        assert 5 < slant.max() < 21
+        # On its way out it leaves its own pads.
+        assert dot(seat.way[:, None], seat.pad_normals).min() > 0
+        assert free_of_ways(seat).min() > APART_MM
+
+    def test_moved_pads(self, whole: Base) -> None:
+        moved = resized(whole.seats, np.array([0.0, 0.2]))
+        assert norm(moved[:, 1]) - norm(moved[:, 0]) == pytest.approx(np.full((16, 3), 0.2))
+
+
+class TestLight:
+    def test_all_light_is_within_the_level(self, whole: Base, paper: Prototype) -> None:
+        random = np.random.default_rng(1)
+        for cone in light(paper.balls.outline, whole.light.pinhole, 30.0):
+            share = random.random((len(cone), 500, 1))
+            middle = cone.start[:, None] + share * (cone.end - cone.start)[:, None]
+            reach = cone.start_radius[:, None] * (1 - share[..., 0])
+            reach = reach + cone.end_radius[:, None] * share[..., 0]
+            turn = 2 * np.pi * random.random(reach.shape)
+            rim = reach[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+            assert whole.light.beyond(middle + rim).max() <= -2 * KEYS.light_clearance_mm + 1e-9
+
+    def test_the_wall_is_beyond_it(self, whole: Base) -> None:
+        parts = np.stack([whole.inner[:-1], whole.inner[1:]], axis=1)
+        assert whole.light.least_beyond(parts).min() >= 0
+
+    def test_the_bound_of_a_facet_is_below_all_of_it(self) -> None:
+        random, region = np.random.default_rng(2), Light(140.0, 250.0)
+        facets = random.normal(size=(200, 3, 3)) * 100
+        weights = random.dirichlet([1, 1, 1], size=(200, 40))
+        inside = region.beyond(weights @ facets).min(axis=1)
+        assert (region.least_beyond(facets) <= inside + 1e-9).all()
+
+    def test_a_boss_in_the_light_is_refused(self, made: Prototype) -> None:
+        with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
+            base(keys(light_clearance_mm=12.0), made)
+
+
+class TestProfile:
+    def test_hull(self) -> None:
+        points = np.array([[0, 0], [1, 2], [2, 2.5], [3, 0], [1.5, 1]], dtype=float)
+        assert hull(points).tolist() == [[0, 0], [1, 2], [2, 2.5], [3, 0]]
+
+    def test_offset_lines_keep_their_distance(self, whole: Base) -> None:
+        away = outside(whole.inner, offset(whole.inner, 5.0))
+        assert away == pytest.approx(np.full(len(away), 5.0))
+
+    def test_thinned_lines_go_round(self) -> None:
+        line = np.array([[0, 0], [2, 4], [2.5, 4.6], [6, 7], [12, 7]], dtype=float)
+        short = thinned(line, 2.0)
+        assert len(short) == 4
+        assert outside(short, line).max() <= 1e-12
+        assert short[[0, -1]].tolist() == line[[0, -1]].tolist()
+
+    def test_trimmed_and_prolonged(self) -> None:
+        line = np.array([[0, 0], [2, 4], [6, 6]], dtype=float)
+        assert trimmed(line, 4.0).tolist() == [[0, 0], [2, 4], [4, 5]]
+        assert trimmed(line, 8.0).tolist() == [[0, 0], [2, 4], [8, 7]]
+
+    def test_bosses_begin_inside_and_end_outside_of_the_wall(self, whole: Base) -> None:
+        seat, frame = whole.seats, whole.frame
+        for length, sign in ((seat.front, -1), (seat.back, 1)):
+            for side in (-1, 1):
+                point = seat.centre + length[:, None] * seat.axis
+                point = (point + side * seat.boss[:, None] * seat.axes[:, 0]) @ frame.T
+                at = np.stack([point[:, 0], norm(point[:, 1:])], axis=1)
+                line = whole.inner if sign < 0 else whole.outer
+                assert (sign * outside(line, at)).min() > -1e-9
+
+    def test_the_sector_holds_all_bosses(self, whole: Base, paper: Prototype) -> None:
+        low, high = whole.sector
+        azimuth = paper.placement.azimuth
+        assert low < azimuth.min() < azimuth.max() < high
+        assert whole.outermost(paper.placement.swing) > paper.placement.outermost
+        assert whole.outermost(paper.placement.swing) < np.radians(160)
+        assert len(whole.ribs) == KEYS.ribs
+        assert (np.diff(whole.ribs) > 0).all()
+
+
+class TestHub:
+    def test_it_stands_beyond_the_light(self, whole: Base) -> None:
+        held = whole.hub
+        assert whole.light.beyond(np.array([held.front, 0.0])) >= 0
+        assert held.front > held.back > held.face == whole.hub_face
+
+    @pytest.mark.parametrize(
+        ("drive", "circle", "hole"),
+        [("nema17-belt", 28.0, 4.0), ("nema17-direct", 16.0, 4.0), ("stage-60", 50.0, 6.6)],
+    )
+    def test_patterns(self, drive: str, circle: float, hole: float) -> None:
+        held = hub(keys(drive=drive), -60.0)
+        assert norm(held.holes) == pytest.approx(np.full(4, circle / 2))
+        assert held.hole == hole
+        assert held.disc > circle / 2 + hole / 2 + 2
+        assert held.source
+
+    def test_a_shaft_too_thick(self) -> None:
+        with pytest.raises(SpecError, match=r"prototype.base.shaft_mm 9 or less"):
+            hub(keys(drive="nema17-direct", shaft_mm=12.0), -60.0)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("changed", "text"),
+        [
+            ({"pad_angle_deg": 70.0, "pad_mm": 8.0}, "would close round it: make"),
+            ({"clearance_mm": 0.1, "pad_mm": 6.0}, "do not stand out of its cup: make"),
+            ({"magnets_mm": [40.0]}, "no magnet fits between the pads of ball 1: add one of"),
+        ],
+    )
+    def test_seats(self, made: Prototype, changed: dict[str, object], text: str) -> None:
+        with pytest.raises(SpecError, match=text):
+            base(keys(**changed), made)
+
+    def test_pads_in_the_way_of_other_balls(self, made: Prototype) -> None:
+        close = replace(made.placement, azimuth=made.placement.azimuth * 0)
+        small = replace(made.balls.at, apex=made.balls.at.apex * 0 + made.balls.at.apex[:1])
+        crowded = replace(made, placement=close, balls=replace(made.balls, at=small))
+        with pytest.raises(SpecError, match="stands where another ball is put in"):
+            seats(KEYS, crowded)
+
+    def test_a_ball_next_to_the_axis(self, made: Prototype) -> None:
+        seat = seats(KEYS, made)
+        frame = made.half.ellipsoid.frame()
+        near = replace(seat, centre=seat.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
+        with pytest.raises(SpecError, match="stands too near to the axis for its seat"):
+            sector(KEYS, near, made)
+
+    def test_balls_all_round_the_axis(self, made: Prototype) -> None:
+        spread = replace(made.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0]))
+        with pytest.raises(SpecError, match=r"would go 3\d\d degrees round its axis"):
+            base(KEYS, replace(made, placement=spread))

@@ -1,0 +1,230 @@
+"""How the base is cut for the bed: planes, holes, what is bought, and what is refused."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tbcad.geometry.vectors import norm
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.base.joints import profile
+from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.profile import outside
+from tbcad.prototype.base.purchased import bought, fasteners, magnets
+from tbcad.prototype.base.screws import access, sizes
+from tbcad.prototype.base.split import Split, split
+from tbcad.prototype.drive.drive import load_parts
+from tbcad.prototype.printing.bed import lack, needed, room
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+
+KEYS = Keys()
+DOWN = [np.array([0.0, 0.0, -1.0])]
+
+
+def keys(**changed: object) -> Keys:
+    return Keys.model_validate(KEYS.model_dump() | changed)
+
+
+def cube(size: float) -> Keys:
+    return keys(bed_mm=[size] * 3)
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+
+
+@pytest.fixture(scope="module")
+def paper(paper_design: Design) -> Prototype:
+    return prototype(load_spec(None), paper_design)
+
+
+@pytest.fixture(scope="module", params=["small", "paper in two", "paper in three"])
+def cut(request: pytest.FixtureRequest, made: Prototype, paper: Prototype) -> tuple[Base, Split]:
+    at = {"small": (made, 150.0), "paper in two": (paper, 180.0), "paper in three": (paper, 160.0)}
+    chosen, bed = at[request.param]
+    numbers = base(cube(bed), chosen)
+    plan = split(numbers)
+    assert len(plan.pieces) == (3 if "three" in request.param else 2)
+    return numbers, plan
+
+
+def rims(numbers: Base) -> np.ndarray:
+    """Points round both ends of all bosses, (k, 2, n, 3)."""
+    found, turn = numbers.own_seats, np.linspace(0, 2 * np.pi, 90)
+    circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    around = found.boss[:, None, None] * (circle @ found.axes)
+    ends = np.stack([found.front, found.back], axis=1)[..., None] * found.axis[:, None]
+    return (found.centre[:, None] + ends)[:, :, None] + around[:, None]
+
+
+class TestPlanes:
+    def test_a_base_that_fits_stays_whole(self, made: Prototype, paper: Prototype) -> None:
+        for one in (made, paper):
+            plan = split(base(KEYS, one))
+            assert not plan.joints
+            assert [len(piece) for piece in plan.pieces] == [0]
+
+    def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[Base, Split]) -> None:
+        numbers, plan = cut
+        corners = rims(numbers).reshape(len(numbers.seats), -1, 3)
+        for joint in plan.joints:
+            inside = (corners @ joint.within[:, :3].T <= joint.within[:, 3]).all(axis=(1, 2))
+            away = joint.plane.above(corners[inside])
+            assert ((away.min(axis=1) > 0.99) | (away.max(axis=1) < -0.99)).all()
+            assert (away.min(axis=1) > 0).any()
+            assert (away.max(axis=1) < 0).any()
+
+    def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[Base, Split]) -> None:
+        numbers, plan = cut
+        held, turn = numbers.hub, np.linspace(0, 2 * np.pi, 60)
+        for z in (held.face, held.front):
+            rim = np.stack([held.disc * np.cos(turn), held.disc * np.sin(turn), 0 * turn + z], 1)
+            assert {plan.piece_of(point) for point in rim} == {0}
+
+    def test_pieces_fill_space_once(self, cut: tuple[Base, Split]) -> None:
+        points = np.random.default_rng(1).normal(size=(3000, 3)) * 150
+        inside = [(points @ one[:, :3].T < one[:, 3]).all(axis=1) for one in cut[1].pieces]
+        assert (np.sum(inside, axis=0) == 1).all()
+        assert all(one.any() for one in inside)
+
+    def test_the_same_again(self, made: Prototype) -> None:
+        one, two = (split(base(cube(150.0), made)) for _ in range(2))
+        for first, second in zip(one.joints, two.joints, strict=True):
+            assert (first.screws == second.screws).all()
+            assert (first.plane.normal == second.plane.normal).all()
+
+    def test_a_bed_too_small_names_one_that_does(self, made: Prototype) -> None:
+        with pytest.raises(SpecError, match=r"make prototype\.base\.bed_mm at least") as said:
+            split(base(keys(bed_mm=[135.0, 135.0, 60.0]), made))
+        (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))
+        large = np.array([float(size) for size in bed])
+        assert len(split(base(keys(bed_mm=large.tolist()), made)).pieces) == 2
+
+
+class TestJoints:
+    def test_two_dowels_and_two_screws_or_more(self, cut: tuple[Base, Split]) -> None:
+        for joint in cut[1].joints:
+            assert len(joint.dowels) == 2
+            assert len(joint.screws) >= 2
+            places = np.vstack([joint.dowels, joint.screws])
+            assert np.abs(joint.plane.above(places)).max() < 1e-9
+            apart = norm(places[:, None] - places) + 99 * np.eye(len(places))
+            assert apart.min() >= 8.0
+            assert norm(joint.dowels[1] - joint.dowels[0]) > 40
+
+    def test_holes_are_in_the_flanges_and_off_all_seats(self, cut: tuple[Base, Split]) -> None:
+        numbers, plan = cut
+        seat, used = numbers.own_seats, numbers.keys
+        for joint in plan.joints:
+            along = np.linspace(-used.joint_mm, used.joint_mm, 40)[:, None, None]
+            axes = np.vstack([joint.dowels, joint.screws]) + along * joint.plane.normal
+            at = np.stack([axes[..., 2], norm(axes[..., :2])], axis=-1)
+            assert outside(numbers.inner, at).min() > used.insert_hole_mm / 2 + 1
+            balls = norm(axes[..., None, :] - seat.centre) - seat.cup
+            assert balls.min() > used.insert_hole_mm / 2 + 1
+            # And beside the magnets.
+            away = axes[..., None, :] - seat.centre
+            deep = (away * seat.axis).sum(axis=-1)
+            beside = norm(away - deep[..., None] * seat.axis) - seat.pocket
+            assert (beside[(deep > 0) & (deep < seat.back)] > used.insert_hole_mm / 2 + 1).all()
+
+    def test_heads_are_reached_from_outside(self, cut: tuple[Base, Split]) -> None:
+        numbers, plan = cut
+        free = access(sizes(numbers.keys))
+        assert free > 5.5 / 2
+        for joint in plan.joints:
+            for place, side in zip(joint.screws, joint.heads, strict=True):
+                steps = numbers.keys.joint_mm + np.linspace(0, 25, 60)
+                axis = place + side * steps[:, None] * joint.plane.normal
+                at = np.stack([axis[:, 2], norm(axis[:, :2])], axis=-1)
+                assert outside(numbers.outer, at).min() > 5.5 / 2
+                for rim, up in zip(rims(numbers), numbers.own_seats.axis, strict=True):
+                    ends = rim.mean(axis=1)
+                    deep = np.clip((axis - ends[0]) @ up, 0, (ends[1] - ends[0]) @ up)
+                    away = norm(axis - ends[0] - deep[:, None] * up)
+                    assert away.min() > norm(rim[0, 0] - ends[0]) + 5.5 / 2 - 0.1
+
+    def test_flanges_are_behind_the_light(self, cut: tuple[Base, Split]) -> None:
+        numbers, _ = cut
+        line = profile(numbers)
+        parts = np.stack([line, np.roll(line, -1, axis=0)], axis=1)
+        assert numbers.light.least_beyond(parts).min() > 0
+        assert line[:, 1].min() > numbers.hub.disc
+
+    def test_sizes_are_in_the_lists(self) -> None:
+        found, parts = sizes(KEYS), load_parts()
+        assert parts[found.dowel].sizes == (3.0, 12.0)
+        assert found.dowel_depth + 1 <= KEYS.joint_mm
+        length = parts[found.screw].sizes[1]
+        # 1.3 diameters in the insert, and not through its hole.
+        assert 1.3 * 3 <= length - KEYS.joint_mm <= KEYS.insert_depth_mm
+
+    @pytest.mark.parametrize(
+        ("changed", "text"),
+        [
+            ({"joint_mm": 6.0}, r"prototype\.base\.joint_mm at least 7\.2"),
+            ({"dowel_mm": 5.0}, r"no dowel of 5 mm is at most 13 mm long"),
+            ({"joint_mm": 27.0}, r"no M3 screw is 31 to 33\.2 mm long"),
+        ],
+    )
+    def test_refused(self, made: Prototype, changed: dict[str, object], text: str) -> None:
+        with pytest.raises(SpecError, match=text):
+            split(base(keys(bed_mm=[150.0] * 3, **changed), made))
+
+
+class TestBed:
+    def test_a_box(self) -> None:
+        corners = np.array(np.meshgrid([0, 100], [0, 50], [0, 20]), dtype=float).reshape(3, -1).T
+        exact = keys(bed_mm=[100.0, 50.0, 20.0], bed_margin_mm=0.0)
+        assert lack(corners, DOWN, exact) == pytest.approx(0.4)
+        assert needed(corners, DOWN, exact).tolist() == [101, 51, 21]
+        assert room(KEYS).tolist() == pytest.approx([249.6, 249.6, 252.6])
+
+    def test_it_is_turned_to_fit(self) -> None:
+        corners = np.array([[0, 0, 0], [0, 120, 0], [10, 0, 0], [10, 120, 0]], dtype=float)
+        assert lack(corners, DOWN, cube(100.0)) <= 0
+        assert lack(corners * 1.3, DOWN, cube(100.0)) > 0
+
+
+class TestBought:
+    def test_a_whole_base(self, paper: Prototype) -> None:
+        found = bought(base(KEYS, paper))
+        magnet = {name: count for name, count in found.items() if name.startswith("MAGNET")}
+        assert sum(magnet.values()) == len(paper.balls.body_radius)
+        # Four of the drive, two of the set screws.
+        assert found["INSERT-M3"] == 6
+        (screw,) = (name for name in found if name.startswith("SET"))
+        assert found[screw] == 2
+        # From the shaft to no farther than the hub's face.
+        assert load_parts()[screw].sizes[1] <= 19.0 - 4.0
+        assert set(found) <= set(load_parts())
+        assert not any(name.startswith(("DOWEL", "M3x")) for name in found)
+
+    def test_joints_need_more(self, cut: tuple[Base, Split]) -> None:
+        numbers, plan = cut
+        found, screws = fasteners(numbers, plan), sum(len(j.screws) for j in plan.joints)
+        assert found["DOWEL-3x12"] == 2 * len(plan.joints)
+        assert found["M3x12"] == screws
+        assert found["INSERT-M3"] == 6 + screws
+
+    def test_other_hubs(self, made: Prototype) -> None:
+        clamp = bought(base(keys(lock="clamp"), made))
+        assert clamp["INSERT-M3"] == 5
+        assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
+        stage = bought(base(keys(drive="stage-60", hold="glue"), made))
+        assert stage == {}
+
+    def test_not_in_a_list(self, made: Prototype) -> None:
+        with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
+            magnets(base(keys(magnet_height_mm=4.0), made))
+        numbers = base(keys(insert_hole_mm=4.4), made)
+        with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
+            fasteners(numbers, split(numbers))
+        short = replace(numbers, hub=replace(numbers.hub, boss=6.0), keys=KEYS)
+        with pytest.raises(SpecError, match=r"no M3 screw of at most 2\.0 mm is in setscrews\.csv"):
+            fasteners(short, split(numbers))

@@ -1,0 +1,257 @@
+"""The base cut up: every figure from the pieces' solids and meshes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold, Mesh64
+from OCP.BRep import BRep_Tool
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.Geom import Geom_CylindricalSurface
+
+from tbcad.cad.checks import check_mesh
+from tbcad.cad.glyphs import ROWS, SIGNS, fitting
+from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
+from tbcad.formats.step import write_step
+from tbcad.geometry.vectors import norm
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import prototype
+from tbcad.prototype.base.hub import SCREW_MM
+from tbcad.prototype.base.joints import LABEL_MM, Joint
+from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.screws import access, sizes
+from tbcad.prototype.base.solid import bodies, carrier, tools, whole
+from tbcad.prototype.base.split import Split, split
+from tbcad.prototype.base.split_solids import holes
+from tbcad.prototype.printing.placing import Part
+from tbcad.shell.mesh import Mesh
+from tbcad.shell.solid import InvalidSolidError, Solid
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.design import load_spec
+
+KEYS = Keys(bed_mm=(160.0, 160.0, 160.0))
+Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
+Cut = tuple[Base, Split, list[Part], list[trimesh.Trimesh]]
+
+
+def cut_up(numbers: Base) -> Cut:
+    plan = split(numbers)
+    parts = carrier(numbers, plan)
+    return numbers, plan, parts, [as_trimesh(part) for part in parts]
+
+
+def as_trimesh(part: Part) -> trimesh.Trimesh:
+    found = meshed(part.shape, 0.02)
+    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
+
+
+@pytest.fixture(scope="module")
+def small(small_design: Design) -> Cut:
+    made = prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+    return cut_up(base(KEYS, made))
+
+
+@pytest.fixture(scope="module")
+def paper(paper_design: Design) -> Cut:
+    made = prototype(load_spec(None), paper_design)
+    return cut_up(base(Keys(bed_mm=(180.0, 180.0, 180.0)), made))
+
+
+def check_pieces(cut: Cut) -> None:
+    """Each is one watertight solid that fits the bed; no two overlap; all pads are there."""
+    numbers, plan, parts, meshes = cut
+    assert [part.name for part in parts] == [f"carrier_{n + 1}" for n in range(len(plan.pieces))]
+    for part, mesh in zip(parts, meshes, strict=True):
+        assert len(solids(part.shape)) == 1
+        assert BRepCheck_Analyzer(part.shape).IsValid()
+        assert mesh.is_watertight
+        assert mesh.body_count == 1
+        assert mesh.volume == pytest.approx(part.volume, rel=1e-3)
+        low, high = bounds(part.on_bed)
+        assert (high - low <= np.array(numbers.keys.bed_mm) - [6, 6, 3]).all()
+        assert low[2] == pytest.approx(0, abs=0.5)
+    nets = [Manifold(Mesh64(m.vertices, m.faces.astype(np.uint64))) for m in meshes]
+    for n, one in enumerate(nets):
+        for other in nets[:n]:
+            assert (one ^ other).volume() < 0.1
+            # They touch.
+            assert one.min_gap(other, 1.0) < 1e-3
+
+
+def check_pads(cut: Cut) -> None:
+    numbers, _, parts, _ = cut
+    planes = [plane_faces(part.shape) for part in parts]
+    middle = np.concatenate([one for one, _ in planes])
+    area = np.concatenate([one for _, one in planes])
+    for contacts, pad in zip(numbers.seats.contacts, numbers.seats.pad, strict=True):
+        for contact in contacts:
+            near = norm(middle - contact) < 1e-4
+            assert area[near] == pytest.approx([np.pi * pad**2], rel=1e-6)
+
+
+class TestSmall:
+    def test_pieces(self, small: Cut) -> None:
+        check_pieces(small)
+
+    def test_pads(self, small: Cut) -> None:
+        check_pads(small)
+
+    def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
+        numbers, plan, parts, _ = small
+        seats = numbers.own_seats
+        added, removed = bodies(numbers, seats, plan), tools(numbers, seats)
+        with_flanges = volume_by_meshes(added, removed, 0.01)
+        assert with_flanges > volume_by_meshes(bodies(numbers, seats), removed, 0.01) + 10_000
+        assert volume(whole(numbers, plan)) == pytest.approx(with_flanges, rel=2e-4)
+        # Holes of both sides begin beyond the plane, so each piece has its own taken out.
+        assert len(plan.pieces) == 2
+        (joint,) = plan.joints
+        drilled = sum(part.volume for part in parts)
+        assert drilled < with_flanges - hole_volume(numbers, joint)
+        assert drilled > with_flanges - hole_volume(numbers, joint) - heads_volume(numbers, joint)
+
+    def test_holes_of_both_sides_are_coaxial(self, small: Cut) -> None:
+        numbers, plan, parts, _ = small
+        (joint,) = plan.joints
+        used, size = numbers.keys, sizes(numbers.keys)
+        turn = numbers.axes
+        press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
+        sides = {
+            -1: cylinders(parts[piece_at(plan, joint, -1)]),
+            1: cylinders(parts[piece_at(plan, joint, 1)]),
+        }
+        normal = joint.plane.normal @ turn
+        for place in joint.dowels @ turn:
+            assert on_axis(sides[-1], place, normal) == pytest.approx([press / 2])
+            assert on_axis(sides[1], place, normal) == pytest.approx([slip / 2])
+        for place, head in zip(joint.screws @ turn, joint.heads.tolist(), strict=True):
+            assert on_axis(sides[-head], place, normal) == pytest.approx([used.insert_hole_mm / 2])
+            found = on_axis(sides[head], place, normal)
+            assert found[0] == pytest.approx(SCREW_MM / 2)
+            assert found[-1] <= access(size) + 1e-9
+
+    def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
+        """Straight from the plane into the material, until the mesh is met."""
+        numbers, plan, _, meshes = small
+        (joint,) = plan.joints
+        used, depth = numbers.keys, sizes(numbers.keys).dowel_depth
+        for side in (-1, 1):
+            mesh = meshes[piece_at(plan, joint, side)]
+            out = side * joint.plane.normal @ numbers.axes
+            for place in joint.dowels @ numbers.axes:
+                assert first_hit(mesh, place, out) == pytest.approx(depth, abs=1e-4)
+            for place, head in zip(joint.screws @ numbers.axes, joint.heads, strict=True):
+                expected = used.insert_depth_mm if side != head else np.inf
+                hit = first_hit(mesh, place, out)
+                assert hit == pytest.approx(expected, abs=1e-4) if side != head else hit > 25
+
+    def test_each_piece_bears_its_number(self, small: Cut) -> None:
+        numbers, plan, _, meshes = small
+        (joint,) = plan.joints
+        for side, place in zip((-1, 1), joint.labels, strict=True):
+            n = piece_at(plan, joint, side)
+            out = side * joint.plane.normal @ numbers.axes
+            far = numbers.keys.joint_mm + numbers.keys.relief_mm
+            top = place @ numbers.axes + far * out
+            mesh = meshes[n]
+            flat = np.abs((mesh.triangles - top) @ out).max(axis=1) < 1e-6
+            flat &= (mesh.face_normals @ out > 1 - 1e-9) & (norm(mesh.triangles_center - top) < 6)
+            square = fitting(str(n + 1), numbers.keys.digit_mm, 0.95 * LABEL_MM) / ROWS
+            squares = "".join(SIGNS[str(n + 1)]).count("#")
+            assert mesh.area_faces[flat].sum() == pytest.approx(squares * square**2, rel=1e-6)
+
+    def test_no_facet_reaches_into_the_light(self, small: Cut) -> None:
+        numbers, _, _, meshes = small
+        for mesh in meshes:
+            points = np.vstack([mesh.vertices, mesh.triangles_center])
+            assert numbers.light.beyond(points @ numbers.frame.T).min() > 0
+
+    def test_balls_can_be_put_in(self, small: Cut) -> None:
+        numbers, _, _, meshes = small
+        points = np.vstack([np.vstack([m.vertices, m.triangles_center]) for m in meshes])
+        found = numbers.seats
+        for centre, way, radius in zip(found.centre, found.way, found.radius, strict=True):
+            away, length = points - centre, norm(way)
+            along = away @ way / length
+            beside = norm(away - along[:, None] * way / length)
+            assert not ((along > 0) & (along < length) & (beside < radius)).any()
+
+    def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
+        numbers, plan, parts, _ = small
+        for name, again in (("one", parts), ("two", carrier(numbers, plan))):
+            for part in again:
+                write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))
+        for part in parts:
+            one, two = (tmp_path / f"{name}_{part.name}" for name in ("one", "two"))
+            assert one.read_bytes() == two.read_bytes()
+
+
+@pytest.mark.slow
+class TestPaper:
+    def test_pieces_and_pads(self, paper: Cut) -> None:
+        assert len(paper[2]) == 2
+        check_pieces(paper)
+        check_pads(paper)
+
+
+def piece_at(plan: Split, joint: Joint, side: int) -> int:
+    return plan.piece_of(joint.dowels[0] + side * joint.plane.normal)
+
+
+def hole_volume(numbers: Base, joint: Joint) -> float:
+    """Of dowels' and screws' holes and of inserts, without what is taken off for the heads."""
+    used, depth = numbers.keys, sizes(numbers.keys).dowel_depth
+    pins = [used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm]
+    dowels = len(joint.dowels) * sum(np.pi / 4 * pin**2 * depth for pin in pins)
+    insert = np.pi / 4 * used.insert_hole_mm**2 * used.insert_depth_mm
+    through = np.pi / 4 * SCREW_MM**2 * (used.joint_mm - 0.2)
+    return float(dowels + len(joint.screws) * (insert + through))
+
+
+def heads_volume(numbers: Base, joint: Joint) -> float:
+    """At most all of what is kept clear for the heads."""
+    return float(len(joint.screws) * np.pi * access(sizes(numbers.keys)) ** 2 * 25.2)
+
+
+def cylinders(part: Part) -> list[Cylinder]:
+    """Radius, a point and the direction of each cylindrical face."""
+    found = []
+    for face in faces(part.shape):
+        surface = BRep_Tool.Surface_s(face)
+        if isinstance(surface, Geom_CylindricalSurface):
+            at, along = surface.Location(), surface.Axis().Direction()
+            point = np.array([at.X(), at.Y(), at.Z()])
+            direction = np.array([along.X(), along.Y(), along.Z()])
+            found.append((surface.Radius(), point, direction))
+    return found
+
+
+def on_axis(found: list[Cylinder], at: np.ndarray, along: np.ndarray) -> list[float]:
+    """Radii, each once, of the cylinders about a line, the least first."""
+    return sorted(
+        {
+            round(radius, 9)
+            for radius, point, direction in found
+            if abs(abs(direction @ along) - 1) < 1e-12 and norm(np.cross(point - at, along)) < 1e-9
+        }
+    )
+
+
+def first_hit(mesh: trimesh.Trimesh, at: np.ndarray, out: np.ndarray) -> float:
+    """Distance along a ray to the first facet, infinite where there is none."""
+    places, _, _ = mesh.ray.intersects_location([at + 1e-3 * out], [out])
+    return float(norm(places - at).min()) if len(places) else float(np.inf)
+
+
+def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
+    numbers, _, _, _ = small
+    plan = Split((np.zeros((0, 4)),), ())
+    assert holes(numbers, plan, 0) == []
+
+
+def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:
+    found = meshed(small[2][0].shape, 0.2)
+    check_mesh("piece", found)
+    with pytest.raises(InvalidSolidError, match="piece: the kernel's mesh of the solid is not"):
+        check_mesh("piece", Mesh(found.vertices, found.triangles[1:]))

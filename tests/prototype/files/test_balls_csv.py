@@ -1,0 +1,99 @@
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.files.balls_csv import COLUMNS, rows, write_balls
+from tbcad.spec.design import load_spec
+
+Read = list[dict[str, str]]
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    """Balls and caps, both."""
+    return prototype(
+        load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
+    )
+
+
+@pytest.fixture(scope="module")
+def read(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+    path = tmp_path_factory.mktemp("balls") / "balls.csv"
+    write_balls(path, rows(made))
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def column(read: Read, *names: str) -> NDArray[np.float64]:
+    return np.array([[float(row[name]) for name in names] for row in read]).squeeze()
+
+
+def test_one_row_a_ball(made: Prototype, read: Read) -> None:
+    assert tuple(read[0]) == COLUMNS
+    assert [int(row["number"]) for row in read] == list(range(1, len(made) + 1))
+    assert [row["size"] for row in read] == list(made.balls.size)
+
+
+def test_places_are_exact(made: Prototype, read: Read) -> None:
+    for names, expected in {
+        ("px", "py", "pz"): made.apices(),
+        ("nx", "ny", "nz"): made.normals(),
+        ("cx", "cy", "cz"): made.centres(),
+        ("bx", "by", "bz"): made.body_centres(),
+    }.items():
+        assert np.array_equal(column(read, *names), expected)
+    assert np.array_equal(column(read, "radius_mm"), made.balls.radius)
+    assert np.array_equal(column(read, "body_radius_mm"), made.balls.body_radius)
+    assert np.radians(column(read, "azimuth_deg")) == pytest.approx(
+        made.placement.azimuth, abs=1e-15, rel=1e-15
+    )
+
+
+def test_the_table_alone_gives_the_spheres(read: Read) -> None:
+    apex, normal = column(read, "px", "py", "pz"), column(read, "nx", "ny", "nz")
+    centre, radius = column(read, "cx", "cy", "cz"), column(read, "radius_mm")
+    assert apex - radius[:, None] * normal == pytest.approx(centre)
+    pinhole = np.array([100.0, 0, -100])
+    away = np.linalg.norm(apex, axis=1) + np.linalg.norm(apex - pinhole, axis=1)
+    assert away == pytest.approx(np.full(len(read), away[0]))
+
+
+def test_balls_have_grade_and_mass_caps_have_none(made: Prototype, read: Read) -> None:
+    kinds = [row["kind"] for row in read]
+    assert set(kinds) == {"ball", "cap"}
+    for row, cap, mass in zip(read, made.balls.cap, made.balls.mass_g, strict=True):
+        assert row["kind"] == ("cap" if cap else "ball")
+        if cap:
+            assert row["grade"] == row["standard"] == row["mass_g"] == ""
+        else:
+            assert (row["grade"], row["standard"]) == ("G40", "ISO 3290-1")
+            assert float(row["mass_g"]) == mass
+            assert float(row["diameter_mm"]) == 2 * float(row["radius_mm"])
+
+
+def test_what_they_show(made: Prototype, read: Read) -> None:
+    fit = made.fit
+    assert sum(int(row["mirrors"]) for row in read) == len(made.half)
+    assert column(read, "pixels").sum() == pytest.approx(fit.pixels.sum())
+    assert column(read, "pixels_shell").sum() == pytest.approx(fit.pixels_shell.sum())
+    for j, row in enumerate(read):
+        own = fit.ball == j
+        assert int(row["mirrors"]) == own.sum()
+        assert float(row["coverage_mm"]) == fit.coverage[own].min()
+        assert float(row["coverage_fixed_mm"]) == fit.coverage_fixed[own].min()
+        assert float(row["error_deg"]) == np.degrees(made.stops.error[own]).max()
+
+
+def test_same_bytes(made: Prototype, tmp_path: Path) -> None:
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path in paths:
+        write_balls(path, rows(made))
+    data = [path.read_bytes() for path in paths]
+    assert data[0] == data[1]
+    assert b"\r" not in data[0]
+    assert b"-0.0," not in data[0]

@@ -1,0 +1,156 @@
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.drive.balance import balance, ball_load, cap_volume
+from tbcad.prototype.drive.drive import Drive, chosen, load_drives, load_parts
+from tbcad.prototype.files.bom_csv import (
+    COLUMNS,
+    PartsNeeded,
+    Printed,
+    drive_record,
+    rows,
+    write_bom,
+)
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+from tbcad.spec.motion_keys import Motion
+
+PARTS = load_parts()
+DRIVES = load_drives(PARTS)
+NEEDED = PartsNeeded(
+    bought={
+        **{"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 1},
+        **{"MAGNET-4x3": 2, "MAGNET-8x3": 3},
+    },
+    printed=(Printed("base", "carrier", 5e5), Printed("foot", "below the plate", 1e3, 4)),
+)
+Read = list[dict[str, str]]
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    """Balls and caps, both."""
+    return prototype(
+        load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
+    )
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    return chosen("nema17-belt", 1000, DRIVES)
+
+
+@pytest.fixture(scope="module")
+def read(made: Prototype, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
+    path = tmp_path_factory.mktemp("bom") / "bom.csv"
+    write_bom(path, rows(made, drive, NEEDED, PARTS))
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def of(read: Read, part: str) -> dict[str, str]:
+    (row,) = (row for row in read if row["part"] == part)
+    return row
+
+
+def test_rows(read: Read) -> None:
+    assert tuple(read[0]) == COLUMNS
+    assert [int(row["item"]) for row in read] == list(range(1, len(read) + 1))
+    assert len({row["part"] for row in read}) == len(read)
+    for row in read:
+        total = int(row["quantity"]) * float(row["mass_g"])
+        assert float(row["total_mass_g"]) == pytest.approx(total)
+        assert row["from"] in ("bought", "printed")
+        assert (row["print_volume_mm3"] != "") == (row["from"] == "printed")
+
+
+def test_totals_are_the_sum_of_the_parts(made: Prototype, drive: Drive, read: Read) -> None:
+    balls = made.mass_g + 1.27e-3 * cap_volume(made.balls).sum()
+    bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.bought.items())
+    electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
+    printed = 1.27e-3 * (5e5 + 4e3)
+    expected = balls + bought + electronics + printed + 4 * PARTS["LED-3"].mass_g
+    expected += sum(part.mass_g for part in drive.parts)
+    assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)
+
+
+def test_balls_by_size(made: Prototype, read: Read) -> None:
+    balls = [row for row in read if row["part"].startswith("ball ")]
+    assert sum(int(row["quantity"]) for row in balls) == (~made.balls.cap).sum()
+    for row in balls:
+        size = row["part"].removeprefix("ball ")
+        assert int(row["quantity"]) == made.balls.size.count(size)
+        assert row["what"] == f"steel ball {size} ISO 3290-1 G40"
+    caps = [row for row in read if row["part"].startswith("cap ")]
+    assert len(caps) == made.balls.cap.sum() > 0
+
+
+def test_equal_balls_share_a_row(made: Prototype, drive: Drive) -> None:
+    stock = made.balls.stock.copy()
+    stock[:] = 10
+    alike = replace(made, balls=replace(made.balls, stock=stock))
+    first, *others = rows(alike, drive, PartsNeeded(), PARTS)
+    assert first["quantity"] == len(made)
+    assert not any(str(row["part"]).startswith("ball ") for row in others)
+
+
+def test_counts_add_up(read: Read) -> None:
+    assert of(read, "M3x10")["quantity"] == "8"
+    assert "ISO 4762" in of(read, "M3x10")["what"]
+    assert of(read, "LED-3")["quantity"] == "5"  # four on the stage, one asked for
+    assert of(read, "MAGNET-4x3")["quantity"] == "2"
+    assert of(read, "MAGNET-8x3")["quantity"] == "3"
+    assert of(read, "foot")["quantity"] == "4"
+    assert not [row for row in read if row["part"] == "DOWEL-4x20"]
+
+
+def test_magnets_weigh_what_the_list_says(read: Read) -> None:
+    for name in ("MAGNET-4x3", "MAGNET-8x3"):
+        assert float(of(read, name)["mass_g"]) == pytest.approx(PARTS[name].mass_g, rel=1e-3)
+        disc = np.pi / 4 * PARTS[name]["diameter_mm"] ** 2 * PARTS[name]["height_mm"]
+        assert float(of(read, name)["mass_g"]) == pytest.approx(7.5e-3 * disc, rel=1e-3)
+
+
+def test_drive_is_in_it(drive: Drive, read: Read) -> None:
+    for part in drive.parts:
+        assert of(read, part.name)["quantity"] == "1"
+
+
+def test_turned_caps(made: Prototype, drive: Drive) -> None:
+    needed = PartsNeeded(cap_material="steel")
+    caps = [row for row in rows(made, drive, needed, PARTS) if row["from"] == "turned"]
+    weights = 7.81e-3 * cap_volume(made.balls)[made.balls.cap]
+    assert [row["mass_g"] for row in caps] == pytest.approx(weights.tolist())
+    assert {row["material"] for row in caps} == {"steel"}
+
+
+def test_unknown_part(made: Prototype, drive: Drive) -> None:
+    with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
+        rows(made, drive, PartsNeeded(bought={"M3x11": 1}), PARTS)
+
+
+def test_same_bytes(made: Prototype, drive: Drive, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write_bom(tmp_path / name, rows(made, drive, NEEDED, load_parts()))
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_record_of_the_drive(made: Prototype) -> None:
+    summed = balance(made.half.ellipsoid.frame(), ball_load(made, 1.27))
+    low, high = (float(made.stops.angle[i]) for i in (0, -1))
+    motion = Motion()
+    needed = summed.needed(low, high, np.radians(motion.acceleration_deg_s2), motion.safety)
+    drive = chosen("nema17-belt", needed, DRIVES)
+    record = json.loads(json.dumps(drive_record(summed, drive, motion, (low, high), 120.0)))
+    assert record["needed_nmm"] <= record["holds_nmm"]
+    assert record["needed_nmm"] >= 2 * record["worst_torque_nmm"]
+    assert record["mass_g"] == summed.mass_g
+    assert record["counterweight_g"] * 120 == pytest.approx(record["moment_g_mm"])
+    assert record["motor"] == drive.motor.name

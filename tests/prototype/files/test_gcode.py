@@ -1,0 +1,225 @@
+"""The program is read back by a small GRBL: its words, its groups, its limits."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.drive.drive import Drive, chosen, load_drives, load_parts
+from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+from tbcad.spec.motion_keys import Motion
+
+MOTION = Motion()
+# What GRBL 1.1h takes, by modal group (grbl/gcode.c); only these are used here.
+GROUPS = {
+    **{"G0": 1, "G1": 1, "G4": 0, "G92": 0, "G92.1": 0, "G90": 3, "G91": 3, "G94": 5},
+    **{"G21": 6, "G54": 12, "M0": 104, "M2": 104, "M8": 108, "M9": 108},
+}
+
+
+@dataclass
+class Grbl:
+    """What the machine did.
+
+    Attributes:
+        axis: letter of its rotary axis.
+        at: where it is, degrees.
+        feed: degrees a minute.
+        relay: whether it is closed.
+        ended: after M2.
+        rest: seconds of dwell.
+        moves: every place it was sent to.
+        shots: place each time the relay closed.
+        pauses: place and comment of each M0.
+    """
+
+    axis: str = "X"
+    at: float | None = None
+    feed: float = 0.0
+    relay: bool = False
+    ended: bool = False
+    rest: float = 0.0
+    moves: list[float] = field(default_factory=list)
+    shots: list[float] = field(default_factory=list)
+    pauses: list[tuple[float | None, str]] = field(default_factory=list)
+
+    def send(self, line: str) -> None:
+        assert not self.ended
+        assert len(line) < 80
+        assert line.isascii()
+        assert line.isprintable()
+        assert line.count("(") == line.count(")") <= 1
+        comment = "".join(re.findall(r"\((.*)\)", line))
+        words = re.findall(r"([A-Z])(-?\d+\.?\d*)", re.sub(r"\(.*\)|\s", "", line))
+        assert "".join(a + b for a, b in words) == re.sub(r"\(.*\)|\s", "", line)
+        self._block([a + b for a, b in words], {a: float(b) for a, b in words}, comment)
+
+    def _block(self, words: list[str], value: dict[str, float], comment: str) -> None:
+        commands = [word for word in words if word[0] in "GM"]
+        groups = [GROUPS[word] for word in commands]
+        assert len(set(groups)) == len(groups), "two of a modal group"
+        rest = set(value) - {"G", "M"}
+        if "G4" in commands:
+            assert rest == {"P"}
+            self.rest += value["P"]
+        elif "G92" in commands:
+            assert rest == {self.axis}
+            self.at = value[self.axis]
+        elif "G1" in commands:
+            assert rest <= {self.axis, "F"}
+            self.feed = value.get("F", self.feed)
+            assert self.feed > 0
+            assert self.at is not None, "moves before it knows where it is"
+            assert not self.relay, "moves while the camera is released"
+            self.at = value[self.axis]
+            self.moves.append(self.at)
+        else:
+            assert not rest
+        if "M8" in commands:
+            assert not self.relay
+            assert self.at is not None
+            self.shots.append(self.at)
+            self.relay = True
+        if "M9" in commands:
+            self.relay = False
+        if "M0" in commands:
+            self.pauses.append((self.at, comment))
+        self.ended = "M2" in commands
+
+
+def sent(lines: list[str], axis: str = "X") -> Grbl:
+    machine = Grbl(axis)
+    for line in lines:
+        machine.send(line)
+    assert machine.ended
+    return machine
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    return chosen("nema17-belt", 1000, load_drives(load_parts()))
+
+
+def test_every_stop_twice_in_order_within_a_step(made: Prototype, drive: Drive) -> None:
+    machine = sent(program(made, drive, MOTION))
+    angle = np.degrees(made.stops.angle)
+    step = 1 / drive.steps_per_deg(MOTION.microsteps)
+    off = np.abs(np.array(machine.shots) - np.tile(angle, 2))
+    assert off.max() < 10**-DECIMALS < step / 10
+
+
+def test_it_stays_in_the_swing_but_for_the_approach(made: Prototype, drive: Drive) -> None:
+    machine = sent(program(made, drive, MOTION))
+    ends = np.degrees(made.stops.angle[[0, -1]])
+    half = np.degrees(made.placement.swing) / 2
+    assert ends.min() >= -half - 1e-9
+    start = ends[0] - MOTION.approach_deg
+    assert max(machine.moves) <= ends[1]
+    assert min(machine.moves) >= start
+    within = [place for place in machine.moves if place != pytest.approx(start, abs=1e-3)]
+    assert len(within) == len(machine.moves) - 3  # before each run, and while the object is turned
+    assert min(within) >= ends[0]
+
+
+def test_every_stop_is_reached_from_below(made: Prototype, drive: Drive) -> None:
+    machine = sent(program(made, drive, MOTION))
+    steps = list(zip(machine.moves, machine.moves[1:], strict=False))
+    for shot in set(machine.shots):
+        came = [old for old, new in steps if new == shot]
+        assert len(came) == 2
+        assert max(came) < shot
+
+
+def test_pauses_for_people(made: Prototype, drive: Drive) -> None:
+    machine = sent(program(made, drive, MOTION))
+    (before, first), (between, second) = machine.pauses
+    assert before is None
+    assert "base at 0 degrees" in first
+    assert "turn the object by 180 degrees" in second
+    assert between == pytest.approx(run(made, MOTION).start, abs=1e-3)
+
+
+def test_it_ends_where_it_began(made: Prototype, drive: Drive) -> None:
+    motion = Motion(home_deg=-12.5)
+    assert sent(program(made, drive, motion)).at == -12.5
+
+
+def test_other_axis(made: Prototype, drive: Drive) -> None:
+    plain, other = (program(made, drive, Motion(axis=axis)) for axis in ("X", "A"))
+    assert sent(other, "A").shots == sent(plain).shots
+    assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
+    assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
+
+
+def test_a_person_as_trigger(made: Prototype, drive: Drive) -> None:
+    lines = program(made, drive, Motion(trigger="pause"))
+    machine = sent(lines)
+    assert not machine.shots
+    assert len(machine.pauses) == 2 + 2 * len(made.stops)
+    assert not {"M8", "M9"} & set(lines)
+
+
+def test_comments_count_the_mirrors(made: Prototype, drive: Drive) -> None:
+    lines = program(made, drive, MOTION)
+    counts = [int(c) for line in lines for c in re.findall(r"of \d+: (\d+) mirrors", line)]
+    assert sum(counts) == 2 * len(made.half)
+    assert f"(stop 1 of {len(made.stops)}: {len(made.stops.mirrors(0))} mirrors)" in lines
+
+
+def test_time(made: Prototype, drive: Drive) -> None:
+    machine = sent(program(made, drive, MOTION))
+    todo = run(made, MOTION)
+    way = 2 * 2 * (todo.angle[-1] - todo.start)
+    assert minutes(todo, MOTION) == pytest.approx(machine.rest / 60 + way / MOTION.feed_deg_min)
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [Motion(settle_s=0.0, exposure_s=0.0), Motion(approach_deg=0.0), Motion(approach_deg=30)],
+)
+def test_other_motions(made: Prototype, drive: Drive, motion: Motion) -> None:
+    machine = sent(program(made, drive, motion))
+    low, high = np.degrees(free(made))
+    assert low <= min(machine.moves)
+    assert max(machine.moves) <= high
+    assert len(machine.shots) == 2 * len(made.stops)
+
+
+def test_the_approach_ends_where_something_stands(small_design: Design) -> None:
+    spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
+    tight = prototype(spec, small_design)
+    start = run(tight, Motion(approach_deg=20)).start
+    assert start == pytest.approx(np.degrees(free(tight)[0]))
+    assert start == pytest.approx(-90)
+
+
+def test_a_start_out_of_reach(made: Prototype) -> None:
+    with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
+        run(made, Motion(home_deg=170))
+
+
+def test_written(made: Prototype, drive: Drive, tmp_path: Path) -> None:
+    lines = program(made, drive, MOTION)
+    for name in ("a.nc", "b.nc"):
+        write_program(tmp_path / name, lines)
+    data = (tmp_path / "a.nc").read_bytes()
+    assert data == (tmp_path / "b.nc").read_bytes()
+    assert data.decode("ascii").splitlines() == lines
+    assert b"\r" not in data
+
+
+def test_the_reader_can_refuse() -> None:
+    for line in ("G5 X1", "G1 X1", "G0 G1 X1", "G1 X1 (", "M8 P1", "A" * 81, "G1 Xé"):
+        with pytest.raises((AssertionError, KeyError)):
+            Grbl().send(line)

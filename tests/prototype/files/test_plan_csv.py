@@ -1,0 +1,102 @@
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, pictures, prototype
+from tbcad.prototype.files.balls_csv import Row
+from tbcad.prototype.files.plan_csv import (
+    COLUMNS,
+    STOP_COLUMNS,
+    rows,
+    stop_rows,
+    write_plan,
+    write_stops,
+)
+from tbcad.spec.design import load_spec
+
+Read = list[dict[str, str]]
+
+
+def read_back(path: Path) -> Read:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
+
+
+@pytest.fixture(scope="module")
+def plan(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+    path = tmp_path_factory.mktemp("plan") / "rotation_plan.csv"
+    write_plan(path, rows(pictures(made)))
+    return read_back(path)
+
+
+@pytest.fixture(scope="module")
+def stops(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+    path = tmp_path_factory.mktemp("stops") / "stops.csv"
+    write_stops(path, stop_rows(made))
+    return read_back(path)
+
+
+def test_every_mirror_of_both_cameras_once(made: Prototype, plan: Read) -> None:
+    assert tuple(plan[0]) == COLUMNS
+    assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(made.half) + 1))
+    for turn, camera in (("0", "a"), ("180", "b")):
+        own = [row["mirror"] for row in plan if row["object_turn_deg"] == turn]
+        assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(made.half))]
+
+
+def test_round_trip(made: Prototype, plan: Read) -> None:
+    for row, one in zip(plan, pictures(made), strict=True):
+        assert int(row["stop"]) == one.stop + 1
+        assert int(row["ball"]) == one.ball + 1
+        for name, angle in {
+            "base_angle_deg": one.angle,
+            "polar_error_deg": one.polar_error,
+            "azimuth_error_deg": one.azimuth_error,
+            "error_deg": one.error,
+        }.items():
+            assert np.radians(float(row[name])) == pytest.approx(angle, rel=1e-15, abs=1e-15)
+
+
+def test_each_run_goes_upward(plan: Read) -> None:
+    for turn in ("0", "180"):
+        angle = [float(row["base_angle_deg"]) for row in plan if row["object_turn_deg"] == turn]
+        assert angle == sorted(angle)
+
+
+def test_the_table_alone_gives_the_directions(made: Prototype, plan: Read) -> None:
+    """Ball's azimuth on the base and the base's angle, less the error: the mirror's azimuth."""
+    half, azimuth = made.half, np.degrees(made.placement.azimuth)
+    for row in (row for row in plan if row["object_turn_deg"] == "0"):
+        i = half.ids.index(row["mirror"])
+        stands = azimuth[int(row["ball"]) - 1] + float(row["base_angle_deg"])
+        found = stands - float(row["azimuth_error_deg"])
+        assert found == pytest.approx(np.degrees(half.azimuth[i]), abs=1e-9)
+
+
+def test_stops_sum_up_the_plan(plan: Read, stops: Read) -> None:
+    assert tuple(stops[0]) == STOP_COLUMNS
+    for turn in ("0", "180"):
+        for stop in stops:
+            own = [r for r in plan if (r["stop"], r["object_turn_deg"]) == (stop["stop"], turn)]
+            assert len(own) == int(stop["mirrors"])
+            assert {row["base_angle_deg"] for row in own} == {stop["base_angle_deg"]}
+            assert {row["ball"] for row in own} == set(stop["balls"].split())
+            assert max(float(row["error_deg"]) for row in own) == float(stop["error_deg"])
+            worst = max(abs(float(row["azimuth_error_deg"])) for row in own)
+            assert worst == float(stop["azimuth_error_deg"])
+
+
+def test_same_bytes(made: Prototype, tmp_path: Path) -> None:
+    def written(name: str, records: list[Row]) -> bytes:
+        write_plan(tmp_path / name, records)
+        return (tmp_path / name).read_bytes()
+
+    assert written("a", rows(pictures(made))) == written("b", rows(pictures(made)))

@@ -1,0 +1,177 @@
+"""The prototype's files: read back, and compared with the numbers they are from."""
+
+import csv
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import design
+from tbcad.output.build import export
+from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
+from tbcad.spec.design import load_spec
+from tests.helpers import area, read_mesh, read_step, volume
+
+MESH_ERROR_MM = 0.1
+OPTIONS = [
+    *("n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5"),
+    f"structure_error_mm={MESH_ERROR_MM}",
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("prototype")
+    export(design(load_spec(None, OPTIONS)), place, [PROTOTYPE])
+    return place
+
+
+@pytest.fixture(scope="module")
+def record(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "prototype.json").read_text())
+    return found
+
+
+def in_rig(folder: Path, part: dict[str, Any]) -> trimesh.Trimesh:
+    """A part's STL, moved from the bed to where it stands."""
+    mesh = read_mesh(folder / part["stl"])
+    axes = np.array(part["axes"])
+    mesh.vertices = (mesh.vertices - part["origin_mm"]) @ axes.T
+    return mesh
+
+
+def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
+    own = {part[kind] for part in record["parts"] for kind in ("step", "stl", "3mf")}
+    tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
+    tables |= {"plate_holes.csv"}
+    whole = {"prototype.json", "prototype.step", "prototype.glb"}
+    records = {"design.json", "mirrors.csv", "manifest.json"}
+    assert {p.name for p in folder.iterdir()} == own | tables | whole | records
+    assert json.loads((folder / "design.json").read_text())["parts"] == []
+
+
+def test_the_manifest_is_of_these_files(folder: Path) -> None:
+    listed = json.loads((folder / "manifest.json").read_text())["files"]
+    assert listed.keys() == {p.name for p in folder.iterdir()} - {"manifest.json"}
+    for name, wanted in listed.items():
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == wanted["sha256"]
+
+
+def test_meshes_lie_on_the_bed_and_steps_stand_in_the_rig(
+    folder: Path, record: dict[str, Any]
+) -> None:
+    for part in record["parts"]:
+        mesh, step = read_mesh(folder / part["stl"]), read_step(folder / part["step"])
+        assert mesh.is_watertight, part["name"]
+        assert mesh.bounds[0][2] == pytest.approx(0, abs=0.15)
+        assert step.solids == 1
+        assert step.valid
+        off = abs(mesh.volume - volume(step.shape))
+        assert off < MESH_ERROR_MM * area(step.shape)
+        axes = np.array(part["axes"])
+        assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-12)
+        assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_pads_are_where_the_record_says(folder: Path, record: dict[str, Any]) -> None:
+    base = [in_rig(folder, part) for part in record["parts"] if part["role"] == "base"]
+    points = np.vstack([mesh.vertices for mesh in base])
+    for seat, ball in zip(record["seats"], record["balls"], strict=True):
+        centre = np.array([ball[key] for key in ("bx", "by", "bz")])
+        for contact, normal in zip(seat["contacts_mm"], seat["normals"], strict=True):
+            assert np.linalg.norm(contact - centre) == pytest.approx(ball["body_radius_mm"])
+            near = np.linalg.norm(points - contact, axis=1) < 0.51 * seat["pad_diameter_mm"]
+            on_pad = points[near & (np.abs((points - contact) @ normal) < 0.01)]
+            assert len(on_pad) > 10
+            assert np.abs((on_pad - contact) @ normal).max() < 1e-4
+
+
+def test_the_choice_that_was_taken_is_among_those_told(record: dict[str, Any]) -> None:
+    """Its pixels are those of the balls; the default is cover, with caps."""
+    (taken,) = [one for one in record["choices"] if one["way"] == "cover, with caps"]
+    assert len(record["choices"]) == 4
+    assert taken["pixels"] == pytest.approx(sum(ball["pixels"] for ball in record["balls"]))
+    assert taken["caps"] == sum(ball["kind"] == "cap" for ball in record["balls"])
+
+
+def test_tables_and_record_agree(folder: Path, record: dict[str, Any]) -> None:
+    with (folder / "balls.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(record["balls"]) == len(record["seats"]) == 4
+    for row, ball in zip(rows, record["balls"], strict=True):
+        assert {key: "" if value is None else str(value) for key, value in ball.items()} == row
+    with (folder / "bom.csv").open(newline="") as file:
+        printed = {row["part"] for row in csv.DictReader(file) if row["from"] == "printed"}
+    assert printed >= {part["name"] for part in record["parts"] if part["role"] != "cap"}
+
+
+def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any]) -> None:
+    """In the assembly's plate, as drilled, seen from above; and every foot is held by some."""
+    with (folder / "plate_holes.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["holds"] for row in rows} == {
+        part["name"] for part in record["parts"] if part["role"] == "frame"
+    } - {"bearing_head"}
+    scene = trimesh.load(folder / "prototype.glb")
+    matrix, name = scene.graph["plate"]
+    points = 1000 * trimesh.transform_points(scene.geometry[name].vertices, matrix)
+    flat = points[:, [0, 2]] * [1, -1]
+    places = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in rows])
+    for place in places + flat.min(axis=0):
+        away = np.linalg.norm(flat - place, axis=1)
+        assert away.min() == pytest.approx(2.1, abs=0.05)  # of a tapped M5 hole
+        assert (away < 2.2).sum() > 20
+
+
+def test_the_assembly_is_a_tree_of_named_coloured_bodies(
+    folder: Path, record: dict[str, Any]
+) -> None:
+    text = (folder / "prototype.step").read_text()
+    bodies = [part["name"] for part in record["parts"] if part["role"] != "tool"]
+    balls = [f"ball_{ball['number']}" for ball in record["balls"] if ball["kind"] == "ball"]
+    for name in [*bodies, *balls, "capture_sphere", "camera_view"]:
+        assert f"PRODUCT('{name}'" in text
+    solids = text.count("MANIFOLD_SOLID_BREP(")
+    assert text.count("STYLED_ITEM(") == solids >= len(bodies) + len(balls) + 2
+
+
+def test_the_glb_is_in_metres_and_upright(folder: Path, record: dict[str, Any]) -> None:
+    scene = trimesh.load(folder / "prototype.glb")
+    (ball,) = [one for one in record["balls"] if one["kind"] == "ball"]
+    matrix, name = scene.graph[f"ball_{ball['number']}"]
+    points = trimesh.transform_points(scene.geometry[name].vertices, matrix)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    wanted = np.array([ball["bx"], ball["bz"], -ball["by"]]) / 1000
+    assert middle == pytest.approx(wanted, abs=2e-4)
+    assert np.ptp(points, axis=0) == pytest.approx(
+        np.full(3, 2e-3 * ball["body_radius_mm"]), rel=5e-3
+    )
+
+
+def test_the_same_bytes_again(folder: Path, tmp_path: Path) -> None:
+    export(design(load_spec(None, OPTIONS)), tmp_path, [PROTOTYPE])
+    for path in folder.iterdir():
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("shell", ("shell",)),
+        ("prototype, shell", PARTS),
+        ("prototype,", ("prototype",)),
+    ],
+)
+def test_parts(text: str, wanted: tuple[str, ...]) -> None:
+    assert parse_parts(text) == wanted
+
+
+@pytest.mark.parametrize("text", ["", ",", "shells", "shell;prototype"])
+def test_parts_that_there_are_not(text: str) -> None:
+    with pytest.raises(InputError, match="name shell, prototype or one of them"):
+        parse_parts(text)

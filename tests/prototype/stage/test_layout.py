@@ -1,0 +1,294 @@
+"""The stage and the room it stands in: closed forms against other ways to the same figures."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from tbcad.geometry.primitives import SIDES, Prism, Rod, Turned, box, rod, slot, triangles
+from tbcad.geometry.vectors import norm, unit
+from tbcad.mirrors.array import Design
+from tbcad.optics.ball_light import turned
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.drive.drive import load_parts
+from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
+from tbcad.prototype.stage.layout import GRAZING_MM, StageNumbers, leds, stage
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+from tbcad.spec.stage_keys import Frame, Stage
+
+PARTS = load_parts()
+SPEC = load_spec(None, ["n=6", "prototype.k=4"])
+CAPTURE = 30.0
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(SPEC, small_design)
+
+
+@pytest.fixture(scope="module")
+def carrier(made: Prototype) -> Base:
+    return base(SPEC.prototype.base, made)
+
+
+@pytest.fixture(scope="module")
+def space(made: Prototype, carrier: Base) -> Room:
+    return room(made, carrier, CAPTURE, 0.0)
+
+
+def staged(made: Prototype, space: Room, **changed: object) -> StageNumbers:
+    post = changed.pop("post", 20.0)
+    own = SPEC.prototype.model_copy(update={"post_diameter_mm": post})
+    return stage((Stage.model_validate(changed), Frame(), own), made, space, PARTS)
+
+
+def refusal(made: Prototype, space: Room, **changed: object) -> str:
+    with pytest.raises(SpecError) as caught:
+        staged(made, space, **changed)
+    return str(caught.value)
+
+
+class TestStage:
+    def test_leds_stand_where_the_spec_has_them_and_look_up(
+        self, made: Prototype, space: Room
+    ) -> None:
+        found = leds(staged(made, space))
+        assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
+        assert np.array([place for _, place, _ in found]).tolist() == [
+            list(place) for place in Stage().leds_mm
+        ]
+        assert all((direction == UP).all() for _, _, direction in found)
+
+    def test_leds_are_inside_the_sphere_and_not_in_a_plane(self) -> None:
+        places = np.array(Stage().leds_mm)
+        assert (norm(places) + 1.5 < CAPTURE).all()
+        # Six times the volume of their tetrahedron over the area of its largest face.
+        sides = places[1:] - places[0]
+        area = max(float(norm(np.cross(sides[i], sides[j]))) for i, j in ((0, 1), (0, 2), (1, 2)))
+        assert abs(np.linalg.det(sides)) / area > 2.0
+
+    def test_room_below_the_object_is_what_was_found(self, made: Prototype, space: Room) -> None:
+        numbers = staged(made, space)
+        assert numbers.light > -GRAZING_MM
+        assert numbers.swept > Frame().clearance_mm
+        assert numbers.post == 10.0
+
+    def test_a_stage_without_leds(self, made: Prototype, space: Room) -> None:
+        numbers = staged(made, space, leds_mm=[])
+        assert leds(numbers) == []
+        assert [item.name for item in numbers.items] == ["stage_disc", "stage_crown", "stage_post"]
+
+    def test_the_studs_take_the_disc_two_ways_round(self, made: Prototype, space: Room) -> None:
+        disc, crown, _ = staged(made, space).items
+        holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Rod)])
+        studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Rod)])
+        assert holes == pytest.approx(studs)
+        assert holes[0] == pytest.approx(-holes[1])
+
+    @pytest.mark.parametrize(
+        ("changed", "words"),
+        [
+            ({"post": 0.0}, "hollow hub is not made yet"),
+            ({"post": 6.0}, "8 or more"),
+            ({"top_mm": -29.0}, "set prototype.stage.top_mm from"),
+            ({"top_mm": 5.0}, "to 0"),
+            ({"disc_mm": 60.0}, "does not fit into the capture sphere"),
+            ({"disc_mm": 6.0}, "no room for its studs"),
+            ({"led": "LED-5"}, "for its pocket"),
+        ],
+    )
+    def test_what_does_not_fit_is_refused(
+        self, made: Prototype, space: Room, changed: dict[str, object], words: str
+    ) -> None:
+        assert words in refusal(made, space, **changed)
+
+    def test_a_post_in_the_light_or_in_the_base_is_refused(
+        self, made: Prototype, space: Room
+    ) -> None:
+        below = replace(space, used=space.used + np.pi)
+        assert "mm in the light of the balls" in refusal(made, below)
+        disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
+        words = refusal(made, replace(space, sections=(Section(disc, -np.pi, np.pi),)))
+        assert "the base comes within" in words
+        assert "prototype.post_diameter_mm or prototype.k smaller" in words
+
+    @pytest.mark.parametrize(
+        ("number", "place", "words"),
+        [
+            (1, (20.0, 7.5, -19.0), "LED 1 with its pillar reaches"),
+            (1, (10.6, 7.5, -22.0), "LED 1 stands too low for its pocket"),
+            (3, (-3.4, 8.0, -13.5), "LED 3 stands in the disc"),
+            (4, (-5.4, 12.0, -7.0), "LED 4 collides with LED 3"),
+            (1, (10.6, 7.5, -5.0), "is hidden from mirror"),
+        ],
+    )
+    def test_leds_that_do_not_do_are_refused(
+        self,
+        made: Prototype,
+        space: Room,
+        number: int,
+        place: tuple[float, float, float],
+        words: str,
+    ) -> None:
+        places = list(Stage().leds_mm)
+        places[number - 1] = place
+        assert words in refusal(made, space, leds_mm=places)
+
+    def test_leds_in_one_plane_are_refused(self, made: Prototype, space: Room) -> None:
+        places = [(x, y, -15.0) for x, y, _ in Stage().leds_mm]
+        assert "nearly in one plane" in refusal(made, space, leds_mm=places)
+
+    def test_a_floor_too_high_is_refused(self, made: Prototype, space: Room) -> None:
+        with pytest.raises(SpecError, match=r"make prototype\.frame\.floor_mm"):
+            stage((Stage(), Frame(floor_mm=-60.0), SPEC.prototype), made, space, PARTS)
+
+    def test_three_leds_are_refused_by_the_spec(self) -> None:
+        with pytest.raises(ValidationError, match="4 to 12 places"):
+            Stage.model_validate({"leds_mm": Stage().leds_mm[:3]})
+
+    def test_no_led_is_hidden_in_a_march_along_its_rays(self, made: Prototype, space: Room) -> None:
+        numbers = staged(made, space)
+        crown = numbers.items[1]
+        pillars = [body for body in crown.added[3:] if isinstance(body, Rod)]
+        assert len(pillars) == 4
+        cameras = made.half.ellipsoid.camera_distance * made.half.u
+        for i, place in enumerate(numbers.leds):
+            way = unit(cameras - place)
+            points = place + np.arange(0.0, 60.0, 0.25)[:, None, None] * way
+            for j, pillar in enumerate(pillars):
+                low = points[..., 2] < pillar.start[2] + pillar.length
+                near = norm(points[..., :2] - pillar.start[:2]) < pillar.radius
+                assert i == j or not (low & near).any()
+
+
+class TestRoom:
+    def test_light_is_where_rays_are(self, made: Prototype, space: Room) -> None:
+        """Rays from points of the capture sphere to points of the part in use, at its stops."""
+        rng = np.random.default_rng(5)
+        outline, stops = made.balls.outline, made.stops
+        frame = made.half.ellipsoid.frame()
+        for mirror in rng.choice(len(made.half), 12, replace=False).tolist():
+            ball = int(made.fit.ball[mirror])
+            azimuth = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
+            rim = turned(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
+            start = CAPTURE * unit(rng.normal(size=(len(rim), 3)))
+            ends = [start, np.broadcast_to(made.half.view.pinhole, rim.shape)]
+            for other in ends:
+                share = rng.uniform(size=(len(rim), 1))
+                assert (space.light(other + share * (rim - other)) < 1e-6).all()
+
+    def test_light_hull_is_no_larger_than_its_spheres(self, space: Room) -> None:
+        """Distances by many spheres between both ends, at many azimuths."""
+        points = np.random.default_rng(6).uniform(-200, 200, (40, 3))
+        share = np.linspace(0, 1, 401)[:, None]
+        local = points @ space.frame.T
+        found = np.full(len(points), np.inf)
+        cones = space.cones
+        for k, (low, high) in enumerate(space.used.tolist()):
+            middle = cones.start[k] + share * (cones.end[k] - cones.start[k])
+            radius = cones.start_radius[k] + share[:, 0] * (
+                cones.end_radius[k] - cones.start_radius[k]
+            )
+            flat = np.column_stack([middle, 0 * radius])
+            for azimuth in np.linspace(low, high, 241):
+                centre = turned(flat, np.full(len(flat), azimuth))
+                found = np.minimum(found, (norm(local[:, None] - centre) - radius).min(axis=1))
+        exact = space.light(points)
+        assert (exact <= found + 1e-9).all()
+        outside = exact > 0
+        assert outside.sum() > 10
+        assert exact[outside] == pytest.approx(found[outside], abs=0.8)
+
+    def test_swept_holds_carrier_and_balls_at_all_angles(
+        self, made: Prototype, carrier: Base, space: Room
+    ) -> None:
+        seat = carrier.seats
+        for angle in np.linspace(made.stops.angle[0], made.stops.angle[-1], 7).tolist():
+            ends = seat.centre + seat.back[:, None] * seat.axis
+            local = turned(ends @ carrier.frame.T, np.full(len(ends), angle))
+            assert (space.swept(local @ carrier.frame) == 0).all()
+            assert (space.swept(made.body_centres(angle)) < -5).all()
+            for azimuth in carrier.sector:
+                turn = np.full(len(carrier.outer), azimuth + angle)
+                line = np.column_stack([carrier.outer, 0 * turn])
+                points = turned(line, turn) @ carrier.frame
+                assert space.swept(points).max() < 1e-6
+
+    def test_swept_is_a_distance_off_the_sector(self, carrier: Base, space: Room) -> None:
+        """Beyond the outermost azimuth, to the edge's half-plane."""
+        high = max(one.high for one in space.sections if one.high < np.pi)
+        at = carrier.middle[len(carrier.middle) // 2]
+        along = np.array([[at[0], at[1], 0.0]])
+        for beyond in (0.05, 0.1):
+            point = turned(along, np.array([high + beyond])) @ carrier.frame
+            away = at[1] * np.sin(beyond)
+            assert space.swept(point)[0] <= away + 1e-9
+            assert space.swept(point)[0] > 0.5 * away
+
+    def test_approach_widens_what_is_swept(self, made: Prototype, carrier: Base) -> None:
+        near = room(made, carrier, CAPTURE, 0.0).sections[0]
+        far = room(made, carrier, CAPTURE, 0.1).sections[0]
+        assert far.low == pytest.approx(near.low - 0.1)
+        assert far.high == near.high
+
+    def test_the_sphere_is_no_obstacle_to_itself(self, space: Room) -> None:
+        inside = 0.9 * CAPTURE * unit(np.random.default_rng(7).normal(size=(50, 3)))
+        assert (space.light(inside) < 0).all()
+        assert (space.scene(inside) > 0).all()
+
+    def test_least_distance_of_a_box_to_a_point(self) -> None:
+        body = box(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), np.eye(3))
+        for point, away in ((np.zeros(3), np.sqrt(14)), (np.array([2.0, 3.0, 10.0]), 4.0)):
+            found = least(partial(distance, point), [body])
+            assert away - max(EXACT_MM, EXACT * away) - 1e-9 <= found <= away
+
+
+def distance(point: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return norm(at - point)
+
+
+class TestBodies:
+    @pytest.mark.parametrize(
+        "body",
+        [
+            rod(np.array([1.0, 2.0, 3.0]), np.array([4.0, 6.0, 3.0]), 2.0),
+            Turned(np.array([[0.0, 1.0], [0.0, 3.0], [2.0, 3.0], [2.0, 1.0]])),
+            Prism(np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]), np.array([0.0, 0, 3])),
+        ],
+    )
+    def test_triangles_enclose_and_close(self, body: object) -> None:
+        corners = triangles(body)  # type: ignore[arg-type]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        # Of a closed surface each edge belongs to two triangles.
+        ends = np.round(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), 6)
+        edges = np.sort(ends.reshape(-1, 2, 3).view([("", float)] * 3)[..., 0], axis=1)
+        _, count = np.unique(edges, axis=0, return_counts=True)
+        assert (count == 2).all()
+        assert (norm(normal) > 1e-9).all()
+
+    def test_round_bodies_are_inside_their_triangles(self) -> None:
+        body = Rod(np.zeros(3), UP, 2.0, 5.0)
+        middles = triangles(body).mean(axis=1)
+        sides = middles[(middles[:, 2] > 0.1) & (middles[:, 2] < 4.9)]
+        assert norm(sides[:, :2]).min() >= 2.0 - 1e-9
+        assert norm(triangles(body)[..., :2]).max() == pytest.approx(2 / np.cos(np.pi / SIDES))
+
+    def test_a_slot_without_travel_is_a_hole(self) -> None:
+        args = (np.zeros(3), np.array([1.0, 0, 0]))
+        (only,) = slot(*args, 0.0, 1.5, 4 * UP)
+        assert isinstance(only, Rod)
+        assert (only.radius, only.length) == (1.5, 4.0)
+        middle, *ends = slot(*args, 6.0, 1.5, 4 * UP)
+        assert isinstance(middle, Prism)
+        assert np.ptp(middle.corners, axis=0) == pytest.approx([6, 3, 0])
+        assert [end.start[0] for end in ends if isinstance(end, Rod)] == [-3, 3]
+
+
+def test_the_same_stage_twice(made: Prototype, space: Room) -> None:
+    first, second = (replace(staged(made, space), led=PARTS["LED-3"]) for _ in range(2))
+    assert repr(first) == repr(second)

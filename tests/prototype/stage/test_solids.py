@@ -1,0 +1,146 @@
+"""The stage as solids: pockets and bores recovered from meshes, volumes by closed forms."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from tbcad.cad.solids import meshed
+from tbcad.formats.step import write_step
+from tbcad.geometry.vectors import norm
+from tbcad.mirrors.array import Design
+from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.base.layout import base
+from tbcad.prototype.drive.drive import load_parts
+from tbcad.prototype.keepout import Room, room
+from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
+from tbcad.prototype.stage.layout import StageNumbers, stage
+from tbcad.prototype.stage.stage_solids import parts
+from tbcad.shell.solid import Solid
+from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.design import load_spec
+from tbcad.spec.errors import SpecError
+from tbcad.spec.stage_keys import Frame, Stage
+
+LISTS = load_parts()
+CAPTURE = 30.0
+KEYS = Keys()
+
+
+@pytest.fixture(scope="module")
+def made(small_design: Design) -> Prototype:
+    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+
+
+@pytest.fixture(scope="module")
+def space(made: Prototype) -> Room:
+    return room(made, base(KEYS, made), CAPTURE, 0.0)
+
+
+@pytest.fixture(scope="module")
+def numbers(made: Prototype, space: Room) -> StageNumbers:
+    own = load_spec(None).prototype
+    return stage((Stage(), Frame(), own), made, space, LISTS)
+
+
+@pytest.fixture(scope="module")
+def solids(numbers: StageNumbers) -> dict[str, Part]:
+    return {part.name: part for part in parts(numbers, KEYS)}
+
+
+@pytest.fixture(scope="module")
+def crown(solids: dict[str, Part]) -> trimesh.Trimesh:
+    return as_trimesh(solids["stage_crown"])
+
+
+def as_trimesh(part: Part, tolerance: float = 0.01) -> trimesh.Trimesh:
+    found = meshed(part.shape, tolerance)
+    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
+
+
+class TestSolids:
+    def test_each_is_watertight(self, solids: dict[str, Part]) -> None:
+        assert list(solids) == ["stage_disc", "stage_crown", "stage_post"]
+        for part in solids.values():
+            mesh = as_trimesh(part)
+            assert mesh.is_watertight
+            assert mesh.is_winding_consistent
+            assert mesh.body_count == 1
+            assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
+
+    def test_volume_of_the_disc(self, solids: dict[str, Part], numbers: StageNumbers) -> None:
+        stud = min(STUD_MM, numbers.disc / 5) + STUD_PLAY_MM
+        area = np.pi * (numbers.disc**2 - 2 * stud**2)
+        assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
+
+    def test_volume_of_the_post(self, solids: dict[str, Part], numbers: StageNumbers) -> None:
+        wall = Stage().wall_mm
+        tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (numbers.joint - numbers.foot)
+        # The set screw's hole is nearly as long as the wall is thick.
+        hole = np.pi * 1.4**2 * wall
+        assert solids["stage_post"].volume == pytest.approx(tube - hole, abs=0.1 * hole)
+
+    def test_led_places_are_recovered_from_the_pockets(
+        self, numbers: StageNumbers, crown: trimesh.Trimesh
+    ) -> None:
+        led = numbers.led
+        radius = led["flange_mm"] / 2 + 0.1
+        for place in numbers.leds:
+            floor = place[2] - (led["height_mm"] - led["diameter_mm"] / 2)
+            flat = (np.abs(crown.triangles[..., 2] - floor).max(axis=1) < 1e-6) & (
+                crown.face_normals[:, 2] > 0.999
+            )
+            near = norm(crown.triangles_center[:, :2] - place[:2]) < radius
+            rim = crown.triangles[flat & near].reshape(-1, 3)
+            away = norm(rim[:, :2] - place[:2])
+            outer = rim[away > radius - 0.02]
+            assert len(outer) > 20
+            # The circle through the pocket's rim, by least squares.
+            rows = np.column_stack([2 * outer[:, :2], np.ones(len(outer))])
+            middle = np.linalg.lstsq(rows, (outer[:, :2] ** 2).sum(axis=1), rcond=None)[0][:2]
+            assert norm(middle - place[:2]) < 1e-6
+
+    def test_wires_come_from_every_pocket_to_the_bores_end(
+        self, numbers: StageNumbers, crown: trimesh.Trimesh
+    ) -> None:
+        """A way of points in the open: down from the pocket, along the groove, down the bore."""
+        groove = numbers.plate - 0.8
+        end = crown.bounds[0, 2] - 1
+        steps = np.linspace(0, 1, 40)[:, None]
+        for place, floor in zip(numbers.leds, numbers.pockets, strict=True):
+            corners = np.array(
+                [
+                    [*place[:2], floor + 0.5],
+                    [*place[:2], groove],
+                    [0, 0, groove],
+                    [0, 0, end],
+                ]
+            )
+            way = np.vstack([a + steps * (b - a) for a, b in pairwise(corners)])
+            assert not crown.contains(way).any()
+            assert crown.contains(way[39:41] - [0, 0, 1.5]).all()  # the plate below the groove
+
+    def test_all_inside_the_sphere_is_inside_or_in_the_dark(
+        self, solids: dict[str, Part], space: Room
+    ) -> None:
+        for part in solids.values():
+            mesh = as_trimesh(part)
+            points, _ = trimesh.sample.sample_surface(mesh, 20_000, seed=2)
+            outside = points[norm(points) > CAPTURE]
+            if len(outside):
+                assert space.light(outside).min() > -0.15
+                assert space.swept(outside).min() > 3
+
+    def test_a_bed_too_small_is_refused(self, numbers: StageNumbers) -> None:
+        with pytest.raises(SpecError, match="stage_post does not fit"):
+            parts(numbers, Keys(bed_mm=(120.0, 120.0, 120.0)))
+
+
+def test_the_same_bytes_twice(numbers: StageNumbers, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        crown = parts(numbers, KEYS)[1]
+        write_step(tmp_path / name, Solid(crown.name, crown.shape, ()))
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

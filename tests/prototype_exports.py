@@ -1,0 +1,47 @@
+"""A prototype as the simulation meets it: its plan, and the files that it is read from."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.mirrors.array import Design
+from tbcad.mirrors.record import write_record
+from tbcad.prototype.balls.layout import Prototype, pictures
+from tbcad.prototype.files.balls_csv import rows as ball_rows
+from tbcad.prototype.files.plan_csv import rows, write_plan
+from tbcad.simulate.prototype.plan import Plan
+
+
+def plan_of(made: Prototype) -> Plan:
+    """The plan without the way through files."""
+    ball, stop = made.fit.ball, made.stops.stop
+    back = np.argsort(made.twin)
+    return Plan(
+        frame=made.half.ellipsoid.frame(),
+        apex=made.apices(),
+        normal=made.normals(),
+        radius=made.balls.radius,
+        body_centre=made.body_centres(),
+        body_radius=made.balls.body_radius,
+        moved=True,
+        angle=made.stops.angle,
+        ball=np.stack([ball, ball[back]]),
+        stop=np.stack([stop, stop[back]]),
+    )
+
+
+def write_export(folder: Path, little: Design, made: Prototype) -> Path:
+    """What the simulation needs of an export with its prototype, by the export's own writers."""
+    write_record(folder, little, shells=False)
+    write_plan(folder / "rotation_plan.csv", rows(pictures(made)))
+    axis, zero, third = made.half.ellipsoid.frame().tolist()
+    document = {
+        "schema": "tbcad-prototype/1",
+        "camera": "a",
+        "picture": little.spec.prototype.picture,
+        "frame": {"axis": axis, "zero": zero, "third": third},
+        "balls": ball_rows(made),
+    }
+    (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
+    return folder

@@ -1,0 +1,128 @@
+import csv
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.record import COLUMNS
+from tbcad.output.build import export
+from tbcad.output.parts import SHELL
+from tbcad.spec.design import load_spec, spec_dict
+from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
+
+
+@pytest.fixture(scope="module")
+def exported(small_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("export")
+    export(small_design, folder, [SHELL])
+    return folder
+
+
+def test_all_files_are_there(exported: Path) -> None:
+    kinds = ("step", "stl", "3mf")
+    shells = [f"shell_{camera}.{kind}" for camera in "ab" for kind in kinds]
+    assert {p.name for p in exported.iterdir()} == {
+        "design.json",
+        "mirrors.csv",
+        "manifest.json",
+        *shells,
+    }
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_step_round_trip(exported: Path, small_design: Design, which: int) -> None:
+    half = small_design.halves[which]
+    content = read_step(exported / f"shell_{half.camera}.step")
+    built = solid_of(small_design, which)
+    assert content.solids == 1
+    assert content.valid
+    assert volume(content.shape) == pytest.approx(volume(built.shape), rel=1e-9)
+    assert area(content.shape) == pytest.approx(area(built.shape), rel=1e-9)
+    assert set(content.faces) == {name for name, _ in built.faces}
+    assert content.kinds["StepGeom_SphericalSurface"] == len(half)
+    assert sum(content.kinds.values()) == len(built.faces)
+
+
+def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Design) -> None:
+    """Read by a parser that is no CAD kernel: sphere of each named face."""
+    from steputils import p21
+
+    file = p21.readfile(str(exported / "shell_a.step"))
+    half = small_design.halves[0]
+    found = {}
+    for instance in file.data[0].instances.values():
+        if not hasattr(instance, "entity") or instance.entity.name != "ADVANCED_FACE":
+            continue
+        name, _, surface, _ = instance.entity.params
+        sphere = file[surface].entity
+        if sphere.name == "SPHERICAL_SURFACE":
+            placement = file[sphere.params[1]].entity
+            point = file[placement.params[1]].entity.params[1]
+            found[name] = (*point, sphere.params[2])
+    assert list(found) == half.ids
+    expected = np.column_stack([half.mirrors.centre, half.mirrors.radius])
+    assert np.array(list(found.values())) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["stl", "3mf"])
+@pytest.mark.parametrize("camera", ["a", "b"])
+def test_mesh_round_trip(exported: Path, small_design: Design, camera: str, kind: str) -> None:
+    made, read = mesh_of(small_design), read_mesh(exported / f"shell_{camera}.{kind}")
+    assert len(read.faces) == len(made.triangles)
+    assert read.is_watertight
+    assert read.is_winding_consistent
+    assert read.volume == pytest.approx(made.volume, rel=1e-6)
+
+
+def test_record(exported: Path, small_design: Design) -> None:
+    with (exported / "mirrors.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == COLUMNS
+    document = json.loads((exported / "design.json").read_text())
+    assert document["spec"] == spec_dict(small_design.spec)
+    assert [row["id"] for row in rows] == [row["id"] for row in document["mirrors"]]
+    for half in small_design.halves:
+        own = [row for row in rows if row["camera"] == half.camera]
+        apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own])
+        assert np.array_equal(apex, half.mirrors.apex)  # full double precision
+        assert np.array_equal([float(row["coverage_mm"]) for row in own], half.coverage)
+
+
+def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:
+    export(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path, [SHELL])
+    with (tmp_path / "mirrors.csv").open(newline="") as file:
+        row = next(csv.DictReader(file))
+    assert row["radius_mm"] == row["cx"] == ""
+    assert float(row["coverage_mm"]) > 0
+    assert read_step(tmp_path / "shell_a.step").kinds["StepGeom_Plane"] >= 15
+
+
+def test_manifest_holds_every_file(exported: Path) -> None:
+    manifest = json.loads((exported / "manifest.json").read_text())
+    names = {p.name for p in exported.iterdir()} - {"manifest.json"}
+    assert set(manifest["files"]) == names
+    for name, entry in manifest["files"].items():
+        data = (exported / name).read_bytes()
+        assert entry == {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
+    assert {"tbcad", "cadquery-ocp", "numpy"} <= set(manifest["versions"])
+
+
+def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
+    export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
+    for path in exported.iterdir():
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+def test_pcurves_on_request(tmp_path: Path) -> None:
+    sizes = []
+    for wanted in ("false", "true"):
+        folder = tmp_path / wanted
+        folder.mkdir()
+        export(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder, [SHELL])
+        text = (folder / "shell_a.step").read_text()
+        assert ("PCURVE" in text) == (wanted == "true")
+        sizes.append(len(text))
+    assert sizes[1] > 1.5 * sizes[0]

@@ -1,0 +1,155 @@
+"""The light field's file: what is written is read, in parts too; other files are refused."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.simulate.capture.light_field import PLANES, SCHEMA, LightField, write, writing
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.shading import Scene
+
+Cameras = tuple[Reflector, Reflector]
+
+
+def written(path: Path, cameras: Cameras, scene: Scene) -> Path:
+    with writing(path, 60.0, {"object": "knot"}) as store:
+        for at in cameras:
+            write(store, at, photograph(at.view, exact(at), scene))
+    return path
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory, cameras: Cameras, knot: Scene) -> Path:
+    return written(tmp_path_factory.mktemp("field") / "lightfield.h5", cameras, knot)
+
+
+def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: LightField) -> None:
+    with LightField.open(file) as source:
+        assert source.facts == {"object": "knot"}
+        assert source.capture_mm == 60.0
+        assert len(source) == len(light_field)
+        for at, frame in zip(cameras, source.frames.values(), strict=True):
+            memory = light_field.frames[at.camera]
+            for name in PLANES:
+                assert np.array_equal(frame.planes[name][:], memory.planes[name])
+            assert np.array_equal(frame.u, at.u)
+            assert np.array_equal(frame.boxes, at.boxes())
+            assert np.array_equal(frame.view.pinhole, at.view.pinhole)
+            assert frame.view.hfov == at.view.hfov
+            assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
+
+
+def test_a_part_is_a_part(file: Path, light_field: LightField) -> None:
+    with LightField.open(file.parent) as source:  # the folder will do
+        part = source.frames["b"].read(slice(50, 90), slice(100, 333))
+    for name, values in part.items():
+        assert np.array_equal(values, light_field.frames["b"].planes[name][50:90, 100:333])
+
+
+def test_boxes_hold_all_of_each_mirror(light_field: LightField) -> None:
+    for frame in light_field.frames.values():
+        rows, columns = np.nonzero(frame.planes["mirror"])
+        box = frame.boxes[frame.planes["mirror"][rows, columns].astype(int) - 1]
+        assert ((columns >= box[:, 0]) & (columns < box[:, 1])).all()
+        assert ((rows >= box[:, 2]) & (rows < box[:, 3])).all()
+
+
+def test_rays_are_unit_and_leave_their_mirror(light_field: LightField) -> None:
+    frame = light_field.frames["a"]
+    on = frame.planes["mirror"] > 0
+    way = frame.planes["direction"][on].astype(float)
+    assert np.linalg.norm(way, axis=1) == pytest.approx(np.ones(len(way)), abs=1e-6)
+    owner = frame.planes["mirror"][on].astype(int) - 1
+    off = frame.mirrors.value(owner, frame.planes["origin"][on].astype(float))
+    assert np.abs(off).max() < 1e-4
+    assert not frame.planes["origin"][~on].any()
+
+
+def test_compressed_and_the_same_each_time(
+    file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
+) -> None:
+    again = written(tmp_path / "again.h5", cameras, knot)
+    assert again.read_bytes() == file.read_bytes()
+    raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PLANES.values())
+    assert file.stat().st_size < 0.8 * 2 * 416 * 310 * raw
+
+
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        ("schema", "schema"),
+        ("no schema", "schema"),
+        ("no cameras", "without cameras"),
+        ("shape", "another shape"),
+        ("kind", "another shape or kind"),
+        ("missing", "damaged"),
+        ("facts", "damaged"),
+        ("boxes", "boxes"),
+        ("nan", "not finite"),
+        ("linked", "elsewhere"),
+        ("external", "elsewhere"),
+        ("cut", "no light field"),
+        ("text", "no light field"),
+    ],
+)
+def test_other_files_are_refused(file: Path, tmp_path: Path, change: str, wrong: str) -> None:
+    path = tmp_path / "changed.h5"
+    path.write_bytes(file.read_bytes())
+    if change in ("cut", "text"):
+        path.write_bytes(path.read_bytes()[:3000] if change == "cut" else b"hello")
+    else:
+        with h5py.File(path, "r+") as store:
+            _changed(store, change)
+    with pytest.raises(InputError, match=wrong) as error, LightField.open(path):
+        pass
+    assert "\n" not in str(error.value)
+
+
+def _changed(store: h5py.File, change: str) -> None:
+    group = store["a"]
+    if change == "schema":
+        store.attrs["schema"] = SCHEMA.replace("/1", "/2")
+    elif change == "no schema":
+        del store.attrs["schema"]
+    elif change == "no cameras":
+        del store["a"], store["b"]
+    elif change in ("shape", "kind"):
+        del group["mirror"]
+        kind = "u2" if change == "shape" else "f8"
+        group["mirror"] = np.zeros((310, 415 + (change == "kind")), dtype=kind)
+    elif change == "missing":
+        del group["direction"]
+    elif change == "facts":
+        store.attrs["facts"] = "{"
+    elif change == "boxes":
+        group["mirrors/boxes"][0] = [0, 417, 0, 5]
+    elif change == "nan":
+        group["mirrors/u"][0] = np.nan
+    elif change == "linked":
+        del group["colour"]
+        group["colour"] = h5py.ExternalLink("/etc/other.h5", "/colour")
+    else:
+        del group["colour"]
+        group.create_dataset(
+            "colour", (310, 416, 3), "u1", external=[("/etc/hostname", 0, 386_880)]
+        )
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is no file"), LightField.open(tmp_path):
+        pass
+
+
+def test_the_reader_is_found_where_the_documentation_has_it(file: Path) -> None:
+    import tbcad.simulate
+
+    with tbcad.simulate.LightField.open(file) as source:
+        part = source.frames["a"].read(slice(100, 120), slice(100, 140))
+    assert part["origin"].shape == (20, 40, 3)
+    with pytest.raises(AttributeError, match="Nothing"):
+        tbcad.simulate.Nothing  # noqa: B018

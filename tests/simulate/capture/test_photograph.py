@@ -1,0 +1,139 @@
+"""Photographs: what each pixel sees, whether spheres and meshes agree, what hides what."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from tbcad.formats.stl import write_stl
+from tbcad.mirrors.array import Design
+from tbcad.simulate.capture.photograph import Tracer, photograph, shifts
+from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.facets import on_mesh, read_shells
+from tbcad.simulate.scene.object import built_in
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.shading import Scene, look, scene_of
+from tests.helpers import mesh_of
+
+Cameras = tuple[Reflector, Reflector]
+
+
+def picture(at: Reflector, scene: Scene, samples: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    bands = list(photograph(at.view, exact(at), scene, samples))
+    return (
+        np.concatenate([band.colour for band in bands]),
+        np.concatenate([band.rays.mirror for band in bands]),
+    )
+
+
+def test_a_pixel_sees_what_its_ray_sees(cameras: Cameras, knot: Scene) -> None:
+    at = cameras[0]
+    colour, mirror = picture(at, knot)
+    rays = exact(at)(range(at.view.height_px), (0.0, 0.0))
+    seen = look(knot, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    on = mirror.ravel() > 0
+    assert np.array_equal(np.rint(seen.colour[on]), colour.reshape(-1, 3)[on])
+    assert colour.reshape(-1, 3)[on].any(axis=1).sum() > 1000
+
+
+def test_the_object_hides_what_is_behind_it(cameras: Cameras, knot: Scene) -> None:
+    """Where the camera sees the object directly there is a colour and no mirror's ray."""
+    at = cameras[0]
+    colour, mirror = picture(at, knot)
+    direct = colour.any(axis=2) & (mirror == 0)
+    assert direct.sum() > 100
+    middle = np.argwhere(direct).mean(axis=0)
+    # The middle of the object appears where the camera sees the origin, above the seam.
+    way = -at.view.pinhole
+    down = np.cross(at.view.forward, at.view.right)
+    x, y = (way @ at.view.right, way @ down) / (way @ at.view.forward)
+    expected = np.array([y, x]) / (2 * at.view.half_sizes[0] / at.view.width_px)
+    size = (np.array([at.view.height_px, at.view.width_px]) - 1) / 2
+    assert np.abs(middle - size - expected)[1] < 5
+    assert middle[0] < at.view.height_px / 4
+
+
+def test_anti_aliasing_is_the_mean_of_finer_pixels(cameras: Cameras, knot: Scene) -> None:
+    at = cameras[1]
+    fine = [
+        np.concatenate(
+            [band.colour for band in photograph(at.view, _shifted(at, shift), knot)]
+        ).astype(float)
+        for shift in shifts(2)
+    ]
+    smooth, mirror = picture(at, knot, 2)
+    on = mirror > 0
+    assert np.abs(smooth - np.mean(fine, axis=0))[on].max() <= 1.0
+    plain, same = picture(at, knot)
+    assert np.array_equal(mirror, same)  # rays are those of the pixels' centres
+    assert not np.array_equal(plain, smooth)
+
+
+def _shifted(at: Reflector, shift: tuple[float, float]) -> Tracer:
+    trace = exact(at)
+    return lambda rows, _: trace(rows, shift)
+
+
+def test_places_in_a_pixel_are_even() -> None:
+    assert shifts(1) == [(0.0, 0.0)]
+    assert sorted(shifts(2)) == [(-0.25, -0.25), (-0.25, 0.25), (0.25, -0.25), (0.25, 0.25)]
+    assert np.mean(shifts(5), axis=0) == pytest.approx([0, 0])
+
+
+def test_progress_is_told(cameras: Cameras, knot: Scene) -> None:
+    said: list[str] = []
+    list(photograph(cameras[0].view, exact(cameras[0]), knot, 1, said.append))
+    assert said[0] == "row 0 of 310"
+    assert len(said) > 1
+
+
+@pytest.fixture(scope="module")
+def with_meshes(
+    little: Design, record: Path, exported: Exported, tmp_path_factory: pytest.TempPathFactory
+) -> Exported:
+    """The record with shells beside it, as STL."""
+    folder, made = tmp_path_factory.mktemp("meshes"), mesh_of(little)
+    write_stl(folder / "shell_a.stl", made)
+    write_stl(folder / "shell_b.stl", made.mirrored())
+    return exported.model_copy(update={"folder": folder})
+
+
+def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
+    shells = read_shells(with_meshes)
+    for at in with_meshes.reflectors:
+        rows = range(at.view.height_px)
+        one, other = exact(at)(rows, (0.0, 0.0)), on_mesh(shells, at)(rows, (0.0, 0.0))
+        same = one.mirror == other.mirror
+        assert same.mean() > 0.999  # but for pixel centres on an edge
+        both = same & (one.mirror > 0)
+        apart = other.origin[both] - one.origin[both]
+        assert np.abs(apart).max() < 1e-4
+        turned = np.cross(one.direction[both], other.direction[both])
+        assert 200 * np.linalg.norm(turned, axis=1).max() < 2e-3  # mm at the object
+        pictures = [
+            np.concatenate([band.colour for band in photograph(at.view, trace, knot)]).astype(int)
+            for trace in (exact(at), on_mesh(shells, at))
+        ]
+        assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
+
+
+def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: Design) -> None:
+    """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
+    corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
+    shells = read_shells(with_meshes)
+    owner = shells.mirror[: len(corners)]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.bincount(
+        np.maximum(owner, 0), weights=np.linalg.norm(sides, axis=1) / 2, minlength=len(owner)
+    )[1 : len(little.halves[0]) + 1]
+    assert area == pytest.approx(little.halves[0].area, rel=2e-3)
+
+
+def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:
+    small = scene_of(built_in(30.0))
+    large_seen, small_seen = (
+        (picture(cameras[0], scene)[0].any(axis=2)).sum() for scene in (knot, small)
+    )
+    assert small_seen < 0.5 * large_seen

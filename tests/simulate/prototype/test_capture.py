@@ -1,0 +1,449 @@
+"""Capture with the prototype: its plan as read, its photographs, and what is merged of them."""
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import tbcad.simulate.compiled
+import tbcad.simulate.prototype.merge
+from tbcad.errors import InputError
+from tbcad.geometry.vectors import norm, unit
+from tbcad.prototype.balls.layout import Prototype
+from tbcad.simulate.capture.light_field import LightField, write, writing
+from tbcad.simulate.capture.photograph import CENTRE, Band
+from tbcad.simulate.capture.photograph import photograph as shell_photograph
+from tbcad.simulate.prototype.merge import light_field, merge
+from tbcad.simulate.prototype.photograph import photograph, resampled
+from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
+from tbcad.simulate.prototype.run import Run, runs, stand_ins
+from tbcad.simulate.prototype.sight import directions, places_of, sight
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.object import built_in
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import Reflector, pixels_of
+from tbcad.simulate.scene.shading import Scene, scene_of
+from tbcad.spec.design import load_spec
+from tests.prototype_exports import plan_of
+from tests.simulate.conftest import CAPTURE_MM, OPTIONS
+
+SPEC = load_spec(None, OPTIONS)
+Both = tuple[Run, Run]
+Rows = list[dict[str, str]]
+
+
+@pytest.fixture(scope="module")
+def both(made: Prototype, cameras: tuple[Reflector, Reflector]) -> Both:
+    return runs(cameras, plan_of(made))
+
+
+@pytest.fixture(scope="module")
+def scene(knot: Scene) -> Scene:
+    return knot
+
+
+@pytest.fixture(scope="module")
+def merged(both: Both, scene: Scene) -> LightField:
+    return light_field(both, scene, CAPTURE_MM)
+
+
+def ideal(made: Prototype, angle: float) -> Plan:
+    """A ball for every mirror, its like, on a base that brings them there at one angle."""
+    half, m = made.half, np.arange(len(made.half))
+    back = Rotation.from_rotvec(-angle * half.ellipsoid.axis)
+    apex, normal = back.apply(half.mirrors.apex), back.apply(half.mirrors.normal)
+    radius = half.mirrors.radius
+    centre = apex - radius[:, None] * normal
+    ball, stop = np.stack([m, np.argsort(made.twin)]), np.zeros((2, len(m)), dtype=np.int64)
+    frame = half.ellipsoid.frame()
+    return Plan(frame, apex, normal, radius, centre, radius, True, np.array([angle]), ball, stop)
+
+
+def misses(run: Run, mirror: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Distances from the origin of rays of mirrors' windows after their balls, caps whole.
+
+    Infinite where a ray meets something else.
+    """
+    whole = np.concatenate([run.balls[..., :4], run.balls[..., :4]], axis=2)
+    turned = np.einsum("nx,nxy->ny", way, run.turn[mirror])
+    seen = sight(replace(run, balls=whole), turned, run.stop[mirror])
+    away = norm(np.cross(seen.origin, seen.direction))
+    return np.where(seen.ball == run.ball[mirror] + 1, away, np.inf)
+
+
+class TestGeometry:
+    def test_a_mirrors_apex_is_shown_the_middle_of_the_object_by_its_balls(
+        self, both: Both
+    ) -> None:
+        """Origin and pinhole are foci of the ellipsoid that both apices lie on."""
+        for run in both:
+            way = unit(run.at.mirrors.apex - run.view.pinhole)
+            turned = np.einsum("nx,nxy->ny", way, run.turn)
+            seen = sight(run, turned, run.stop)
+            assert (seen.ball == run.ball + 1).all()
+            assert np.abs(seen.origin - run.stands.apex).max() < 1e-9
+            assert np.abs(seen.direction + unit(run.stands.apex)).max() < 1e-9
+
+    def test_balls_stand_as_far_off_as_the_plan_says(self, both: Both, made: Prototype) -> None:
+        a, b = (2 * np.arcsin(norm(unit(run.stands.apex) - run.at.u) / 2) for run in both)
+        assert a == pytest.approx(made.stops.error, abs=1e-9)
+        assert b[made.twin] == pytest.approx(made.stops.error, abs=1e-9)
+        assert a.max() > np.radians(1)
+
+    def test_windows_are_turned_not_tilted(self, both: Both) -> None:
+        for run in both:
+            eye = np.einsum("mxy,mzy->mxz", run.turn, run.turn)
+            assert np.abs(eye - np.eye(3)).max() < 1e-12
+            assert np.linalg.det(run.turn) == pytest.approx(1)
+
+    def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
+        self, both: Both, made: Prototype
+    ) -> None:
+        """The record is computed at the mirror's own azimuth, these rays at the stop."""
+        for run, order in zip(both, (np.arange(len(made.half)), made.twin), strict=True):
+            arcs, m = run.at.cells.arcs, len(run.at)
+            wall, t = run.at.cells.boundary.seam, np.linspace(0, 1, 201)
+            least = np.full(m, np.inf)
+            for mine, other in (arcs.faces.T, arcs.faces.T[::-1]):
+                # A cell halved by the seam goes on in the other camera's picture.
+                counted = np.flatnonzero(
+                    (mine < m) & ~((other == wall) & (run.at.u[mine % m, 0] == 0))
+                )
+                point = arcs.at(
+                    np.repeat(counted[:, None], len(t), 1),
+                    np.broadcast_to(t, (len(counted), len(t))),
+                )
+                way = unit(point - run.view.pinhole).reshape(-1, 3)
+                mirror = np.repeat(mine[counted], len(t))
+                np.minimum.at(least, mirror, misses(run, mirror, way))
+            assert 2 * least[order] == pytest.approx(made.fit.coverage, abs=2e-3)
+
+    def test_left_where_they_are(self, made: Prototype, cameras: tuple[Reflector, ...]) -> None:
+        still = runs(cameras, replace(plan_of(made), moved=False))
+        assert (still[0].turn == np.eye(3)).all()
+
+    def test_a_caps_body_hides_and_shows_nothing(self, both: Both) -> None:
+        """Body about (0, 0, 10) of radius 3, its front cut off by a ball of 10 whose apex is 8."""
+        cap = np.array([[[0.0, 0.0, 18.0, 10.0, 0.0, 0.0, 10.0, 3.0]]])
+        view = replace(both[0].view, pinhole=np.zeros(3))
+        run = replace(both[0], view=view, balls=cap)
+        # Both spheres meet at z = 8.6875, 2.697 from the axis.
+        edge, rim = np.arctan2(2.697, 8.6875), np.arcsin(3 / 10)
+        angle = np.array([0, 0.9 * edge, 0.99 * rim, 1.01 * rim])
+        way = np.column_stack([np.sin(angle), np.zeros(4), np.cos(angle)])
+        seen = sight(run, way, np.zeros(4, dtype=np.int64))
+        assert edge < 0.99 * rim
+        assert seen.ball.tolist() == [1, 1, 0, 0]
+        assert np.isfinite(seen.reach).tolist() == [True, True, True, False]
+        assert seen.reach[0] == pytest.approx(8)
+        assert norm(seen.origin[1] - [0, 0, 18]) == pytest.approx(10)
+        assert seen.direction[0] == pytest.approx([0, 0, -1])
+
+    def test_places(self, both: Both) -> None:
+        view = both[1].view
+        places = np.array([[0.0, 0.0], [415.0, 309.0], [12.25, 200.5]])
+        assert places_of(view, directions(view, places)) == pytest.approx(places, abs=1e-9)
+        outside = directions(view, np.array([[-0.1, 5.0], [5.0, 309.1]]))
+        assert np.isnan(places_of(view, np.vstack([outside, -view.forward]))).all()
+
+
+class TestPhotographs:
+    def test_the_second_run_sees_the_object_turned(self, both: Both, scene: Scene) -> None:
+        """Camera a before an object that was really turned takes the same photograph."""
+        subject = replace(scene.subject, points=scene.subject.points * HALF_TURN)
+        turned = replace(scene_of(subject), shade=scene.shade)
+        second, first = photograph(both[1], scene, 3), photograph(both[0], turned, 3)
+        assert second.any()
+        assert (np.abs(second.astype(int) - first) > 1).any(axis=2).mean() < 1e-3
+        straight = photograph(both[0], scene, 3)
+        assert (np.abs(second.astype(int) - straight) > 1).any(axis=2).mean() > 1e-2
+
+    def test_between_pixels(self, both: Both, scene: Scene) -> None:
+        whole = photograph(both[0], scene, 2, samples=2).astype(float)
+        row, column = np.argwhere(whole.sum(axis=2) > 0)[::7].T
+        row, column = np.minimum(row, 308), np.minimum(column, 414)
+        places = np.column_stack([column, row]).astype(float)
+        assert (resampled(both[0], scene, 2, 2, places) == whole[row, column]).all()
+        right, under = whole[row, column + 1], whole[row + 1, column]
+        middle = 0.75 * whole[row, column] + 0.25 * right
+        found = resampled(both[0], scene, 2, 2, places + np.array([0.25, 0]))
+        assert np.abs(found - middle).max() <= 0.5
+        found = resampled(both[0], scene, 2, 2, places + np.array([0, 0.5]))
+        assert np.abs(found - (whole[row, column] + under) / 2).max() <= 0.5
+
+    def test_the_last_pixel(self, both: Both, scene: Scene) -> None:
+        last = np.array([[415.0, 309.0]])
+        whole = photograph(both[0], scene, 0)
+        assert (resampled(both[0], scene, 0, 1, last) == whole[-1, -1]).all()
+
+
+class TestMerged:
+    @pytest.mark.parametrize("size_mm", [CAPTURE_MM, 1.7 * CAPTURE_MM])
+    @pytest.mark.parametrize("resample", ["exact", "photograph"])
+    def test_balls_like_the_mirrors_give_the_shells_picture(
+        self,
+        made: Prototype,
+        cameras: tuple[Reflector, Reflector],
+        resample: str,
+        size_mm: float,
+    ) -> None:
+        """Also where the object, if it is too large, hides mirrors."""
+        scene = scene_of(built_in(size_mm))
+        found = light_field(runs(cameras, ideal(made, 0.7)), scene, CAPTURE_MM, resample)  # type: ignore[arg-type]
+        for at in cameras:
+            shell = list(shell_photograph(at.view, exact(at), scene))
+            planes = found.frames[at.camera].planes
+            mirror, picture = joined(shell, "mirror"), np.concatenate([b.colour for b in shell])
+            # At the very edge between two cells rounding decides.
+            same = planes["mirror"] == mirror
+            free = sum((exact(at)(band.rows, CENTRE).mirror > 0).sum() for band in shell)
+            assert ((mirror > 0).sum() < free) == (size_mm > CAPTURE_MM)
+            assert same.mean() > 1 - 1e-4
+            for name in ("origin", "direction"):
+                away = np.abs(planes[name] - joined(shell, name))[same]
+                assert away.max() < 1e-4
+            off = np.abs(planes["colour"].astype(int) - picture).max(axis=2)
+            assert (off > 1).mean() < 5e-4
+
+    def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, both: Both) -> None:
+        for run in both:
+            frame = merged.frames[run.at.camera]
+            mirror = frame.planes["mirror"].astype(int)
+            on = mirror > 0
+            row = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
+            away = norm(frame.planes["origin"][on] - row[:, :3]) - row[:, 3]
+            assert np.abs(away).max() < 1e-4
+            assert norm(frame.planes["direction"][on]) == pytest.approx(1, abs=1e-6)
+            assert not frame.planes["origin"][~on].any()
+
+    def test_light_obeys_the_law_of_reflection(self, merged: LightField, both: Both) -> None:
+        """Way in and way out have the ball's normal for their bisector."""
+        for run in both:
+            frame = merged.frames[run.at.camera]
+            mirror = frame.planes["mirror"].astype(int)
+            on = mirror > 0
+            centre = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1], :3]
+            origin = frame.planes["origin"][on].astype(float)
+            both_ways = unit(run.view.pinhole - origin) + frame.planes["direction"][on]
+            assert np.abs(unit(both_ways) - unit(origin - centre)).max() < 1e-4
+
+    def test_pixels_kept(
+        self, merged: LightField, made: Prototype, cameras: tuple[Reflector, Reflector]
+    ) -> None:
+        """As many rays into the capture sphere as the design's areas promise, within rounding."""
+        kept = sum(capture_rays(frame.planes).sum() for frame in merged.frames.values())
+        shell = sum(
+            capture_rays({k: getattr(exact(at)(range(310), (0, 0)), k) for k in RAYS}).sum()
+            for at in cameras
+        )
+        assert shell == pytest.approx(2 * made.fit.pixels_shell.sum(), rel=0.01)
+        assert kept / shell == pytest.approx(made.fit.kept, abs=0.01)
+
+    def test_photographs_are_close_to_exact_rays(
+        self, merged: LightField, both: Both, scene: Scene
+    ) -> None:
+        sharp = light_field(both, scene, CAPTURE_MM, "exact")
+        for camera, frame in merged.frames.items():
+            other = sharp.frames[camera]
+            for name in RAYS:
+                assert (frame.planes[name] == other.planes[name]).all()
+            off = frame.image().astype(float) - other.image()
+            psnr = 10 * np.log10(255**2 / (off**2).mean())
+            moved = np.roll(other.image(), 1, axis=1).astype(float) - other.image()
+            assert psnr > 10 * np.log10(255**2 / (moved**2).mean()) + 2
+
+    def test_windows_that_leave_the_photograph(self, both: Both, scene: Scene) -> None:
+        """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
+        wide = both[0].view
+        narrow = replace(both[0], view=replace(wide, hfov=0.8 * wide.hfov))
+        for resample in ("exact", "photograph"):
+            bands = list(merge(narrow, scene, resample))  # type: ignore[arg-type]
+            mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
+            place = pixels_of(narrow.view, origin[mirror > 0])
+            assert (place >= -1e-6).all()
+            assert (place <= np.array([415, 309]) + 1e-6).all()
+            free = exact(both[0].at)(range(310), CENTRE).mirror
+            lost = (mirror == 0) & (free > 0)
+            assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
+            assert not np.concatenate([band.colour for band in bands])[lost].any()
+
+    def test_samples_smooth(self, both: Both, scene: Scene) -> None:
+        for resample in ("exact", "photograph"):
+            one, many = (
+                np.concatenate([b.colour for b in merge(both[0], scene, resample, n)])
+                for n in (1, 3)
+            )
+            rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
+            assert rough[1] < 0.95 * rough[0]
+
+    def test_same_bytes_on_one_thread(
+        self, merged: LightField, both: Both, scene: Scene, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(tbcad.simulate.compiled, "THREADS", 1)
+        monkeypatch.setattr(tbcad.simulate.prototype.merge, "THREADS", 1)
+        again = light_field(both, scene, CAPTURE_MM)
+        for camera, frame in merged.frames.items():
+            for name, plane in frame.planes.items():
+                assert (plane == again.frames[camera].planes[name]).all()
+
+    def test_as_a_file(self, merged: LightField, both: Both, scene: Scene, tmp_path: Path) -> None:
+        with writing(tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}) as store:
+            for run in both:
+                write(store, stand_ins(run), merge(run, scene))
+        with LightField.open(tmp_path / "field.h5") as found:
+            for run in both:
+                frame, other = found.frames[run.at.camera], merged.frames[run.at.camera]
+                assert (frame.image() == other.image()).all()
+                assert (frame.mirrors.apex == run.stands.apex).all()
+                assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
+                assert frame.u == pytest.approx(unit(run.stands.apex))
+
+    def test_progress(self, both: Both, scene: Scene) -> None:
+        told: list[str] = []
+        list(merge(both[0], scene, progress=told.append))
+        assert told[0] == f"stop 1 of {len(both[0])}"
+        assert any(one.startswith("row ") for one in told)
+
+
+RAYS = ("mirror", "origin", "direction")
+
+
+def joined(bands: list[Band], name: str) -> np.ndarray:
+    return np.concatenate([getattr(band.rays, name) for band in bands])
+
+
+def capture_rays(planes: dict[str, np.ndarray]) -> np.ndarray:
+    """Pixels whose ray meets the capture sphere."""
+    origin, way = planes["origin"].astype(float), planes["direction"].astype(float)
+    near = norm(np.cross(origin, way)) <= CAPTURE_MM / 2
+    return near & (planes["mirror"] > 0) & ((origin * way).sum(axis=2) < 0)
+
+
+class TestReading:
+    def test_what_was_written(self, written: Path, made: Prototype) -> None:
+        found, wanted = read_plan(read_export(written)), plan_of(made)
+        for name in ("frame", "apex", "normal", "radius", "body_centre", "body_radius", "angle"):
+            assert getattr(found, name) == pytest.approx(getattr(wanted, name), abs=1e-12)
+        assert (found.ball == wanted.ball).all()
+        assert (found.stop == wanted.stop).all()
+        assert found.moved
+        assert found.centre == pytest.approx(made.centres())
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (lambda table: table.pop(5), "does not show mirror a"),
+            (lambda table: table.pop(-1), "does not show mirror b"),
+            (lambda table: table.append(table[7]), "a second time"),
+            (lambda table: table[3].update(mirror="b0001"), "row 4 shows b0001"),
+            (lambda table: table[3].update(mirror="a9999"), "allowed .* is a0001 to a0103"),
+            (lambda table: table[3].update(mirror="a1"), "4 mirror: "),
+            (lambda table: table[3].update(ball="6"), "names ball 6, allowed is 1 to 5"),
+            (lambda table: table[3].update(ball="1.5"), "4 ball: "),
+            (lambda table: table[3].update(object_turn_deg="90"), "object_turn_deg 90"),
+            (lambda table: table[3].update(base_angle_deg="nan"), "4 base_angle_deg: "),
+            (lambda table: table[3].update(error_deg="inf"), "4 error_deg: "),
+            (lambda table: table[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
+            (lambda table: raised(table, "stop", 1), "not numbered from 1"),
+            (lambda table: exchanged(table, "1", "2"), "do not rise from stop to stop"),
+            (lambda table: table[3].update(ball=other(table[3]["ball"])), "but its ball stands"),
+            (lambda table: raised(table, "base_angle_deg", 0.5), "but its ball stands"),
+            (lambda table: [row.pop("stop") for row in table], "1 stop: field required"),
+            (lambda table: table.clear(), "not numbered from 1|does not show"),
+        ],
+    )
+    def test_refused_plans(
+        self, written: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+    ) -> None:
+        folder = copied(written, tmp_path)
+        path = folder / "rotation_plan.csv"
+        with path.open(newline="") as file:
+            table = list(csv.DictReader(file))
+        names = list(table[0])
+        change(table)
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, names)
+            writer.writerow({name: name for name in (table[0] if table else names)})
+            writer.writerows(table)
+        with pytest.raises(InputError, match=message) as caught:
+            read_plan(read_export(folder))
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (lambda record: record.update(schema="tbcad-prototype/9"), "schema: "),
+            (lambda record: record.update(picture="bent"), "picture: "),
+            (lambda record: record.update(balls=[]), "balls: "),
+            (lambda record: record["balls"].pop(), "names ball 5, allowed is 1 to 4"),
+            (lambda record: record["balls"].reverse(), "ball 1 is out of order"),
+            (lambda record: record["balls"][2].update(radius_mm=-1), "balls 3 radius_mm: "),
+            (lambda record: record["balls"][2].update(nx=2.0), "ball 3 has a normal"),
+            (lambda record: record["balls"][1].update(cx=1.0), "ball 2 has a centre"),
+            (lambda record: record["balls"][1].update(bz=float("nan")), "balls 2 bz: "),
+            (lambda record: record["frame"].update(zero=[1, 0, 0]), "not square"),
+            (lambda record: record["frame"].update(third=[0, 1, 0]), "right-handed"),
+            (lambda record: record["frame"].update(turned_frame(record)), "does not point"),
+        ],
+    )
+    def test_refused_records(
+        self, written: Path, tmp_path: Path, change: Callable[[dict], object], message: str
+    ) -> None:
+        folder = copied(written, tmp_path)
+        path = folder / "prototype.json"
+        record = json.loads(path.read_text())
+        change(record)
+        path.write_text(json.dumps(record))
+        with pytest.raises(InputError, match=message) as caught:
+            read_plan(read_export(folder))
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize("name", ["prototype.json", "rotation_plan.csv"])
+    def test_files_that_are_not_there_or_no_text(
+        self, written: Path, tmp_path: Path, name: str
+    ) -> None:
+        folder = copied(written, tmp_path)
+        (folder / name).write_bytes(b"\xff\xfe\x00")
+        with pytest.raises(InputError, match=f"{name} cannot be read"):
+            read_plan(read_export(folder))
+        (folder / name).unlink()
+        with pytest.raises(InputError, match=f"{name} is not there"):
+            read_plan(read_export(folder))
+
+    def test_one_camera_that_cannot_take_both_halves(self, written: Path) -> None:
+        exported = read_export(written)
+        a, b = exported.reflectors
+        askew = replace(b, view=replace(b.view, pinhole=b.view.pinhole + np.array([0, 1, 0])))
+        with pytest.raises(InputError, match="one camera cannot take both halves"):
+            read_plan(exported.model_copy(update={"reflectors": (a, askew)}))
+
+
+def copied(folder: Path, target: Path) -> Path:
+    for path in folder.iterdir():
+        (target / path.name).write_bytes(path.read_bytes())
+    return target
+
+
+def raised(table: Rows, name: str, by: float) -> None:
+    for row in table:
+        value = float(row[name]) + by
+        row[name] = str(int(value)) if name == "stop" else repr(value)
+
+
+def exchanged(table: Rows, one: str, two: str) -> None:
+    for row in table:
+        row["stop"] = {one: two, two: one}.get(row["stop"], row["stop"])
+
+
+def other(ball: str) -> str:
+    return "2" if ball != "2" else "3"
+
+
+def turned_frame(record: dict) -> dict:
+    frame = record["frame"]
+    return {"axis": frame["zero"], "zero": frame["third"], "third": frame["axis"]}

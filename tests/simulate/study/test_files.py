@@ -1,0 +1,236 @@
+"""What the studies find and write, and the command."""
+
+import csv
+import math
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+from tbcad import schedule
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.mirrors import radii
+from tbcad.mirrors.array import design
+from tbcad.simulate import compiled
+from tbcad.simulate.study.capture_area import capture_area
+from tbcad.simulate.study.depth import Optics, depth
+from tbcad.simulate.study.elevation import correlation, elevation
+from tbcad.simulate.study.paper import claims
+from tbcad.simulate.study.pixels import Sensor
+from tbcad.simulate.study.plot import Panel, Series, picture
+from tbcad.simulate.study.record import Study, check_target, contents_of, write
+from tbcad.simulate.study.resolution import Ratio, resolution
+from tbcad.simulate.study.sweep import numbers
+from tbcad.simulate.study.tables import SUMMARY, Table, csv_text
+from tbcad.spec.design import load_spec
+
+SMALL = ("n=4", "width_px=208", "height_px=155")
+# No radius gives some of these mirrors their coverage.
+HOPELESS = ("camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+
+
+def small_resolution() -> Study:
+    sensors, ratios = (Sensor(208, 155), Sensor(416, 310)), (Ratio(1, 1), Ratio(1, 4))
+    return resolution(load_spec(None, SMALL), range(3, 8), sensors, ratios)
+
+
+def row_of(table: Table, column: str, value: object) -> dict[str, object]:
+    place = table.column(column).index(value)
+    return dict(zip(table.columns, table.rows[place], strict=True))
+
+
+def test_resolution_finds_what_its_rows_say() -> None:
+    study = small_resolution()
+    swept, balanced, defined = study.tables
+    assert len(swept.rows) == 10
+    for row in swept.rows:
+        at = dict(zip(swept.columns, row, strict=True))
+        assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
+        assert at["seeing_average_px"] == at["seeing_px"] / at["virtual_cameras"]
+        assert at["seeing_px"] < at["on_mirrors_px"] < 2 * at["width_px"] * at["height_px"]
+    for row in balanced.rows:
+        at = dict(zip(balanced.columns, row, strict=True))
+        if at["balanced_n"] is None:
+            assert "--from" in at["reason"]
+            continue
+        aim = {"1:1": 1, "1:4": 0.25}[at["ratio"]]
+        found = [r for r in swept.rows if r[1] == at["width_px"]]
+        column = {"seeing": 6, "on mirrors": 7}[at["pixels_counted"]]
+        above = [r[0] for r in found if r[3] / r[column] > aim]
+        below = [r[0] for r in found if r[3] / r[column] < aim]
+        assert max(below) < at["balanced_n"] < min(above)
+    assert any(row[4] is not None for row in balanced.rows)
+    zenith = row_of(defined, "reading", "directions with z > 0")
+    assert zenith["value"] == 5 * 16 - 2 * 4 + 1
+    assert zenith["paper"] is None  # the paper's figures are of n = 18
+
+
+def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = []
+    for threads in (1, 3):
+        monkeypatch.setattr(compiled, "THREADS", threads)
+        monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
+        files.append(contents_of(small_resolution()))
+    assert files[0] == files[1]
+    assert len(files[0]) == 6
+
+
+def test_capture_area_has_the_paper_beside_it() -> None:
+    table = (study := capture_area(load_spec(None), range(2, 6))).tables[0]
+    at = row_of(table, "n", 4)
+    assert at["paper_claim_flat_mm"] == 21.2
+    assert at["flat_closed_mm"] == pytest.approx(21.0, abs=0.01)  # measured before: 21.0
+    half = design(load_spec(None, ["n=4", "radius_rule=paper"])).halves[0]
+    assert at["paper_least_mm"] == half.coverage.min()
+    assert at["paper_short"] == (half.coverage < 59.9994).sum() > 0
+    assert at["traced_least_mm"] > 60.59
+    assert at["traced_short"] == 0
+    assert table.column("paper_claim_flat_mm") == [None, None, 21.2, None]
+    assert study.summary.columns == SUMMARY
+    assert study.summary.rows[0][2:4] == (at["flat_closed_mm"], 21.2)
+
+
+def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(radii, "MAX_ITERATIONS", 2)  # else the search takes ten seconds
+    spec = load_spec(None, HOPELESS)
+    at = row_of(capture_area(spec, range(9, 10)).tables[0], "n", 9)
+    assert at["traced_least_mm"] is None
+    assert "no radius gives" in str(at["traced_reason"])
+    study = resolution(spec, range(9, 10), (Sensor(208, 155),), (Ratio(1, 1),))
+    assert study.tables[0].rows[0][3:10] == (None,) * 7
+    assert "no radius gives" in str(study.tables[0].rows[0][10])
+    assert len(contents_of(study)) == 6
+
+
+def test_elevation_of_the_paper_design() -> None:
+    """Radii by eq. 2 at n = 18: 8.00 ... 65.4 mm (DESIGN.md section 3), tied to the polar angle."""
+    study = elevation(load_spec(None))
+    mirrors, correlated = study.tables
+    assert len(mirrors.rows) == 847
+    radius, polar = mirrors.numbers("paper_radius_mm"), np.array(mirrors.numbers("polar_deg"))
+    assert min(radius) == pytest.approx(8.00, abs=0.005)
+    assert max(radius) == pytest.approx(65.4, abs=0.06)
+    assert (polar.min(), polar.max()) == (pytest.approx(45), pytest.approx(135))
+    for rule, of, angle, value, _ in correlated.rows:
+        if of == "log radius":
+            assert (abs(value) > 0.97) == (angle == "polar angle"), rule
+
+
+def test_correlation_is_pearsons() -> None:
+    x = np.arange(10.0)
+    assert correlation(x, 3 - 2 * x) == pytest.approx(-1, rel=1e-12)
+    assert correlation(x, (x - 4.5) ** 2) == pytest.approx(0, abs=1e-12)
+
+
+def test_elevation_of_few_mirrors() -> None:
+    study = elevation(load_spec(None, ["n=1"]))
+    assert len(study.tables[0].rows) == 5
+    assert all(math.isfinite(row[3]) for row in study.tables[1].rows)
+
+
+def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
+    study = depth(load_spec(None, ["n=4"]), Optics())
+    flat = row_of(study.summary, "quantity", "camera to farthest image, flat radii")
+    assert flat["tbcad"] == pytest.approx(2 * math.sqrt(15000) + 30, rel=1e-12)
+    assert (flat["paper"], flat["where"]) == (250, "section 6")
+    stops = study.tables[1]
+    paper = [row for row in stops.rows if row[0] == "the paper's distances" and row[5] != "x"]
+    assert [row[1:4] for row in paper] == [(150, 250, pytest.approx(187.5))] * 3
+    # Closed form: with 2080 pixels across 89 degrees a pixel is 2 tan(44.5 deg) / 2080 wide at
+    # unit distance, and pupil = 2 pixel / (1/150 - 1/250).
+    limited = next(row for row in paper if row[5] == "blur limited")
+    width = 2 * math.tan(math.radians(44.5)) / 2080
+    assert limited[6] == pytest.approx(2 * width / (1 / 150 - 1 / 250), rel=1e-12)
+
+
+def test_csv_keeps_every_digit() -> None:
+    table = Table("t", ("a", "b", "c"), ((1 / 3, None, "x, y"), (1e-17, 3, "")))
+    rows = list(csv.reader(csv_text(table).splitlines()))
+    assert rows[0] == ["a", "b", "c"]
+    assert (float(rows[1][0]), rows[1][1:]) == (1 / 3, ["", "x, y"])
+    assert float(rows[2][0]) == 1e-17
+    assert table.numbers("b") == pytest.approx([math.nan, 3], nan_ok=True)
+
+
+def test_pictures_repeat_whatever_the_user_has_set() -> None:
+    line = Series("line", np.arange(1.0, 5), np.array([1, 2, np.nan, 400.0]))
+    panels = (Panel("one", "x", "y", (line,), "y"), Panel("two", "x", "y", (line,)))
+    first = picture(panels)
+    with matplotlib.rc_context({"figure.facecolor": "red", "font.size": 20.0}):
+        assert picture(panels) == first
+    assert picture(panels[:1]) != first
+    assert first.startswith(b"\x89PNG")
+
+
+def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "studies"
+    study = elevation(load_spec(None, ["n=4"]))
+    files = write(study, out)
+    (out / "mine.txt").write_text("mine")
+    (out / "elevation.csv").write_text("old")
+    assert write(study, out) == files
+    assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
+    assert (out / "elevation.csv").read_bytes() == contents_of(study)["elevation.csv"]
+
+
+def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
+    study = elevation(load_spec(None, ["n=4"]))
+    (tmp_path / "elevation.png").mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        write(study, tmp_path)
+    assert not [path for path in tmp_path.iterdir() if path.name.endswith(".new")]
+
+
+def test_folder_that_cannot_be(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        check_target(tmp_path / "file" / "studies")
+    check_target(tmp_path / "not" / "yet")
+    assert not (tmp_path / "not").exists()
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 5), (5, 4), (2, 61)])
+def test_sweeps_that_cannot_be(first: int, last: int) -> None:
+    with pytest.raises(InputError, match="--from or --to"):
+        numbers(first, last)
+    assert list(numbers(2, 4)) == [2, 3, 4]
+
+
+def test_claims_say_where_they_stand() -> None:
+    assert all(claim.where and claim.text for claim in claims().values())
+    assert claims()["virtual_cameras"].value == 1657
+
+
+def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "studies"
+    arguments = ["study", "capture-area", "--from", "4", "--to", "4", "--out", str(out)]
+    assert run(arguments) == 0
+    shown = capsys.readouterr()
+    assert "21.2 mm" in shown.out
+    assert "capture-area.csv" in shown.out
+    assert (out / "capture-area.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["resolution", "--sensor", "12"],
+        ["resolution", "--ratio", "0:1"],
+        ["resolution", "--from", "9", "--to", "3"],
+        ["capture-area", "--to", "61"],
+        ["elevation", "--set", "optics.m=3"],
+        ["elevation", "--design", "missing.toml"],
+        ["depth-of-field", "--blur-px", "0"],
+        ["depth-of-field", "--pixel-um", "nan"],
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["study", *arguments, "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()

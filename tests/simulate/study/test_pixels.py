@@ -1,0 +1,137 @@
+"""Pixels and their balance, against closed forms."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import Design, Half, design
+from tbcad.simulate.scene.reflector import Reflector, pixels_of, reflectors
+from tbcad.simulate.study.pixels import Sensor, _traced, counts, sensor_of, virtual_cameras
+from tbcad.simulate.study.resolution import Ratio, balance, ratio_of
+from tbcad.spec.design import load_spec
+
+# The paper's lens does not hold the few large mirrors of a small n.
+WIDE = ("n=8", "hfov_deg=95", "width_px=832", "height_px=620")
+
+
+@pytest.fixture(scope="module")
+def wide() -> Design:
+    return design(load_spec(None, WIDE))
+
+
+def window(at: Reflector, mirror: int) -> float:
+    """Area of a mirror's cell in the picture, in pixels, from its arcs alone."""
+    offsets, sides = at.cells.rings
+    steps, total = np.linspace(0, 1, 200), 0.0
+    for side in sides[offsets[mirror] : offsets[mirror + 1]]:
+        t = steps if side % 2 == 0 else steps[::-1]
+        point = pixels_of(at.view, at.cells.arcs.at(np.full(len(t), side // 2), t))
+        for (x0, y0), (x1, y1) in pairwise(point):
+            total += (x0 * y1 - x1 * y0) / 2
+    return abs(total)
+
+
+def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: Design) -> None:
+    """Pixels counted one by one against the area within the cell's arcs."""
+    at = reflectors(wide)[0]
+    on = counts(wide.halves[0], (Sensor(832, 620),), 30.0)[0].on
+    area = np.array([window(at, i) for i in range(len(at))])
+    assert np.abs(on - area).max() < 3 * np.sqrt(area.max())  # pixels along its edge
+    assert on.sum() == pytest.approx(area.sum(), rel=5e-4)
+
+
+def test_both_cameras_have_the_same_pixels(wide: Design) -> None:
+    a, b = (_traced(at, 30.0) for at in reflectors(wide))
+    assert np.array_equal(a[0], b[0])
+    assert np.array_equal(a[1], b[1])
+
+
+def test_no_ray_meets_nothing_and_all_meet_everything(wide: Design) -> None:
+    half = wide.halves[0]
+    sensor = (Sensor(416, 310),)
+    assert counts(half, sensor, 0.0)[0].seen.sum() == 0
+    most = counts(half, sensor, 300.0)[0]  # all mirrors are inside
+    some = counts(half, sensor, 30.0)[0]
+    assert (some.seen <= some.on).all()
+    assert 0.3 < some.seen.sum() / some.on.sum() < 0.9
+    assert np.array_equal(some.on, most.on)
+    assert np.array_equal(most.seen, most.on)
+
+
+def test_share_that_sees_the_sphere_follows_its_size(wide: Design) -> None:
+    """A mirror shows a small sphere in an area that grows with the square of its radius."""
+    seen = [
+        counts(wide.halves[0], (Sensor(1664, 1240),), r)[0].seen.sum() for r in (5.0, 10.0, 20.0)
+    ]
+    assert seen[1] / seen[0] == pytest.approx(4, rel=0.02)
+    assert seen[2] / seen[1] == pytest.approx(4, rel=0.05)
+
+
+def test_rays_for_blocks_of_pixels_give_the_same_count(wide: Design) -> None:
+    half, sensor = wide.halves[0], Sensor(1664, 1240)
+    every = counts(half, (sensor,), 30.0)[0]
+    some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]
+    assert every.rays == 1664 * 1240
+    assert some.rays == 832 * 620
+    assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
+    assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
+
+
+def test_sides_that_do_not_divide_are_sampled_too(wide: Design) -> None:
+    half, sensor = wide.halves[0], Sensor(1663, 1239)
+    every = counts(half, (sensor,), 30.0)[0]
+    some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]
+    assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
+    assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 6, 9])
+def test_number_of_virtual_cameras(n: int) -> None:
+    """5 n^2 + 2 n + 1 vertices have z >= 0: 1657 at n = 18 (Table I)."""
+    half = design(load_spec(None, [f"n={n}"])).halves[0]
+    assert virtual_cameras(half) == 5 * n**2 + 2 * n + 1
+
+
+def test_table_1(paper_half: Half) -> None:
+    assert virtual_cameras(paper_half) == 1657
+
+
+@pytest.mark.parametrize("ratio", [Ratio(1, 1), Ratio(1, 4), Ratio(4, 1)])
+def test_balance_of_power_laws_is_exact(ratio: Ratio) -> None:
+    """5 n^2 cameras with 500,000 / n^2 pixels balance where n^4 = 100,000 ratio."""
+    n = np.arange(5.0, 40.0)
+    found = balance(n, 5 * n**2, 5e5 / n**2, ratio)
+    assert found.n == pytest.approx((1e5 * ratio.cameras / ratio.pixels) ** 0.25, rel=1e-12)
+    assert abs(n[found.nearest] - found.n) < 0.51
+
+
+def test_balance_outside_the_sweep_is_none() -> None:
+    n = np.arange(20.0, 25.0)
+    assert np.isnan(balance(n, 5 * n**2, 5e5 / n**2, Ratio(1, 1)).n)
+    assert np.isnan(balance(n, n * np.nan, n * np.nan, Ratio(1, 1)).n)
+
+
+def test_balance_passes_over_designs_that_were_refused() -> None:
+    n = np.arange(15.0, 21.0)
+    cameras, pixels = 5 * n**2, 5e5 / n**2
+    cameras[2], pixels[2] = np.nan, np.nan
+    assert balance(n, cameras, pixels, Ratio(1, 1)).n == pytest.approx(1e5**0.25, rel=1e-12)
+
+
+def test_texts() -> None:
+    assert sensor_of("8320x6208") == Sensor(8320, 6208)
+    assert ratio_of("1:4") == Ratio(1, 4)
+
+
+@pytest.mark.parametrize("text", ["", "2080", "2080x", "15x1552", "2080x99999", "-1x20", "ax20"])
+def test_no_sensors(text: str) -> None:
+    with pytest.raises(InputError, match="2080x1552"):
+        sensor_of(text)
+
+
+@pytest.mark.parametrize("text", ["", "1", "1:0", "-1:1", "nan:1", "1:inf", "a:b", "1:2:3"])
+def test_no_ratios(text: str) -> None:
+    with pytest.raises(InputError, match="1:4"):
+        ratio_of(text)

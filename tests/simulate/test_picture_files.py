@@ -1,0 +1,89 @@
+"""Pictures as files, whole or not at all, and how like they are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from tbcad.errors import InputError
+from tbcad.simulate.picture_files import (
+    ANIMATED,
+    beside,
+    check_place,
+    difference,
+    write_animation,
+    write_stills,
+)
+from tbcad.simulate.quality import likeness
+
+RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
+
+
+def test_stills_are_read_back_and_repeat(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    files = [tmp_path / "one.png", tmp_path / "two.png"]
+    write_stills({files[0]: noise, files[1]: noise})
+    assert np.array_equal(np.asarray(Image.open(files[0])), noise)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "two.png"]
+
+
+@pytest.mark.parametrize("suffix", ANIMATED)
+def test_films_go_there_and_back(tmp_path: Path, suffix: str) -> None:
+    frames = [np.full((24, 32, 3), level, dtype=np.uint8) for level in (0, 80, 160, 240)]
+    file = tmp_path / f"film{suffix}"
+    write_animation(file, frames)
+    with Image.open(file) as film:
+        levels = [np.asarray(f.convert("RGB"))[0, 0, 0] for f in ImageSequence.Iterator(film)]
+    assert levels == [0, 80, 160, 240, 160, 80]
+
+
+def test_pictures_beside_each_other() -> None:
+    sheet = beside({"red": RED, "blue": BLUE})
+    assert (sheet[-1, 0] == [255, 0, 0]).all()
+    assert (sheet[-1, -1] == [0, 0, 255]).all()
+    assert sheet.shape[1] > 64
+
+
+def test_difference_has_no_sign() -> None:
+    assert (difference(RED, BLUE) == [255, 0, 255]).all()
+    assert np.array_equal(difference(RED, BLUE), difference(BLUE, RED))
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "folder.png"])
+def test_places_that_cannot_be(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(InputError, match=name):
+        check_place(tmp_path / name)
+
+
+def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
+    old = tmp_path / "b.png"
+    write_stills({old: RED})
+    before = old.read_bytes()
+    with pytest.raises((InputError, TypeError)):
+        write_stills({old: BLUE, tmp_path / "c.png": np.zeros((3, 3, 7), dtype=np.uint8)})
+    assert old.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+def test_equal_pictures_are_alike() -> None:
+    same = likeness(RED, RED)
+    assert same.ssim == pytest.approx(1)
+    assert same.psnr_db == float("inf")
+
+
+def test_psnr_in_closed_form() -> None:
+    """An error of 10 everywhere: 10 log10(255^2 / 100)."""
+    grey = np.full((24, 32, 3), 100, dtype=np.uint8)
+    assert likeness(grey, grey + np.uint8(10)).psnr_db == pytest.approx(28.1308, abs=1e-4)
+    assert likeness(grey, grey + np.uint8(10)).ssim < 1
+
+
+def test_ssim_of_even_pictures_in_closed_form() -> None:
+    """Without texture only the luminance term is left (Wang and others, eq. 6)."""
+    one, other = (np.full((24, 32, 3), level, dtype=np.uint8) for level in (100, 140))
+    c1 = (0.01 * 255) ** 2
+    expected = (2 * 100 * 140 + c1) / (100**2 + 140**2 + c1)
+    assert likeness(one, other).ssim == pytest.approx(expected)

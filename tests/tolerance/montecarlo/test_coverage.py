@@ -1,0 +1,136 @@
+"""What the fast model makes of one half; tests/validation holds it against other means."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import Design, design
+from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.reflector import pixels_of, reflectors
+from tbcad.spec.design import load_spec
+from tbcad.tolerance.montecarlo.coverage import coverage, seen, virtual
+from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
+from tests.tolerance.exact_builds import surrounded
+
+Halves = tuple[Nominal, Nominal]
+
+
+def none(halves: Halves, machines: int = 1) -> tuple[Draws, Draws]:
+    return draw(Errors(), 1, range(machines), len(halves[0]))
+
+
+def test_virtual_cameras_share_halved_mirrors(halves: Halves) -> None:
+    which, m = virtual(halves), len(halves[0])
+    halved = halves[0].halved
+    assert len(np.unique(which)) == which.max() + 1 == 2 * m - halved.sum() == 193
+    assert np.array_equal(which[:m], np.arange(m))
+    assert np.array_equal(which[m:][halved], np.flatnonzero(halved))
+    assert (which[m:][~halved] >= m).all()
+
+
+def test_pixels_are_those_that_are_counted(small_design: Design) -> None:
+    """Against one exact ray a pixel, for mirrors whose picture lies inside the frame."""
+    a, _ = reflectors(small_design)
+    half = nominal(a)
+    area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+    numbers = exact(a)(range(a.view.height_px), (0.0, 0.0)).mirror
+    count = np.bincount(numbers.ravel(), minlength=len(half) + 1)[1:]
+    box = a.boxes()
+    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < a.view.width_px)
+    inside &= box[:, 3] < a.view.height_px
+    # Of the pixels on the border, as many as the root of the area, half of one each is uncertain.
+    assert inside.sum() > 60
+    assert np.abs(area - count)[inside] == pytest.approx(0, abs=0.5 * np.sqrt(count.max()))
+
+
+def test_pixels_are_the_area_of_the_outline(small_design: Design) -> None:
+    """To a millionth of a polygon with 512 corners on every edge."""
+    a, b = reflectors(small_design)
+    for at in (a, b):
+        half, (offsets, sides) = nominal(at), at.cells.rings
+        t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
+        t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
+        edge = pixels_of(
+            at.view, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
+        )
+        area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+        for k, (first, last) in enumerate(pairwise(offsets)):
+            x, y = edge[first:last].reshape(-1, 2).T
+            polygon = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+            assert area[k] == pytest.approx(polygon, rel=1e-6)
+
+
+def test_longer_focal_length_makes_larger_pictures(halves: Halves) -> None:
+    draws = none(halves)[0]
+    longer = replace(draws, focal=np.array([1.01]))
+    ratio = seen(halves[0], longer).pixels / seen(halves[0], draws).pixels
+    assert ratio == pytest.approx(1.01**2, rel=1e-12)
+
+
+def test_facets_cost_what_they_cost(halves: Halves) -> None:
+    whole, _ = coverage(halves, none(halves))
+    less, _ = coverage(halves, draw(Errors(facets=Error(0, 0.4)), 1, range(1), len(halves[0])))
+    assert whole - less == pytest.approx(0.4, abs=1e-12)
+
+
+def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: Halves) -> None:
+    a, b = none(halves)
+    shrunk = replace(b, radius=np.where(halves[1].halved, 0.2, 0.0)[None])
+    both, pixels = coverage(halves, (a, shrunk))
+    one, other = seen(halves[0], a), seen(halves[1], shrunk)
+    halved = halves[0].halved
+    lesser = (other.diameter < one.diameter)[0, halved]
+    assert 0 < lesser.sum() < halved.sum()
+    least = np.where(lesser, other.diameter[0, halved], one.diameter[0, halved])
+    assert np.array_equal(both[0, : len(halved)][halved], least)
+    together = (one.pixels + other.pixels)[0, halved]
+    assert pixels[0, : len(halved)][halved] == pytest.approx(together, rel=1e-12)
+
+
+def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: Halves) -> None:
+    """Its sphere moved back behind theirs, it has no cell."""
+    lost = int(np.flatnonzero(~halves[0].halved)[10])
+    a, b = none(halves)
+    centre = np.zeros_like(a.centre)
+    centre[0, lost] = -5 * halves[0].table[lost, 3:6]
+    sees, pixels = coverage(halves, (replace(a, centre=centre), b))
+    assert (sees[0, lost], pixels[0, lost]) == (0, 0)
+    assert np.delete(sees[0], lost).min() > 0
+
+
+@pytest.mark.parametrize(("shift", "all_look"), [(3.0, True), (45.0, False), (60.0, False)])
+def test_mirror_that_looks_past_the_object_sees_nothing(
+    halves: Halves, small_design: Design, shift: float, all_look: bool
+) -> None:
+    """Its rays may miss the middle by far and yet not surround it."""
+    a, _ = none(halves)
+    moved = replace(a, camera_shift=np.array([[0.0, shift, 0.0]]))
+    one, whole = seen(halves[0], moved), ~halves[0].halved
+    wanted = surrounded(small_design.halves[0], moved.camera_shift[0])
+    assert np.array_equal(one.passes[0, whole] % 2 == 1, wanted[whole])
+    assert wanted[whole].all() == all_look
+
+
+def test_errors_larger_than_a_mirror_are_refused(halves: Halves) -> None:
+    draws = draw(Errors(sphere_radius=Error(0, -1e3)), 1, range(1), len(halves[0]))
+    with pytest.raises(InputError, match=r"sphere_radius_um.*make the errors smaller"):
+        coverage(halves, draws)
+
+
+def test_no_machines(halves: Halves) -> None:
+    diameter, pixels = coverage(halves, none(halves, 0))
+    assert diameter.shape == pixels.shape == (0, 193)
+
+
+def test_planar_mirrors_with_a_thick_coat_move_and_stay_planar() -> None:
+    """Their cells are cut by straight edges; all moved along their normals they stay alike."""
+    flat = design(load_spec(None, ["n=4", "radius_rule=flat"]))
+    a, b = (nominal(at) for at in reflectors(flat))
+    bare, _ = coverage((a, b), draw(Errors(), 1, range(1), len(a)))
+    coated, _ = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
+    assert bare[0, : len(a)] == pytest.approx(flat.halves[0].coverage, abs=1e-5)
+    assert 0 < np.abs(coated - bare).max() < 1

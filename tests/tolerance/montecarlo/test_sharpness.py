@@ -1,0 +1,230 @@
+"""Pictures of machines that are off: where their mirrors are, and what calibration gives back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tbcad.mirrors.array import Design, design
+from tbcad.optics.camera import View
+from tbcad.simulate.scene.object import built_in
+from tbcad.simulate.scene.rays import exact, reflected
+from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.shading import Scene, scene_of
+from tbcad.simulate.scene.viewpoint import viewpoint
+from tbcad.simulate.study.views import truths
+from tbcad.spec.design import load_spec
+from tbcad.tolerance.montecarlo.coverage import seen
+from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo.edge_model import nominal
+from tbcad.tolerance.montecarlo.pointing import pointing
+from tbcad.tolerance.montecarlo.sharpness import AsMade, Sharpness, Wanted, actual, sharpness
+
+CAPTURE_MM = 60.0
+SIZE = (160, 120)
+# All that a sphere stays a sphere under, and large: cells move by a tenth of their width.
+LARGE = Errors(
+    sphere_centre=Error(0.3),
+    sphere_radius=Error(0.1),
+    scale_isotropic=Error(0.01),
+    shell_shift=Error(0.4),
+    shell_tilt=Error(5e-3),
+    camera_shift=Error(0.4),
+    camera_tilt=Error(5e-3),
+    camera_focal=Error(5e-3),
+)
+
+
+@pytest.fixture(scope="module")
+def little() -> Design:
+    return design(load_spec(None, ["n=4", "camera.width_px=416", "camera.height_px=310"]))
+
+
+@pytest.fixture(scope="module")
+def cameras(little: Design) -> tuple[Reflector, Reflector]:
+    return reflectors(little)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return scene_of(built_in(CAPTURE_MM))
+
+
+@pytest.fixture(scope="module")
+def wanted(scene: Scene) -> Wanted:
+    places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
+    views: list[View] = [viewpoint(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places]
+    return Wanted(CAPTURE_MM, views, truths(scene, views, lambda _: None))
+
+
+def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
+    return draw(errors, 5, range(count), len(cameras[0]))
+
+
+def numbers(at: Reflector) -> np.ndarray:
+    return exact(at)(range(at.view.height_px), (0.0, 0.0)).mirror
+
+
+class WholeFrame(AsMade):
+    """Looks for every mirror in the whole picture."""
+
+    def boxes(self) -> np.ndarray:
+        return np.tile([0, self.view.width_px, 0, self.view.height_px], (len(self), 1))
+
+
+class OwnCells(AsMade):
+    """Looks for mirrors no farther than about their designed cells."""
+
+    def boxes(self) -> np.ndarray:
+        return Reflector.boxes(self)
+
+
+class TestActual:
+    @pytest.mark.parametrize("side", [0, 1])
+    def test_without_errors_it_is_the_designed_one(
+        self, cameras: tuple[Reflector, Reflector], side: int
+    ) -> None:
+        at, drawn = cameras[side], machines(cameras, Errors())[side]
+        made = actual(at, drawn, 0)
+        for name in ("apex", "normal", "curvature"):
+            close = pytest.approx(getattr(at.mirrors, name), abs=1e-12)
+            assert getattr(made.mirrors, name) == close
+        assert made.view.hfov == pytest.approx(at.view.hfov, abs=1e-14)
+        assert np.array_equal(numbers(made), numbers(at))
+
+    @pytest.mark.parametrize("side", [0, 1])
+    def test_spheres_are_where_draws_say(
+        self, cameras: tuple[Reflector, Reflector], side: int
+    ) -> None:
+        """A point x comes to lie at R (scale x) + shift (tbcad.tolerance.montecarlo.draws)."""
+        at, drawn = cameras[side], machines(cameras, LARGE, 2)[side]
+        made = actual(at, drawn, 1)
+        scale, turn = drawn.scale[1, 0], Rotation.from_rotvec(drawn.shell_tilt[1])
+        centre = at.mirrors.apex - at.mirrors.normal / at.mirrors.curvature[:, None]
+        moved = turn.apply(scale * (centre + drawn.centre[1])) + drawn.shell_shift[1]
+        now = made.mirrors.apex - made.mirrors.normal / made.mirrors.curvature[:, None]
+        assert now == pytest.approx(moved, abs=1e-9)
+        radius = scale * (1 / at.mirrors.curvature + drawn.radius[1])
+        assert 1 / made.mirrors.curvature == pytest.approx(radius, rel=1e-12)
+
+    def test_camera_is_where_draws_say(self, cameras: tuple[Reflector, Reflector]) -> None:
+        at, drawn = cameras[0], machines(cameras, LARGE)[0]
+        view = actual(at, drawn, 0).view
+        assert np.array_equal(view.pinhole, at.view.pinhole + drawn.camera_shift[0])
+        angle = np.linalg.norm(drawn.camera_tilt[0])
+        axis = drawn.camera_tilt[0] / angle
+        for new, old in ((view.forward, at.view.forward), (view.right, at.view.right)):
+            along = axis * (axis @ old)
+            turned = along + np.cos(angle) * (old - along) + np.sin(angle) * np.cross(axis, old)
+            assert new == pytest.approx(turned, abs=1e-12)
+        longer = np.tan(at.view.hfov / 2) / np.tan(view.hfov / 2)
+        assert longer == pytest.approx(drawn.focal[0], rel=1e-12)
+        assert drawn.focal[0] != 1
+
+    def test_pixels_are_those_of_the_fast_model(self, cameras: tuple[Reflector, Reflector]) -> None:
+        """One ray a pixel against areas of outlines; of the border half a pixel is uncertain."""
+        both, compared = machines(cameras, LARGE, 3), 0
+        for at, drawn in zip(cameras, both, strict=True):
+            area = seen(nominal(at), drawn).pixels
+            for k in range(3):
+                made = actual(at, drawn, k)
+                count = np.bincount(numbers(made).ravel(), minlength=len(at) + 1)[1:]
+                box, view = made.boxes(), made.view
+                inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
+                inside &= box[:, 3] < view.height_px
+                close = pytest.approx(area[k][inside], abs=0.5 * np.sqrt(count.max()))
+                assert count[inside] == close
+                compared += int(inside.sum())
+        assert compared > 60
+
+    def test_rays_are_off_as_the_fast_model_says(
+        self, cameras: tuple[Reflector, Reflector]
+    ) -> None:
+        """The pixels that should show the apices, seen by the made camera off the made mirrors."""
+        for at, drawn in zip(cameras, machines(cameras, LARGE), strict=True):
+            made, m = actual(at, drawn, 0), len(at)
+            ray = at.mirrors.apex - at.view.pinhole
+            old, new = (_axes(view) for view in (at.view, made.view))
+            way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
+            mirror = np.arange(1, m + 1, dtype=np.int32)[None]
+            rays = reflected(made.view.pinhole, way[None], made.mirrors, mirror)
+            missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
+            offset = pointing(nominal(at), drawn).offset[0]
+            assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
+            assert missed.min() > 0.01
+
+
+def _axes(view: View) -> np.ndarray:
+    return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
+
+
+def test_boxes_hold_all_pixels(cameras: tuple[Reflector, Reflector]) -> None:
+    """As if every mirror were looked for everywhere; the designed cells would lose some."""
+    lost = 0
+    for at, drawn in zip(cameras, machines(cameras, LARGE, 3), strict=True):
+        for k in range(3):
+            made = actual(at, drawn, k)
+            parts = (made.camera, made.view, made.u, made.cells, made.surfaces)
+            everywhere = numbers(WholeFrame(*parts))
+            assert np.array_equal(numbers(made), everywhere)
+            lost += int((numbers(OwnCells(*parts)) != everywhere).sum())
+    assert lost > 0
+
+
+class TestSharpness:
+    @staticmethod
+    def found(
+        cameras: tuple[Reflector, Reflector],
+        scene: Scene,
+        wanted: Wanted,
+        errors: Errors,
+        left: float = 0.0,
+    ) -> Sharpness:
+        return sharpness(cameras, machines(cameras, errors, 2), scene, wanted, left)
+
+    def test_without_errors_all_are_the_designed_one(
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+    ) -> None:
+        """But for rounding in the last digit of a ray that decides between two pixels."""
+        found = self.found(cameras, scene, wanted, Errors())
+        assert found.designed.shape == (2,)
+        assert found.uncalibrated.shape == found.calibrated.shape == (2, 2)
+        for table in (found.uncalibrated, found.calibrated):
+            assert table == pytest.approx(np.tile(found.designed, (2, 1)), abs=1e-4)
+        assert 0.5 < found.designed.min() < found.designed.max() < 1
+
+    def test_calibration_gives_back_what_errors_cost(
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+    ) -> None:
+        found = self.found(cameras, scene, wanted, LARGE, 0.5e-3)
+        assert (found.uncalibrated < found.calibrated).all()
+        assert (found.uncalibrated < found.designed).all()
+        lost = found.designed - found.uncalibrated
+        assert (np.abs(found.calibrated - found.designed) < lost / 2).all()
+
+    def test_what_calibration_leaves_counts(
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+    ) -> None:
+        exactly, roughly = (
+            self.found(cameras, scene, wanted, Errors(), left) for left in (0.0, 0.02)
+        )
+        assert (roughly.calibrated < exactly.calibrated - 0.01).all()
+        assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
+
+    def test_same_machines_same_figures(
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+    ) -> None:
+        one, two = (self.found(cameras, scene, wanted, LARGE, 1e-3) for _ in range(2))
+        assert np.array_equal(one.calibrated, two.calibrated)
+        assert np.array_equal(one.uncalibrated, two.uncalibrated)
+        assert not np.array_equal(one.calibrated[0], one.calibrated[1])
+
+    def test_each_machine_is_told(
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+    ) -> None:
+        told: list[str] = []
+        drawn: tuple[Draws, Draws] = machines(cameras, Errors(), 2)
+        one = replace(wanted, views=wanted.views[:1], truths=wanted.truths[:1])
+        sharpness(cameras, drawn, scene, one, 0.0, progress=told.append)
+        assert told == ["machine 1 of 2", "machine 2 of 2"]

@@ -1,0 +1,296 @@
+"""The answer says what the figures say, in words, tables and JSON alike."""
+
+import csv
+import io
+import json
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import Design, design
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.simulate.study.record import contents_of
+from tbcad.simulate.study.tables import SUMMARY
+from tbcad.spec.design import load_spec
+from tbcad.tolerance.analysis import Analysis, Choice, Stands, Wishes
+from tbcad.tolerance.margin import Margin
+from tbcad.tolerance.montecarlo.builds import Task, Yield, simulate, yielded
+from tbcad.tolerance.montecarlo.draws import Error, Errors
+from tbcad.tolerance.montecarlo.edge_model import nominal
+from tbcad.tolerance.montecarlo.sensitivity import Alone
+from tbcad.tolerance.montecarlo.sharpness import Sharpness
+from tbcad.tolerance.process.process import load_process
+from tbcad.tolerance.prototype.builds import PrototypeResult
+from tbcad.tolerance.report import document, json_text, study, words
+
+MACHINES, TARGET = 25, 60.0
+ALONE = (
+    Alone("sphere_centre", 1.25, 1.75, 0.375),
+    Alone("facets", 0.36, 0.36, 1.5),
+    Alone("camera_tilt", 0.0, 0.0, math.inf),
+)
+CHOICES = (
+    Choice("fdm", Yield(0.0, 0.0, 0.04), Margin(None, 0.2, "it would need more than 20 mm")),
+    Choice("sla", Yield(0.25, 0.2, 0.3), Margin(3.71, 0.99)),
+    Choice("diamond", Yield(1.0, 0.96, 1.0), Margin(0.56, 0.99)),
+)
+SHARP = Sharpness(np.array([0.9, 0.8]), np.array([[0.7, 0.6]]), np.array([[0.84, 0.74]]))
+
+
+@pytest.fixture(scope="module")
+def little() -> Design:
+    return design(load_spec(None, ["n=4"]))
+
+
+@pytest.fixture(scope="module")
+def found(little: Design) -> Analysis:
+    """Real machines, some good and some not; all else made up."""
+    cameras = reflectors(little)
+    halves = nominal(cameras[0]), nominal(cameras[1])
+    errors = Errors(sphere_centre=Error(0.012))
+    return Analysis(
+        process=load_process("sla"),
+        wishes=Wishes(machines=MACHINES, seed=4),
+        target=TARGET,
+        cameras=cameras,
+        halves=halves,
+        result=simulate(Task(halves, errors, 4), MACHINES),
+        alone=ALONE,
+        choices=CHOICES,
+        margin=CHOICES[1].margin,
+        sharpness=SHARP,
+        stands=None,
+    )
+
+
+def stands(plain: float, known: float, offset: float = 2.0) -> Stands:
+    """Ten prototypes each, the shares of which are good."""
+
+    def result(share: float) -> PrototypeResult:
+        coverage = np.where(np.arange(10) < round(10 * share), 61.0, 59.0)
+        return PrototypeResult(coverage[:, None], np.full((10, 3), offset))
+
+    return Stands(result(plain), result(known))
+
+
+def rows_of(found: Analysis, name: str) -> list[dict[str, str]]:
+    text = contents_of(study(found))[f"tolerance-{name}.csv"].decode()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def percent(pattern: str, text: str) -> float:
+    return float(re.findall(pattern + r"([\d.]+)%", text)[0])
+
+
+class TestWords:
+    def test_machines(self, found: Analysis) -> None:
+        said, worst = words(found), found.result.worst
+        share = yielded(worst, TARGET)
+        assert 0 < share.share < 1
+        assert percent(r"^Made by sla \(.*?\), ", said) == pytest.approx(
+            100 * share.share, abs=0.05
+        )
+        low, high = 100 * share.low, 100 * share.high
+        assert f"({low:.1f}% to {high:.1f}%) of the machines see 60 mm" in said
+        assert f"sees {np.median(worst):.2f} mm (median" in said
+        assert f"1 % see less than {np.quantile(worst, 0.01):.2f})" in said
+
+    def test_worst_kind_of_error(self, found: Analysis) -> None:
+        assert (
+            "Most is lost by sphere centre: 1.25 mm by itself; alone it may be 0.38 times"
+            in words(found)
+        )
+
+    def test_nothing_is_lost(self, found: Analysis) -> None:
+        harmless = words(replace(found, alone=ALONE[2:]))
+        assert "camera tilt: 0.00 mm by itself; harmless." in harmless
+        assert "times" not in harmless
+        assert "lost" not in words(replace(found, alone=()))
+
+    def test_design_that_falls_short(self, found: Analysis) -> None:
+        said = words(replace(found, alone=(replace(ALONE[0], times=0.0),)))
+        assert "the design itself falls short" in said
+        assert "may be" not in said
+
+    def test_margin(self, found: Analysis) -> None:
+        said = words(found)
+        command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
+        assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
+        assert "No margin" not in said
+
+    def test_no_margin(self, found: Analysis) -> None:
+        said = words(replace(found, margin=CHOICES[0].margin))
+        assert "No margin was found that makes it do: it would need more than 20 mm." in said
+        assert "A margin of" not in said
+
+    def test_processes(self, found: Analysis) -> None:
+        assert (
+            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
+            "none was found for fdm."
+        ) in words(found)
+        every = words(replace(found, choices=CHOICES[1:]))
+        assert "diamond with 0.56 mm." in every
+        assert "none" not in every
+        none = words(replace(found, choices=CHOICES[:1]))
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
+
+    def test_pictures(self, found: Analysis) -> None:
+        assert (
+            "SSIM 0.850 as designed, 0.650 taken for the designed machine, 0.790 once calibrated."
+            in words(found)
+        )
+
+    def test_prototype(self, found: Analysis) -> None:
+        assert "Prototype" not in words(found)
+        said = words(replace(found, stands=stands(0.0, 0.7)))
+        assert percent("Prototype: ", said) == 0
+        assert percent("without calibration, ", said) == 70
+
+    @pytest.mark.parametrize(("wanted", "text"), [(0.995, "99.5%"), (0.999, "99.9%")])
+    def test_wanted_yield_is_told_as_it_was_asked(
+        self, found: Analysis, wanted: float, text: str
+    ) -> None:
+        """100 % is not 99.9 %."""
+        said = words(replace(found, wishes=replace(found.wishes, wanted=wanted)))
+        assert f"Margins needed for {text}:" in said
+
+    def test_changed_process_is_not_advised_under_the_old_name(self, found: Analysis) -> None:
+        """The built-in process of that name would get another margin."""
+        changed = load_process("sla", ["sphere_radius_um=0"])
+        said = words(replace(found, process=changed, margin=Margin(1.82, 0.99)))
+        assert "--for-process sla --yield" not in said
+
+
+class TestJson:
+    def test_says_what_was_found(self, found: Analysis) -> None:
+        read = json.loads(json_text(found))
+        worst = found.result.worst
+        assert read["schema"] == "tbcad-tolerance/1"
+        assert read["words"] == words(found)
+        assert (read["machines"], read["seed"], read["target_mm"]) == (MACHINES, 4, TARGET)
+        assert read["yield"]["share"] == (worst >= TARGET).mean()
+        assert read["worst_camera_mm"]["0.5"] == np.median(worst)
+        assert read["margin_needed_mm"] == 3.71
+        assert [one["name"] for one in read["processes"]] == ["fdm", "sla", "diamond"]
+        assert read["processes"][0]["margin_needed_mm"] is None
+        assert read["ssim"]["calibration_leaves_mrad"] == 0.5
+        assert read["prototype"] is None
+
+    def test_pointing(self, found: Analysis) -> None:
+        told, offset = document(found)["pointing_mm"], found.result.offset
+        assert told["rms"] == pytest.approx(np.linalg.norm(offset) / np.sqrt(offset.size))
+        assert told["largest_median"] == np.median(offset.max(axis=1))
+        some = offset.copy()
+        some[::2, 3] = np.nan  # rays that pass their mirrors by
+        patchy = replace(found, result=replace(found.result, offset=some))
+        assert 0 < json.loads(json_text(patchy))["pointing_mm"]["rms"] < offset.max()
+
+    def test_what_may_be_anything_has_no_number(self, found: Analysis) -> None:
+        assert not re.search("NaN|Infinity", json_text(found))
+        told = {one["kind"]: one["may_be_times"] for one in json.loads(json_text(found))["alone"]}
+        assert told == {"sphere_centre": 0.375, "facets": 1.5, "camera_tilt": None}
+
+    def test_prototype(self, found: Analysis) -> None:
+        read = json.loads(json_text(replace(found, stands=stands(0.1, 0.7))))["prototype"]
+        assert read["uncalibrated"]["yield"]["share"] == 0.1
+        assert read["calibrated"]["yield"]["share"] == 0.7
+        assert read["calibrated"]["pointing_rms_mm"] == 2
+        assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
+
+    def test_prototype_whose_windows_miss_balls(self, found: Analysis) -> None:
+        """Its pointing error is infinite (tbcad.tolerance.prototype.windows.seen)."""
+        lost = replace(found, stands=stands(0.0, 0.0, math.inf))
+        json.loads(json_text(lost))
+
+    def test_same_bytes(self, found: Analysis) -> None:
+        assert json_text(found) == json_text(replace(found))
+        one, two = contents_of(study(found)), contents_of(study(found))
+        assert one == two
+        assert one["tolerance.png"].startswith(b"\x89PNG")
+
+
+class TestTables:
+    def test_summary(self, found: Analysis) -> None:
+        table = study(found).summary
+        assert table.columns == SUMMARY
+        assert words(found) in table.notes
+        told = {str(row[0]): row[2] for row in table.rows}
+        read: dict[str, Any] = document(found)
+        assert told["good machines"] == 100 * read["yield"]["share"]
+        assert told["worst camera, median"] == read["worst_camera_mm"]["0.5"]
+        assert told["worst camera, 1 % see less"] == read["worst_camera_mm"]["0.01"]
+        assert told["margin needed"] == 3.71
+        for one in read["alone"]:
+            kind = one["kind"].replace("_", " ")
+            assert told[f"loss by {kind} alone"] == one["loss_mm"]
+        for one in read["processes"]:
+            assert told[f"good machines by {one['name']}"] == 100 * one["yield"]["share"]
+
+    def test_machines(self, found: Analysis) -> None:
+        rows, result = rows_of(found, "machines"), found.result
+        assert [int(row["machine"]) for row in rows] == list(range(MACHINES))
+        assert [float(row["worst_coverage_mm"]) for row in rows] == result.worst.tolist()
+        for k, row in enumerate(rows):
+            at = result.coverage[k, int(row["worst_camera"])]
+            assert at == float(row["worst_coverage_mm"])
+        squares = [float(row["pointing_rms_mm"]) ** 2 for row in rows]
+        assert np.mean(squares) == pytest.approx(document(found)["pointing_mm"]["rms"] ** 2)
+
+    def test_sensitivity(self, found: Analysis) -> None:
+        rows = rows_of(found, "sensitivity")
+        names = ["sphere_centre_um", "facets_mm", "camera_tilt_mrad"]
+        assert [row["kind"] for row in rows] == names
+        for row, one, key in zip(rows, document(found)["alone"], names, strict=True):
+            assert float(row["loss_mm"]) == one["loss_mm"]
+            assert float(row["tail_mm"]) == one["tail_mm"]
+            assert float(row["magnitude"]) == getattr(found.process, key).magnitude
+            times = one["may_be_times"]
+            assert row["may_be_times"] == ("" if times is None else str(times))
+        assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
+        # Facets of sla: 0.36 mm in every machine and no spread; 1.5 times that is no zero.
+        may = [(row["may_be_magnitude"], row["may_be_mean"]) for row in rows]
+        assert may == [(str(0.375 * 25), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
+
+    def test_processes(self, found: Analysis) -> None:
+        for row, one in zip(rows_of(found, "processes"), document(found)["processes"], strict=True):
+            assert row["process"] == one["name"]
+            assert float(row["yield"]) == one["yield"]["share"]
+            assert float(row["yield_low"]) == one["yield"]["low"]
+            assert float(row["yield_high"]) == one["yield"]["high"]
+            margin = one["margin_needed_mm"]
+            assert row["margin_needed_mm"] == ("" if margin is None else str(margin))
+            assert row["reason"] == one["reason"]
+
+    def test_cameras(self, found: Analysis, little: Design) -> None:
+        rows, coverage = rows_of(found, "cameras"), found.result.coverage
+        assert len(rows) == coverage.shape[1]
+        short = [float(row["share_short"]) for row in rows]
+        assert short == (coverage < TARGET).mean(axis=0).tolist()
+        assert max(short) > 0
+        median = [float(row["median_mm"]) for row in rows]
+        assert median == np.median(coverage, axis=0).tolist()
+        assert all(float(row["five_percent_mm"]) < float(row["median_mm"]) for row in rows)
+        u = np.array([[float(row[name]) for name in ("ux", "uy", "uz")] for row in rows])
+        assert np.linalg.norm(u, axis=1) == pytest.approx(1, abs=1e-12)
+        assert np.array_equal(u[: len(little.halves[0])], found.cameras[0].u)
+        # One for each direction of both halves.
+        every = np.concatenate([at.u for at in found.cameras])
+        apart = np.linalg.norm(every[:, None] - u, axis=2)
+        assert apart.min(axis=1) == pytest.approx(0, abs=1e-9)
+        assert (np.linalg.norm(u[:, None] - u, axis=2) + np.eye(len(u))).min() > 0.1
+
+    def test_plot_has_a_bar_for_each_kind(self, found: Analysis) -> None:
+        curve, bars, sky = study(found).panels
+        assert curve.series[0].y[0] == 100
+        reached = np.interp(TARGET, curve.series[0].x, curve.series[0].y)
+        step = 100 / MACHINES
+        assert reached == pytest.approx(100 * found.yielded.share, abs=step + 1e-9)
+        assert bars.names == ("sphere centre", "facets", "camera tilt")
+        assert bars.series[0].x.tolist() == [1.25, 0.36, 0]
+        away = np.hypot(sky.series[0].x, sky.series[0].y)
+        u = np.concatenate([at.u for at in found.cameras])
+        assert away.max() == pytest.approx(np.degrees(np.arccos(u[:, 2].min())), abs=1e-9)

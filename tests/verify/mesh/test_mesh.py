@@ -1,0 +1,118 @@
+"""Closed forms and known faults: boxes, not mirrors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from tbcad_verify.mesh.mesh import Topology, distinct, examine, joined, merge
+from tbcad_verify.mesh.stl import Facets, parse
+from tbcad_verify.record.files import Blob
+
+from tests.verify.synthetic_export import stl
+
+BOX = trimesh.creation.box((2, 3, 5))
+
+
+def facets(triangles: np.ndarray) -> Facets:
+    data = np.frombuffer(stl(np.asarray(triangles, np.float32)), np.uint8)
+    return parse(Blob("x.stl", data, ""))
+
+
+def found(triangles: np.ndarray) -> Topology:
+    one = facets(triangles)
+    return examine(merge(one), one)
+
+
+def test_a_box_is_a_solid() -> None:
+    box = found(BOX.triangles)
+    assert box == Topology(0, 0, 0, 0, 0, 0, 1, box.volume, "NoError")
+    assert box.volume == pytest.approx(30)
+
+
+def test_volume_far_from_the_origin_keeps_its_digits() -> None:
+    assert found(BOX.triangles + 4096).volume == pytest.approx(30, rel=1e-12)
+
+
+def test_a_hole_leaves_three_open_edges() -> None:
+    box = found(BOX.triangles[1:])
+    assert box.open_edges == 3
+    assert box.status != "NoError"
+
+
+def test_one_facet_turned() -> None:
+    triangles = BOX.triangles.copy()
+    triangles[0] = triangles[0][::-1]
+    assert found(triangles).turned_edges == 3
+
+
+def test_inside_out() -> None:
+    assert found(BOX.triangles[:, ::-1]).volume == pytest.approx(-30)
+
+
+def test_stored_normals_that_lie_are_counted() -> None:
+    one = facets(BOX.triangles)
+    lying = Facets(one.name, -one.normals, one.corners)
+    assert examine(merge(lying), lying).stored_normals == 12
+    silent = Facets(one.name, 0 * one.normals, one.corners)
+    assert examine(merge(silent), silent).stored_normals == 0
+
+
+def test_two_boxes_are_two_pieces() -> None:
+    assert found(np.vstack([BOX.triangles, BOX.triangles + 10])).components == 2
+
+
+def test_an_edge_of_four_facets() -> None:
+    touching = found(np.vstack([BOX.triangles, BOX.triangles + np.array([2, 3, 0])]))
+    assert touching.crowded_edges == 1
+
+
+def test_a_facet_and_its_back_are_doubled() -> None:
+    triangle = BOX.triangles[:1]
+    assert found(np.vstack([triangle, triangle[:, ::-1]])).duplicate == 3
+
+
+def test_facets_without_area() -> None:
+    line = np.array([[[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]])
+    assert found(line).degenerate == 2
+
+
+def test_corners_merge_only_when_equal() -> None:
+    box = BOX.triangles.astype(np.float32)
+    assert len(merge(facets(box)).points) == 8
+    box[0, 0, 0] = np.nextafter(box[0, 0, 0], np.float32(9))
+    assert len(merge(facets(box)).points) == 9
+
+
+def test_minus_zero_is_zero() -> None:
+    box = (BOX.triangles + np.array([1, 0, 0])).astype(np.float32)
+    box[box == 0] = np.where(np.arange((box == 0).sum()) % 2, -0.0, 0.0)
+    assert len(merge(facets(box)).points) == 8
+
+
+def test_merging_equals_numpys_unique_rows() -> None:
+    rng = np.random.default_rng(1)
+    triangles = rng.integers(0, 4, (500, 3, 3)).astype(np.float32)
+    mesh = merge(facets(triangles))
+    assert len(mesh.points) == len(np.unique(triangles.reshape(-1, 3), axis=0))
+    np.testing.assert_array_equal(mesh.points[mesh.faces], triangles)
+
+
+def test_twins_lead_back() -> None:
+    mesh = merge(facets(BOX.triangles))
+    np.testing.assert_array_equal(mesh.twin[mesh.twin], np.arange(36))
+    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    np.testing.assert_array_equal(start[mesh.twin], end)
+
+
+def test_joined_meshes_keep_to_themselves() -> None:
+    one = merge(facets(BOX.triangles))
+    two = joined([one, merge(facets(BOX.triangles + 10))])
+    np.testing.assert_array_equal(two.twin[36:] - 36, one.twin)
+    np.testing.assert_array_equal(two.points[two.faces[12:]], BOX.triangles + 10)
+
+
+def test_distinct_sorts_and_keeps_each_once() -> None:
+    keys = np.random.default_rng(2).integers(0, 50, 1000)
+    np.testing.assert_array_equal(distinct(keys), np.unique(keys))
+    assert distinct(keys[:0]).size == 0

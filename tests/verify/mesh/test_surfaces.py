@@ -1,0 +1,170 @@
+"""Rays on spheres and planes against closed forms; fits against points that lie exactly on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tbcad_verify.mesh.fits import corners, fit
+from tbcad_verify.mesh.mesh import indexed
+from tbcad_verify.mesh.segments import Segments
+from tbcad_verify.mesh.surfaces import Surfaces, bounce, misses, nearest, reflect, seen_from
+from tbcad_verify.mesh.vectors import across, cross, dot, norm, unit
+
+RNG = np.random.default_rng(5)
+
+
+def column(*values: float) -> np.ndarray:
+    return np.array(values, dtype=np.float64)[:, None]
+
+
+def sphere(centre: np.ndarray, radius: float, normal: np.ndarray) -> Surfaces:
+    return Surfaces(centre + radius * normal, normal, np.array([1 / radius]))
+
+
+def test_vectors_agree_with_numpy() -> None:
+    a, b = RNG.normal(size=(2, 3, 50))
+    np.testing.assert_allclose(cross(a, b), np.cross(a.T, b.T).T, atol=1e-15)
+    np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=0), atol=1e-14)
+    frame = np.stack([*across(unit(a)), unit(a)])
+    np.testing.assert_allclose(
+        np.einsum("ijn,kjn->nik", frame, frame), np.eye(3)[None].repeat(50, 0), atol=1e-14
+    )
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.2, 0.5])
+def test_reflection_off_a_sphere_on_the_axis(angle: float) -> None:
+    """Pinhole at height h over a sphere's top: the ray at `angle` from the sphere's axis, seen
+    from its centre, leaves at angle + (angle + view) from the axis."""
+    radius, h = 20.0, 150.0
+    top = sphere(column(0, 0, -radius), radius, column(0, 0, 1))
+    hit = np.array([radius * np.sin(angle), 0, radius * np.cos(angle) - radius])
+    pinhole = np.array([0, 0, h])
+    lines = reflect(seen_from(pinhole, top), np.array([0]), (hit - pinhole)[:, None])
+    np.testing.assert_allclose(lines.point[:, 0], hit, atol=1e-12)
+    view = np.arctan2(hit[0], h - hit[2])
+    out = view + 2 * angle
+    np.testing.assert_allclose(unit(lines.toward)[:, 0], [np.sin(out), 0, np.cos(out)], atol=1e-13)
+    expected = abs(hit[0] * np.cos(out) - hit[2] * np.sin(out))
+    assert misses(lines)[0] == pytest.approx(expected, abs=1e-12)
+    assert lines.reach[0] == pytest.approx(1)
+
+
+def test_reflection_off_a_plane_comes_from_the_mirror_image() -> None:
+    normal = unit(column(1, 2, 3))
+    plane = Surfaces(column(4, 5, 6), normal, np.zeros(1))
+    pinhole = np.array([30.0, 40, 50])
+    image = pinhole - 2 * ((pinhole - [4, 5, 6]) @ normal[:, 0]) * normal[:, 0]
+    d = column(4, 5, 6) + 3 * across(normal)[0] - pinhole[:, None]
+    lines = reflect(seen_from(pinhole, plane), np.array([0]), d)
+    back = unit(lines.point - image[:, None])
+    np.testing.assert_allclose(unit(lines.toward), back, atol=1e-13)
+
+
+def test_nearly_flat_joins_flat_without_a_jump() -> None:
+    pinhole, d = np.array([50.0, 0, 100]), column(-0.5, 0.02, -1)
+    points = []
+    for curvature in (0.0, 1e-14, 1e-10, 1e-7):
+        surface = Surfaces(column(0, 0, 0), column(0, 0, 1), np.array([curvature]))
+        points.append(reflect(seen_from(pinhole, surface), np.array([0]), d).toward)
+    for toward in points[1:]:
+        np.testing.assert_allclose(toward, points[0], atol=1e-5)
+    np.testing.assert_allclose(points[1], points[0], atol=1e-12)
+
+
+def test_a_ray_that_misses_the_sphere_is_nan() -> None:
+    top = sphere(column(0, 0, -1), 1.0, column(0, 0, 1))
+    lines = reflect(seen_from(np.array([0, 0, 9.0]), top), np.array([0]), column(1, 0, -1))
+    assert np.isnan(lines.point).all()
+
+
+def test_nearest_point_is_at_right_angles() -> None:
+    plane = Surfaces(column(1, 2, 3), unit(column(1, 1, 1)), np.zeros(1))
+    lines = reflect(seen_from(np.array([9.0, 8, 7]), plane), np.array([0]), column(-1, -1.1, -0.9))
+    miss = nearest(lines)
+    assert dot(miss, lines.toward)[0] == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(bounce(bounce(miss, plane.normal), plane.normal), miss)
+
+
+def test_coat_lies_above_and_keeps_the_centre() -> None:
+    bare = sphere(column(1, 2, 3), 7.0, unit(column(1, 0, 1)))
+    coated = bare.coated(0.25)
+    np.testing.assert_allclose(coated.centre(), bare.centre(), atol=1e-12)
+    assert 1 / coated.curvature[0] == pytest.approx(7.25)
+    assert bare.height(coated.point)[0] == pytest.approx(0.25)
+
+
+def cap(centre: np.ndarray, radius: float, half: float, count: int = 400) -> np.ndarray:
+    """(N, 3) points on a sphere round its top, within a half width."""
+    r = half * np.sqrt(RNG.random(count))
+    a = 2 * np.pi * RNG.random(count)
+    x, y = r * np.cos(a), r * np.sin(a)
+    turn = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
+    turn[:, 2] *= np.sign(np.linalg.det(turn))
+    return np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=1) @ turn.T + centre
+
+
+def fitted(points: np.ndarray):
+    """Fit one segment whose facets are triples of the points, turned outward."""
+    middle = points.mean(axis=0)
+    order = np.argsort(np.linalg.norm(points - middle, axis=1))[:300].reshape(-1, 3)
+    mesh = indexed(points, np.sort(order, axis=1).astype(np.int32))
+    outward = mesh.area.T @ np.linalg.svd(points - middle)[2][2]
+    faces = np.where((outward < 0)[:, None], mesh.faces[:, ::-1], mesh.faces)
+    mesh = indexed(points, faces)
+    segments = Segments(np.zeros(len(faces), np.int32), 1)
+    return fit(mesh, segments, corners(mesh, segments)), mesh
+
+
+@pytest.mark.parametrize(("radius", "half"), [(7.0, 2.0), (30.0, 3.5), (65.0, 3.5), (400.0, 8.0)])
+def test_exact_points_give_the_exact_sphere(radius: float, half: float) -> None:
+    centre = np.array([60.0, -40, 50])
+    fits, _ = fitted(cap(centre, radius, half))
+    assert abs(1 / fits.surfaces.curvature[0]) == pytest.approx(radius, rel=1e-8)
+    np.testing.assert_allclose(fits.surfaces.centre()[:, 0], centre, rtol=0, atol=1e-6)
+    assert fits.form[0] < 1e-10
+
+
+@pytest.mark.parametrize(("radius", "half"), [(7.0, 2.0), (65.0, 3.5)])
+def test_float32_points_give_it_within_a_micrometre(radius: float, half: float) -> None:
+    centre = np.array([60.0, -40, 50])
+    points = cap(centre, radius, half).astype(np.float32).astype(np.float64)
+    fits, _ = fitted(points)
+    np.testing.assert_allclose(fits.surfaces.centre()[:, 0], centre, rtol=0, atol=1e-3)
+    assert 1e-7 < fits.form[0] < 4e-6
+
+
+def test_a_sphere_grown_by_twenty_micrometres_is_seen() -> None:
+    fits, _ = fitted(cap(np.zeros(3), 30.02, 3.5).astype(np.float32).astype(np.float64))
+    assert abs(1 / fits.surfaces.curvature[0]) == pytest.approx(30.02, abs=1e-3)
+
+
+def test_a_plane_has_no_curvature() -> None:
+    points = RNG.normal(size=(300, 3)) * [4, 3, 0]
+    fits, _ = fitted(points)
+    assert abs(fits.sag[0]) < 1e-9
+    assert abs(fits.surfaces.normal[2, 0]) == pytest.approx(1)
+    assert fits.form[0] < 1e-10
+
+
+def test_four_corners_of_a_square_are_a_plane() -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    mesh = indexed(points, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    segments = Segments(np.zeros(2, np.int32), 1)
+    fits = fit(mesh, segments, corners(mesh, segments))
+    assert abs(fits.sag[0]) < 1e-6
+    np.testing.assert_allclose(fits.surfaces.normal[:, 0], [0, 0, 1], atol=1e-9)
+
+
+def test_form_error_is_what_was_added() -> None:
+    points = cap(np.zeros(3), 30.0, 3.5, 4000)
+    noisy = points * (1 + 2e-3 / 30 * RNG.normal(size=(4000, 1)))
+    fits, _ = fitted(noisy)
+    mesh_points = 300  # only vertices of facets count
+    assert fits.form[0] == pytest.approx(2e-3, rel=4 / np.sqrt(2 * mesh_points))
+
+
+def test_height_is_the_true_distance() -> None:
+    ball = sphere(column(1, 2, 3), 5.0, column(0, 0, 1))
+    x = RNG.normal(size=(3, 20)) * 2 + column(1, 2, 8)
+    many = Surfaces(*(np.repeat(v, 20, axis=-1) for v in (ball.point, ball.normal, ball.curvature)))
+    np.testing.assert_allclose(many.height(x), norm(x - column(1, 2, 3)) - 5, atol=1e-12)

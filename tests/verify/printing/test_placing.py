@@ -1,0 +1,261 @@
+"""Where parts fit, how much they overhang, and what is said of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.vectors import norm
+from tbcad_verify.printing.assess import assess, checks, to_row
+from tbcad_verify.printing.overhang import overhang
+from tbcad_verify.printing.placing import place, words
+from tbcad_verify.printing.profile import Profile, load
+from tbcad_verify.printing.shape import Shape
+from tbcad_verify.printing.turning import turn
+from tbcad_verify.report.checks import passed
+
+from tests.verify.printing.printing_meshes import (
+    box,
+    measured,
+    mesh_of,
+    plate,
+    prism,
+    rectangle,
+    ring,
+    turned,
+    turned_inside_out,
+)
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def shape(*solids: object) -> Shape:
+    return measured(mesh_of(*solids))  # type: ignore[arg-type]
+
+
+@cache
+def fdm(**changed: object) -> Profile:
+    return load("fdm").model_copy(update=changed)
+
+
+def bed(*sides: float, rim: float = 0.0) -> Profile:
+    return fdm(bed_mm=sides, clearance_mm=rim)
+
+
+def area(mesh: Mesh, lean_deg: float, down: np.ndarray = DOWN) -> float:
+    return overhang(mesh, norm(mesh.area), down, math.radians(lean_deg))
+
+
+def test_a_cube_that_fits_only_turned_back() -> None:
+    cube = shape(turned(box(20, 20, 20), 45, (0, 0, 1)))
+    found = place(cube, bed(20, 20, 20))
+    assert found.fits
+    assert found.pose.size == pytest.approx([20, 20, 20], abs=1e-4)
+    assert not place(cube, bed(19.9, 20, 20)).fits
+
+
+def test_a_long_plate_fits_only_diagonally() -> None:
+    """Turned by t, l x w needs l cos t + w sin t both ways at 45 degrees: (l + w) / sqrt 2."""
+    strip = shape(box(110, 10, 3))  # the room is too low for it to stand on its side
+    side = 120 / math.sqrt(2)
+    found = place(strip, bed(side + 0.01, side + 0.01, 3.01))
+    assert found.fits
+    assert found.pose.size == pytest.approx([side, side, 3], abs=1e-4)
+    assert "turned" in words(found.pose)
+    missed = place(strip, bed(side - 0.5, side - 0.5, 3.01))
+    assert not missed.fits
+    assert missed.pose.excess == pytest.approx(0.5, abs=1e-4)
+
+
+@pytest.mark.parametrize("degrees", [20, 30, 60])
+def test_a_long_plate_fits_an_oblong_bed_at_one_angle(degrees: float) -> None:
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    sides = 110 * cos + 10 * sin, 110 * sin + 10 * cos
+    found = place(shape(box(110, 10, 3)), bed(*sides, 3.01))
+    assert found.fits
+    assert found.pose.size == pytest.approx([*sides, 3], abs=1e-3)
+
+
+def test_a_cube_that_stands_on_a_corner_is_laid_down() -> None:
+    cube = shape(turned(box(20, 20, 20), 33, (1, 2, 3)))
+    assert place(cube, bed(20, 20, 20)).fits
+
+
+def test_a_rod_fits_only_tilted() -> None:
+    """Longer than the diagonal of the bed, shorter than that of the room above it."""
+    found = place(shape(box(160, 2, 2)), bed(100, 100, 100))
+    assert found.fits
+    assert np.abs(found.pose.down).max() < 0.9
+
+
+def test_the_rim_is_kept_free() -> None:
+    plate = shape(box(99, 99, 5))
+    assert place(plate, bed(100, 100, 6, rim=0.5)).fits
+    assert not place(plate, bed(100, 100, 6, rim=0.6)).fits
+
+
+def test_how_much_too_large() -> None:
+    found = place(shape(box(50, 40, 30)), bed(45, 45, 45, rim=0.5))
+    assert not found.fits
+    # Upright 50 is 5 too high. Lying diagonally 30 x 50 needs 56.6, and 30 x 40 stands in 44 x 44.
+    assert found.pose.excess == pytest.approx(5, abs=1e-4)
+
+
+def test_the_pose_is_a_rotation_that_gives_the_size() -> None:
+    part = turned(prism([(0, 0), (30, 0), (22, 14), (0, 9)], 12), 33, (1, 2, 3))
+    found = shape(part)
+    pose = place(found, fdm()).pose
+    np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(pose.rotation) == pytest.approx(1)
+    np.testing.assert_allclose(np.ptp(pose.rotation @ found.mesh.points.T, axis=1), pose.size)
+
+
+points = st.lists(
+    st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=4, max_size=12, unique=True
+)
+
+
+@given(points, st.floats(5, 100), st.floats(5, 100))
+@settings(max_examples=60, deadline=None)
+def test_no_turn_beats_the_one_found(
+    corners: list[tuple[float, float]], width: float, depth: float
+) -> None:
+    """Against every twentieth of a degree."""
+    flat = np.array([*corners, (-9, -8), (9, -7), (8, 9)]).T
+    angle, sides = turn(flat, width, depth, 1e-9)
+    tried = np.linspace(0, np.pi, 3601)
+    x = np.cos(tried)[:, None] * flat[0] - np.sin(tried)[:, None] * flat[1]
+    y = np.sin(tried)[:, None] * flat[0] + np.cos(tried)[:, None] * flat[1]
+    excess = np.maximum(np.ptp(x, axis=1) - width, np.ptp(y, axis=1) - depth).min()
+    found = max(sides[0] - width, sides[1] - depth)
+    assert found <= max(excess, 0) + 1e-6
+    turned_x = math.cos(angle) * flat[0] - math.sin(angle) * flat[1]
+    assert np.ptp(turned_x) == pytest.approx(sides[0])
+
+
+def tee() -> trimesh.Trimesh:
+    """A stem of 10 x 30 x 20 under a bar of 50 x 30 x 5."""
+    outline = [(-5, 0), (5, 0), (5, 20), (25, 20), (25, 25), (-25, 25), (-25, 20), (-5, 20)]
+    return prism(outline, 30)
+
+
+def test_the_overhang_of_a_t() -> None:
+    mesh = mesh_of(tee())
+    assert area(mesh, 45) == pytest.approx(2 * 20 * 30, rel=1e-6)
+    assert area(mesh, 45, -DOWN) == 0
+    assert place(shape(tee()), fdm()).overhang == 0  # lying on its back, nothing does
+
+
+@pytest.mark.parametrize(("lean", "share"), [(29.9, 1), (30, 0), (45, 0)])
+def test_the_overhang_of_a_tilted_plate(lean: float, share: float) -> None:
+    """One face of 40 x 20 leans 30 degrees; the edge of 20 x 1 below looks down by 60."""
+    mesh = mesh_of(turned(box(1, 20, 40), 30, (0, 1, 0)))
+    assert area(mesh, lean) == pytest.approx(20 * 1 + share * 800, rel=1e-5)
+
+
+def test_what_lies_on_the_bed_does_not_hang() -> None:
+    assert area(mesh_of(box(10, 10, 10)), 45) == 0
+    stepped = mesh_of(box(10, 10, 10), box(4, 4, 4, at=(20, 0, 0)))
+    assert area(stepped, 45) == pytest.approx(16, rel=1e-6)
+
+
+def test_no_overhang_where_none_needs_support() -> None:
+    found = assess("t.stl", shape(tee()), load("sls"))
+    assert found.placing.overhang is None
+    assert to_row(found)["overhang_share"] is None
+
+
+def test_without_overhang_the_lowest_way_to_lie() -> None:
+    assert place(shape(box(3, 20, 30)), load("sls")).pose.size[2] == pytest.approx(3, abs=1e-5)
+
+
+def test_a_good_part() -> None:
+    found = assess("b.stl", shape(box(20, 10, 5)), fdm())
+    assert found.problems == ()
+    assert found.mass_g == pytest.approx(1.24)
+    (told,) = checks([found], wanted=False)
+    assert (told.name, told.file, told.unit) == ("print fdm", "b.stl", "problems")
+    assert (told.measured, told.limit, told.passed) == (0, None, True)
+    assert told.detail == "fits: -z down, 1 g PLA"
+    (held,) = checks([found], wanted=True)
+    assert (held.measured, held.limit, held.passed) == (0, 0, True)
+
+
+def bad() -> Shape:
+    """Two solids and a cavity; walls of 0.5; a hole of 1; 300 long."""
+    plates = plate(rectangle(300, 20), [ring(0.5, 32)], 0.5)
+    hollow = turned_inside_out(box(3, 3, 3, at=(0, 0, 50)))
+    return shape(plates, box(9, 9, 9, at=(0, 0, 50)), hollow)
+
+
+def test_every_problem_is_named_with_figure_and_limit() -> None:
+    machine = load("sla").model_copy(update={"max_triangles": 100, "hole_mm": 1.5})
+    found = assess("bad.stl", bad(), machine)
+    solids, cavities, triangles, wall, hole, size = found.problems
+    assert solids == "2 separate solids, 1 wanted"
+    assert cavities == "1 closed cavities, none wanted"
+    assert triangles == f"{len(bad().mesh.faces)} triangles, at most 100 are read"
+    assert wall.startswith("least wall 0.5 mm, 0.8 needed, at (")
+    assert hole == "smallest hole 1 mm, 1.5 needed, at (0.0, 0.0, 0.2)"
+    assert "mm too large: " in size
+    assert size.endswith("the bed is 145 x 145 x 175 less 0.2 at the rim")
+    (told,) = checks([found], wanted=False)
+    assert told.passed
+    assert told.measured == 6
+    (held,) = checks([found], wanted=True)
+    assert held.passed is False
+    assert held.detail == told.detail == "; ".join(found.problems)
+
+
+def test_an_open_mesh_is_a_problem() -> None:
+    cube = box(10, 10, 10)
+    cube.update_faces(np.arange(len(cube.faces)) > 0)
+    assert assess("o.stl", shape(cube), fdm()).problems[0].startswith("no closed solid: manifold3d")
+
+
+def test_a_cavity_is_a_problem_only_where_something_is_trapped() -> None:
+    hollow = shape(box(20, 20, 20), turned_inside_out(box(10, 10, 10)))
+    assert assess("h.stl", hollow, fdm()).problems == ()
+    assert assess("h.stl", hollow, load("sls")).problems == ("1 closed cavities, none wanted",)
+
+
+def test_limits_that_are_just_met_are_met() -> None:
+    part = shape(plate(rectangle(30, 30), [ring(1, 64)], 1.2))
+    assert assess("p.stl", part, fdm()).problems == ()
+    assert len(assess("p.stl", part, fdm(wall_mm=1.21, hole_mm=2.01)).problems) == 2
+    assert assess("p.stl", part, fdm(max_triangles=part.triangles)).problems == ()
+    assert len(assess("p.stl", part, fdm(max_triangles=part.triangles - 1)).problems) == 1
+
+
+def test_what_a_round_tool_leaves_in_inner_edges() -> None:
+    """In a right angle a tool of radius r leaves (sqrt 2 - 1) r; a T has two, 30 long each."""
+    part, mill = shape(tee()), load("machined")
+    left = (math.sqrt(2) - 1) * mill.spot_mm / 2
+
+    def length(tolerance: float) -> float | None:
+        machine = mill.model_copy(update={"tolerance_mm": tolerance})
+        return assess("t.stl", part, machine).inner_edges_mm
+
+    assert length(left - 0.01) == pytest.approx(60, abs=1e-4)
+    assert length(left + 0.01) == 0
+    assert assess("t.stl", part, fdm()).inner_edges_mm is None
+
+
+def test_rows_are_json_and_the_same_every_time() -> None:
+    names = ("fdm", "sla", "sls", "machined")
+    rows = [[to_row(assess("x.stl", part, load(k))) for k in names] for part in (bad(), bad())]
+    text = [json.dumps(row, allow_nan=False, sort_keys=True) for row in rows]
+    assert text[0] == text[1]
+    lid = trimesh.Trimesh([[0, 0, 1], [9, 0, 0], [0, 9, 0], [9, 9, 0]], [[0, 1, 2], [1, 3, 2]])
+    row = to_row(assess("lid.stl", shape(lid), fdm()))
+    assert row["wall_mm"] is None
+    assert row["hole_mm"] is None
+    json.dumps(row, allow_nan=False)
+    assert not passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))

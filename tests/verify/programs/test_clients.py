@@ -1,0 +1,393 @@
+"""What fake programs say becomes checks; what they do not say clearly is never a pass."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tbcad_verify import BadExport
+from tbcad_verify.programs import Wanted, client_checks, is_skipped
+from tbcad_verify.programs.clients import ERRANDS
+from tbcad_verify.report.checks import Check
+
+from tests.verify.programs.fake_programs import ADMESH, BAD, GOOD, INFO, SEEN, install, install_good
+
+FILES = {"step": "part.step", "stl": "part.stl", "3mf": "part.3mf"}
+PART = Wanted("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
+NAMES = [(name, PART.files[e.kind], unit) for e in ERRANDS for name, unit in e.questions.items()]
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Path:
+    folder = tmp_path / "export"
+    folder.mkdir()
+    for name in FILES.values():
+        (folder / name).write_text(f"this is {name}")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The only folder in which programs are found; gmsh's package is not there."""
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    return tmp_path / "bin"
+
+
+def ask(export: Path, part: Wanted = PART, seconds: float = 20) -> list[Check]:
+    return client_checks(export, [part], seconds)
+
+
+def failed(checks: Sequence[Check]) -> list[str]:
+    return [check.name for check in checks if check.passed is False]
+
+
+def figure(checks: Sequence[Check], name: str) -> float | None:
+    return next(check.measured for check in checks if check.name == name)
+
+
+def test_good_programs_pass(export: Path, programs: Path) -> None:
+    checks = ask(export, seconds=20)
+    assert all(map(is_skipped, checks))
+    install_good(programs)
+    checks = ask(export)
+    assert [(check.name, check.file, check.unit) for check in checks] == NAMES
+    assert all(check.passed for check in checks)
+    assert [c.name for c in checks if c.limit is None] == [
+        "gmsh spheres",
+        "prusa filament",
+        "prusa time",
+    ]
+    assert figure(checks, "gmsh volume") == 0.5
+    assert figure(checks, "admesh volume") == 0.25
+    assert figure(checks, "prusa slices") == pytest.approx(42 * math.pi * 1.75**2 / 4 - 100)
+    assert figure(checks, "prusa filament") == 0.42
+    assert figure(checks, "prusa time") == 26.5
+
+
+@pytest.mark.parametrize("program", GOOD)
+def test_absent_is_skipped_with_a_word(export: Path, programs: Path, program: str) -> None:
+    install_good(programs)
+    (programs / program).unlink()
+    name = program.removesuffix("cmd").removesuffix("-slicer")
+    for check in ask(export):
+        assert (check.passed, check.name) == (True, check.name)
+        if check.name.startswith(name):
+            assert is_skipped(check)
+            assert (check.measured, check.limit) == (None, None)
+            assert check.detail.startswith("skipped: not installed: ")
+            assert check.detail.endswith((f"apt install {program.removesuffix('cmd')}", "gmsh"))
+        elif check.name != "gmsh spheres":
+            assert not is_skipped(check)
+
+
+@pytest.mark.parametrize("way", BAD)
+def test_bad_programs_leave_all_unknown(export: Path, programs: Path, way: str) -> None:
+    install_good(programs)
+    for name, good in GOOD.items():
+        install(programs, **{name.replace("-", "_"): BAD[way].replace("{good}", good)})
+    start = time.monotonic()
+    checks = ask(export, seconds=0.5 if way == "hangs" else 20)
+    assert time.monotonic() - start < 10
+    assert [(check.name, check.file, check.unit) for check in checks] == NAMES
+    assert {check.passed for check in checks} == {None}
+    assert all(check.detail for check in checks)
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [("solids", 1), ("spheres", 1), ("spheres", -1), ("volume", 1.5), ("volume", -1.5)],
+)
+def test_freecad_counts(export: Path, programs: Path, key: str, change: float) -> None:
+    seen = SEEN | {key: SEEN[key] + change}
+    install(programs, freecadcmd=f"open('answer.json', 'w').write({json.dumps(seen)!r})")
+    assert failed(ask(export)) == [f"freecad {key}"]
+
+
+@pytest.mark.parametrize("key", ["invalid", "open", "loose"])
+def test_freecad_flaws(export: Path, programs: Path, key: str) -> None:
+    seen = SEEN | {key: 2}
+    install(programs, freecadcmd=f"open('answer.json', 'w').write({json.dumps(seen)!r})")
+    checks = ask(export)
+    assert failed(checks) == ["freecad valid"]
+    assert figure(checks, "freecad valid") == 2
+
+
+def test_no_solid_is_not_valid(export: Path, programs: Path) -> None:
+    seen = dict.fromkeys(SEEN, 0)
+    install(programs, freecadcmd=f"open('answer.json', 'w').write({json.dumps(seen)!r})")
+    names = ["solids", "valid", "spheres", "volume"]
+    assert failed(ask(export)) == [f"freecad {name}" for name in names]
+
+
+@pytest.mark.parametrize("key", ["solids", "invalid", "spheres", "volume"])
+@pytest.mark.parametrize("value", [None, "1", True, [1], math.nan, math.inf, 10**400])
+def test_freecad_must_answer_with_numbers(
+    export: Path, programs: Path, key: str, value: object
+) -> None:
+    text = json.dumps(SEEN | {key: value})
+    install(programs, freecadcmd=f"open('answer.json', 'w').write({text!r})")
+    checks = ask(export, replace(PART, files={"step": "part.step"}))
+    assert {c.passed for c in checks if c.name.startswith("freecad")} == {None}
+
+
+def test_our_script_says_why_it_broke(export: Path, programs: Path) -> None:
+    """Plain Python in FreeCAD's place: it runs the script, but has no Part."""
+    install(programs, freecadcmd="import sys; exec(open(sys.argv[1]).read())")
+    checks = ask(export, replace(PART, files={"step": "part.step"}))
+    detail = "gave up with exit status 3: ModuleNotFoundError: No module named 'Part'"
+    assert {(c.passed, c.detail) for c in checks if c.name.startswith("freecad")} == {
+        (None, detail)
+    }
+
+
+PACKAGE = """
+from types import SimpleNamespace as Space
+def initialize(**options): print("chatter")
+def surfaces(dim): return [(dim, tag) for tag in range({solids} if dim == 3 else 9)]
+occ = Space(
+    importShapes=lambda path: open(path).read() == "this is part.step" or 1 / 0,
+    synchronize=lambda: None,
+    getMass=lambda dim, tag: 1000.25,
+)
+model = Space(
+    occ=occ, getEntities=surfaces, getType=lambda dim, tag: "Sphere" if tag < 7 else "Plane"
+)
+option = Space(setNumber=lambda name, value: None)
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on our path that a module named gmsh can be put into."""
+    monkeypatch.delitem(sys.modules, "gmsh")
+    monkeypatch.syspath_prepend(tmp_path / "site packages")
+    (tmp_path / "site packages").mkdir()
+    return tmp_path / "site packages" / "gmsh.py"
+
+
+def gmsh_alone(export: Path) -> list[Check]:
+    checks = ask(export, replace(PART, files={"step": "part.step"}))
+    return [check for check in checks if check.name.startswith("gmsh")]
+
+
+@pytest.mark.parametrize(("solids", "wrong"), [(1, []), (2, ["gmsh solids", "gmsh volume"])])
+def test_gmsh_as_a_package(export: Path, package: Path, solids: int, wrong: list[str]) -> None:
+    package.write_text(PACKAGE.replace("{solids}", str(solids)))
+    checks = gmsh_alone(export)
+    assert failed(checks) == wrong
+    assert [check.measured for check in checks[:2]] == [solids, 7]
+
+
+@pytest.mark.parametrize(
+    ("body", "detail"),
+    [
+        ("raise OSError('libGLU.so.1: no such file')", "OSError: libGLU.so.1: no such file"),
+        ("import os; os.abort()", "crashed (SIGABRT)"),
+        ("import os; os._exit(0)", "ended well, but left no readable answer"),
+    ],
+)
+def test_a_package_that_breaks(export: Path, package: Path, body: str, detail: str) -> None:
+    package.write_text(body)
+    for check in gmsh_alone(export):
+        assert check.passed is None
+        assert check.detail.endswith(detail)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wrong"),
+    [
+        ("manifold = yes", "manifold = no\nopen_edges = 3", ["manifold"]),
+        ("manifold = yes", "manifold = yes\nfacets_reversed = 2", ["manifold"]),
+        ("manifold = yes", "manifold = yes\nedges_fixed = 1", ["manifold"]),
+        ("parts =  1", "parts =  2", ["parts"]),
+        ("volume = 1000.0", "volume = 1002.0", ["volume"]),
+        ("volume = 1000.0", "volume = nan", ["volume"]),
+        ("volume = 1000.0", f"volume = 500.0\n{INFO}", ["parts", "volume"]),
+    ],
+)
+def test_prusa_info(export: Path, programs: Path, old: str, new: str, wrong: list[str]) -> None:
+    assert old in INFO
+    install(programs, prusa_slicer=f"print({INFO.replace(old, new)!r})")
+    checks = ask(export)
+    assert failed(checks) == [f"prusa {name}" for name in wrong] * 2  # STL and 3MF
+    assert [c.passed for c in checks if c.name == "prusa slices"] == [None]
+
+
+@pytest.mark.parametrize("old", ["manifold = yes", "number_of_parts =  1", "volume = 1000.0"])
+def test_prusa_info_left_out(export: Path, programs: Path, old: str) -> None:
+    install(programs, prusa_slicer=f"print({INFO.replace(old, '')!r})")
+    checks = [c for c in ask(export) if c.name.startswith("prusa")]
+    assert {check.passed for check in checks} == {None}
+
+
+@pytest.mark.parametrize("length", ["0.00", "390.00", "440.00"])
+def test_a_print_of_another_volume_fails(export: Path, programs: Path, length: str) -> None:
+    install(programs, prusa_slicer=GOOD["prusa-slicer"].replace("420.00", length))
+    assert failed(ask(export)) == ["prusa slices"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wrong"),
+    [
+        ("facets        :     0  ", "facets        :     3  ", ["repairs"]),
+        ("fixed           :     0", "fixed           :     1", ["repairs"]),
+        ("removed        :     0", "removed        :     1", ["repairs"]),
+        ("added          :     0", "added          :     1", ["repairs"]),
+        ("Backwards edges       :     0", "Backwards edges       :     1", ["repairs"]),
+        ("parts       :     1", "parts       :     2", ["parts"]),
+        ("1000.250000", "-1000.250000", ["volume"]),
+    ],
+)
+def test_admesh(export: Path, programs: Path, old: str, new: str, wrong: list[str]) -> None:
+    assert old in ADMESH
+    install(programs, admesh=f"print({ADMESH.replace(old, new)!r})")
+    assert failed(ask(export)) == [f"admesh {name}" for name in wrong]
+
+
+def test_admesh_on_what_is_no_mesh(export: Path, programs: Path) -> None:
+    """It prints its banner, no report, and ends with 0."""
+    install(programs, admesh="print('ADMesh version 0.98.4')")
+    checks = [c for c in ask(export) if c.name.startswith("admesh")]
+    assert {check.passed for check in checks} == {None}
+
+
+@pytest.mark.parametrize("gap", ["volume", "volume_error"])
+def test_an_unknown_volume_is_no_pass(export: Path, programs: Path, gap: str) -> None:
+    install_good(programs)
+    checks = ask(export, replace(PART, **{gap: math.nan}))
+    unsure = {check.name for check in checks if check.passed is None}
+    volumes = {name for name, _, unit in NAMES if "mm^3" in unit}
+    assert unsure == volumes | ({"prusa slices"} if gap == "volume" else set())
+
+
+ECHO = "import sys; print(sys.argv[1:], open(sys.argv[-1]).read()); raise SystemExit(9)"
+
+
+@pytest.mark.parametrize("name", ["-b=x.stl", "--help", "a part.stl", "$(touch x);.stl", "ä\n.stl"])
+def test_names_are_only_names(export: Path, programs: Path, name: str) -> None:
+    """The program gets a copy, by an absolute path of our own."""
+    (export / name).write_text("right file")
+    install(programs, admesh=ECHO)
+    checks = ask(export, replace(PART, files={"stl": name}))
+    said = [c for c in checks if c.name.startswith("admesh")]
+    assert {(c.file, c.passed) for c in said} == {(name, None)}
+    assert said[0].detail == "gave up with exit status 9: ['./given.stl'] right file"
+
+
+def test_the_export_and_the_home_stay_as_they_are(
+    export: Path, programs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even by programs that write beside the file, over it, into the home and where they stand."""
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(home))
+    writes = """
+import os, sys
+for place in (".", os.environ["HOME"], os.environ.get("XDG_CONFIG_HOME", "."),
+              os.path.dirname(sys.argv[-1]) or "."):
+    os.makedirs(place, exist_ok=True)
+    open(os.path.join(place, "litter"), "w").write("litter")
+open(sys.argv[-1], "w").write("changed")
+"""
+    install(programs, freecadcmd=writes, gmsh=writes, prusa_slicer=writes, admesh=writes)
+    before = {path: path.read_bytes() for path in export.iterdir()}
+    ask(export)
+    assert {path: path.read_bytes() for path in export.iterdir()} == before
+    assert not list(home.iterdir())
+    assert not list(Path.cwd().glob("litter"))
+
+
+def test_nothing_stays_behind(
+    export: Path, programs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "places"
+    place.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    install_good(programs, admesh=BAD["hangs"])
+    ask(export, seconds=0.5)
+    assert not list(place.iterdir())
+
+
+@pytest.mark.parametrize("name", ["gone.step", "../outside.step", "/etc/hostname"])
+def test_files_outside_the_export_are_not_opened(
+    export: Path, programs: Path, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / "outside.step").write_text("not for them")
+    install_good(programs)
+    checks = ask(export, replace(PART, files={"step": name}))
+    assert {c.passed for c in checks if c.file == name} == {None}
+
+
+def test_a_part_without_files_is_skipped(export: Path, programs: Path) -> None:
+    install_good(programs)
+    checks = ask(export, replace(PART, files={"stl": ""}))
+    assert len(checks) == len(NAMES)
+    assert all(map(is_skipped, checks))
+    assert {check.file for check in checks} == {"part"}
+
+
+def test_no_folder_is_a_bad_export(tmp_path: Path) -> None:
+    with pytest.raises(BadExport, match="no such folder"):
+        ask(tmp_path / "nowhere")
+
+
+def test_order_and_number_at_a_time(export: Path, programs: Path, tmp_path: Path) -> None:
+    """Answers come in the order of parts and errands; never do three programs run at once."""
+    log = tmp_path / "log"
+    noted = f"""
+import time
+def note(word): open({str(log)!r}, "a").write(word)
+note("+"); time.sleep(0.05)
+BODY
+note("-")
+"""
+    bodies = {n.replace("-", "_"): noted.replace("BODY", body) for n, body in GOOD.items()}
+    install(programs, **bodies)
+    parts = [replace(PART, name=name) for name in "ab"]
+    begun: list[str] = []
+    checks = client_checks(export, parts, 20, begun.append)
+    assert [(check.name, check.file, check.unit) for check in checks] == NAMES * 2
+    assert sorted(begun) == sorted(f"{e.program}: {PART.files[e.kind]}" for e in ERRANDS * 2)
+    running = [log.read_text()[:k].count("+") - log.read_text()[:k].count("-") for k in range(25)]
+    assert max(running) == 2
+
+
+class Broken(Exception):
+    pass
+
+
+def broken() -> None:
+    raise Broken
+
+
+def ctrl_c() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.parametrize(
+    ("event", "error"), [(ctrl_c, KeyboardInterrupt), (broken, Broken)], ids=["ctrl-c", "broken"]
+)
+def test_an_interrupt_does_not_wait(
+    export: Path, programs: Path, event: Callable[[], None], error: type[BaseException]
+) -> None:
+    install(programs, freecadcmd=BAD["hangs"], prusa_slicer=BAD["hangs"], admesh=BAD["hangs"])
+
+    def progress(stage: str) -> None:
+        if stage == "prusa: part.stl":
+            time.sleep(0.3)
+            event()
+
+    start = time.monotonic()
+    with pytest.raises(error):
+        client_checks(export, [PART], 60, progress)
+    assert time.monotonic() - start < 5

@@ -1,0 +1,347 @@
+"""The figures behind the checks, against closed forms, brute force and other algorithms."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pnt
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+from tbcad_verify.mesh.mass import bulk
+from tbcad_verify.mesh.stl import parse
+from tbcad_verify.prototype import (
+    axis,
+    cells,
+    gcode,
+    nearest,
+    plan,
+    seats,
+    swing,
+    trace,
+    tracing,
+)
+from tbcad_verify.prototype.bodies import Body, body, joined_bodies, of_roles
+from tbcad_verify.prototype.caps import measure
+from tbcad_verify.prototype.rig import Rig, rig
+from tbcad_verify.prototype.step_files import readings, step_checks
+from tbcad_verify.prototype.view import View
+from tbcad_verify.record.files import read
+from tbcad_verify.record.record import read_export
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.reading import StepFile, examine_all, load
+
+from tests.verify.prototype.synthetic_prototype import Machine, balls, export, shell_of, turned
+from tests.verify.synthetic_export import Cells, poses, sign
+
+
+def view_of(folder: Path) -> View:
+    record = read_export(folder)
+    assert record.prototype is not None
+    return View(record, record.prototype)
+
+
+def bodies_of(view: View) -> list[Body]:
+    folder = view.export.folder
+    return [body(part, parse(read(folder, part.stl))) for part in view.made.parts]
+
+
+def rig_of(view: View) -> Rig:
+    bodies = bodies_of(view)
+    held = seats.hold(view, joined_bodies(of_roles(bodies, "base"))[0])
+    caps = [measure(view, one) for one in of_roles(bodies, "cap")]
+    return rig(view, held, caps, bodies)
+
+
+@pytest.fixture(scope="module")
+def view(machine: Path) -> View:
+    return view_of(machine)
+
+
+@pytest.fixture(scope="module")
+def ready(view: View) -> Rig:
+    return rig_of(view)
+
+
+def test_centres_are_where_the_pads_were_put(ready: Rig) -> None:
+    made = balls(Machine())
+    np.testing.assert_allclose(ready.body.T, [ball.b for ball in made], atol=1e-5)
+    np.testing.assert_allclose(ready.centre.T, [ball.c for ball in made], atol=2e-4)
+    np.testing.assert_allclose(ready.radius, [ball.radius for ball in made], atol=2e-4)
+
+
+def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
+    """The centre moves along the line that both other planes leave it."""
+    view = view_of(export(tmp_path / "x", Machine(pads={(1, 2): 0.02})))
+    base, _ = joined_bodies(of_roles(bodies_of(view), "base"))
+    ball = balls(Machine())[1]
+    shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
+    np.testing.assert_allclose(seats.hold(view, base).centre[1], ball.b + shift, atol=1e-5)
+    assert np.linalg.norm(shift) > 0.02
+
+
+def test_pads_are_found_without_the_contacts_being_right(view: View) -> None:
+    base, _ = joined_bodies(of_roles(bodies_of(view), "base"))
+    made = view.made
+    off = made.seats.contacts + 0.3 * made.seats.axis[:, None]
+    near = replace(view, made=replace(made, seats=replace(made.seats, contacts=off)))
+    np.testing.assert_allclose(
+        seats.hold(near, base).centre, made.balls.columns("bx", 3).T, atol=1e-5
+    )
+
+
+def test_sphere_on_three_planes() -> None:
+    normals = [np.eye(3)[k] for k in range(3)]
+    np.testing.assert_allclose(seats.touching(normals, [1.0, 2.0, 3.0], 0.5), [1.5, 2.5, 3.5])
+    with pytest.raises(Unknown, match="do not meet"):
+        seats.touching([normals[0]] * 3, [1.0, 2.0, 3.0], 0.5)
+
+
+def test_distances_from_triangles_by_brute_force() -> None:
+    rng = np.random.default_rng(1)
+    corners = rng.normal(size=(3, 3, 40))
+    point = rng.normal(size=3)
+    s, t = rng.dirichlet([0.5, 0.5, 0.5], 40000)[:, :2].T
+    a, b, c = corners
+    tried = a[:, :, None] + s * (b - a)[:, :, None] + t * (c - a)[:, :, None]
+    brute = np.linalg.norm(tried - point[:, None, None], axis=0).min(axis=1)
+    found = nearest.distances(point, (a, b, c))
+    assert (found <= brute + 1e-12).all()
+    np.testing.assert_allclose(found, brute, atol=0.02)
+
+
+def test_turns_about_the_axis(view: View) -> None:
+    x = np.random.default_rng(2).normal(size=(3, 5))
+    for angle in (-70.0, 33.0):
+        found = axis.turned(x, view.frame[0][:, None], np.radians(np.full(5, angle)))
+        wanted = np.stack([turned(one, angle) for one in x.T], axis=1)
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
+        before, after = axis.angles(view.frame, x), axis.angles(view.frame, found)
+        np.testing.assert_allclose(before[0], after[0], atol=1e-12)
+        np.testing.assert_allclose(
+            axis.wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
+        )
+
+
+def test_outlines_are_those_of_cells_cut_by_hand(view: View) -> None:
+    """`Cells` goes through all pairs of cutting planes, with no camera."""
+    design = shell_of(Machine())
+    hand = Cells(design, poses(design))
+    found = cells.outlines(cells.shell_of(view))
+    for k, outline in hand.outlines.items():
+        # What lies on the seam is no edge of a halved mirror.
+        points = np.array([point for point, other in outline if other != -1 or not view.halved[k]])
+        d = points.T - view.pinhole[:, None]
+        chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
+        first, second = cells.across(chief)
+        angle = axis.between(chief, d)
+        turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
+        low = np.floor(turn / (2 * np.pi) * cells.AROUND).astype(int) % cells.AROUND
+        both = np.stack([low, (low + 1) % cells.AROUND])
+        own = found.own[k, both].all(axis=0)
+        near, far = found.angle[k, both].min(axis=0)[own], found.angle[k, both].max(axis=0)[own]
+        assert own.sum() > 20
+        assert (angle[own] > 0.998 * near).all()
+        assert (angle[own] < 1.08 * far).all()  # a corner between two directions stands out
+
+
+def test_first_mirrors_by_brute_force(view: View) -> None:
+    shell = cells.shell_of(view)
+    d = np.random.default_rng(3).normal(size=(3, 4000)) + np.array([[-1.0], [0], [2]])
+    found = cells.first_mirrors(shell, d)
+    assert (found >= 0).sum() > 100
+    for k in range(0, 4000, 7):
+        unit = d[:, k] / np.linalg.norm(d[:, k])
+        best, which = np.inf, -1
+        for j in range(shell.radius.size):
+            away = shell.pinhole - shell.centre[:, j]
+            b, c = away @ unit, away @ away - shell.radius[j] ** 2
+            if b * b > c and -b - np.sqrt(b * b - c) < best:
+                best, which = -b - np.sqrt(b * b - c), j
+        point = shell.pinhole + best * unit if which >= 0 else np.full(3, np.nan)
+        good = which >= 0 and point[0] >= 0 and point[2] >= shell.foot
+        assert found[k] == (which if good else -1)
+
+
+def test_the_window_goes_along_with_its_ball(view: View, ready: Rig) -> None:
+    """Each mirror's middle is moved to its ball's apex, which shows the origin."""
+    ways = trace.trace(ready)
+    shell = cells.shell_of(view)
+    chief = cells.outlines(shell).chief
+    _, lines = ways.lines(np.arange(chief.shape[1]), chief)
+    apex = view.made.balls.columns("px", 3)[:, view.ball]
+    np.testing.assert_allclose(lines.point, apex, atol=1e-3)
+    away = (
+        lines.point
+        - (lines.point * lines.toward).sum(axis=0) / (lines.toward**2).sum(axis=0) * lines.toward
+    )
+    assert np.linalg.norm(away, axis=0).max() < 0.02
+
+
+def test_coverage_by_rays_on_a_fine_outline(view: View, ready: Rig) -> None:
+    """One mirror by a plain loop over many directions, its ball turned and not the rays."""
+    shown = tracing.show(ready)
+    edge = cells.outlines(cells.shell_of(view))
+    ways = trace.trace(ready)
+    for i in (5, 20, 40):
+        ball, angle = int(view.ball[i]), float(np.degrees(view.angle[i]))
+        made = balls(Machine())[ball]
+        centre = turned(made.c, angle)
+        least = np.inf
+        middle = ways.moved[:, :, i] @ edge.chief[:, i]
+        for d in edge.direction[:, i].T[edge.own[i]]:
+            way = ways.moved[:, :, i] @ d
+            away = view.pinhole - centre
+            b, c = way @ away, away @ away - made.radius**2
+            while b * b <= c:  # beside the ball: back to where it ends
+                way = way + 1e-4 * (middle - way)
+                way /= np.linalg.norm(way)
+                b = way @ away
+            point = view.pinhole + (-b - np.sqrt(b * b - c)) * way
+            normal = (point - centre) / made.radius
+            out = way - 2 * (way @ normal) * normal
+            at = point + max(-(point @ out), 0) * out
+            least = min(least, 2 * float(np.linalg.norm(at)))
+        assert shown.coverage[i] == pytest.approx(least, rel=5e-3)
+
+
+def test_twins_are_turned_about_z(view: View) -> None:
+    rows = view.export.rows
+    u = rows.columns("ux", 3)
+    np.testing.assert_allclose(
+        u[:, plan.twins(view)], u[:, view.mine] * [[-1], [-1], [1]], atol=1e-12
+    )
+
+
+def test_a_program_is_followed_as_controllers_do() -> None:
+    found = gcode.run("(G1 X9)\ng92 x5\nG1 X1.5 F9 ; G1 X3\nm8\nM9\nG1X-.5\nM8\n")
+    assert found.moves.tolist() == [1.5, -0.5]
+    assert found.photographs.tolist() == [1.5, -0.5]
+    assert found.faults == ()
+    pauses = gcode.run("M0\nG1 A0\nG1 A1\nM0\nG1 A0\nM0 (turn)\nG1 A1\nM0\n")
+    assert pauses.photographs.tolist() == [1.0, 1.0]
+    assert gcode.run("G91\nG1 X1\nwhat?").faults == (
+        "line 1 is in inches or relative",
+        "line 3 is no G-code",
+    )
+
+
+def test_no_step_of_the_swing_is_too_large(ready: Rig) -> None:
+    """A rod that the base passes at one angle only is found, however thin."""
+    import manifold3d
+
+    arm = manifold3d.Manifold.cube([100.0, 2.0, 2.0]).translate([0, 80, 0])
+    rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate([5.0, 0, 0])
+    rows = ready.view.frame
+    arm = arm.transform(np.hstack([rows[[1, 2, 0]].T, np.zeros((3, 1))]))
+    for turn, meets in ((0.0, True), (170.0, False)):
+        at = turned(rows.T @ np.array([0.3, 85.0, 80.7]), turn)
+        standing = rod.translate(at - np.array([5.2, 0.2, 0.2]))
+        found = swing.sweep(
+            ready, swing._mover(ready, "arm", arm), swing._mover(ready, "rod", standing)
+        )
+        assert (found.volume > swing.TOUCH_MM3) == meets
+        assert found.looks > 5
+
+
+def test_one_look_does_where_nothing_can_ever_meet(ready: Rig) -> None:
+    """Cubes at 20 and 30 mm along the axis keep 8 mm; one inside of the other shares its room."""
+    import manifold3d
+
+    def at(along: float, out: float, size: float) -> swing.Mover:
+        cube = manifold3d.Manifold.cube([size] * 3, center=True).translate([along, out, 0])
+        placed = cube.transform(np.hstack([ready.view.frame.T, np.zeros((3, 1))]))
+        return swing._mover(ready, "cube", placed)
+
+    found = swing.sweep(ready, at(20, 30, 2), at(30, 30, 2))
+    assert (found.looks, found.volume) == (1, 0.0)
+    assert 5 < found.gap <= 8
+    inside = swing.sweep(ready, at(20, 30, 20), at(20, 30, 2))
+    assert inside.volume == pytest.approx(8, rel=1e-6)
+    assert inside.looks > 1
+
+
+def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
+    """Give the stage a STEP file of a box."""
+    STEPControl_Controller.Init_s()
+    writer = STEPControl_Writer()
+    box = BRepPrimAPI_MakeBox(gp_Pnt(*low), gp_Pnt(*high)).Shape()
+    writer.Transfer(box, STEPControl_AsIs)
+    writer.Write(str(folder / "stage.step"))
+    text = (folder / "stage.step").read_text()
+    text = text.replace("MANIFOLD_SOLID_BREP('',", "MANIFOLD_SOLID_BREP('stage',")
+    (folder / "stage.step").write_text(text)
+    record = json.loads((folder / "prototype.json").read_text())
+    next(p for p in record["parts"] if p["name"] == "stage")["step"] = "stage.step"
+    (folder / "prototype.json").write_text(json.dumps(record))
+    design = json.loads((folder / "design.json").read_text())
+    design["spec"]["mesh"] = {"chord_error_mm": 0.01, "structure_error_mm": 0.02}
+    (folder / "design.json").write_text(json.dumps(design))
+    return sign(folder, [p.name for p in folder.iterdir() if p.name != "manifest.json"])
+
+
+def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None:
+    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
+    checks = {
+        check.name: check for check in step_checks(view.export, bulks, readings(view.export, 60))
+    }
+    assert [name for name, check in checks.items() if not check.passed] == ["step properties"]
+    assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
+
+
+def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
+    for low, high, names in (
+        ([-4, -4, -7.7], [4, 4, -5.7], {"step box", "step centroid", "step properties"}),
+        (
+            [-4, -4, -8],
+            [4, 4, -5],
+            {"step box", "step centroid", "step properties", "step volume", "step area"},
+        ),
+    ):
+        view = view_of(stepped(made, low, high))
+        bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
+        checks = step_checks(view.export, bulks, readings(view.export, 60))
+        assert {check.name for check in checks if not check.passed} == names
+
+
+def test_one_broken_step_file_leaves_the_others_known(made: Path) -> None:
+    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    good = load(view.export.folder, "stage.step")
+    (made / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
+    bad = load(made, "bad.step")
+    found = examine_all([bad, good, bad], 60)
+    assert [isinstance(one, StepFile) for one in found] == [False, True, False]
+
+
+def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
+    made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tbcad_verify.step import reading
+
+    real = reading.run
+
+    def killed(command, place, limits):  # type: ignore[no-untyped-def]
+        if len(command) > 6:  # all files at once
+            return reading.run.__wrapped__(command, place, limits)
+        return real(command, place, limits)
+
+    killed.__wrapped__ = lambda command, place, limits: real(  # type: ignore[attr-defined]
+        [command[0], "-c", "import os; os.abort()"], place, limits
+    )
+    monkeypatch.setattr(reading, "run", killed)
+    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    good = load(view.export.folder, "stage.step")
+    found = examine_all([good, good], 60)
+    assert [isinstance(one, StepFile) for one in found] == [True, True]
+
+
+def test_the_bend_of_a_cube_is_its_edges(view: View) -> None:
+    """Twelve edges at a right angle, of 8, 8 and 2 mm."""
+    stage = next(one for one in bodies_of(view) if one.part.name == "stage")
+    assert stage.placed_bulk is not None
+    assert stage.placed_bulk.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
+    assert bulk(stage.needed).volume == pytest.approx(128, rel=1e-6)

@@ -1,0 +1,492 @@
+"""A good prototype passes; one broken in one way fails, for that reason and not for another."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tbcad_verify import main, verify
+from tbcad_verify.report.checks import Check
+
+from tests.verify.benches import HERE
+from tests.verify.prototype.synthetic_prototype import Machine, balls, export
+from tests.verify.synthetic_export import sign
+
+Row = dict[str, Any]
+
+# Checks that are unknown where a ball's stop is, and where its place is.
+ON_STOPS = (
+    "cells",
+    "coverage, balls",
+    "coverage, balls, off the record",
+    "light of the balls",
+    "rays of the balls",
+    "pixels kept by the balls",
+)
+ON_BALLS = (
+    *ON_STOPS,
+    "swing",
+    "swing clearance",
+    "looks over the swing",
+    "parts apart",
+    "balls apart",
+)
+
+
+def signed(folder: Path) -> Path:
+    return sign(folder, sorted(p.name for p in folder.iterdir() if p.name != "manifest.json"))
+
+
+def found(folder: Path) -> dict[str, Check]:
+    """Failed and unknown checks by name."""
+    report = verify(folder, wishes=replace(HERE, write=False))
+    return {check.name: check for check in report.checks if check.passed is not True}
+
+
+def edited(folder: Path, change: Callable[[Row], None]) -> Path:
+    path = folder / "prototype.json"
+    value = json.loads(path.read_text())
+    change(value)
+    path.write_text(json.dumps(value))
+    return signed(folder)
+
+
+def table(folder: Path, name: str, change: Callable[[list[Row]], None]) -> Path:
+    path = folder / name
+    rows = list(csv.DictReader(io.StringIO(path.read_text())))
+    change(rows)
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    path.write_text(stream.getvalue())
+    return signed(folder)
+
+
+def both(folder: Path, ball: int, change: Callable[[Row], Any]) -> Path:
+    """Change a ball in both of its records."""
+
+    def in_table(rows: list[Row]) -> None:
+        row = {key: float(x) if key in NUMERIC else x for key, x in rows[ball - 1].items()}
+        change(row)
+        rows[ball - 1].update({k: repr(x) if k in NUMERIC else x for k, x in row.items()})
+
+    edited(folder, lambda value: change(value["balls"][ball - 1]))
+    return table(folder, "balls.csv", in_table)
+
+
+NUMERIC = frozenset(
+    ["diameter_mm", "radius_mm", "body_radius_mm"]
+    + [name + axis for name in "pncb" for axis in "xyz"]
+)
+
+
+def moved(row: Row, name: str, by: float) -> None:
+    row[name + "x"] += by
+
+
+def test_a_good_prototype_passes(made: Path) -> None:
+    report = verify(made, wishes=HERE)
+    assert report.passed, [c for c in report.checks if not c.passed]
+    assert report.verdict.startswith("PASS: no shell in this export; prototype: 4 balls at 48")
+    section = json.loads((made / "verify.json").read_text())["prototype"]
+    assert [ball["kind"] for ball in section["balls"]] == ["ball", "ball", "ball", "cap"]
+    assert max(ball["centre_error_um"] for ball in section["balls"]) < 0.01
+    assert sum(stop["mirrors"] for stop in section["stops"]) == 49
+    assert {stop["blocked"] for stop in section["stops"]} == {0}
+    assert all(stop["coverage_mm"] > 25 for stop in section["stops"])
+
+
+def test_the_proof_in_another_process_is_the_same(made: Path) -> None:
+    here = verify(made, wishes=replace(HERE, write=False))
+    apart = verify(made, wishes=replace(HERE, write=False, apart=True))
+    assert apart.to_json() == here.to_json()
+
+
+def test_a_prototype_beside_a_shell(tmp_path: Path) -> None:
+    report = verify(export(tmp_path / "x", Machine(shell=True)), wishes=HERE)
+    assert report.passed, [c for c in report.checks if not c.passed]
+    assert "virtual cameras see" in report.verdict
+    assert "prototype: 4 balls" in report.verdict
+
+
+def test_the_shell_is_not_asked_for_when_there_is_none(made: Path) -> None:
+    names = {check.name for check in verify(made, wishes=HERE).checks}
+    assert "poses" in names
+    assert not names & {"coverage, spheres", "light path", "mirrors found"}
+
+
+def row_of(name: str) -> Callable[[list[Row]], None]:
+    return lambda rows: rows.remove(next(row for row in rows if row["mirror"] == name))
+
+
+def exchanged(rows: list[Row]) -> None:
+    """Two of camera b's mirrors take each other's pictures."""
+    one, two = (next(row for row in rows if row["mirror"] == name) for name in ("b0007", "b0030"))
+    one["mirror"], two["mirror"] = two["mirror"], one["mirror"]
+
+
+def nudged(key: str, by: float, row: int = 3) -> Callable[[list[Row]], None]:
+    return lambda rows: rows[row].update({key: repr(float(rows[row][key]) + by)})
+
+
+def program(old: str, new: str) -> Callable[[Path], Path]:
+    def change(folder: Path) -> Path:
+        path = folder / "rotation_plan.nc"
+        before = path.read_text()
+        assert old in before
+        path.write_text(before.replace(old, new, 1))
+        return signed(folder)
+
+    return change
+
+
+def angle_off(folder: Path) -> Path:
+    path = folder / "rotation_plan.nc"
+    lines = path.read_text().splitlines()
+    place = next(k for k, line in enumerate(lines) if line == "M8") - 2
+    lines[place] = f"G1 X{float(lines[place][4:]) + 0.01:.4f}"
+    path.write_text("\n".join(lines) + "\n")
+    return signed(folder)
+
+
+def in_record(*path: Any, to: Any) -> Callable[[Path], Path]:
+    def change(value: Any) -> None:
+        for key in path[:-1]:
+            value = value[key]
+        value[path[-1]] = to(value[path[-1]]) if callable(to) else to
+
+    return lambda folder: edited(folder, change)
+
+
+def in_table(name: str, change: Callable[[list[Row]], None]) -> Callable[[Path], Path]:
+    return lambda folder: table(folder, name, change)
+
+
+def ball(number: int, change: Callable[[Row], Any]) -> Callable[[Path], Path]:
+    return lambda folder: both(folder, number, change)
+
+
+def turned_over(axes: list[list[float]]) -> list[list[float]]:
+    return [[-x for x in row] for row in axes]
+
+
+PLAN = "rotation_plan.csv"
+FIN = 0.5 * balls(Machine())[1].p  # half way from the object to a ball
+# How, which checks may fail (the first must), and a word of its detail.
+RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
+    "table unlike record": (
+        in_table("balls.csv", nudged("mass_g", 1e-9, 0)),
+        ("prototype record",),
+        "ball 1 mass_g",
+    ),
+    "ball missing in table": (
+        in_table("balls.csv", lambda rows: rows.pop() and None),
+        ("prototype record",),
+        "missing",
+    ),
+    "another target": (in_record("target_mm", to=24.0), ("prototype requirements",), "target"),
+    "frame turned": (
+        in_record("frame", "zero", to=lambda v: [-x for x in v]),
+        ("prototype requirements",),
+        "frame",
+    ),
+    "apex off": (
+        ball(1, lambda row: moved(row, "p", 1e-6)),
+        ("ball places", "plan errors"),
+        "ball 1",
+    ),
+    "centre off the normal": (
+        ball(2, lambda row: [moved(row, name, 1e-6) for name in "cb"]),
+        ("ball places",),
+        "ball 2",
+    ),
+    "ball larger than its stock": (
+        ball(1, lambda row: row.update(diameter_mm=row["diameter_mm"] + 1e-3)),
+        ("ball sizes",),
+        "ball 1",
+    ),
+    "mirror missing in the plan": (
+        in_table(PLAN, row_of("a0007")),
+        (
+            "plan mirrors",
+            "plan twins",
+            "plan errors",
+            "plan stops",
+            *ON_STOPS,
+        ),
+        "no a0007",
+    ),
+    "twin missing in the plan": (
+        in_table(PLAN, row_of("b0007")),
+        ("plan mirrors", "plan twins"),
+        "b0007",
+    ),
+    "twins exchanged": (in_table(PLAN, exchanged), ("plan twins",), "b0007"),
+    "polar error off": (
+        in_table(PLAN, nudged("polar_error_deg", 2e-6)),
+        ("plan errors", "plan twins"),
+        "deg",
+    ),
+    "error off": (
+        in_table(PLAN, nudged("error_deg", 2e-6)),
+        ("plan errors", "plan twins", "plan stops"),
+        "deg",
+    ),
+    "angle off": (
+        in_table(PLAN, nudged("base_angle_deg", 1e-3)),
+        ("plan stops", "plan errors", "plan twins"),
+        "row 4",
+    ),
+    "stops and plan agree on a wrong angle": (
+        lambda folder: table(
+            table(folder, "stops.csv", nudged("base_angle_deg", 1e-3)),
+            PLAN,
+            lambda rows: (
+                [
+                    row.update(base_angle_deg=repr(float(row["base_angle_deg"]) + 1e-3))
+                    for row in rows
+                    if row["stop"] == "4"
+                ]
+                and None
+            ),
+        ),
+        ("plan errors", "plan program"),
+        "deg",
+    ),
+    "a stop beyond the swing": (
+        in_record("swing_deg", to=lambda swing: [swing[0] + 1e-6, swing[1]]),
+        ("plan stops",),
+        "stop 1 beyond",
+    ),
+    "program driven beyond the swing": (
+        program("G4 P0.5", "G1 X179.0"),
+        ("plan program",),
+        "beyond the swing",
+    ),
+    "program angle off": (angle_off, ("plan program",), "photograph"),
+    "program in inches": (program("G21", "G20"), ("plan program",), "inches"),
+    "program without a photograph": (program("M8\n", ""), ("plan program",), "photographs"),
+    "program that is none": (program("G4 P0.5", "hello"), ("plan program",), "no G-code"),
+    "pose mirrored": (
+        in_record("parts", 4, "axes", to=turned_over),
+        ("print pose",),
+        "no rotation",
+    ),
+    "part out of its place": (
+        in_record("parts", 0, "origin_mm", to=lambda v: [v[0], v[1] + 0.02, v[2]]),
+        ("ball centres", "balls clear", "pads", "light of the balls"),
+        "ball",
+    ),
+    "light outside": (
+        in_record("leds", 0, "position_mm", to=[0.0, 0.0, -13.0]),
+        ("leds inside",),
+        "led_1",
+    ),
+    "light in the stage": (
+        in_record("leds", 0, "position_mm", to=[0.0, 0.0, -7.0]),
+        ("leds free",),
+        "led_1",
+    ),
+    "no cap for its ball": (
+        in_record("parts", 1, "ball", to=2),
+        (
+            "cap fronts",
+            "cap bodies",
+            "cap form",
+            *ON_BALLS,
+        ),
+        "no sphere",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", RECORDS)
+def test_a_broken_record_fails(made: Path, how: str) -> None:
+    change, names, words = RECORDS[how]
+    failed = found(change(made))
+    assert names[0] in failed
+    assert set(failed) <= set(names)
+    assert any(words in check.detail for check in failed.values()), failed
+
+
+# What is made, which checks may fail (the first must), and a word of its detail.
+MACHINES: dict[str, tuple[Machine, tuple[str, ...], str]] = {
+    "pad moved by 20 um": (Machine(pads={(1, 2): 0.02}), ("ball centres",), "ball 2"),
+    "all pads of a ball too low": (
+        Machine(pads={(0, j): 0.05 for j in range(3)}),
+        ("ball centres",),
+        "ball 1",
+    ),
+    "no pad": (
+        Machine(pads={(0, 0): 3.0}),
+        (
+            "ball centres",
+            "pads",
+            "balls clear",
+            *ON_BALLS,
+        ),
+        "no pad",
+    ),
+    "a knob in the seat": (Machine(bump=0.01), ("balls clear",), "ball 1"),
+    "cap's front 20 um too large": (Machine(grown=0.02), ("cap fronts",), "ball 4"),
+    "cap shows too little": (
+        Machine(target=40.0, front=400.0),
+        ("coverage, balls", "light of the balls"),
+        "a00",
+    ),
+    "wall in the light": (
+        Machine(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])}),
+        ("light of the balls", "swing"),
+        "blocked by",
+    ),
+    "stage in the light": (Machine(stage_mm=16.0), ("light of the balls",), "blocked by stage"),
+    "wall on the base": (
+        Machine(more={"fin": ("base", FIN - 3, FIN + 3)}),
+        ("light of the balls", "swing"),
+        "blocked by",
+    ),
+    "frame where the base swings": (
+        Machine(more={"bar": ("frame", [-150, -150, 60], [150, 150, 62])}),
+        ("swing", "light of the balls"),
+        "share",
+    ),
+    "motor where the base swings": (
+        Machine(motor=([-150, -150, 60], [150, 150, 62])),
+        ("swing",),
+        "motor",
+    ),
+    "a ball drawn elsewhere": (
+        Machine(drawn_off={"ball_1": 0.5}),
+        ("assembly",),
+        "ball_1",
+    ),
+    "a part drawn elsewhere": (
+        Machine(drawn_off={"foot": 1.0}),
+        ("assembly",),
+        "foot",
+    ),
+    "two parts in one place": (
+        Machine(more={"brick": ("frame", [-10, -10, -295], [10, 10, -250])}),
+        ("parts apart",),
+        "foot and brick",
+    ),
+    "pictures left where they are": (
+        Machine(moved=False),
+        ("coverage, balls", "light of the balls"),
+        "shows too little",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", MACHINES)
+def test_a_broken_machine_fails(tmp_path: Path, how: str) -> None:
+    machine, names, words = MACHINES[how]
+    failed = found(export(tmp_path / "x", machine))
+    assert names[0] in failed
+    assert set(failed) <= set(names)
+    assert any(words in check.detail for check in failed.values()), failed
+
+
+def test_what_stands_in_the_light_is_named(tmp_path: Path) -> None:
+    wall = Machine(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])})
+    assert "wall" in found(export(tmp_path / "x", wall))["light of the balls"].detail
+
+
+def test_parts_of_a_prototype_are_listed_or_fail(made: Path) -> None:
+    (made / "stray.stl").write_bytes((made / "stage.stl").read_bytes())
+    signed(made)
+    assert "stray.stl" in found(made)["manifest"].detail
+
+
+def test_a_prototype_that_the_manifest_does_not_list_fails(made: Path) -> None:
+    names = [p.name for p in made.iterdir() if p.name not in ("manifest.json", "prototype.json")]
+    sign(made, names)
+    assert "prototype.json" in found(made)["manifest"].detail
+
+
+def test_a_mesh_with_a_hole_fails(made: Path) -> None:
+    data = (made / "stage.stl").read_bytes()
+    count = int.from_bytes(data[80:84], "little") - 1
+    (made / "stage.stl").write_bytes(data[:80] + np.uint32(count).tobytes() + data[84:-50])
+    failed = found(signed(made))
+    assert failed["watertight"].file == "stage.stl"
+
+
+def test_a_machine_that_cannot_make_the_parts_fails(made: Path) -> None:
+    report = verify(made, wishes=replace(HERE, write=False, printers=("sla",)))
+    assert {c.file for c in report.checks if c.name == "print sla" and not c.passed} >= {"foot.stl"}
+
+
+def deep(*path: Any, to: Any) -> Callable[[Path], Path]:
+    return in_record(*path, to=to)
+
+
+REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "schema": (deep("schema", to="x"), "schema"),
+    "no balls": (deep("balls", to=[]), "0 balls"),
+    "many balls": (deep("balls", to=lambda v: v * 400), "1600 balls"),
+    "ball number": (deep("balls", 1, "number", to=7), "number 2"),
+    "ball kind": (deep("balls", 1, "kind", to="cube"), "kind must be one of"),
+    "ball text": (deep("balls", 1, "radius_mm", to="5"), "ball 2: radius_mm"),
+    "ball infinite": (deep("balls", 1, "px", to=1e300), "ball 2: px"),
+    "ball without radius": (deep("balls", 1, "radius_mm", to=0), "ball 2: radius_mm"),
+    "seat missing": (deep("seats", to=lambda v: v[:-1]), "one for each ball"),
+    "seat short": (deep("seats", 0, "normals", to=[[1, 0, 0]]), "three rows"),
+    "part above": (deep("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
+    "part absolute": (deep("parts", 0, "step", to="/etc/passwd"), "plain file name"),
+    "part role": (deep("parts", 0, "role", to="hat"), "role must be one of"),
+    "part twice": (deep("parts", 0, "name", to="stage"), "names of their own"),
+    "mesh twice": (deep("parts", 0, "stl", to="stage.stl"), "STL of their own"),
+    "cap of no ball": (deep("parts", 1, "ball", to=9), "a cap's ball or null"),
+    "base of a ball": (deep("parts", 0, "ball", to=1), "a cap's ball or null"),
+    "quantity": (deep("parts", 0, "quantity", to=0), "quantity"),
+    "axes": (deep("parts", 0, "axes", to=[1, 2, 3]), "three numbers"),
+    "camera": (deep("camera", to="z"), "camera 'z'"),
+    "picture": (deep("picture", to="blurred"), "picture must be one of"),
+    "swing": (deep("swing_deg", to=[3, 2]), "swing_deg must ascend"),
+    "frame": (deep("frame", to=[]), "frame must be a dict"),
+    "bought": (deep("bought", 0, "turns", to="no"), "turns"),
+    "assembly": (deep("assembly", to={"step": "a/b.step"}), "plain file name"),
+    "led": (deep("leds", 0, "position_mm", to=[1, 2]), "position_mm must be three"),
+    "plan missing": (lambda f: (f / PLAN).unlink(), f"{PLAN}: missing"),
+    "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),
+    "plan nan": (in_table(PLAN, lambda r: r[3].update(base_angle_deg="nan")), "base_angle_deg"),
+    "plan odd name": (in_table(PLAN, lambda r: r[3].update(mirror="../x")), "no name"),
+    "plan fraction": (in_table(PLAN, lambda r: r[3].update(stop="1.5")), "whole number"),
+    "stops foreign": (lambda f: (f / "stops.csv").write_text("a,b\n1,2\n"), "first line"),
+    "stops empty": (
+        lambda f: (f / "stops.csv").write_text((f / "stops.csv").read_text().split("\n")[0]),
+        "0 rows",
+    ),
+    "program no text": (lambda f: (f / "rotation_plan.nc").write_bytes(b"\xff\xfe"), "UTF-8"),
+    "record cut": (
+        lambda f: (f / "prototype.json").write_text((f / "prototype.json").read_text()[:-9]),
+        "broken JSON",
+    ),
+    "part missing": (lambda f: (f / "stage.stl").unlink(), "stage.stl: missing"),
+    "part truncated": (
+        lambda f: (f / "stage.stl").write_bytes((f / "stage.stl").read_bytes()[:-1]),
+        "truncated",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", REFUSED)
+def test_a_malformed_prototype_is_refused(
+    made: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, words = REFUSED[how]
+    change(made)
+    assert main([str(made), "-q"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert words in lines[0]
+    assert not (made / "verify.json").exists()

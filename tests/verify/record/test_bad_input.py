@@ -1,0 +1,204 @@
+"""What is no export is refused: exit 2, one line that says why, and nothing written."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tbcad_verify import BadExport, main, verify
+
+from tests.verify.benches import HERE
+from tests.verify.synthetic_export import sign
+
+NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
+
+
+def edit(name: str, change: Callable[[dict], None]) -> Callable[[Path], None]:
+    def job(folder: Path) -> None:
+        value = json.loads((folder / name).read_text())
+        change(value)
+        (folder / name).write_text(json.dumps(value))
+
+    return job
+
+
+def text(name: str, old: str, new: str) -> Callable[[Path], None]:
+    def job(folder: Path) -> None:
+        before = (folder / name).read_text()
+        assert old in before
+        (folder / name).write_text(before.replace(old, new, 1))
+
+    return job
+
+
+def put(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    return lambda folder: (folder / name).write_bytes(change((folder / name).read_bytes())) and None
+
+
+def sparse(folder: Path) -> None:
+    with (folder / "shell_a.stl").open("wb") as stream:
+        stream.truncate(2 * 10**9)
+
+
+def huge(folder: Path) -> None:
+    with (folder / "shell_a.stl").open("wb") as stream:
+        stream.truncate(5 * 10**9)
+
+
+def fifo(folder: Path) -> None:
+    (folder / "shell_a.stl").unlink()
+    os.mkfifo(folder / "shell_a.stl")
+
+
+def link_out(folder: Path) -> None:
+    outside = folder.parent / "outside.stl"
+    (folder / "shell_a.stl").rename(outside)
+    (folder / "shell_a.stl").symlink_to(outside)
+
+
+def as_folder(folder: Path) -> None:
+    (folder / "shell_a.stl").unlink()
+    (folder / "shell_a.stl").mkdir()
+
+
+def nan_vertex(data: bytes) -> bytes:
+    return data[: 84 + 12] + np.float32(np.nan).tobytes() + data[84 + 16 :]
+
+
+def first(key: str, value: object) -> Callable[[dict], None]:
+    return lambda design: design["cameras"][0].update({key: value})
+
+
+def part_file(name: str) -> Callable[[Path], None]:
+    return edit("design.json", lambda d: d["parts"][0].update(stl=name))
+
+
+BROKEN = {
+    "no design": (lambda f: (f / "design.json").unlink(), "design.json: missing"),
+    "no table": (lambda f: (f / "mirrors.csv").unlink(), "mirrors.csv: missing"),
+    "no manifest": (lambda f: (f / "manifest.json").unlink(), "manifest.json: missing"),
+    "no shell": (lambda f: (f / "shell_b.stl").unlink(), "shell_b.stl: missing"),
+    "foreign": (lambda f: (f / "design.json").write_text('{"schema": "x"}'), "schema"),
+    "no object": (lambda f: (f / "design.json").write_text("[]"), "JSON object"),
+    "broken JSON": (put("design.json", lambda b: b[: len(b) // 2]), "broken JSON"),
+    "deep JSON": (lambda f: (f / "design.json").write_text("[" * 100000), "broken JSON"),
+    "not text": (put("design.json", lambda b: b"\xff\xfe" + b), "not UTF-8"),
+    "NaN in JSON": (text("design.json", '"target_mm": 40.0', '"target_mm": NaN'), "NaN"),
+    "text target": (text("design.json", '"target_mm": 40.0', '"target_mm": "40"'), "target_mm"),
+    "true target": (text("design.json", '"target_mm": 40.0', '"target_mm": true'), "target_mm"),
+    "null apex": (text("design.json", '"px": ', '"px": null, "was": '), "px"),
+    "no mirrors": (edit("design.json", lambda d: d.update(mirrors=[])), "0 mirrors"),
+    "no cameras": (edit("design.json", lambda d: d.update(cameras=[])), "cameras"),
+    "no parts": (edit("design.json", lambda d: d.update(parts=[])), "parts"),
+    "odd parts": (edit("design.json", lambda d: d.update(parts=["shell_a"])), "list of objects"),
+    "skew axes": (edit("design.json", first("forward", [0, 0, 2])), "unit vectors"),
+    "short vector": (edit("design.json", first("forward", [0, 1])), "three numbers"),
+    "absurd sensor": (edit("design.json", first("width_px", 10**9)), "width_px"),
+    "big sensor": (
+        edit("design.json", lambda d: d["cameras"][0].update(width_px=65536, height_px=65536)),
+        "at most",
+    ),
+    "absolute part": (part_file("/etc/passwd"), "plain file name"),
+    "part above": (part_file("../shell_a.stl"), "plain file name"),
+    "part named ..": (part_file(".."), "plain file name"),
+    "manifest leads out": (
+        edit("manifest.json", lambda m: m["files"].update({"../x": {"size": 1, "sha256": ""}})),
+        "not a plain file name",
+    ),
+    "manifest empty": (edit("manifest.json", lambda m: m.update(files={})), "manifest.json"),
+    "manifest odd": (edit("manifest.json", lambda m: m["files"].update(x=3)), "sha256"),
+    "table cut short": (put("mirrors.csv", lambda b: b[:-300]), "truncated"),
+    "table empty": (put("mirrors.csv", lambda b: b""), "first line"),
+    "table foreign": (put("mirrors.csv", lambda b: b"a,b\n1,2\n"), "first line"),
+    "table quoted": (put("mirrors.csv", lambda b: b + b'"a'), "broken CSV"),
+    "table nan": (text("mirrors.csv", "a0001,a,0.0", "a0001,a,nan"), "no finite number"),
+    "table word": (text("mirrors.csv", "a0001,a,0.0", "a0001,a,left"), "no finite number"),
+    "STL cut short": (put("shell_a.stl", lambda b: b[:-10]), "truncated"),
+    "STL too long": (put("shell_a.stl", lambda b: b + b"x"), "truncated or no binary"),
+    "STL of no facets": (put("shell_a.stl", lambda b: b[:80] + bytes(4)), "0 facets"),
+    "STL empty": (put("shell_a.stl", lambda b: b""), "0 bytes"),
+    "STL count lies": (
+        put("shell_a.stl", lambda b: b[:80] + b"\xff\xff\xff\xff" + b[84:]),
+        "4294967295",
+    ),
+    "STL in ASCII": (put("shell_a.stl", lambda b: b"solid x\n facet normal 0 0 1\n"), "ASCII"),
+    "STL with NaN": (put("shell_a.stl", nan_vertex), "not finite"),
+    "STL sparse": (sparse, "truncated"),
+    "STL over the limit": (huge, "at most"),
+    "STL a pipe": (fifo, "not a regular file"),
+    "STL a folder": (as_folder, "not a regular file"),
+    "STL a link out": (link_out, "leads out"),
+}
+
+
+@pytest.mark.parametrize("how", BROKEN)
+def test_broken_export_is_refused(good: Path, how: str, capsys: pytest.CaptureFixture[str]) -> None:
+    change, words = BROKEN[how]
+    change(good)
+    before = {path: path.stat().st_mtime_ns for path in good.parent.rglob("*")}
+    assert main([str(good)]) == 2
+    out = capsys.readouterr()
+    last = [line for line in out.err.splitlines() if not line.startswith("verify: ")]
+    assert len(last) == 1
+    assert words in last[0]
+    assert out.out == ""
+    assert {path: path.stat().st_mtime_ns for path in good.parent.rglob("*")} == before
+
+
+def test_missing_folder_and_file_for_folder(tmp_path: Path) -> None:
+    with pytest.raises(BadExport, match="no such folder"):
+        verify(tmp_path / "nowhere", wishes=HERE)
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(BadExport, match="not a folder"):
+        verify(tmp_path / "file", wishes=HERE)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BadExport, match=r"design\.json: missing"):
+        verify(tmp_path / "empty", wishes=HERE)
+
+
+def test_link_inside_is_followed(good: Path) -> None:
+    (good / "shell_a.stl").rename(good / "real.stl")
+    (good / "shell_a.stl").symlink_to("real.stl")
+    assert verify(sign(good, NAMES), wishes=HERE).passed
+
+
+def test_bad_arguments_are_bad_input() -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
+
+
+def test_a_file_cut_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tbcad_verify.record import files
+
+    whole = np.fromfile
+
+    def cut(stream, dtype, count):
+        return whole(stream, dtype=dtype, count=count - 1)
+
+    monkeypatch.setattr(files.np, "fromfile", cut)
+    with pytest.raises(BadExport, match="changed while it was read"):
+        verify(good, wishes=HERE)
+
+
+def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tbcad_verify.record import files
+
+    def smaller(handle: int) -> os.stat_result:
+        return os.stat_result((0o100644, 0, 0, 1, 0, 0, real(handle).st_size - 50, 0, 0, 0))
+
+    real = os.fstat
+    monkeypatch.setattr(files.os, "fstat", smaller)
+    with pytest.raises(BadExport, match="changed while it was read"):
+        verify(good, wishes=HERE)
+
+
+def test_a_folder_that_takes_no_verdict(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (good / "verify.json").mkdir()
+    assert main([str(good), "-q"]) == 2
+    assert "verify.json cannot be written" in capsys.readouterr().err
+    assert [p.name for p in good.iterdir() if p.name.startswith(".")] == []

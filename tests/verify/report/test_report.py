@@ -1,0 +1,368 @@
+"""The whole proof: what it writes, what it says, and that it fails when it should."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tbcad_verify
+from tbcad_verify import main, verify
+from tbcad_verify.mesh import rays
+from tbcad_verify.record.poses import geodesic
+from tbcad_verify.report.checks import Check, at_least, at_most, offenders, told
+from tbcad_verify.report.report import Report
+from tbcad_verify.run.verify import Wishes
+from tbcad_verify.shell import pixels
+
+from tests.verify.benches import HERE
+from tests.verify.synthetic_export import (
+    Cells,
+    Design,
+    export,
+    mirrored,
+    rows,
+    sign,
+    solid,
+    stl,
+    table,
+)
+
+NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
+
+
+def failed(report: Report) -> set[str]:
+    return {check.name for check in report.checks if check.passed is not True}
+
+
+def detail(report: Report, name: str) -> str:
+    return "; ".join(check.detail for check in report.checks if check.name == name)
+
+
+def test_a_good_export_passes(good: Path) -> None:
+    report = verify(good, wishes=HERE)
+    assert failed(report) == set()
+    assert report.passed
+    written = json.loads((good / "verify.json").read_text())
+    assert list(written) == ["pass", "target_mm", "checks", "printing", "mirrors"]
+    assert written["pass"] is True
+    assert written["target_mm"] == 40.0
+    for check in written["checks"]:
+        held = check["limit"] is not None
+        words = [] if held or "detail" not in check else ["detail"]
+        assert list(check) == ["name", "file", "pass", "measured", "limit", "unit", *words]
+    ids = [mirror["id"] for mirror in written["mirrors"]]
+    assert ids == sorted(ids)
+    assert len(ids) == 98
+    for mirror in written["mirrors"]:
+        assert list(mirror) == [
+            "id",
+            "coverage_facet_mm",
+            "coverage_fitted_mm",
+            "centre_error_mm",
+            "radius_error_mm",
+            "pixels",
+        ]
+        assert mirror["coverage_fitted_mm"] >= 40
+        assert mirror["pixels"] > 0
+
+
+def test_same_export_same_bytes(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    verify(good, wishes=HERE)
+    before = (good / "verify.json").read_bytes()
+    for threads in (1, 3):
+        monkeypatch.setattr(rays, "THREADS", threads)
+        verify(good, wishes=HERE)
+        assert (good / "verify.json").read_bytes() == before
+    assert [path.name for path in good.iterdir() if "verify" in path.name] == ["verify.json"]
+
+
+def test_nothing_is_written_when_asked(good: Path) -> None:
+    assert verify(good, wishes=Wishes(write=False, apart=False)).passed
+    assert not (good / "verify.json").exists()
+
+
+def test_stages_are_told(good: Path) -> None:
+    said: list[str] = []
+    verify(good, said.append, HERE)
+    assert said[0] == "reading"
+    assert said[-1] == "every pixel"
+
+
+def test_command_line(good: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "tbcad_verify", str(good)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PYTHONPATH": str(Path(tbcad_verify.__file__).parents[1])},
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.splitlines()[-1].startswith("PASS: 98 mirrors, 89 virtual cameras see 40 mm")
+    assert "\x1b" not in run.stdout
+
+
+def test_quiet_is_one_line(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(good), "--quiet"]) == 0
+    out = capsys.readouterr()
+    assert out.err == ""
+    assert len(out.out.splitlines()) == 1
+
+
+def test_too_little_coverage_names_the_worst(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, _ = export(tmp_path / "x", Design(radius=400.0))
+    assert main([str(folder), "-q"]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("FAIL: ")
+    assert "virtual cameras fall short of 40 mm" in said
+    assert " short;" in said
+    written = json.loads((folder / "verify.json").read_text())
+    assert written["pass"] is False
+    bad = [check for check in written["checks"] if check["pass"] is False]
+    assert {"coverage, facets", "coverage, spheres"} <= {check["name"] for check in bad}
+    assert {"centre error", "radius error"}.isdisjoint(check["name"] for check in bad)
+    assert all(check["detail"] for check in bad)
+
+
+def rewrite(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Path], None]:
+    """Change an STL's (F, 3, 3) facets."""
+
+    def job(folder: Path) -> None:
+        data = np.frombuffer((folder / name).read_bytes()[84:], [("v", "<f4", 12), ("a", "<u2")])
+        (folder / name).write_bytes(stl(change(data["v"][:, 3:].reshape(-1, 3, 3).copy())))
+
+    return job
+
+
+def both(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Path], None]:
+    def job(folder: Path) -> None:
+        rewrite("shell_a.stl", change)(folder)
+        rewrite("shell_b.stl", change)(folder)
+
+    return job
+
+
+def edit(change: Callable[[dict], None]) -> Callable[[Path], None]:
+    def job(folder: Path) -> None:
+        design = json.loads((folder / "design.json").read_text())
+        change(design)
+        (folder / "design.json").write_text(json.dumps(design))
+        (folder / "mirrors.csv").write_bytes(table(design["mirrors"]))
+
+    return job
+
+
+def swap_ids(folder: Path) -> None:
+    text = (folder / "mirrors.csv").read_text()
+    text = text.replace("a0016,", "#,").replace("a0017,", "a0016,").replace("#,", "a0017,")
+    (folder / "mirrors.csv").write_text(text)
+
+
+def swap_spheres(design: dict) -> None:
+    one, two = design["mirrors"][15], design["mirrors"][16]
+    for key in ("cx", "cy", "cz", "radius_mm"):
+        one[key], two[key] = two[key], one[key]
+
+
+def drop(design: dict) -> None:
+    design["mirrors"] = [m for m in design["mirrors"] if m["id"] not in ("a0010", "b0010")]
+
+
+def shift_camera(design: dict) -> None:
+    design["cameras"][0]["pinhole_mm"][1] += 0.5
+
+
+def flip_one(facets: np.ndarray) -> np.ndarray:
+    facets[5] = facets[5][::-1]
+    return facets
+
+
+def sliver(facets: np.ndarray) -> np.ndarray:
+    """Split an edge at a vertex of its own: a facet without area."""
+    a, b = facets[0, 0], facets[0, 1]
+    return np.concatenate([facets, [np.stack([a, b, a])]])
+
+
+def dent(facets: np.ndarray) -> np.ndarray:
+    """One vertex inside a mirror pushed in by ten micrometres."""
+    where = (facets == facets[700, 2]).all(axis=2)
+    facets[where] *= np.float32(1 - 1e-2 / np.linalg.norm(facets[700, 2]))
+    return facets
+
+
+BROKEN: dict[str, tuple[Callable[[Path], None], str, str]] = {
+    "flipped": (both(lambda f: f[:, ::-1]), "outward", "inside out"),
+    "one facet flipped": (rewrite("shell_a.stl", flip_one), "watertight", "turned against"),
+    "a hole": (rewrite("shell_a.stl", lambda f: f[1:]), "watertight", "3 open"),
+    "inches": (both(lambda f: f / np.float32(25.4)), "mirrors found", "x the record's size"),
+    "shifted": (both(lambda f: f + np.float32([0, 0, 0.02])), "centre error", "0.0200 mm"),
+    "shells swapped": (
+        lambda folder: (
+            (folder / "shell_a.stl").rename(folder / "x")
+            and (folder / "shell_b.stl").rename(folder / "shell_a.stl")
+            and (folder / "x").rename(folder / "shell_b.stl")
+            and None
+        ),
+        "mirrors found",
+        "missing",
+    ),
+    "a sliver": (rewrite("shell_a.stl", sliver), "facets", "1 without area"),
+    "a dent": (rewrite("shell_a.stl", dent), "surface error", "a0002 0.00"),
+    "two pieces": (
+        rewrite("shell_a.stl", lambda f: np.vstack([f, f[:] * np.float32(3)])),
+        "components",
+        "more than one piece",
+    ),
+    "swapped ids in the table": (swap_ids, "record", "a0016, a0017"),
+    "swapped spheres in the record": (edit(swap_spheres), "poses", "a0016"),
+    "a mirror dropped from the record": (edit(drop), "directions", "2 vertices"),
+    "and found on the mesh": (edit(drop), "mirrors found", "2 not in the record"),
+    "a camera shifted": (edit(shift_camera), "poses", "off the ellipsoid"),
+    "another spec": (edit(shift_camera), "requirements", "camera a pinhole 1"),
+    "target lowered": (edit(lambda d: d.update(target_mm=30.0)), "requirements", "target_mm"),
+    "id twice": (edit(lambda d: d["mirrors"][3].update(id="a0010")), "ids", "a0010"),
+    "odd id": (edit(lambda d: d["mirrors"][3].update(id="m 4")), "ids", "m 4"),
+    "apex off": (edit(lambda d: d["mirrors"][3].update(px=1.0)), "poses", "a0004"),
+}
+
+
+@pytest.mark.parametrize("how", BROKEN)
+def test_broken_export_fails_for_its_reason(good: Path, how: str) -> None:
+    change, name, words = BROKEN[how]
+    change(good)
+    report = verify(sign(good, NAMES), wishes=HERE)
+    assert not report.passed
+    assert name in failed(report)
+    assert words in detail(report, name)
+    assert json.loads((good / "verify.json").read_text())["pass"] is False
+    assert report.verdict.startswith("FAIL: ")
+
+
+def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
+    """Consistent, watertight, and every mirror left sees enough: but one is not there."""
+    design = Design()
+    from tests.verify.synthetic_export import document, poses, write
+
+    record = [m for m in poses(design) if m["number"] != 10]
+    facets = solid(Cells(Design(without=(10,)), poses(design)))
+    mirrors = rows(design, record)
+    folder = write(
+        tmp_path / "x",
+        {
+            "design.json": json.dumps(document(design, mirrors)).encode(),
+            "mirrors.csv": table(mirrors),
+            "shell_a.stl": stl(facets),
+            "shell_b.stl": stl(mirrored(facets)),
+        },
+    )
+    assert failed(verify(folder, wishes=HERE)) == {"directions"}
+
+
+def test_changed_files_are_noticed(good: Path) -> None:
+    data = bytearray((good / "shell_a.stl").read_bytes())
+    data[0] ^= 1
+    (good / "shell_a.stl").write_bytes(data)
+    report = verify(good, wishes=HERE)
+    assert failed(report) == {"manifest"}
+    assert "shell_a.stl" in detail(report, "manifest")
+
+
+def test_listed_but_missing_and_unlisted_files(good: Path) -> None:
+    (good / "notes.csv").write_text("x")
+    sign(good, [*NAMES, "notes.csv"])
+    assert verify(good, wishes=HERE).passed
+    (good / "notes.csv").unlink()
+    assert failed(verify(good, wishes=HERE)) == {"manifest"}
+    sign(good, NAMES[:3])
+    assert "shell_b.stl" in detail(verify(good, wishes=HERE), "manifest")
+    sign(good, NAMES)
+    (good / "notes.txt").write_text("mine")
+    report = verify(good, wishes=HERE)
+    assert report.passed
+    assert next(c.measured for c in report.checks if c.name == "other files") == 1
+
+
+def test_a_check_that_breaks_is_unknown_and_no_pass(
+    good: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("on purpose")
+
+    monkeypatch.setattr(pixels.light, "full_sensor", broken)
+    report = verify(good, wishes=HERE)
+    assert not report.passed
+    unknown = {check.name for check in report.checks if check.passed is None}
+    assert unknown == set(pixels.CHECKS)
+    written = json.loads((good / "verify.json").read_text())
+    lost = [check for check in written["checks"] if check["pass"] is None]
+    assert all(check["detail"] == "ZeroDivisionError: on purpose" for check in lost)
+    assert all(mirror["pixels"] is None for mirror in written["mirrors"])
+    assert "unknown: light path" in report.verdict
+
+
+def test_everything_optical_is_unknown_without_a_bench(
+    good: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tbcad_verify.run import stages
+
+    def broken(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(stages, "recover", broken)
+    report = verify(good, wishes=HERE)
+    names = {check.name for check in report.checks if check.passed is None}
+    assert {"mirrors found", "coverage, facets", "light path"} <= names
+    assert "watertight" not in names
+
+
+def test_a_spec_without_its_keys_is_unknown(good: Path) -> None:
+    design = json.loads((good / "design.json").read_text())
+    del design["spec"]["optics"]
+    (good / "design.json").write_text(json.dumps(design))
+    report = verify(sign(good, NAMES), wishes=HERE)
+    unknown = {check.name for check in report.checks if check.passed is None}
+    assert unknown == {"requirements", "poses", "directions"}
+    assert not report.passed
+
+
+@pytest.mark.parametrize(("n", "upper"), [(1, 8), (4, 89), (18, 1657)])
+def test_geodesic_counts(n: int, upper: int) -> None:
+    """Table I of the paper: 1657 at n = 18."""
+    points = geodesic(n)
+    assert points.shape == (3, 10 * n * n + 2)
+    assert (points[2] > -1e-9).sum() == upper
+    if n == 18:
+        assert ((points[2] > -1e-9) & (points[0] > -1e-9)).sum() == 847
+
+
+def test_checks_hold_their_limits() -> None:
+    name = ("x", "f", "mm")
+    assert at_most(name, 1, 1).passed is True
+    assert at_most(name, 1.1, 1, "why") == Check("x", "f", False, 1.1, 1, "mm", "why")
+    assert at_most(name, np.nan, 1).passed is False
+    assert at_most(name, np.inf, 1).measured is None
+    assert at_least(name, 1, 1).passed is True
+    assert at_least(name, np.nan, 1).passed is False
+    assert told(name, 3).limit is None
+    assert offenders(["a", "b", "c"], np.array([1.0, 2, 3]), "mm", np.array([2, 0])) == (
+        "c 3.00 mm, a 1.00 mm"
+    )
+
+
+def test_the_proof_shares_no_code_with_what_it_proves() -> None:
+    root = Path(tbcad_verify.__file__).parent
+    kernel = root / "step" / "kernel.py"  # run apart, and never for the optical proof
+    for path in root.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            roots = {name.split(".")[0] for name in names}
+            assert not roots & {"tbcad", "build123d", "cadquery"}, path
+            assert path == kernel or "OCP" not in roots, path

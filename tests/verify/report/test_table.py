@@ -1,0 +1,58 @@
+"""What people see: rows, and words from outside that must not be taken for markup."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from tbcad_verify import main
+from tbcad_verify.programs.answers import skipped
+from tbcad_verify.report.checks import Check, at_most, told, unknown
+from tbcad_verify.report.table import table
+
+
+def shown(*checks: Check) -> list[str]:
+    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    console.print(table(checks))
+    return [" ".join(line.split()) for line in console.export_text().splitlines()][1:]
+
+
+def test_files_that_agree_share_a_row() -> None:
+    a, b = (at_most(("x", file, "mm"), value, 3) for file, value in (("a", 1.5), ("b", 2)))
+    assert shown(a, b) == ["x 2 files pass 1.5 ... 2 3 mm"]
+    assert shown(a, at_most(("x", "b", "mm"), 4, 3, "too long")) == [
+        "x a pass 1.5 3 mm",
+        "x b FAIL 4 3 mm too long",
+    ]
+
+
+def test_states_are_told_apart() -> None:
+    name = ("x", "f", "mm")
+    assert shown(unknown(name, "why")) == ["x f unknown mm why"]
+    assert shown(told(name, 1)) == ["x f info 1 mm"]
+    assert shown(skipped(name, "not installed: y")) == ["x f skipped mm skipped: not installed: y"]
+
+
+def test_words_from_outside_are_no_markup() -> None:
+    assert shown(at_most(("x", "[red]f", "mm"), 2, 1, "[/such] [bold]")) == [
+        "x [red]f FAIL 2 1 mm [/such] [bold]"
+    ]
+
+
+def test_absent_programs_are_skipped_in_so_many_words(
+    good: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(good.parent))
+    assert main([str(good), "--clients"]) == 0
+    said = capsys.readouterr().out
+    assert "not installed: apt install prusa-slicer" in said
+    assert "questions to other programs skipped" in said
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "soon"])
+def test_a_time_limit_is_a_time(limit: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["x", f"--time-limit={limit}"])
+    assert stop.value.code == 2
+    assert "time-limit" in capsys.readouterr().err

@@ -1,0 +1,123 @@
+"""A child cannot hang us, flood us, outlive us, or see and change what is the user's."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from tbcad_verify.run.child import Limits, Outcome, run
+
+
+def python(place: Path, body: str, limits: Limits | None = None) -> Outcome:
+    return run([sys.executable, "-IS", "-c", body], place, limits or Limits(10))
+
+
+def is_alive(pid: int) -> bool:
+    """False for what has gone and for what nobody has waited for yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def gone_soon(pid: int) -> bool:
+    deadline = time.monotonic() + 5
+    while is_alive(pid) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return not is_alive(pid)
+
+
+def test_a_good_end(tmp_path: Path) -> None:
+    done = python(tmp_path, "import sys; print('out'); print('err', file=sys.stderr); sys.exit(7)")
+    assert (done.code, done.reason) == (7, "")
+    assert sorted(done.text.split()) == ["err", "out"]
+    assert 0 < done.seconds < 10
+
+
+def test_late_words_are_not_lost(tmp_path: Path) -> None:
+    done = python(tmp_path, "print('x' * 300_000 + 'end')")
+    assert done.text.endswith("xend\n")
+    assert len(done.text) == 300_004
+
+
+def test_hanging_is_cut_short(tmp_path: Path) -> None:
+    start = time.monotonic()
+    done = python(tmp_path, "import time; print('soon', flush=True); time.sleep(60)", Limits(0.5))
+    assert time.monotonic() - start < 5
+    assert (done.code, done.reason) == (None, "no answer within 0.5 s")
+    assert done.text == "soon\n"
+
+
+SPAWN = """
+import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-IS", "-c", "import time; time.sleep(60)"])
+print(child.pid, flush=True)
+"""
+
+
+@pytest.mark.parametrize(("rest", "reason"), [("time.sleep(60)", "no answer within 1 s"), ("", "")])
+def test_grandchildren_do_not_outlive_a_child(tmp_path: Path, rest: str, reason: str) -> None:
+    """Nor do they keep us waiting: this one holds the pipe open."""
+    start = time.monotonic()
+    done = python(tmp_path, SPAWN + rest, Limits(1))
+    assert done.reason == reason
+    assert time.monotonic() - start < 5
+    assert gone_soon(int(done.text))
+
+
+def test_ignoring_polite_signals_does_not_help(tmp_path: Path) -> None:
+    body = "import os, signal, time; signal.signal(15, signal.SIG_IGN); print(os.getpid(), "
+    done = python(tmp_path, body + "flush=True); time.sleep(60)", Limits(0.5))
+    assert gone_soon(int(done.text))
+
+
+def test_a_crash_is_named(tmp_path: Path) -> None:
+    done = python(tmp_path, "import os; os.kill(os.getpid(), 11)")
+    assert (done.code, done.reason) == (None, "crashed (SIGSEGV)")
+
+
+def test_printing_has_an_end(tmp_path: Path) -> None:
+    done = python(tmp_path, "while True: print('y' * 1000)", Limits(10, output=5000))
+    assert done.reason == "printed more than 5000 bytes"
+    assert len(done.text) == 5000
+    assert done.seconds < 5
+
+
+@pytest.mark.parametrize("command", ["missing", "no_program", "nul\0nul"])
+def test_what_cannot_be_started(tmp_path: Path, command: str) -> None:
+    (tmp_path / "no_program").write_text("words")
+    done = run([f"{tmp_path}/{command}"], tmp_path, Limits(5))
+    assert done.code is None
+    assert done.reason.startswith("cannot be started")
+
+
+def test_home_is_private_and_nothing_is_there_to_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setenv("PYTHONPATH", "/nowhere")
+    body = (
+        "import json, os, sys; print(json.dumps([dict(os.environ), os.getcwd(), sys.stdin.read()]))"
+    )
+    environment, where, said = json.loads(python(tmp_path, body).text)
+    assert said == ""
+    assert where == "."  # places are left out of what is shown
+    assert {"DISPLAY", "PYTHONPATH"}.isdisjoint(environment)
+    own = ["HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "FREECAD_USER_HOME"]
+    assert all(environment[name].startswith("./home") for name in own)
+    assert environment["PATH"] == os.environ["PATH"]
+
+
+def test_stop_kills_what_runs_and_starts_no_more(tmp_path: Path) -> None:
+    limits = Limits(60)
+    threading.Timer(0.3, limits.stop.set).start()
+    start = time.monotonic()
+    assert python(tmp_path, "import time; time.sleep(60)", limits).reason == "stopped"
+    assert python(tmp_path, "open('ran', 'w')", limits).reason == "stopped"
+    assert time.monotonic() - start < 5
+    assert not (tmp_path / "ran").exists()

@@ -1,0 +1,218 @@
+"""Every pixel against brute force on exact spheres; what stands in the way is named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from tbcad_verify import verify
+from tbcad_verify.mesh import rays
+from tbcad_verify.shell import coverage, image_rim, light, pixels
+from tbcad_verify.shell.optics import Bench
+
+from tests.verify.benches import HERE, bench_of
+from tests.verify.synthetic_export import PIN, Cells, sign, stl
+
+NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
+
+
+def pixel_directions(bench: Bench) -> np.ndarray:
+    """(N, 3) directions of camera a's pixels, row by row, from the definition."""
+    c = bench.cameras[0]
+    focal = c.width / 2 / np.tan(c.hfov / 2)
+    down = np.cross(c.forward, c.right)
+    j, i = np.meshgrid(np.arange(c.width), np.arange(c.height))
+    x, y = j.ravel() + 0.5 - c.width / 2, i.ravel() + 0.5 - c.height / 2
+    return c.forward + (x[:, None] * c.right + y[:, None] * down) / focal
+
+
+def test_pixel_rays_are_the_definitions(bench: Bench) -> None:
+    camera = bench.cameras[0]
+    found = np.hstack([rays.pixel_rows(camera, *rows) for rows in rays.row_chunks(camera)])
+    np.testing.assert_allclose(found.T, pixel_directions(bench), atol=1e-13)
+
+
+def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """First mirror of camera a along each ray (-1: none or cut off), and whether it is useful.
+
+    The first ball that a ray enters is the mirror; seam and foot cut.
+    """
+    first, mirror = np.full(len(d), np.inf), np.full(len(d), -1)
+    miss = np.full(len(d), np.inf)
+    for k, (c, r, n) in enumerate(cells.spheres):
+        o = PIN - c
+        a, b = (d * d).sum(axis=1), d @ o
+        rest = b * b - a * (o @ o - r * r)
+        t = np.where(rest > 0, (-b - np.sqrt(np.abs(rest))) / a, np.inf)
+        x = PIN + np.where(np.isfinite(t), t, 0)[:, None] * d
+        ok = (t > 0) & (t < first) & ((x - c) @ n > 0.5 * r)
+        first[ok], mirror[ok] = t[ok], k
+        normal = (x - c) / r
+        out = d - 2 * (d * normal).sum(axis=1)[:, None] * normal
+        near = x - ((x * out).sum(axis=1) / (out * out).sum(axis=1))[:, None] * out
+        miss[ok] = np.linalg.norm(near, axis=1)[ok]
+    x = PIN + np.where(np.isfinite(first), first, 0)[:, None] * d
+    outside = (x[:, 0] < 0) | (x[:, 2] < -12) | ~np.isfinite(first)
+    mirror[outside] = -1
+    return mirror, (miss <= radius) & ~outside
+
+
+def test_pixel_counts_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+    cells = made[1]
+    tally = light.full_sensor(bench.stage(bench.cameras[0]))
+    mirror, useful = exact(cells, pixel_directions(bench), bench.radius)
+    expected = np.bincount(mirror[useful], minlength=len(cells.mirrors))
+    found = tally.pixels[: len(cells.mirrors)]
+    assert tally.pixels[len(cells.mirrors) :].sum() == 0
+    # Only pixels on the very edge of a cell may differ: the mesh has chords for arcs.
+    assert np.abs(found - expected).max() <= 2
+    assert found.sum() > 4000
+    assert abs(tally.on_mirrors - (mirror >= 0).sum()) < 60
+    assert tally.blocked.sum() == 0
+
+
+def test_nearest_way_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+    d = pixel_directions(bench)
+    useful = exact(made[1], d, bench.radius)[1]
+    d = d[useful]
+    foot = -(d @ PIN) / (d * d).sum(axis=1)
+    expected = np.linalg.norm(PIN + foot[:, None] * d, axis=1).min()
+    tally = light.full_sensor(bench.stage(bench.cameras[0]))
+    assert tally.nearest.min() == pytest.approx(expected, rel=0.02)
+
+
+def test_chunks_and_threads_do_not_matter(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = bench.stage(bench.cameras[1])
+    one = light.full_sensor(stage)
+    monkeypatch.setattr(rays, "RAYS_A_CHUNK", 999)
+    monkeypatch.setattr(rays, "THREADS", 3)
+    two = light.full_sensor(stage)
+    for name in ("pixels", "blocked", "on_mirrors", "twice", "nearest", "spread"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_hits_in_float64(bench: Bench) -> None:
+    d = rays.pixel_rows(bench.cameras[0], 90, 100)
+    origin = bench.cameras[0].pinhole[:, None]
+    facet = rays.first_hits(bench.scene, origin, d)
+    hit = np.flatnonzero(facet >= 0)
+    t = rays.reach(bench.scene, facet[hit], origin, d[:, hit])
+    x = origin + t * d[:, hit]
+    corners = bench.mesh.points[bench.mesh.faces[facet[hit]]]
+    inside = trimesh.triangles.points_to_barycentric(corners, x.T)
+    assert inside.min() > -1e-4
+    back = np.einsum("nij,ni->nj", corners, inside)
+    np.testing.assert_allclose(back, x.T, atol=1e-9)
+
+
+def test_facet_error_is_the_facets_size(bench: Bench) -> None:
+    """Off a facet of size s on a sphere of radius r the normal is wrong by up to s / 2 r, and the
+    ray at the object by twice that times the distance: millimetres, here."""
+    tally = light.full_sensor(bench.stage(bench.cameras[0]))
+    assert 0.3 < np.median(tally.spread) < 5
+
+
+def with_post(folder: Path, low: list[float], high: list[float]) -> Path:
+    """Add a part to the export: a box, in the way."""
+    box = trimesh.creation.box(bounds=[low, high])
+    (folder / "post.stl").write_bytes(stl(box.triangles.astype(np.float32)))
+    design = json.loads((folder / "design.json").read_text())
+    design["parts"].append({"name": "post", "stl": "post.stl"})
+    (folder / "design.json").write_text(json.dumps(design))
+    return sign(folder, [*NAMES, "post.stl"])
+
+
+def test_a_post_between_camera_and_mirrors_is_named(good: Path) -> None:
+    bench = bench_of(with_post(good, [66, 9, -23], [68, 11, -21]))
+    lines = {c.name: c for c in coverage.checks(bench, coverage.measure(bench), "x")}
+    assert lines["mirrors seen"].passed is False
+    assert "behind post (no mirror)" in lines["mirrors seen"].detail
+
+
+def test_a_post_between_mirror_and_object_is_named(good: Path) -> None:
+    bench = bench_of(with_post(good, [-6, -6, 30], [6, 6, 32]))
+    lines = {c.name: c for c in pixels.checks(bench, None, "x")[1]}
+    assert lines["light path"].passed is False
+    assert "blocked by post (no mirror)" in lines["light path"].detail
+    assert lines["light path"].measured > 10
+
+
+def test_a_post_inside_the_capture_sphere_is_the_object(good: Path) -> None:
+    bench = bench_of(with_post(good, [-5, -5, -5], [5, 5, 5]))
+    lines = {c.name: c for c in pixels.checks(bench, None, "x")[1]}
+    assert lines["light path"].passed is True
+
+
+def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: Bench) -> None:
+    """DESIGN.md section 3: 62.0 mm, at the zenith mirror."""
+    camera = bench.cameras[0]
+    zenith = np.flatnonzero(bench.u[2] > 1 - 1e-12)[:1]
+    start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
+    seen = bench.seen(camera)
+    small = image_rim.ring(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
+    way = image_rim.nearest_on_the_way(seen, small.direction, small.lines)
+    assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
+
+
+def test_an_object_too_large_stands_in_the_light(bench: Bench) -> None:
+    lines = {}
+    for diameter in (40.0, 75.0):
+        big = replace(bench, export=replace(bench.export, target_mm=diameter))
+        lines[diameter] = {c.name: c for c in pixels.checks(big, None, "x")[1]}["object clear"]
+    assert lines[40.0].passed is True
+    assert lines[75.0].passed is False
+
+
+def test_ring_grazes_the_capture_sphere(bench: Bench) -> None:
+    camera = bench.cameras[0]
+    ring = pixels._ring(bench, camera, None)
+    assert ring.error.max() < 1e-6
+    from tbcad_verify.mesh.surfaces import misses
+
+    np.testing.assert_allclose(misses(ring.lines), bench.radius, atol=1e-6)
+    assert np.bincount(ring.mirror).max() == image_rim.AZIMUTHS
+
+
+def test_a_narrow_camera_cuts_mirrors_off(good: Path) -> None:
+    design = json.loads((good / "design.json").read_text())
+    for camera in design["cameras"]:
+        camera["hfov_deg"] = 70.0
+    (good / "design.json").write_text(json.dumps(design))
+    lines = {c.name: c for c in pixels.checks(bench_of(good), None, "x")[1]}
+    assert lines["in frame"].passed is False
+    assert "partly out of the frame: a0" in lines["in frame"].detail
+
+
+def test_the_rim_is_looked_for_only_where_a_mirror_reaches(bench: Bench) -> None:
+    """A mirror that sees little fails for that, and not for being out of frame as well."""
+    found = coverage.measure(bench)
+    short = replace(found, fitted=np.full_like(found.fitted, 10.0))
+    ring = pixels._ring(bench, bench.cameras[0], short)
+    from tbcad_verify.mesh.surfaces import misses
+
+    np.testing.assert_allclose(misses(ring.lines), 5.0, atol=1e-6)
+
+
+def test_margins_by_hand(bench: Bench) -> None:
+    camera = bench.cameras[0]
+    corner = camera.forward + camera.right * np.tan(camera.hfov / 2)
+    d = np.stack([camera.forward, corner, -camera.forward], axis=1)
+    found = image_rim.margins(camera, d)
+    assert found[0] == pytest.approx(camera.height / 2)
+    assert found[1] == pytest.approx(0, abs=1e-9)
+    assert found[2] == -np.inf
+
+
+def test_a_mirror_without_pixels_fails(good: Path) -> None:
+    design = json.loads((good / "design.json").read_text())
+    for camera in design["cameras"]:
+        camera["width_px"], camera["height_px"] = 13, 10
+    (good / "design.json").write_text(json.dumps(design))
+    report = verify(good, wishes=replace(HERE, write=False))
+    lines = {c.name: c for c in report.checks}
+    assert lines["pixels a virtual camera"].passed is False
+    assert lines["pixels a virtual camera"].measured == 0

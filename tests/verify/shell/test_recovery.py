@@ -1,0 +1,205 @@
+"""The mirrors come out of the triangles, and only they; what was moved is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+from tbcad_verify.mesh.mesh import Mesh, indexed
+from tbcad_verify.mesh.segments import creases, measure_edges, rounding
+from tbcad_verify.shell.mirrors_found import checks
+from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.recover import recover
+
+from tests.verify.benches import bench_of
+from tests.verify.synthetic_export import Cells, Design, export
+
+RNG = np.random.default_rng(7)
+PINHOLE = np.array([100.0, 0, -100])
+
+
+def test_every_facet_goes_to_its_mirror(bench: Bench, made: tuple[Path, Cells]) -> None:
+    cells = made[1]
+    owner = bench.owner()[bench.recovery.segments.label]
+    count = len(cells.faces)
+    ids = bench.export.mirrors.ids
+    names = [f"a{cells.mirrors[k]['number']:04d}" for k in cells.face_mirror]
+    assert [ids[k] for k in owner[:count]] == names
+    walls = len(bench.mesh.faces) // 2
+    assert (owner[count:walls] == -1).all()
+
+
+def test_recovered_within_a_micrometre(bench: Bench) -> None:
+    assert bench.match.centre_error.max() < 1e-3
+    assert bench.match.radius_error.max() < 1e-3
+    assert all(check.passed for check in checks(bench, "x"))
+
+
+def failing(folder: Path) -> dict[str, str]:
+    return {c.name: c.detail for c in checks(bench_of(folder), "x") if c.passed is not True}
+
+
+def test_a_mirror_moved_by_twenty_micrometres_is_named(tmp_path: Path) -> None:
+    folder, _ = export(tmp_path / "x", Design(moved={10: [0.012, 0.012, 0.011]}))
+    said = failing(folder)
+    assert "radius error" not in said
+    assert said["centre error"].startswith("a0010 0.0202 mm, b0010 0.0202 mm")
+    assert "more" not in said["centre error"]
+
+
+def test_four_micrometres_are_allowed(tmp_path: Path) -> None:
+    folder, _ = export(tmp_path / "x", Design(moved={10: [0.004, 0, 0]}))
+    assert failing(folder) == {}
+
+
+def test_a_radius_off_by_twenty_micrometres_is_named(tmp_path: Path) -> None:
+    folder, _ = export(tmp_path / "x", Design(grown={17: 0.02}))
+    said = failing(folder)
+    assert "centre error" not in said
+    assert "a0017 0.0200 mm, b0017 0.0200 mm" in said["radius error"]
+
+
+def test_a_missing_mirror_is_named(tmp_path: Path) -> None:
+    folder, _ = export(tmp_path / "x", Design(without=(10,)))
+    assert "missing: a0010, b0010" in failing(folder)["mirrors found"]
+
+
+def test_centres_swapped_in_the_record_are_named(good: Path) -> None:
+    bench = bench_of(good)
+    table = bench.export.mirrors.table.copy()
+    table[[15, 16], 9:13] = table[[16, 15], 9:13]
+    mirrors = replace(bench.export.mirrors, table=table)
+    swapped = replace(bench, export=replace(bench.export, mirrors=mirrors))
+    errors = np.linalg.norm(bench.mirrors.centre() - mirrors.columns("cx", 3), axis=0)
+    swapped = replace(swapped, match=replace(bench.match, centre_error=errors))
+    said = {c.name: c.detail for c in checks(swapped, "x")}
+    assert "a0016 has the place of a0017, a0017 has the place of a0016" in said["centre error"]
+
+
+def test_inches_are_recognised(good: Path) -> None:
+    from tests.verify.synthetic_export import stl
+
+    for name in ("shell_a.stl", "shell_b.stl"):
+        data = np.frombuffer(
+            (good / name).read_bytes()[84:], dtype=[("v", "<f4", 12), ("a", "<u2")]
+        )
+        (good / name).write_bytes(stl(data["v"][:, 3:].reshape(-1, 3, 3) * np.float32(25.4)))
+    said = failing(good)
+    assert " x the record's size" in said["mirrors found"]
+
+
+def closed_cap(radius: float, warp: float) -> Mesh:
+    """A spherical cap that faces camera and object, with a cone behind it, badly triangulated.
+
+    The triangles are Delaunay's for points that are then moved along the sphere: the result has
+    concave edges inside one sphere.
+    """
+    a = 2 * np.pi * np.arange(60) / 60
+    rim = 4 * np.stack([np.cos(a), np.sin(a)])
+    inner = 3.7 * np.sqrt(RNG.random(400)) * np.stack([np.cos(b := RNG.random(400) * 7), np.sin(b)])
+    flat = np.hstack([rim, inner])
+    faces = Delaunay(flat.T).simplices
+    (a, b), (c, d) = (flat[:, faces[:, k]] - flat[:, faces[:, 0]] for k in (1, 2))
+    turned = a * d - b * c < 0
+    faces[turned] = faces[turned][:, ::-1]
+    flat[:, 60:] += warp * np.sin(3 * flat[::-1, 60:])
+    points = np.vstack([flat, np.sqrt(radius**2 - (flat**2).sum(axis=0)) - radius])
+    hub = np.array([[0], [0], [-8.0]])
+    back = [[(j + 1) % 60, j, points.shape[1]] for j in range(60)]
+    place = np.array([0, 0, 60.0])
+    normal = (PINHOLE - place) / np.linalg.norm(PINHOLE - place) - [0, 0, 1]
+    n = normal / np.linalg.norm(normal)
+    e = np.cross(n, [0, 1, 0])
+    e /= np.linalg.norm(e)
+    turn = np.stack([e, np.cross(n, e), n])
+    points = np.hstack([points, hub]).T @ turn + place
+    points = points.astype(np.float32).astype(np.float64)
+    return indexed(points, np.vstack([faces, back]).astype(np.int32))
+
+
+@pytest.mark.parametrize("radius", [7.0, 60.0])
+def test_concave_edges_inside_a_sphere_do_not_split_it(radius: float) -> None:
+    mesh = closed_cap(radius, 0.12)
+    edges = measure_edges(mesh)
+    inside = edges.half[creases(edges) & (edges.angle < 0)]
+    assert inside.size > 20  # or the test tests nothing
+    found = recover(mesh, PINHOLE, 30)
+    assert found.mirror.sum() == 1
+    mirror = int(np.flatnonzero(found.mirror)[0])
+    assert (found.segments.label[:-60] == mirror).all()
+    assert 1 / found.fits.surfaces.curvature[mirror] == pytest.approx(radius, abs=5e-3)
+
+
+def test_what_faces_away_is_no_mirror() -> None:
+    mesh = closed_cap(20.0, 0.0)
+    assert recover(mesh, PINHOLE, 30).mirror.sum() == 1
+    assert recover(mesh, np.array([0.0, 0, 300]), 30).mirror.sum() == 0
+    turned = indexed(mesh.points, mesh.faces[:, ::-1].copy())
+    assert recover(turned, PINHOLE, 30).mirror.sum() == 0
+    assert recover(mesh, None, 30).mirror.sum() == 0
+
+
+def test_a_misshapen_patch_is_no_mirror() -> None:
+    """Astigmatism of ten micrometres over the patch: smooth, but no sphere."""
+    mesh = closed_cap(20.0, 0.0)
+    x = mesh.points - mesh.points.mean(axis=0)
+    bent = mesh.points + 1e-2 * (x[:, 1:2] / 4) ** 2 * [0, 0, 1]
+    found = recover(indexed(bent, mesh.faces), PINHOLE, 30)
+    assert found.mirror.sum() == 0
+    assert found.fits.form[found.segments.label[0]] > 1e-3
+
+
+def test_splinters_are_no_spheres() -> None:
+    """A rough surface falls into splinters that each fit some sphere: too few points to tell."""
+    mesh = closed_cap(20.0, 0.0)
+    rough = mesh.points + 4e-3 * RNG.normal(size=mesh.points.shape)
+    found = recover(indexed(rough, mesh.faces), PINHOLE, 30)
+    assert (found.fits.area[found.mirror] < 0.1 * found.fits.area.max()).all()
+
+
+def test_a_fold_is_seen() -> None:
+    """A vertex pulled across its neighbours: closed still, but folded."""
+    mesh = closed_cap(20.0, 0.0)
+    assert recover(mesh, PINHOLE, 30).folds == 0
+    points = mesh.points.copy()
+    inner = mesh.faces[np.argmax(mesh.faces.min(axis=1) > 100)]
+    points[inner[0]] += 3 * (points[inner[1]] - points[inner[0]])
+    assert recover(indexed(points, mesh.faces), PINHOLE, 30).folds > 0
+
+
+def test_a_countersink_is_no_mirror() -> None:
+    """A cone's rim and tip lie on a sphere; its facets do not follow it."""
+    a = 2 * np.pi * np.arange(60) / 60
+    rim = np.stack([4 * np.cos(a), 4 * np.sin(a), np.zeros(60)])
+    tips = np.array([[0, 0], [0, 0], [1.2, -5.0]])
+    local = np.hstack([rim, tips])
+    ends = [[j, (j + 1) % 60, 60] for j in range(60)] + [[(j + 1) % 60, j, 61] for j in range(60)]
+    mesh = closed_cap(20.0, 0.0)
+    n = mesh.area[:, :-60].sum(axis=1)
+    n /= np.linalg.norm(n)
+    e = np.cross(n, [0, 1, 0])
+    e /= np.linalg.norm(e)
+    points = local.T @ np.stack([e, np.cross(n, e), n]) + [0, 0, 60]
+    found = recover(indexed(points, np.array(ends, np.int32)), PINHOLE, 30)
+    tip = found.segments.label[0]
+    assert (found.segments.label[:60] == tip).all()
+    assert found.fits.form[tip] < 1e-6
+    assert not found.mirror.any()
+
+
+def test_rounding_never_makes_a_crease() -> None:
+    """Facets of a true plane, thin ones too, rounded to float32: no edge may look concave."""
+    flat = RNG.random((2000, 2)) * [80, 0.05] + [20, 90]
+    flat = np.vstack([flat, RNG.random((500, 2)) * 80 + [20, 20]])
+    faces = Delaunay(flat).simplices.astype(np.int32)
+    turn = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
+    points = np.column_stack([flat, np.full(len(flat), 9.0)]) @ turn
+    mesh = indexed(points.astype(np.float32).astype(np.float64), faces)
+    edges = measure_edges(mesh)
+    assert np.abs(edges.angle).max() > 1e-5
+    sure = edges.noise < 0.05
+    assert (np.abs(edges.angle) <= edges.noise)[sure].all()
+    assert rounding(mesh) < 2e-5

@@ -1,0 +1,153 @@
+"""STEP files of known solids, read as text and by the kernel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Quaternion, gp_Trsf
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+from OCP.TopoDS import TopoDS_Shape
+from tbcad_verify import BadExport
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.kernel import read_solid
+from tbcad_verify.step.reading import StepFile, examine, load, parse
+from tbcad_verify.step.text import read_text
+
+
+def written(folder: Path, *shapes: TopoDS_Shape) -> Path:
+    STEPControl_Controller.Init_s()
+    writer = STEPControl_Writer()
+    for shape in shapes:
+        writer.Transfer(shape, STEPControl_AsIs)
+    writer.Write(str(folder / "part.step"))
+    return folder / "part.step"
+
+
+def box(low: tuple[float, ...], high: tuple[float, ...]) -> TopoDS_Shape:
+    return BRepPrimAPI_MakeBox(gp_Pnt(*low), gp_Pnt(*high)).Shape()
+
+
+def ball(radius: float, z: float = 0) -> TopoDS_Shape:
+    return BRepPrimAPI_MakeSphere(gp_Pnt(0, 0, z), radius).Shape()
+
+
+BOX = box((-5, -10, -15), (5, 10, 15))
+
+
+def both(file: Path) -> StepFile:
+    return parse(read_text(file), read_solid(file))
+
+
+def test_box_in_closed_form(tmp_path: Path) -> None:
+    found = both(written(tmp_path, box((-4, -8, -12), (6, 12, 18))))
+    assert found.counts == {"solids": 1, "shells": 1, "open_edges": 0}
+    assert found.valid
+    assert found.bulk.volume == pytest.approx(6000, rel=1e-12)
+    assert found.bulk.area == pytest.approx(2200, rel=1e-12)
+    assert found.bulk.centroid == pytest.approx([1, 2, 3], abs=1e-9)
+    assert found.bulk.low == pytest.approx([-4, -8, -12], abs=1e-9)
+    assert found.bulk.high == pytest.approx([6, 12, 18], abs=1e-9)
+    assert found.properties == {}
+    faces = found.faces
+    assert set(faces.kind) == {"plane"}
+    assert sorted(faces.area) == pytest.approx([200, 200, 300, 300, 600, 600])
+    outward = ((faces.middle - [1, 2, 3]) * faces.normal).sum(axis=1)
+    assert sorted(outward) == pytest.approx([5, 5, 10, 10, 15, 15])
+
+
+def test_ball_and_its_hollow(tmp_path: Path) -> None:
+    """The box is the patch's own, not the whole surface's; hollows are told from balls."""
+    solid = both(written(tmp_path, ball(3, 5)))
+    assert solid.counts == {"solids": 1, "shells": 1, "open_edges": 0}
+    assert solid.faces.outward.all()
+    assert solid.faces.area.sum() == pytest.approx(36 * np.pi, rel=1e-9)
+    assert solid.faces.radius == pytest.approx([3])
+    cut = BRepAlgoAPI_Cut(box((-10, -10, -10), (10, 10, 10)), ball(3)).Shape()
+    hollow = both(written(tmp_path, cut))
+    assert hollow.counts["shells"] == 2
+    spheres = hollow.faces.kind == "sphere"
+    assert spheres.any()
+    assert not hollow.faces.outward[spheres].any()
+    assert hollow.bulk.volume == pytest.approx(8000 - 36 * np.pi, rel=1e-9)
+
+
+def test_box_of_a_cap(tmp_path: Path) -> None:
+    cap = BRepAlgoAPI_Common(ball(10), box((-20, -20, 8), (20, 20, 18))).Shape()
+    found = both(written(tmp_path, cap))
+    wide = 6.0  # the circle 8 mm up a sphere of 10
+    assert found.bulk.low == pytest.approx([-wide, -wide, 8], abs=1e-6)
+    assert found.bulk.high == pytest.approx([wide, wide, 10], abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_box_of_a_turned_ball_with_a_flat(tmp_path: Path, seed: int) -> None:
+    """A ball's top is its box's, where it is not cut off; else the flat's rim is."""
+    radius, flat = 7.3, 4.0
+    turn = gp_Trsf()
+    turn.SetRotation(gp_Quaternion(*np.random.default_rng(seed).normal(size=4).tolist()))
+    upright = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
+    cut = BRepPrimAPI_MakeSphere(upright, radius, -np.pi / 2, np.arcsin(flat / radius)).Shape()
+    found = both(written(tmp_path, BRepBuilderAPI_Transform(cut, turn, True).Shape()))
+    up = gp_Dir(0, 0, 1).Transformed(turn)
+    cosine = np.outer([-1, 1], [up.X(), up.Y(), up.Z()])
+    rim = cosine * flat + np.sqrt(radius**2 - flat**2) * np.sqrt(1 - cosine**2)
+    low, high = np.where(cosine * radius <= flat, radius, rim)
+    assert found.bulk.low == pytest.approx(-low, abs=1e-6)
+    assert found.bulk.high == pytest.approx(high, abs=1e-6)
+
+
+def test_two_solids_are_counted(tmp_path: Path) -> None:
+    found = both(written(tmp_path, BOX, box((20, 0, 0), (21, 1, 1))))
+    assert found.counts["solids"] == 2
+    assert len(found.solids) == 2
+
+
+def test_in_a_process_of_its_own(tmp_path: Path) -> None:
+    file = written(tmp_path, BOX)
+    found, here = examine(load(tmp_path, file.name), 60), both(file)
+    assert found.bulk == here.bulk
+    assert found.faces.names == here.faces.names
+
+
+def test_what_takes_too_long_is_unknown(tmp_path: Path) -> None:
+    blob = load(tmp_path, written(tmp_path, BOX).name)
+    with pytest.raises(Unknown, match="no answer within"):
+        examine(blob, 0.05)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("ADVANCED_FACE('',(", "ADVANCED_FACE('',((", 1),
+        lambda text: text.replace("DATA;", "DATA;#1=(((((", 1),
+        lambda text: text[: len(text) // 2] + "\nEND-ISO-10303-21;\n",
+        lambda text: text.replace("CARTESIAN_POINT", "CARTESIAN_PINT"),
+        lambda text: "ISO-10303-21;\nEND-ISO-10303-21;",
+    ],
+)
+def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
+    file = written(tmp_path, BOX)
+    file.write_text(change(file.read_text()))  # type: ignore[operator]
+    with pytest.raises(Unknown):
+        examine(load(tmp_path, file.name), 60)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: b"", "does not begin"),
+        (lambda data: b"solid x", "does not begin"),
+        (lambda data: data[: len(data) // 2], "does not end"),
+        (lambda data: b"PK" + data, "does not begin"),
+    ],
+)
+def test_foreign_or_truncated_is_refused(tmp_path: Path, change: object, words: str) -> None:
+    file = written(tmp_path, BOX)
+    file.write_bytes(change(file.read_bytes()))  # type: ignore[operator]
+    with pytest.raises(BadExport, match=words):
+        load(tmp_path, file.name)

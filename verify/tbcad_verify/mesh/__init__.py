@@ -1,0 +1,1 @@
+"""Meshes: files, topology, smooth patches, fitted surfaces and rays."""

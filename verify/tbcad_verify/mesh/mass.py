@@ -1,0 +1,51 @@
+"""A mesh as a lump: volume, area, middle and box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.vectors import norm
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bulk:
+    """Plain numbers, so that they go through JSON unchanged.
+
+    Attributes:
+        volume: signed, mm^3.
+        area: mm^2.
+        centroid: x, y, z of the volume's middle, mm.
+        low: least x, y, z, mm.
+        high: greatest x, y, z, mm.
+        bend: how fast the area of the surface at a distance grows with it at most, mm^2 / mm:
+            by Steiner, the sum over edges of length times angle. None where nobody asked.
+    """
+
+    volume: float
+    area: float
+    centroid: list[float]
+    low: list[float]
+    high: list[float]
+    bend: float | None = None
+
+
+def bulk(mesh: Mesh) -> Bulk:
+    """Figures of a closed mesh, by the divergence theorem facet by facet."""
+    middle = mesh.points.mean(axis=0)  # about which large terms do not cancel
+    corners = np.take(mesh.points - middle, mesh.faces, axis=0)
+    sixth = np.einsum("ni,in->n", corners[:, 0], mesh.area) / 6
+    volume = float(sixth.sum())
+    moment = np.einsum("n,ni->i", sixth, corners.sum(axis=1) / 4)
+    return Bulk(
+        volume,
+        float(norm(mesh.area).sum() / 2),
+        (middle + moment / (volume or np.nan)).tolist(),
+        mesh.points.min(axis=0).tolist(),
+        mesh.points.max(axis=0).tolist(),
+    )

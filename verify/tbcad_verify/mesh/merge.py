@@ -1,0 +1,101 @@
+"""Join patches again that creases cut out of one surface.
+
+The facets of a sphere need not form a convex body: where the triangulation is poor, edges inside a
+mirror look like valleys. What tells is the surface: a splinter's vertices lie on its mirror's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.fits import Corners, Fits, corners, fit
+from tbcad_verify.mesh.mesh import Mesh, distinct, linked
+from tbcad_verify.mesh.segments import Edges, Segments
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.vectors import dot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Pairs = tuple[Ints, Ints]
+
+# A splinter belongs to a surface if it lies on it to within this, everywhere.
+SAME_MM = 2e-4
+# And if it lies along it: cosine of the angle between the normals. A wall's splinters touch a
+# mirror's edge with all their corners, but stand on it.
+ALONG = 0.9
+# What is thinner than this has no normal to speak of.
+THIN_MM = 1e-3
+# No edge inside a mirror is sharper than this.
+EDGE_RAD = 1.0
+# So many vertices, twice a sphere's four unknowns, before a surface counts as known.
+LEAST = 8
+# Vertices of a splinter that are tried before all.
+SOME = 6
+ROUNDS = 8
+
+
+def heal(mesh: Mesh, edges: Edges, segments: Segments) -> tuple[Segments, Fits]:
+    """Join splinters to the best known surface next to them, until nothing changes.
+
+    Returns:
+        The patches, and the surfaces fitted to them.
+    """
+    for _ in range(ROUNDS):
+        points = corners(mesh, segments)
+        fits = fit(mesh, segments, points)
+        small, large = _joints(mesh, edges, segments, points, fits)
+        if not small.size:
+            break
+        count, label = linked(segments.count, small, large)
+        segments = Segments(label[segments.label], count)
+    else:
+        fits = fit(mesh, segments, corners(mesh, segments))
+    return segments, fits
+
+
+def _joints(mesh: Mesh, edges: Edges, segments: Segments, points: Corners, fits: Fits) -> Pairs:
+    """Splinters and what each belongs to: one neighbour, for none must bridge two mirrors."""
+    small, large = _neighbours(mesh, edges, segments, fits.area)
+    likely = (fits.count[large] >= LEAST) & _along(fits, small, large)
+    small, large = small[likely], large[likely]
+    likely = _farthest(mesh, points, fits.surfaces, (small, large), SOME) < SAME_MM
+    small, large = small[likely], large[likely]
+    worst = _farthest(mesh, points, fits.surfaces, (small, large))
+    order = np.lexsort((worst, small))
+    best = order[np.unique(small[order], return_index=True)[1]]
+    best = best[worst[best] < SAME_MM]
+    return small[best], large[best]
+
+
+def _neighbours(mesh: Mesh, edges: Edges, segments: Segments, area: Floats) -> Pairs:
+    """Pairs of patches with a common edge that is not too sharp, the one of smaller area first."""
+    blunt = np.abs(edges.angle) <= EDGE_RAD + edges.noise
+    half = edges.half[blunt]
+    one, two = segments.label[half // 3], segments.label[mesh.twin[half] // 3]
+    one, two = one[one != two], two[one != two]
+    rank = np.empty(segments.count, dtype=np.int64)
+    rank[np.argsort(area, kind="stable")] = np.arange(segments.count)
+    small = np.where(rank[one] < rank[two], one, two).astype(np.int64)
+    keys = distinct(small * segments.count + (one + two - small))
+    return keys // segments.count, keys % segments.count
+
+
+def _along(fits: Fits, small: Ints, large: Ints) -> NDArray[np.bool_]:
+    surface = fits.surfaces.take(large).gradient(fits.middle[:, small])
+    thin = fits.area[small] < THIN_MM * fits.extent[small]
+    return np.asarray(thin | (dot(surface, fits.normal[:, small]) > ALONG))
+
+
+def _farthest(
+    mesh: Mesh, points: Corners, surfaces: Surfaces, pairs: Pairs, most: int = 1 << 62
+) -> Floats:
+    """Largest distance of (the most first of) a patch's vertices from its neighbour's surface."""
+    small, large = pairs
+    if not small.size:
+        return np.zeros(0)
+    size = np.minimum(np.diff(np.append(points.first, points.segment.size))[small], most)
+    starts = np.cumsum(size) - size
+    rows = np.arange(size.sum()) + np.repeat(points.first[small] - starts, size)
+    height = surfaces.take(np.repeat(large, size)).height(mesh.points[points.vertex[rows]].T)
+    return np.asarray(np.maximum.reduceat(np.abs(height), starts))

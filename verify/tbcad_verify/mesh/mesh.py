@@ -1,0 +1,209 @@
+"""Triangles that share vertices, and whether they close into one solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tbcad_verify.mesh.stl import Facets
+from tbcad_verify.mesh.vectors import cross, dot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """An indexed triangle mesh. Half-edge 3 f + k leads from corner k to corner k + 1 of facet f.
+
+    Attributes:
+        points: (V, 3) float64 mm, exactly the float32 values of the file.
+        faces: (F, 3) vertex indices.
+        twin: (3 F,) the half-edge on the other side; -1 where there is not exactly one.
+        area: (3, F) outward normals, as long as twice the facet's area.
+    """
+
+    points: Floats
+    faces: Ints
+    twin: Ints
+    area: Floats
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What is wrong with a mesh; a good one has zeros, one component and a positive volume.
+
+    Attributes:
+        open_edges: edges that belong to one facet only.
+        crowded_edges: edges of more than two facets.
+        turned_edges: edges whose two facets run the same way along them.
+        degenerate: facets without area.
+        duplicate: facets on the same three vertices as a neighbour.
+        stored_normals: facets whose stored normal contradicts their corners' order.
+        components: connected pieces.
+        volume: signed, mm^3; negative when inside out.
+        status: manifold3d's word.
+    """
+
+    open_edges: int
+    crowded_edges: int
+    turned_edges: int
+    degenerate: int
+    duplicate: int
+    stored_normals: int
+    components: int
+    volume: float
+    status: str
+
+
+def merge(facets: Facets) -> Mesh:
+    """Merge corners that are equal as float32, and find every half-edge's twin."""
+    corners = facets.corners.reshape(-1, 3)
+    index, inverse = _unique_rows(corners)
+    faces = inverse.reshape(-1, 3).astype(np.int32)
+    return indexed(corners[index].astype(np.float64), faces)
+
+
+def indexed(points: Floats, faces: Ints) -> Mesh:
+    """A mesh from (V, 3) points and (F, 3) vertex indices."""
+    a, b, c = (np.take(points, faces[:, k], axis=0).T for k in range(3))
+    return Mesh(points, faces, _twins(faces, len(points)), cross(b - a, c - a))
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one, in order, sharing nothing."""
+    vertices = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    edges = np.cumsum([0, *(mesh.twin.size for mesh in meshes)])
+    twins = [np.where(m.twin < 0, -1, m.twin + e) for m, e in zip(meshes, edges, strict=False)]
+    return Mesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([m.faces + v for m, v in zip(meshes, vertices, strict=False)]).astype(
+            np.int32
+        ),
+        np.concatenate(twins).astype(np.int32),
+        np.concatenate([mesh.area for mesh in meshes], axis=1),
+    )
+
+
+def examine(mesh: Mesh, facets: Facets) -> Topology:
+    """Count what keeps a mesh from being one closed solid."""
+    opened, crowded = _edge_faults(mesh)
+    return Topology(
+        open_edges=opened,
+        crowded_edges=crowded,
+        turned_edges=_turned(mesh),
+        degenerate=int(_flatness(mesh).sum()),
+        duplicate=_duplicates(mesh),
+        stored_normals=_contradicted(facets.normals, mesh.area),
+        components=_components(mesh),
+        volume=_volume(mesh),
+        status=manifold_status(mesh),
+    )
+
+
+def linked(size: int, one: NDArray[np.integer], two: NDArray[np.integer]) -> tuple[int, Ints]:
+    """How many groups `size` things form that are linked one[k] - two[k], and each one's group."""
+    links = coo_array((np.ones(one.size, dtype=np.int8), (one, two)), shape=(size, size))
+    count, label = connected_components(links, directed=False)
+    return int(count), np.asarray(label, dtype=np.int32)
+
+
+def distinct(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sorted, each once; for millions of integers many times faster than np.unique."""
+    keys = np.sort(keys)
+    return keys[np.append(True, keys[1:] != keys[:-1])] if keys.size else keys
+
+
+def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    # Sorting one 64-bit hash is many times faster than sorting triples; a clash is checked for.
+    bits = (rows + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes +0
+    key = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+    key = (key ^ (key >> np.uint64(29))) + bits[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
+    key = (key ^ (key >> np.uint64(32))) + bits[:, 2] * np.uint64(0x165667B19E3779F9)
+    _, index, inverse = np.unique(key, return_index=True, return_inverse=True)
+    if not np.array_equal(rows[index][inverse], rows):
+        _, index, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    # Numbered as they first occur, neighbours in the file stay neighbours in memory.
+    order = np.argsort(index)
+    number = np.empty_like(order)
+    number[order] = np.arange(order.size)
+    return index[order], number[inverse.ravel()]
+
+
+def _edge_keys(faces: Ints, count: int) -> NDArray[np.int64]:
+    start = faces.ravel().astype(np.int64)
+    end = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    return np.minimum(start, end) * count + np.maximum(start, end)
+
+
+def _twins(faces: Ints, count: int) -> Ints:
+    keys = _edge_keys(faces, count)
+    order = np.argsort(keys)
+    same = keys[order][1:] == keys[order][:-1]
+    alone = same & ~np.append(same[1:], False) & ~np.insert(same[:-1], 0, False)
+    first, second = order[:-1][alone], order[1:][alone]
+    twin = np.full(keys.size, -1, dtype=np.int32)
+    twin[first], twin[second] = second, first
+    return twin
+
+
+def _edge_faults(mesh: Mesh) -> tuple[int, int]:
+    lost = _edge_keys(mesh.faces, len(mesh.points))[mesh.twin < 0]
+    counts = np.unique(lost, return_counts=True)[1]
+    return int((counts == 1).sum()), int((counts > 2).sum())
+
+
+def _paired(mesh: Mesh) -> tuple[NDArray[np.intp], Ints]:
+    first = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
+    return first, mesh.twin[first]
+
+
+def _turned(mesh: Mesh) -> int:
+    first, second = _paired(mesh)
+    start = mesh.faces.ravel()
+    return int((start[first] == start[second]).sum())
+
+
+def _duplicates(mesh: Mesh) -> int:
+    first, second = _paired(mesh)
+    far = np.roll(mesh.faces, -2, axis=1).ravel()
+    return int((far[first] == far[second]).sum())
+
+
+def _flatness(mesh: Mesh) -> NDArray[np.bool_]:
+    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
+    sides = [corner[k] - corner[k - 1] for k in range(3)]
+    longest = np.max([dot(side, side) for side in sides], axis=0)
+    # Below 1e-12 of the longest side even float64 sees no height at all.
+    return np.asarray(dot(mesh.area, mesh.area) <= (1e-12 * longest) ** 2)
+
+
+def _contradicted(stored: NDArray[np.float32], area: Floats) -> int:
+    agreement = np.einsum("ni,in->n", stored, area)
+    return int((agreement < 0).sum())
+
+
+def _components(mesh: Mesh) -> int:
+    first, second = _paired(mesh)
+    size = len(mesh.faces)
+    return linked(size, first // 3, second // 3)[0]
+
+
+def _volume(mesh: Mesh) -> float:
+    # About the middle, so that large terms do not cancel.
+    corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
+    return float(np.einsum("ni,in->n", corner, mesh.area).sum()) / 6
+
+
+def manifold_status(mesh: Mesh) -> str:
+    """What manifold3d says; "NoError" is good."""
+    import manifold3d
+
+    shape = manifold3d.Manifold(
+        manifold3d.Mesh(mesh.points.astype(np.float32), mesh.faces.astype(np.uint32))
+    )
+    return str(shape.status()).rsplit(".", 1)[-1]

@@ -1,0 +1,96 @@
+"""Embree, called directly: the first facet along each ray, from several threads.
+
+Embree works in float32, so only the facet's number is taken from it; where the ray meets that
+facet is worked out again in float64.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.vectors import dot, unit
+from tbcad_verify.record.record import Camera
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+RAYS_A_CHUNK = 1 << 14  # such that a chunk's arrays stay in a core's cache
+THREADS = min(os.cpu_count() or 1, 8)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All parts' facets, ready to be hit.
+
+    Attributes:
+        embree: the committed scene; queries release the interpreter's lock.
+        planes: (F, 4) unit outward normal and its product with a corner, mm.
+    """
+
+    embree: Any
+    planes: Floats
+
+
+def build(mesh: Mesh) -> Scene:
+    """Put a mesh into Embree and commit it."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, mesh.points.astype(np.float32), mesh.faces)
+    one = np.ones((1, 3), dtype=np.float32)
+    scene.run(one, one)  # the first call commits; later ones may come from any thread
+    return Scene(scene, _planes(mesh))
+
+
+def first_hits(scene: Scene, origin: Floats, d: Floats) -> Ints:
+    """(N,) the first facet along rays from origin (3, 1) or (3, N) along d (3, N); -1 for none."""
+    start = np.empty((d.shape[1], 3), dtype=np.float32)
+    start[:] = origin.T
+    return np.asarray(scene.embree.run(start, d.T.astype(np.float32)), dtype=np.int32)
+
+
+def reach(scene: Scene, facet: Ints, origin: Floats, d: Floats) -> Floats:
+    """(N,) lengths of d from origin to the planes of facets, in float64."""
+    plane = np.take(scene.planes, facet, axis=0).T
+    return np.asarray((plane[3] - dot(origin, plane[:3])) / dot(d, plane[:3]))
+
+
+def pixel_rows(camera: Camera, first: int, last: int) -> Floats:
+    """(3, N) directions through the centres of all pixels of rows first ... last - 1, row by row.
+
+    The component along `forward` is 1.
+    """
+    across = (np.arange(camera.width) + 0.5 - camera.width / 2) * camera.pitch
+    downward = (np.arange(first, last) + 0.5 - camera.height / 2) * camera.pitch
+    columns = camera.forward[:, None] + camera.right[:, None] * across
+    rows = camera.down[:, None] * downward
+    return (rows[:, :, None] + columns[:, None, :]).reshape(3, -1)
+
+
+def row_chunks(camera: Camera) -> list[tuple[int, int]]:
+    """Bands of pixel rows, a chunk of rays each: (first, last + 1)."""
+    step = max(1, RAYS_A_CHUNK // camera.width)
+    return [(k, min(k + step, camera.height)) for k in range(0, camera.height, step)]
+
+
+def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Results in the items' order, whatever the threads do."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(work, items))
+
+
+def _planes(mesh: Mesh) -> Floats:
+    normal = unit(mesh.area)
+    offset = dot(normal, np.take(mesh.points, mesh.faces[:, 0], axis=0).T)
+    return np.ascontiguousarray(np.vstack([normal, offset]).T)

@@ -1,0 +1,128 @@
+"""Cut a mesh along its creases into smooth patches, without a hint of where the mirrors are.
+
+Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat;
+the valley between two mirrors is concave, and a wall meets a mirror at a large angle. What keeps
+"little" from "concave" is only the rounding of the vertices to float32, and that is known: it can
+tilt a facet by no more than its leverage over the facet's height.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.mesh import Mesh, linked
+from tbcad_verify.mesh.vectors import cross, dot, norm, slices, unit
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# A concave edge is a crease beyond this and the rounding. Flat mirrors at n = 60 meet at 0.003.
+CONCAVE_RAD = 1e-3
+# A convex one beyond this: facets of a mirror differ by 2 sqrt(2 chord error / radius), 0.1 at
+# most for 0.01 mm on the smallest mirrors; walls meet mirrors at 0.36 or more from n = 2 on.
+SHARP_RAD = 0.2
+# Rounding above which an edge's angle says nothing: it must not join two patches.
+BLIND_RAD = 0.05
+# Two facets that lie back to back, closer than this to a full turn: the surface is folded over.
+FOLD_RAD = 0.2
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The edges between two facets, one a column.
+
+    Attributes:
+        half: (E,) one of the two half-edges, the one with the smaller number.
+        angle: (E,) between the facets' normals, rad; positive where convex.
+        noise: (E,) the most by which rounding can have changed the angle, rad.
+    """
+
+    half: NDArray[np.intp]
+    angle: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Smooth patches.
+
+    Attributes:
+        label: (F,) segment of each facet.
+        count: K.
+    """
+
+    label: NDArray[np.int32]
+    count: int
+
+
+def measure_edges(mesh: Mesh) -> Edges:
+    """Angle over every edge that has two facets, and how far rounding can have moved it."""
+    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size, dtype=np.int32))
+    normal, double = unit(mesh.area), np.maximum(norm(mesh.area), np.finfo(np.float64).tiny)
+    angle, tilt = np.empty((2, half.size))
+    for part in slices(half.size):
+        angle[part], tilt[part] = _bend(mesh, normal, double, half[part])
+    return Edges(half, angle, rounding(mesh) * tilt)
+
+
+def _bend(
+    mesh: Mesh, normal: Floats, double: Floats, half: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Angles over edges, rad, and how far they tilt a unit of vertex error, rad/mm."""
+    other = mesh.twin[half]
+    start = _corner(mesh, half, 0)
+    edge = _corner(mesh, half, 1) - start
+    length = norm(edge)
+    n, m = np.take(normal, half // 3, axis=1), np.take(normal, other // 3, axis=1)
+    angle = np.arctan2(dot(cross(n, m), edge) / length, dot(n, m))
+    one, two = (
+        _leverage(_corner(mesh, h, 2) - start, edge, length) * length / double[h // 3]
+        for h in (half, other)
+    )
+    return angle, one + two
+
+
+def rounding(mesh: Mesh) -> float:
+    """How far float32 can have moved a vertex, mm: half a unit in the last place on each axis."""
+    return math.sqrt(3) / 2 * float(np.spacing(np.float32(np.abs(mesh.points).max())))
+
+
+def creases(edges: Edges) -> Bools:
+    """(E,) the edges that part two patches."""
+    concave = edges.angle < -(CONCAVE_RAD + edges.noise)
+    sharp = edges.angle > SHARP_RAD + edges.noise
+    return np.asarray(concave | sharp | (edges.noise > BLIND_RAD))
+
+
+def folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
+    """How many edges fold the surface back onto itself; a solid one can make has none.
+
+    Args:
+        edges: of a mesh.
+        nearest: facets closer than this to a full turn lie back to back, rad.
+    """
+    turned = np.abs(edges.angle) - edges.noise > np.pi - nearest
+    return int(turned.sum())
+
+
+def split(mesh: Mesh, edges: Edges) -> Segments:
+    """Join facets over all edges that are no creases."""
+    smooth = edges.half[~creases(edges)]
+    count, label = linked(len(mesh.faces), smooth // 3, mesh.twin[smooth] // 3)
+    return Segments(label, count)
+
+
+def _corner(mesh: Mesh, half: NDArray[np.integer], step: int) -> Floats:
+    """(3, E) the corner where a half-edge starts, ends (step 1), or that faces it (step 2)."""
+    facet, k = np.divmod(half, 3)
+    return np.asarray(np.take(mesh.points, mesh.faces[facet, (k + step) % 3], axis=0).T)
+
+
+def _leverage(apex: Floats, edge: Floats, length: Floats) -> Floats:
+    # Beyond the edge's ends, its own vertices' errors are extrapolated.
+    along = dot(apex, edge) / np.square(length)
+    return np.asarray(1 + np.abs(along) + np.abs(1 - along))

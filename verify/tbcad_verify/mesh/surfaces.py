@@ -1,0 +1,136 @@
+"""Spheres and planes in one form, and rays that meet them.
+
+A surface is a point p on it, its unit normal n there (out of the solid, toward the light) and its
+curvature k = 1 / radius, positive where it bulges toward the light:
+    (x - p).n + k/2 |x - p|^2 = 0.
+A plane has k = 0, and nothing blows up on the way there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.vectors import dot, norm
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """N surfaces.
+
+    Attributes:
+        point: (3, N) mm, on the surface.
+        normal: (3, N) unit.
+        curvature: (N,) 1/mm.
+    """
+
+    point: Floats
+    normal: Floats
+    curvature: Floats
+
+    def take(self, index: NDArray[np.integer]) -> Surfaces:
+        """The surfaces with these numbers, in this order."""
+        return Surfaces(
+            np.take(self.point, index, axis=1),
+            np.take(self.normal, index, axis=1),
+            np.take(self.curvature, index),
+        )
+
+    def coated(self, thickness: float) -> Surfaces:
+        """The surfaces at this distance above, mm."""
+        return Surfaces(
+            self.point + thickness * self.normal,
+            self.normal,
+            self.curvature / (1 + self.curvature * thickness),
+        )
+
+    def centre(self) -> Floats:
+        """(3, N) sphere centres; not finite for planes."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.point - self.normal / self.curvature
+
+    def height(self, x: Floats) -> Floats:
+        """(N,) signed distances of points (3, N) from the surfaces, mm."""
+        a = x - self.point
+        f = dot(a, self.normal) + self.curvature / 2 * dot(a, a)
+        return np.asarray(2 * f / (1 + np.sqrt(np.maximum(1 + 2 * self.curvature * f, 0))))
+
+    def gradient(self, x: Floats) -> Floats:
+        """(3, N) normals at points (3, N); unit on the surface."""
+        return self.normal + self.curvature * (x - self.point)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Reflected rays: points on the mirrors and directions, (3, N) each; and the way there.
+
+    Attributes:
+        point: (3, N) mm, where the ray meets the mirror; NaN where it misses.
+        toward: (3, N) direction after reflection, as long as the one before.
+        reach: (N,) how many lengths of the incoming direction lie before the point.
+    """
+
+    point: Floats
+    toward: Floats
+    reach: Floats
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Surfaces as seen from one point: what is the same for all rays is worked out once.
+
+    Attributes:
+        origin: (3,) mm, where all rays start.
+        table: (K, 8) a row a surface: m (3), C, k, q (3); a ray meets the surface where
+            k/2 |d|^2 t^2 + d.m t + C = 0, and the normal at x is q + k x.
+    """
+
+    origin: Floats
+    table: Floats
+
+
+def seen_from(origin: Floats, surfaces: Surfaces) -> Seen:
+    """Prepare surfaces for rays from one point, (3,) mm."""
+    a = origin[:, None] - surfaces.point
+    k = surfaces.curvature
+    table = np.stack(
+        [
+            *(surfaces.normal + k * a),
+            dot(a, surfaces.normal) + k / 2 * dot(a, a),
+            k,
+            *(surfaces.normal - k * surfaces.point),
+        ]
+    )
+    return Seen(origin, np.ascontiguousarray(table.T))
+
+
+def reflect(seen: Seen, index: NDArray[np.integer], d: Floats) -> Lines:
+    """Reflect rays of directions d (3, N) on surfaces number index (N,)."""
+    row = np.take(seen.table, index, axis=0).T
+    k = row[4]
+    b, c = dot(d, row[:3]), row[3]
+    with np.errstate(invalid="ignore"):
+        # The root before the bulge, in the form that keeps its digits when k goes to zero.
+        reach = 2 * c / (np.sqrt(b * b - 2 * k * c * dot(d, d)) - b)
+    point = seen.origin[:, None] + reach * d
+    return Lines(point, bounce(d, row[5:] + k * point), reach)
+
+
+def bounce(d: Floats, normal: Floats) -> Floats:
+    """(3, N) directions d after reflection on unit normals."""
+    return d - 2 * dot(d, normal) * normal
+
+
+def nearest(lines: Lines) -> Floats:
+    """(3, N) the point of each reflected line that is nearest to the origin."""
+    p, r = lines.point, lines.toward
+    return p - dot(p, r) / dot(r, r) * r
+
+
+def misses(lines: Lines) -> Floats:
+    """(N,) distances of the reflected lines from the origin, mm."""
+    return norm(nearest(lines))

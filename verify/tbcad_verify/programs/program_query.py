@@ -1,0 +1,112 @@
+"""What one program is asked about one kind of file, and what it is given to answer."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from tbcad_verify.record.files import locate
+from tbcad_verify.report.checks import Check, Name
+from tbcad_verify.run.child import Limits, Outcome, run
+
+Command = tuple[str, ...]  # a program's absolute path and first arguments; empty: it is absent
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """One part, and what the programs should find in its files.
+
+    Attributes:
+        name: of the part.
+        files: "step", "stl", "3mf" -> file name inside the export; what is missing is skipped.
+        spheres: number of spherical faces of the solid; None: any number.
+        volume: of the mesh, mm^3; NaN when it is unknown.
+        volume_error: how far another file's volume may be from it, mm^3.
+    """
+
+    name: str
+    files: Mapping[str, str]
+    spheres: int | None
+    volume: float
+    volume_error: float
+
+
+@dataclass(frozen=True)
+class Room:
+    """A private folder with a copy of one file, for one run of one program.
+
+    Attributes:
+        command: how the program's command line starts.
+        place: the folder, absolute.
+        given: the copy in it. Its name is ours, so that no name is ever taken for an option.
+        file: name of the original inside the export.
+        limits: of the run.
+    """
+
+    command: Command
+    place: Path
+    given: Path
+    file: str
+    limits: Limits
+
+    def run(self, *arguments: str | Path) -> Outcome:
+        """Run the program with these further arguments."""
+        return run([*self.command, *map(str, arguments)], self.place, self.limits)
+
+
+@dataclass(frozen=True)
+class Errand:
+    """One program and one kind of file.
+
+    Attributes:
+        program: its name.
+        kind: which of a part's files it is given.
+        install: the command that installs it.
+        questions: name -> unit of the checks it answers, in order.
+        find: how to start it.
+        ask: runs it; raises Unknown when there is no answer.
+    """
+
+    program: str
+    kind: str
+    install: str
+    questions: Mapping[str, str]
+    find: Callable[[], Command]
+    ask: Callable[[Room, Wanted], Sequence[Check]]
+
+    def names(self, wanted: Wanted) -> list[Name]:
+        """Name, file and unit of every check; a part without such a file goes by its own name."""
+        file = wanted.files.get(self.kind) or wanted.name
+        return [(name, file, unit) for name, unit in self.questions.items()]
+
+
+def on_path(*names: str) -> Command:
+    """The first of these programs that is installed, by its absolute path."""
+    found = next(filter(None, map(shutil.which, names)), None)
+    return () if found is None else (str(Path(found).absolute()),)
+
+
+@contextmanager
+def room(command: Command, folder: Path, file: str, kind: str, limits: Limits) -> Iterator[Room]:
+    """A room that is gone afterwards.
+
+    Args:
+        command: how the program's command line starts.
+        folder: the export, resolved.
+        file: name inside it.
+        kind: ending of the copy's name.
+        limits: of the run.
+
+    Raises:
+        BadExport: the file is no regular file inside the export.
+    """
+    original = locate(folder, file)
+    with tempfile.TemporaryDirectory(prefix="tbcad-", ignore_cleanup_errors=True) as name:
+        place = Path(name).resolve()
+        given = place / f"given.{kind}"
+        shutil.copyfile(original, given)
+        yield Room(command, place, given, file, limits)

@@ -1,0 +1,76 @@
+"""STEP files of printed parts, read by other processes and held against the meshes."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.rays import in_threads
+from tbcad_verify.record.prototype_record import Printed
+from tbcad_verify.record.record import Export
+from tbcad_verify.report.checks import Check, Unknown, guarded
+from tbcad_verify.step.part_checks import UNITS, Lump, lump_checks
+from tbcad_verify.step.reading import StepFile, examine_all, load
+
+AT_ONCE = 2  # processes, each with its share of the files
+CLAIM_SHARE = 1e-5
+
+
+def readings(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
+    """The STEP files of a prototype's parts, or why one is not known, by part.
+
+    Args:
+        export: the record.
+        seconds: longest that reading one process's files may take.
+
+    Raises:
+        BadExport: a file is missing, foreign or truncated.
+    """
+    parts = _parts(export)
+    # The largest first, so that both processes have about as much to do.
+    blobs = [load(export.folder, part.step) for part in parts]
+    order = sorted(range(len(parts)), key=lambda k: (-blobs[k].data.size, k))
+    shares = [order[k::AT_ONCE] for k in range(AT_ONCE) if order[k::AT_ONCE]]
+    answers = in_threads(lambda share: examine_all([blobs[k] for k in share], seconds), shares)
+    return {
+        parts[k].name: answer
+        for share, some in zip(shares, answers, strict=True)
+        for k, answer in zip(share, some, strict=True)
+    }
+
+
+def step_checks(
+    export: Export, bulks: dict[str, Bulk], found: dict[str, StepFile | Unknown]
+) -> list[Check]:
+    """All checks of the STEP files of a prototype's parts.
+
+    Args:
+        export: the record.
+        bulks: figures of the meshes moved back to their places, by part.
+        found: the files as read.
+    """
+    return [
+        check
+        for part in _parts(export)
+        for check in _part(export, part, found[part.name], bulks.get(part.name))
+    ]
+
+
+def _parts(export: Export) -> list[Printed]:
+    return [part for part in (export.prototype.parts if export.prototype else ()) if part.step]
+
+
+def _part(
+    export: Export, part: Printed, found: StepFile | Unknown, bulk: Bulk | None
+) -> list[Check]:
+    names = [(name, part.step, unit) for name, unit in UNITS.items()]
+    return guarded(names, partial(_known, export, part, found, bulk))
+
+
+def _known(
+    export: Export, part: Printed, found: StepFile | Unknown, bulk: Bulk | None
+) -> list[Check]:
+    if isinstance(found, Unknown):
+        raise found
+    lump = Lump(part.name, found, bulk, export.mesh_error_mm, CLAIM_SHARE)
+    return lump_checks(part.step, lump)

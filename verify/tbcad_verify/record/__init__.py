@@ -1,0 +1,1 @@
+"""The record of an export: files that nobody vouches for, read strictly."""

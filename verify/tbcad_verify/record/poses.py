@@ -1,0 +1,212 @@
+"""What DESIGN.md section 2 demands of the recorded mirrors, worked out again from the cameras."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.record.record import Camera, Export
+
+Floats = NDArray[np.float64]
+
+POSE_MM = 1e-9
+HALVED = 1e-9  # |ux| below which the seam cuts a mirror in two
+WELL_FORMED = re.compile(r"[a-z][0-9]{4,}")
+
+
+@dataclass(frozen=True)
+class Virtual:
+    """Virtual cameras: one a mirror, but one for the two halves of a mirror on the seam.
+
+    Attributes:
+        index: (M,) virtual camera of each mirror.
+        count: V.
+        halved: (M,) true for mirrors that have their other half on the other side of the seam.
+    """
+
+    index: NDArray[np.intp]
+    count: int
+    halved: NDArray[np.bool_]
+
+
+def virtual_cameras(mirrors: Mirrors) -> Virtual:
+    """Pair mirrors on x = 0 that have the same number and the same direction."""
+    u = mirrors.columns("ux", 3)
+    first: dict[str, int] = {}
+    index = np.arange(len(mirrors))
+    halved = np.zeros(len(mirrors), dtype=np.bool_)
+    for row in np.flatnonzero(np.abs(u[0]) < HALVED).tolist():
+        other = first.setdefault(mirrors.ids[row][1:], row)
+        if other != row and np.abs(u[:, row] - u[:, other]).max() < HALVED:
+            index[row] = other
+            halved[[row, other]] = True
+    unique, index = np.unique(index, return_inverse=True)
+    return Virtual(index, len(unique), halved)
+
+
+def malformed(mirrors: Mirrors) -> list[str]:
+    """Ids that occur twice, or are not the camera's letter and four digits or more."""
+    counts = Counter(mirrors.ids)
+    return sorted(
+        {
+            name
+            for name, camera in zip(mirrors.ids, mirrors.camera.tolist(), strict=True)
+            if counts[name] > 1 or not WELL_FORMED.fullmatch(name) or name[0] != camera
+        }
+    )
+
+
+def differing(one: Mirrors, two: Mirrors) -> list[str]:
+    """Ids whose rows differ between two records, bit for bit."""
+    rows = [
+        dict(
+            zip(
+                m.ids,
+                zip(m.camera.tolist(), np.nan_to_num(m.table, nan=-1e300).tolist(), strict=True),
+                strict=True,
+            )
+        )
+        for m in (one, two)
+    ]
+    odd = {name for name in {*rows[0], *rows[1]} if rows[0].get(name) != rows[1].get(name)}
+    return sorted(odd or ({"the order"} if one.ids != two.ids else ()))
+
+
+def pose_errors(export: Export) -> Floats:
+    """(M,) largest deviation of each mirror from the design, mm; inf where its camera is unknown.
+
+    Checked, angles as lengths at 1 mm: u and n are unit; p lies along u and on the ellipsoid with
+    the spec's semi-minor axis and foci at the origin and the pinhole; n bisects -u and the way to
+    the pinhole; c = p - r n.
+    """
+    mirrors = export.mirrors
+    errors = np.full(len(mirrors), np.inf)
+    for camera in export.cameras.values():
+        rows = np.flatnonzero(mirrors.camera == camera.id)
+        errors[rows] = _deviations(mirrors, rows, camera, _semi_minor(export))
+    return errors
+
+
+def missing_directions(export: Export) -> tuple[list[str], int]:
+    """Mirrors whose direction is no vertex of the polyhedron, or taken; and vertices not taken.
+
+    Every vertex with z >= 0 needs a mirror of camera a where x >= 0 and one of b where x <= 0.
+    """
+    odd: list[str] = []
+    lost = 0
+    vertices = geodesic(int(export.spec["optics"]["n"]))
+    for camera in export.cameras.values():
+        side = np.sign(camera.pinhole[0])
+        wanted = vertices[:, (vertices[2] > -1e-9) & (side * vertices[0] > -1e-9)]
+        rows = np.flatnonzero(export.mirrors.camera == camera.id)
+        bad, free = _taken(export.mirrors.columns("ux", 3)[:, rows], wanted)
+        odd += [export.mirrors.ids[row] for row in rows[bad].tolist()]
+        lost += free
+    return sorted(odd), lost
+
+
+def contradictions(export: Export) -> list[str]:
+    """What the record asks for against what the spec it carries asks for, by name."""
+    optics, sensor = export.spec["optics"], export.spec["camera"]
+    asked = {
+        "target_mm": (export.target_mm, optics["capture_diameter_mm"]),
+        "coating_mm": (export.coating_mm, export.spec["mirrors"]["coating_um"] / 1000),
+    }
+    for camera in export.cameras.values():
+        mirrored = camera.pinhole * np.sign([camera.pinhole[0] * optics["camera_mm"][0], 1, 1])
+        asked |= {
+            f"camera {camera.id} pinhole {k}": (mirrored[k], optics["camera_mm"][k])
+            for k in range(3)
+        }
+        asked |= {
+            f"camera {camera.id} width": (camera.width, sensor["width_px"]),
+            f"camera {camera.id} height": (camera.height, sensor["height_px"]),
+            f"camera {camera.id} hfov": (np.degrees(camera.hfov), sensor["hfov_deg"]),
+        }
+    return sorted(name for name, (one, two) in asked.items() if abs(one - two) > 1e-9)
+
+
+def geodesic(n: int) -> Floats:
+    """(3, 10 n^2 + 2) unit vertices of the geodesic polyhedron.
+
+    Source: DESIGN.md section 2: the icosahedron with vertices (0, +-1, +-phi) and cyclic
+    permutations, split by the prime factors of n in ascending order, each time onto the sphere.
+    """
+    faces = _icosahedron()
+    for prime in _primes(n):
+        faces = _split(faces, prime)
+    points = faces.reshape(-1, 3)
+    _, first = np.unique(np.round(points, 9) + 0.0, axis=0, return_index=True)
+    return np.ascontiguousarray(points[np.sort(first)].T)
+
+
+def _semi_minor(export: Export) -> float:
+    return float(export.spec["optics"]["semi_minor_mm"])
+
+
+def _deviations(mirrors: Mirrors, rows: NDArray[np.intp], camera: Camera, b: float) -> Floats:
+    u, p, n, c = (mirrors.columns(key, 3)[:, rows] for key in ("ux", "px", "nx", "cx"))
+    radius = mirrors.columns("radius_mm")[0, rows]
+    pinhole = camera.pinhole[:, None]
+    double_a = 2 * np.sqrt(b**2 + (camera.pinhole @ camera.pinhole) / 4)
+    deviations = np.max(
+        [
+            np.abs(norm(u) - 1),
+            np.abs(norm(n) - 1),
+            norm(p - dot(p, u) * u),
+            np.abs(norm(p) + norm(pinhole - p) - double_a),
+            norm(unit(unit(pinhole - p) - u) - n),
+            np.where(mirrors.flat[rows], 0, norm(c - (p - radius * n))),
+        ],
+        axis=0,
+    )
+    return np.asarray(deviations)
+
+
+def _taken(u: Floats, wanted: Floats) -> tuple[NDArray[np.intp], int]:
+    distance, vertex = cKDTree(wanted.T).query(u.T)
+    counts = np.bincount(vertex, minlength=wanted.shape[1])
+    bad = (distance > 1e-9) | (counts[vertex] > 1)
+    return np.flatnonzero(bad), int((counts == 0).sum())
+
+
+def _icosahedron() -> Floats:
+    phi = (1 + 5**0.5) / 2
+    corner = np.array([[0, s, t * phi] for s in (1, -1) for t in (1, -1)])
+    points = np.concatenate([np.roll(corner, k, axis=1) for k in range(3)])
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < 2.1
+    faces = [
+        (i, j, k)
+        for i in range(12)
+        for j in range(i)
+        for k in range(j)
+        if near[i, j] and near[j, k] and near[i, k]
+    ]
+    return np.asarray(points[np.array(faces)] / np.sqrt(1 + phi**2))
+
+
+def _primes(n: int) -> list[int]:
+    factors, divisor = [], 2
+    while n > 1:
+        while n % divisor == 0:
+            factors.append(divisor)
+            n //= divisor
+        divisor += 1
+    return factors
+
+
+def _split(faces: Floats, p: int) -> Floats:
+    """Each triangle (corner, axis) into p^2, and every vertex onto the sphere."""
+    up = [((i, j), (i + 1, j), (i, j + 1)) for i in range(p) for j in range(p - i)]
+    down = [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i in range(p) for j in range(p - i - 1)]
+    grid = np.array(up + down, dtype=np.float64)
+    weights = np.concatenate([p - grid.sum(axis=2, keepdims=True), grid], axis=2) / p
+    points = np.einsum("tcw,fwx->ftcx", weights, faces).reshape(-1, 3, 3)
+    return np.asarray(points / np.linalg.norm(points, axis=2, keepdims=True))

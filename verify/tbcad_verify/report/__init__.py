@@ -1,0 +1,1 @@
+"""Checks, the report of a verification, and its tables."""

@@ -1,0 +1,1 @@
+"""The run of a verification: stages, their processes and their results."""

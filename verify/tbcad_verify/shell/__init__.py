@@ -1,0 +1,1 @@
+"""Checks of both shells, on mirrors recovered from their meshes."""

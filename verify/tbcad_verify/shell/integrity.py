@@ -1,0 +1,172 @@
+"""Checks that need no optics.
+
+The files are those of the manifest, the record is the design's, and the meshes are closed solids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.mesh.mesh import Topology
+from tbcad_verify.record.files import digest, listing
+from tbcad_verify.record.poses import (
+    POSE_MM,
+    contradictions,
+    differing,
+    malformed,
+    missing_directions,
+    pose_errors,
+)
+from tbcad_verify.record.record import Export
+from tbcad_verify.report.checks import (
+    Check,
+    Name,
+    at_least,
+    at_most,
+    guarded,
+    listed,
+    offenders,
+    told,
+)
+from tbcad_verify.report.report import NAME
+
+LEAST_VOLUME_MM3 = 1e-6
+PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
+OWN = frozenset({"manifest.json", NAME})
+
+
+def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
+    """Every listed file is there with its size and sha256; what else is there is told.
+
+    Args:
+        export: the record.
+        parsed: size and sha256 of files as they were when they were parsed.
+    """
+    wrong = [
+        name
+        for name, wanted in sorted(export.manifest.items())
+        if parsed.get(name, _found(export, name)) != wanted
+    ]
+    unlisted = sorted({*parsed} - {*export.manifest} - OWN)
+    unread = sorted({*filter(_is_part, export.manifest)} - export.part_files)
+    others = sorted(listing(export.folder) - {*export.manifest} - OWN)
+    return [
+        at_most(
+            ("manifest", "manifest.json", "wrong files"),
+            len(wrong + unlisted + unread),
+            0,
+            "missing, unlisted, not as written, or of no part: "
+            + listed(wrong + unlisted + unread),
+        ),
+        told(("other files", "", "files"), len(others), listed(others)),
+    ]
+
+
+RECORD = (
+    ("record", "mirrors.csv", "rows unlike design.json"),
+    ("requirements", "design.json", "unlike its spec"),
+    ("ids", "design.json", "bad ids"),
+    ("poses", "design.json", "mm off"),
+    ("directions", "design.json", "misplaced or missing"),
+)
+
+
+def record_checks(export: Export) -> list[Check]:
+    """The two records agree, and mirrors stand where DESIGN.md section 2 puts them."""
+    work = (_records_agree, _requirements, _ids, _poses, _directions)
+    return [_guard(name, job, export) for name, job in zip(RECORD, work, strict=True)]
+
+
+def _guard(name: Name, job: Callable[[Name, Export], Check], export: Export) -> Check:
+    return guarded([name], lambda: [job(name, export)])[0]
+
+
+def mesh_checks(name: str, found: Topology) -> list[Check]:
+    """One closed, oriented, clean solid."""
+    return [
+        at_most(
+            ("watertight", name, "bad edges"),
+            found.open_edges + found.crowded_edges + found.turned_edges,
+            0,
+            f"{found.open_edges} open, {found.crowded_edges} with more than two facets, "
+            f"{found.turned_edges} with facets turned against each other",
+        ),
+        at_most(
+            ("facets", name, "bad facets"),
+            found.degenerate + found.duplicate + found.stored_normals,
+            0,
+            f"{found.degenerate} without area, {found.duplicate} doubled, "
+            f"{found.stored_normals} with a stored normal against their corners' order",
+        ),
+        at_least(
+            ("outward", name, "mm^3"),
+            found.volume,
+            LEAST_VOLUME_MM3,
+            "inside out: the signed volume is not positive",
+        ),
+        at_most(("components", name, "solids"), found.components, 1, "more than one piece"),
+        at_most(
+            ("manifold3d", name, "complaints"), int(found.status != "NoError"), 0, found.status
+        ),
+    ]
+
+
+def fold_check(name: str, folds: int) -> Check:
+    """No facet lies back to back with its neighbour."""
+    return at_most(("folds", name, "edges"), folds, 0, "the surface is folded onto itself")
+
+
+def _is_part(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in PART_KINDS
+
+
+def _found(export: Export, name: str) -> tuple[int, str] | None:
+    if name in OWN:
+        return None
+    try:
+        return digest(export.folder, name)
+    except BadExport:
+        return None
+
+
+def _records_agree(name: Name, export: Export) -> Check:
+    odd = differing(export.mirrors, export.rows)
+    return at_most(name, len(odd), 0, f"differ: {listed(odd)}")
+
+
+def _requirements(name: Name, export: Export) -> Check:
+    odd = contradictions(export)
+    return at_most(name, len(odd), 0, f"the record is not its own spec's: {listed(odd)}")
+
+
+def _ids(name: Name, export: Export) -> Check:
+    bad = malformed(export.mirrors)
+    return at_most(name, len(bad), 0, f"twice, or not camera letter and number: {listed(bad)}")
+
+
+def _poses(name: Name, export: Export) -> Check:
+    errors = pose_errors(export)
+    worst = np.argsort(-errors, kind="stable")
+    worst = worst[errors[worst] > POSE_MM]
+    return at_most(
+        name,
+        float(errors.max()),
+        POSE_MM,
+        "off the ellipsoid, not bisecting, or centre off the normal: "
+        + offenders(export.mirrors.ids, errors, "mm", worst, ".3g"),
+    )
+
+
+def _directions(name: Name, export: Export) -> Check:
+    odd, lost = missing_directions(export)
+    return at_most(
+        name,
+        len(odd) + lost,
+        0,
+        f"{lost} vertices of the polyhedron without a mirror; "
+        f"no vertex of their own: {listed(odd) or 'none'}",
+    )

@@ -1,0 +1,151 @@
+"""The real camera at full resolution: every pixel's ray to the mirrors, the object, and beyond."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, pixel_rows, reach, row_chunks
+from tbcad_verify.mesh.surfaces import Lines, Seen, bounce, nearest, reflect
+from tbcad_verify.mesh.vectors import dot, norm
+from tbcad_verify.record.record import Camera
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Second rays start this far above the mirror, mm: a hundred times what float32 rounds.
+LIFT_MM = 1e-3
+SAMPLED = 7  # a prime: no column of pixels is left out
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What light meets, for one camera.
+
+    Attributes:
+        scene: all parts.
+        camera: the real camera.
+        owner: (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the
+            last entry stands for a ray that hits nothing.
+        other: (F + 1,) true for facets of any mirror.
+        seen: the mirrors' reflecting surfaces from the pinhole, one a recorded mirror.
+        mirrors: M, how many are recorded.
+        radius_mm: of the capture sphere.
+        coating_mm: the coat that the mesh does not show.
+    """
+
+    scene: Scene
+    camera: Camera
+    owner: NDArray[np.int32]
+    other: NDArray[np.bool_]
+    seen: Seen
+    mirrors: int
+    radius_mm: float
+    coating_mm: float
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts over pixels; sums of whole numbers and least values, so that order does not matter.
+
+    Attributes:
+        pixels: (M,) per mirror, whose reflected ray meets the capture sphere unhindered.
+        blocked: (M,) per mirror, whose reflected ray is stopped before the capture sphere.
+        blockers: (B,) facets that stop them, each once.
+        on_mirrors: pixels that see any part of this camera's mirrors.
+        twice: of those, how many rays meet another mirror after the first.
+        nearest: (M,) least distance of useful camera-to-mirror rays from the origin, mm.
+        spread: (P,) distance at the object between the rays off facets and off fitted
+            surfaces, for one useful pixel in `SAMPLED`, mm.
+    """
+
+    pixels: Ints
+    blocked: Ints
+    blockers: Ints
+    on_mirrors: int
+    twice: int
+    nearest: Floats
+    spread: NDArray[np.float32]
+
+
+def full_sensor(stage: Stage) -> Tally:
+    """Trace every pixel of one camera, twice."""
+    return total(in_threads(lambda rows: band(stage, *rows), row_chunks(stage.camera)))
+
+
+def total(tallies: list[Tally]) -> Tally:
+    """Tallies of several bands or cameras as one."""
+    return Tally(
+        reduce(np.add, [t.pixels for t in tallies]),
+        reduce(np.add, [t.blocked for t in tallies]),
+        np.unique(np.concatenate([t.blockers for t in tallies])),
+        sum(t.on_mirrors for t in tallies),
+        sum(t.twice for t in tallies),
+        reduce(np.minimum, [t.nearest for t in tallies]),
+        np.concatenate([t.spread for t in tallies]),
+    )
+
+
+def band(stage: Stage, first: int, last: int) -> Tally:
+    """Trace the pixels of some rows."""
+    rays = pixel_rows(stage.camera, first, last)
+    facet = first_hits(stage.scene, stage.camera.pinhole[:, None], rays)
+    mirror = stage.owner[facet]
+    on = np.flatnonzero(mirror >= 0)
+    d, facet, mirror = np.take(rays, on, axis=1), facet[on], mirror[on]
+    lines = reflect(stage.seen, mirror, d)
+    miss = nearest(lines)
+    distance = norm(miss)
+    useful = distance <= stage.radius_mm
+    second, stopped = _second(stage, lines, miss, distance, useful)
+    clear = np.flatnonzero(useful & ~stopped)
+    on_object = mirror[clear]
+    some = clear[(first * stage.camera.width + on[clear]) % SAMPLED == 0]
+    return Tally(
+        np.bincount(on_object, minlength=stage.mirrors),
+        np.bincount(mirror[stopped], minlength=stage.mirrors),
+        np.unique(second[stopped]).astype(np.int64),
+        on.size,
+        int((stage.other[second] & ~stopped).sum()),
+        _nearest_on_the_way(stage, on_object, np.take(d, clear, axis=1), lines.reach[clear]),
+        _spread(stage, facet[some], *(np.take(x, some, axis=1) for x in (d, lines.toward, miss))),
+    )
+
+
+def _second(
+    stage: Stage, lines: Lines, miss: Floats, distance: Floats, useful: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """The next facet along reflected rays, and which useful rays it stops before the object."""
+    length = norm(lines.toward)
+    start = lines.point + (LIFT_MM / length) * lines.toward
+    second = first_hits(stage.scene, start, lines.toward)
+    stopped = np.zeros(second.size, dtype=np.bool_)
+    hit = np.flatnonzero(useful & (second >= 0))
+    toward, begin = np.take(lines.toward, hit, axis=1), np.take(start, hit, axis=1)
+    at = reach(stage.scene, second[hit], begin, toward) * length[hit]
+    depth = np.sqrt(np.maximum(stage.radius_mm**2 - distance[hit] ** 2, 0))
+    stopped[hit] = at < norm(np.take(miss, hit, axis=1) - begin) - depth
+    return second, stopped
+
+
+def _nearest_on_the_way(stage: Stage, mirror: NDArray[np.int32], d: Floats, t: Floats) -> Floats:
+    pinhole = stage.camera.pinhole[:, None]
+    foot = np.minimum(-dot(pinhole, d) / dot(d, d), t)
+    least = np.full(stage.mirrors, np.inf)
+    np.minimum.at(least, mirror, norm(pinhole + foot * d))
+    return least
+
+
+def _spread(
+    stage: Stage, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
+) -> NDArray[np.float32]:
+    """Distance at the object, across the fitted ray, of the ray off the facet's plane."""
+    plane = np.take(stage.scene.planes, facet, axis=0).T
+    pinhole = stage.camera.pinhole[:, None]
+    t = (plane[3] + stage.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
+    point, bounced = pinhole + t * d, bounce(d, plane[:3])
+    at = point - dot(point, toward) / dot(bounced, toward) * bounced
+    return norm(at - miss).astype(np.float32)

@@ -1,0 +1,133 @@
+"""Which recovered mirror is which recorded one, and how far off it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tbcad_verify.mesh.fits import Fits
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.vectors import norm, slices, unit
+from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.shell.recover import FLAT_MM, Recovery
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Match:
+    """Recorded mirrors (M, in the record's order) against recovered patches.
+
+    Attributes:
+        segment: (M,) the patch of each mirror; -1 where it is missing.
+        extra: patches that are mirrors nobody asked for.
+        centre_error: (M,) mm; NaN where missing. For planes: see `compare`.
+        radius_error: (M,) mm; NaN where missing, 0 for planes.
+        blur: (M,) how well float32 lets either be known, mm; 0 for planes.
+        surface_error: (M,) largest distance of a patch's vertex from the recorded surface, mm.
+    """
+
+    segment: Ints
+    extra: Ints
+    centre_error: Floats
+    radius_error: Floats
+    blur: Floats
+    surface_error: Floats
+
+
+def match(
+    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, camera: NDArray[np.str_], coating_mm: float
+) -> Match:
+    """Pair mirrors and patches that are each other's nearest, camera by camera.
+
+    Args:
+        mirrors: the record.
+        recovery: all parts' patches, K.
+        mesh: all parts.
+        camera: (K,) the camera that each patch's part is for.
+        coating_mm: the coat that the mesh does not show.
+    """
+    segment = np.full(len(mirrors), -1, dtype=np.intp)
+    for name in np.unique(mirrors.camera):
+        rows = np.flatnonzero(mirrors.camera == name)
+        patches = np.flatnonzero(recovery.mirror & (camera == name))
+        segment[rows] = _mutual(
+            mirrors.columns("px", 3)[:, rows], recovery.fits.middle[:, patches], patches
+        )
+    extra = np.setdiff1d(np.flatnonzero(recovery.mirror), segment)
+    centre, radius = compare(mirrors, recovery.fits, segment, coating_mm)
+    blur = np.where(mirrors.flat | (segment < 0), 0.0, recovery.fits.blur[segment])
+    surface = _surface_errors(mirrors, recovery, mesh, segment, coating_mm)
+    return Match(segment, extra, centre, radius, blur, surface)
+
+
+def compare(
+    mirrors: Mirrors, fits: Fits, segment: Ints, coating_mm: float
+) -> tuple[Floats, Floats]:
+    """Centre and radius errors of matched mirrors, (M,) mm each; NaN where there is no patch.
+
+    A planar mirror has neither. Its centre error is the largest of: the apex's distance from the
+    patch, the angle between the normals times the patch's half width, and the patch's bulge.
+    """
+    found = np.flatnonzero(segment >= 0)
+    surfaces = fits.surfaces.take(segment[found]).coated(coating_mm)
+    flat = mirrors.flat[found]
+    centre, radius = mirrors.columns("cx", 3)[:, found], mirrors.columns("radius_mm")[0, found]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = norm(surfaces.centre() - centre)
+        grown = np.abs(1 / surfaces.curvature - radius)
+    extent, sag = fits.extent[segment[found]], fits.sag[segment[found]]
+    apex, normal = mirrors.columns("px", 3)[:, found], mirrors.columns("nx", 3)[:, found]
+    tilt = norm(unit(surfaces.gradient(apex)) - normal) * extent
+    plane = np.max([np.abs(surfaces.height(apex)), tilt, np.where(sag > FLAT_MM, sag, 0)], axis=0)
+    errors = np.full((2, len(mirrors)), np.nan)
+    errors[0, found] = np.where(flat, plane, moved)
+    errors[1, found] = np.where(flat, 0.0, grown)
+    return errors[0], errors[1]
+
+
+def recorded(mirrors: Mirrors) -> Surfaces:
+    """The M reflecting surfaces as recorded, by apex, normal and radius."""
+    radius = mirrors.columns("radius_mm")[0]
+    curvature = np.where(mirrors.flat, 0.0, 1 / np.where(mirrors.flat, 1.0, radius))
+    return Surfaces(mirrors.columns("px", 3), mirrors.columns("nx", 3), curvature)
+
+
+def places(mirrors: Mirrors, middle: Floats) -> list[int]:
+    """The recorded mirrors nearest to patches whose middles are (3, N)."""
+    if not middle.size:
+        return []
+    tree = cKDTree(mirrors.columns("px", 3).T)
+    return [int(k) for k in np.atleast_1d(tree.query(middle.T)[1])]
+
+
+def _surface_errors(
+    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, segment: Ints, coating_mm: float
+) -> Floats:
+    owner = np.full(recovery.segments.count, -1, dtype=np.intp)
+    owner[segment[segment >= 0]] = np.flatnonzero(segment >= 0)
+    mirror = owner[recovery.segments.label]
+    facets = np.flatnonzero(mirror >= 0)
+    modelled = recorded(mirrors).coated(-coating_mm)
+    worst = np.where(segment >= 0, 0.0, np.nan)
+    for part in slices(facets.size):
+        mine = mirror[facets[part]]
+        surfaces = modelled.take(mine)
+        for k in range(3):
+            x = np.take(mesh.points, mesh.faces[facets[part], k], axis=0).T
+            np.maximum.at(worst, mine, np.abs(surfaces.height(x)))
+    return worst
+
+
+def _mutual(apex: Floats, middle: Floats, patches: Ints) -> Ints:
+    if not patches.size:
+        return np.full(apex.shape[1], -1, dtype=np.intp)
+    nearest = np.atleast_1d(cKDTree(middle.T).query(apex.T)[1])
+    back = np.atleast_1d(cKDTree(apex.T).query(middle.T)[1])
+    mutual = back[nearest] == np.arange(apex.shape[1])
+    return np.where(mutual, patches[nearest], -1)

@@ -1,0 +1,146 @@
+"""All parts on one optical bench: mesh, recovered mirrors and rays, ready to be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.mesh import joined as joined_meshes
+from tbcad_verify.mesh.rays import Scene, build
+from tbcad_verify.mesh.surfaces import Seen, Surfaces, seen_from
+from tbcad_verify.record.poses import Virtual, virtual_cameras
+from tbcad_verify.record.record import Camera, Export, Part
+from tbcad_verify.shell.light import Stage
+from tbcad_verify.shell.match import Match, match
+from tbcad_verify.shell.outline import Patches
+from tbcad_verify.shell.recover import Recovery, smooth
+from tbcad_verify.shell.recover import joined as joined_recoveries
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Everything that the optical checks look at.
+
+    Attributes:
+        export: requirements and poses.
+        mesh: all parts.
+        recovery: all parts' patches, K.
+        part: (K,) number of each patch's part.
+        match: recorded mirrors against patches.
+        virtual: recorded mirrors as virtual cameras.
+        scene: for rays.
+        mirrors: (M,) reflecting surfaces as recovered, coat included; of missing ones the last
+            patch's, which nobody must ask for.
+    """
+
+    export: Export
+    mesh: Mesh
+    recovery: Recovery
+    part: NDArray[np.intp]
+    match: Match
+    virtual: Virtual
+    scene: Scene
+    mirrors: Surfaces
+
+    @property
+    def radius(self) -> float:
+        """Of the capture sphere, mm."""
+        return self.export.target_mm / 2
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """By id."""
+        return [self.export.cameras[key] for key in sorted(self.export.cameras)]
+
+    @property
+    def u(self) -> Floats:
+        """(3, M) directions of the virtual cameras."""
+        return self.export.mirrors.columns("ux", 3)
+
+    @property
+    def virtual_ids(self) -> list[str]:
+        """Names of the V virtual cameras: of their first mirror."""
+        first = np.unique(self.virtual.index, return_index=True)[1]
+        return [self.export.mirrors.ids[k] for k in first.tolist()]
+
+    def mine(self, camera: Camera) -> NDArray[np.bool_]:
+        """(M,) recorded for this camera and found."""
+        return np.asarray((self.export.mirrors.camera == camera.id) & (self.match.segment >= 0))
+
+    def seen(self, camera: Camera) -> Seen:
+        """All mirrors from this camera's pinhole."""
+        return seen_from(camera.pinhole, self.mirrors)
+
+    def owner(self) -> NDArray[np.intp]:
+        """(K,) recorded mirror of each patch; -1 for none."""
+        owner = np.full(self.recovery.segments.count, -1, dtype=np.intp)
+        found = np.flatnonzero(self.match.segment >= 0)
+        owner[self.match.segment[found]] = found
+        return owner
+
+    def patches(self) -> Patches:
+        """Facets, patches and mirrors, as outlines need them."""
+        fits = self.recovery.fits
+        return Patches(
+            self.recovery.segments.label,
+            self.owner(),
+            fits.surfaces,
+            smooth(fits),
+            self.export.coating_mm,
+        )
+
+    def stage(self, camera: Camera) -> Stage:
+        """One camera, as the full sensor needs it."""
+        owner, mine = self.owner(), self.mine(camera)
+        owner = np.where((owner >= 0) & mine[owner], owner, -1)
+        label = self.recovery.segments.label
+        return Stage(
+            self.scene,
+            camera,
+            np.append(owner[label], -1).astype(np.int32),
+            np.append(self.recovery.mirror[label], False),
+            self.seen(camera),
+            len(self.export.mirrors),
+            self.radius,
+            self.export.coating_mm,
+        )
+
+    def name(self, facet: int) -> str:
+        """The mirror or part that a facet belongs to; facet -1 is none."""
+        if facet < 0:
+            return "nothing"
+        patch = int(self.recovery.segments.label[facet])
+        mirror = int(self.owner()[patch])
+        if mirror >= 0:
+            return self.export.mirrors.ids[mirror]
+        return f"{self.export.parts[int(self.part[patch])].name} (no mirror)"
+
+    def names(self, facets: NDArray[np.integer]) -> list[str]:
+        """The mirrors and parts that facets belong to, each once."""
+        patches = np.unique(self.recovery.segments.label[facets[facets >= 0]], return_index=True)[1]
+        found = {self.name(int(facet)) for facet in facets[facets >= 0][patches].tolist()}
+        return sorted(found | ({"nothing"} if (facets < 0).any() else set()))
+
+
+def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Bench:
+    """Join all parts, match their mirrors with the record, and get ready for rays."""
+    mesh, recovery = joined_meshes(meshes), joined_recoveries(recoveries)
+    counts = [item.segments.count for item in recoveries]
+    part = np.repeat(np.arange(len(counts)), counts)
+    camera = np.array([item.camera for item in export.parts])[part]
+    found = match(export.mirrors, recovery, mesh, camera, export.coating_mm)
+    mirrors = recovery.fits.surfaces.take(found.segment).coated(export.coating_mm)
+    return Bench(
+        export, mesh, recovery, part, found, virtual_cameras(export.mirrors), build(mesh), mirrors
+    )
+
+
+def pinhole_of(export: Export, part: Part) -> Floats | None:
+    """(3,) mm of the camera that a part's mirrors are for; None for parts without mirrors."""
+    camera = export.cameras.get(part.camera)
+    return None if camera is None else camera.pinhole

@@ -1,0 +1,214 @@
+"""What a mirror sees: rays from the pinhole to the edge of the mirror, reflected.
+
+The outline of a mirror is made of the mesh edges that part its patch from others. The least
+distance from the origin of all rays reflected there is half the coverage diameter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.surfaces import Lines, Seen, Surfaces, bounce, nearest, reflect
+from tbcad_verify.mesh.vectors import across, dot, norm
+from tbcad_verify.record.poses import Virtual
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+SAMPLES = np.linspace(0.0, 1.0, 4)
+SEAM_MM = 1e-6
+NEWTON = 5
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outlines of all mirrors of one camera, cut into N samples, edge by edge.
+
+    Attributes:
+        mirror: (N,) recorded mirror.
+        facet: (N,) the facet inside the mirror, at its edge.
+        on_mesh: (3, N) mm, on the mesh edge.
+        inside: (3, N) mm, a little inside the facet.
+        point: (3, N) mm, where the edge is on the reflecting surface, above the coat.
+        seam: (N,) true on the cut of a halved mirror along x = 0.
+    """
+
+    mirror: Ints
+    facet: Ints
+    on_mesh: Floats
+    inside: Floats
+    point: Floats
+    seam: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Which facet belongs to what.
+
+    Attributes:
+        label: (F,) patch of each facet.
+        owner: (K,) recorded mirror of each patch, -1 for none.
+        surfaces: (K) fitted, as meshed.
+        smooth: (K,) true where the fitted surface is what the patch is.
+        coating_mm: the coat on mirrors that the mesh does not show.
+    """
+
+    label: NDArray[np.int32]
+    owner: Ints
+    surfaces: Surfaces
+    smooth: NDArray[np.bool_]
+    coating_mm: float
+
+
+def trace_outline(
+    mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_], halved: NDArray[np.bool_]
+) -> Outline:
+    """Sample the outlines of wanted mirrors.
+
+    Args:
+        mesh: all parts.
+        patches: of that mesh.
+        wanted: (M,) true for mirrors of the camera in question.
+        halved: (M,) true for mirrors that the seam cuts.
+    """
+    half, beyond = _outline_edges(mesh, patches, wanted)
+    corner = mesh.faces.reshape(-1)
+    facet, k = np.divmod(half, 3)
+    start, end, far = (mesh.points[corner[3 * facet + (k + j) % 3]].T for j in range(3))
+    on_mesh = _spread(start[..., None] + (end - start)[..., None] * SAMPLES)
+    height = _spread(
+        np.broadcast_to(_height(start, end, far)[None, :, None], (1, half.size, SAMPLES.size))
+    )[0]
+    many = SAMPLES.size
+    mirror = patches.owner[patches.label[facet]]
+    seam = halved[mirror] & (np.abs(start[0]) < SEAM_MM) & (np.abs(end[0]) < SEAM_MM)
+    middle = np.repeat((start + end + far) / 3, many, axis=1)
+    point = _onto_coats(
+        patches, np.repeat(patches.label[facet], many), np.repeat(beyond, many), on_mesh
+    )
+    return Outline(
+        np.repeat(mirror, many),
+        np.repeat(facet, many),
+        on_mesh,
+        on_mesh + _nudge(height) * (middle - on_mesh),
+        point,
+        np.repeat(seam, many),
+    )
+
+
+def reflect_on_facets(outline: Outline, pinhole: Floats, planes: Floats) -> Lines:
+    """Reflect each sample's ray on its facet's own normal; planes (F, 4) as in `rays.Scene`."""
+    d = outline.point - pinhole[:, None]
+    normal = planes[outline.facet, :3].T
+    return Lines(outline.point, bounce(d, normal), np.ones(d.shape[1]))
+
+
+def reflect_on_fits(outline: Outline, seen: Seen) -> Lines:
+    """Reflect each sample's ray on its mirror's fitted surface, coat included."""
+    return reflect(seen, outline.mirror, outline.point - seen.origin[:, None])
+
+
+def least_miss(outline: Outline, lines: Lines, virtual: Virtual) -> Floats:
+    """(V,) least distance from the origin over each virtual camera's outer edges, mm; inf: none.
+
+    Between samples the image of an edge is taken for straight, as it is for a flat facet.
+    """
+    outer = np.flatnonzero(~outline.seam[:: SAMPLES.size])
+    at = nearest(lines).reshape(3, -1, SAMPLES.size)[:, outer]
+    miss = _from_segments(at[:, :, :-1].reshape(3, -1), at[:, :, 1:].reshape(3, -1))
+    camera = virtual.index[outline.mirror[:: SAMPLES.size][outer]]
+    least = np.full(virtual.count, np.inf)
+    # A ray that passes its mirror by sees nothing of the object.
+    np.minimum.at(least, np.repeat(camera, SAMPLES.size - 1), np.nan_to_num(miss, nan=0.0))
+    return least
+
+
+def turns(outline: Outline, lines: Lines, virtual: Virtual, u: Floats) -> Floats:
+    """(V,) how often each virtual camera's reflected outline runs round the origin.
+
+    The sign is dropped. What is not about 1 does not surround the object's middle at all, however
+    far from it. The cut between two halves is left out: it runs through the middle.
+
+    Args:
+        outline: of one camera.
+        lines: reflected at the samples.
+        virtual: pairs halves.
+        u: (3, M) directions of the virtual cameras.
+    """
+    first, second = across(u[:, outline.mirror])
+    miss = nearest(lines)
+    angle = np.arctan2(dot(miss, second), dot(miss, first)).reshape(-1, SAMPLES.size)
+    step = np.diff(angle, axis=1)
+    step -= 2 * np.pi * np.round(step / (2 * np.pi))
+    edge = np.where(outline.seam[:: SAMPLES.size], 0.0, step.sum(axis=1))
+    camera = virtual.index[outline.mirror[:: SAMPLES.size]]
+    return np.bincount(camera, np.nan_to_num(edge), virtual.count) / (2 * np.pi)
+
+
+def _outline_edges(mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Half-edges inside wanted mirrors' outlines, and the patch beyond each (-1: none)."""
+    owner = patches.owner[patches.label]
+    facets = np.flatnonzero((owner >= 0) & wanted[owner])
+    half = (3 * facets[:, None] + np.arange(3)).ravel()
+    twin = mesh.twin[half]
+    beyond = np.where(twin >= 0, patches.label[twin // 3], -1)
+    edge = beyond != patches.label[half // 3]
+    return half[edge], beyond[edge].astype(np.intp)
+
+
+def _from_segments(a: Floats, b: Floats) -> Floats:
+    """(N,) distances of the origin from segments a - b, (3, N) each."""
+    way = b - a
+    t = -dot(a, way) / np.maximum(dot(way, way), np.finfo(np.float64).tiny)
+    return norm(a + np.clip(t, 0, 1) * way)
+
+
+def _spread(values: Floats) -> Floats:
+    return np.ascontiguousarray(values.reshape(len(values), -1))
+
+
+def _height(start: Floats, end: Floats, far: Floats) -> Floats:
+    edge, side = end - start, far - start
+    along = dot(side, edge) / np.maximum(dot(edge, edge), 1e-300)
+    return norm(side - along * edge)
+
+
+def _nudge(height: Floats) -> Floats:
+    # 2 % of the way to the facet's middle, but at least 0.2 micrometres: Embree rounds to 0.02.
+    return np.clip(2e-4 / np.maximum(height / 3, 1e-12), 0.02, 0.5)
+
+
+def _onto_coats(patches: Patches, inside: NDArray[np.int32], beyond: Ints, x: Floats) -> Floats:
+    """Move edge points to where the coated surfaces of both sides meet; walls have no coat."""
+    if patches.coating_mm == 0:
+        return x
+    coat = patches.coating_mm
+    own = patches.surfaces.take(inside).coated(coat)
+    both = (beyond >= 0) & patches.smooth[beyond]
+    other = patches.surfaces.take(np.where(both, beyond, inside))
+    other = _mixed(patches.owner[np.where(both, beyond, inside)] >= 0, other.coated(coat), other)
+    for _ in range(NEWTON):
+        x = x - _least_step(own, other, both, x)
+    return x
+
+
+def _mixed(choose: NDArray[np.bool_], one: Surfaces, two: Surfaces) -> Surfaces:
+    return Surfaces(
+        np.where(choose, one.point, two.point),
+        np.where(choose, one.normal, two.normal),
+        np.where(choose, one.curvature, two.curvature),
+    )
+
+
+def _least_step(own: Surfaces, other: Surfaces, both: NDArray[np.bool_], x: Floats) -> Floats:
+    """The shortest move that puts x on its own surface and, where there are both, the other."""
+    f, g = own.height(x), other.height(x)
+    m, n = own.gradient(x), other.gradient(x)
+    c = np.where(both, dot(m, n), 0.0)
+    rest = np.maximum(1 - c * c, 1e-12)
+    a, b = (f - c * g) / rest, (g - c * f) / rest
+    return np.where(both, a * m + b * n, f * m)

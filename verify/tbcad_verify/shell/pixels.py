@@ -1,0 +1,117 @@
+"""What the full sensor shows: a clear way for every useful pixel, and a place in the frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.record.record import Camera
+from tbcad_verify.report.checks import (
+    Check,
+    Name,
+    at_least,
+    at_most,
+    listed,
+    offenders,
+    told,
+    unknown,
+)
+from tbcad_verify.shell import image_rim, light
+from tbcad_verify.shell.coverage import Coverage
+from tbcad_verify.shell.optics import Bench
+
+Floats = NDArray[np.float64]
+
+CHECKS = {
+    "light path": "blocked pixels",
+    "object clear": "mm",
+    "pixels a virtual camera": "px",
+    "pixels, median": "px",
+    "pixels, most": "px",
+    "in frame": "px",
+    "second mirrors": "% of pixels",
+    "facet error, median": "mm",
+    "facet error, 95 %": "mm",
+}
+
+
+def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
+    """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show.
+
+    Args:
+        bench: what to look at.
+        seen: what the mirrors cover; no rim is looked for where they do not reach. None takes
+            them to reach the whole object.
+        files: where, for the report.
+    """
+    path, clear, least, median, most, framed, second, half, nearly_all = (
+        (name, files, unit) for name, unit in CHECKS.items()
+    )
+    tally = light.total([light.full_sensor(bench.stage(camera)) for camera in bench.cameras])
+    rings = [(camera, _ring(bench, camera, seen)) for camera in bench.cameras]
+    each = np.bincount(bench.virtual.index, tally.pixels, bench.virtual.count)
+    none = [bench.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
+    spread = np.percentile(tally.spread, [50, 95]) if tally.spread.size else [np.nan, np.nan]
+    return tally.pixels.astype(np.float64), [
+        _path(bench, path, tally),
+        _clear(bench, clear, tally, rings),
+        at_least(least, float(each.min()), 1, f"no pixel sees the object in {listed(none)}"),
+        told(median, float(np.median(each))),
+        told(most, float(each.max())),
+        _framed(bench, framed, rings),
+        told(second, 100 * tally.twice / max(tally.on_mirrors, 1)),
+        told(half, float(spread[0])),
+        told(nearly_all, float(spread[1])),
+    ]
+
+
+def _ring(bench: Bench, camera: Camera, seen: Coverage | None) -> image_rim.Ring:
+    mine = np.flatnonzero(bench.mine(camera))
+    start = bench.recovery.fits.middle[:, bench.match.segment[mine]]
+    found = image_rim.ring(
+        bench.seen(camera), mine, start, bench.u[:, mine], _reach(bench, seen)[mine]
+    )
+    # A halved mirror shows the camera only what its own half reflects.
+    side = np.repeat(np.sign(start[0]), image_rim.AZIMUTHS)
+    own = ~bench.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
+    return image_rim.chosen(found, own)
+
+
+def _reach(bench: Bench, seen: Coverage | None) -> Floats:
+    """(M,) radius about the origin that each mirror sees, the capture sphere's at most, mm."""
+    if seen is None:
+        return np.full(len(bench.export.mirrors), bench.radius)
+    each = np.nan_to_num(seen.fitted / 2, nan=np.inf)[bench.virtual.index]
+    return np.asarray(np.minimum(each, bench.radius))
+
+
+def _path(bench: Bench, name: Name, tally: light.Tally) -> Check:
+    blocked = tally.blocked.astype(np.float64)
+    worst = np.argsort(-blocked, kind="stable")[: np.count_nonzero(blocked)]
+    who = offenders(bench.export.mirrors.ids, blocked, "px", worst, ".0f")
+    by = listed(bench.names(tally.blockers))
+    return at_most(name, int(blocked.sum()), 0, f"{who}; blocked by {by}")
+
+
+def _clear(
+    bench: Bench, name: Name, tally: light.Tally, rings: list[tuple[Camera, image_rim.Ring]]
+) -> Check:
+    ways = [
+        image_rim.nearest_on_the_way(bench.seen(camera), ring.direction, ring.lines)
+        for camera, ring in rings
+    ]
+    least = np.nanmin(np.concatenate([tally.nearest, *ways]))
+    reason = "the object stands between a camera and its mirrors"
+    return at_least(name, float(least) - bench.radius, 0, reason)
+
+
+def _framed(bench: Bench, name: Name, rings: list[tuple[Camera, image_rim.Ring]]) -> Check:
+    mirror = np.concatenate([ring.mirror for _, ring in rings])
+    error = np.concatenate([ring.error for _, ring in rings])
+    margin = np.concatenate([image_rim.margins(camera, ring.direction) for camera, ring in rings])
+    ids = bench.export.mirrors.ids
+    lost = [ids[k] for k in np.unique(mirror[~(error < image_rim.CLOSE_MM)]).tolist()]
+    if lost or not margin.size:
+        return unknown(name, f"no ray grazes the object by way of {listed(lost) or 'any mirror'}")
+    outside = [ids[k] for k in np.unique(mirror[margin < 0]).tolist()]
+    return at_least(name, float(margin.min()), 0, f"partly out of the frame: {listed(outside)}")

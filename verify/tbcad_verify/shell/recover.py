@@ -1,0 +1,110 @@
+"""Find the mirrors in a mesh: cut it into patches, heal cuts that part one surface, judge each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.fits import Fits
+from tbcad_verify.mesh.merge import LEAST, heal
+from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.segments import Segments, folds, measure_edges, split
+from tbcad_verify.mesh.surfaces import Surfaces, bounce
+from tbcad_verify.mesh.vectors import dot, norm
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# A patch is a mirror's only if its vertices lie on one sphere or plane to within this, RMS.
+FORM_MM = 1e-3
+# And only if its facets, which are flat, follow the surface to within this, or to within this
+# share of its bulge: vertices alone may fit by chance, as those of a cone or a bore do, whose few
+# circles lie on a sphere.
+CHORD_MM, CHORD_SHARE = 0.1, 0.05
+# What bulges less than this over its extent is a plane: ten times what float32 rounding does.
+FLAT_MM = 1e-4
+# Light that comes or goes flatter than this cosine is not a mirror's.
+GRAZING = 0.05
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """The patches of one or more meshes.
+
+    Attributes:
+        segments: patch of every facet.
+        fits: surface of every patch.
+        mirror: (K,) true for those that are mirrors.
+        folds: edges at which the mesh is folded onto itself.
+    """
+
+    segments: Segments
+    fits: Fits
+    mirror: Bools
+    folds: int
+
+
+def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
+    """Find the mirrors of one part, from triangles alone.
+
+    A mirror is a patch of a bulging sphere, or of a plane that sends the camera's light into the
+    capture sphere; in either case it faces both the camera and the object.
+
+    Args:
+        mesh: the part.
+        pinhole: (3,) mm; None for parts that have no mirrors.
+        radius_mm: of the capture sphere about the origin.
+    """
+    edges = measure_edges(mesh)
+    segments, fits = heal(mesh, edges, split(mesh, edges))
+    return Recovery(segments, fits, _judge(fits, pinhole, radius_mm), folds(edges))
+
+
+def joined(parts: list[Recovery]) -> Recovery:
+    """Several parts' patches, numbered on."""
+    starts = np.cumsum([0, *(part.segments.count for part in parts)])
+    label = np.concatenate(
+        [part.segments.label + start for part, start in zip(parts, starts, strict=False)]
+    )
+    return Recovery(
+        Segments(label.astype(np.int32), int(starts[-1])),
+        _joined([part.fits for part in parts]),
+        np.concatenate([part.mirror for part in parts]),
+        sum(part.folds for part in parts),
+    )
+
+
+def _joined(fits: list[Fits]) -> Fits:
+    surfaces = _columns([item.surfaces for item in fits])
+    return Fits(Surfaces(*surfaces), *_columns(fits)[1:])
+
+
+def _columns(items: Sequence[Fits] | Sequence[Surfaces]) -> list[Any]:
+    """Each field of several dataclasses, end to end; fields that are no arrays stay lists."""
+    columns = [[getattr(item, field.name) for item in items] for field in fields(items[0])]
+    return [np.concatenate(c, axis=-1) if isinstance(c[0], np.ndarray) else c for c in columns]
+
+
+def smooth(fits: Fits) -> Bools:
+    """(K,) true where the fitted surface is what the patch really is."""
+    followed = fits.chord < np.maximum(CHORD_MM, CHORD_SHARE * np.abs(fits.sag))
+    return np.asarray((fits.form < FORM_MM) & followed)
+
+
+def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
+    if pinhole is None:
+        return np.zeros(fits.form.size, dtype=np.bool_)
+    middle, normal = fits.middle, fits.normal
+    incoming = middle - pinhole[:, None]
+    facing = [-dot(way, normal) > GRAZING * norm(way) for way in (incoming, middle)]
+    outgoing = bounce(incoming, normal)
+    along = dot(middle, outgoing) / dot(outgoing, outgoing)
+    # Some of its light lands: what leaves the middle may miss by the patch's own image.
+    image = fits.extent * (1 + norm(middle) / norm(incoming))
+    lands = norm(middle - along * outgoing) <= radius_mm + image
+    bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
+    return np.asarray(smooth(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))

@@ -1,0 +1,85 @@
+"""The wedge of the object that neither half of a mirror on the seam sees.
+
+The two halves are different spheres: their cuts along x = 0 map to slightly different curves at
+the object. Where the curves leave room between them, nobody looks; where they cross, both do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.mesh.surfaces import Lines
+from tbcad_verify.mesh.vectors import dot
+from tbcad_verify.record.poses import Virtual
+from tbcad_verify.shell.outline import Outline
+
+Floats = NDArray[np.float64]
+
+STEPS = 121
+
+
+def gaps(
+    outlines: list[Outline], lines: list[Lines], virtual: Virtual, u: Floats, radius_mm: float
+) -> Floats:
+    """(V,) widest gap between the two halves' views over the disc that faces the camera, mm.
+
+    0 where the halves overlap, and for virtual cameras of whole mirrors; NaN where one half is
+    missing.
+
+    Args:
+        outlines: of each camera.
+        lines: reflected on fitted surfaces, at each outline's samples.
+        virtual: pairs halves.
+        u: (3, M) directions of the virtual cameras.
+        radius_mm: of the disc.
+    """
+    halves = np.unique(virtual.index[virtual.halved])
+    widest = np.zeros(virtual.count)
+    if len(outlines) != 2 or not halves.size:
+        return widest
+    cuts = [
+        _cut(o, at, virtual, u, halves, radius_mm) for o, at in zip(outlines, lines, strict=True)
+    ]
+    height = np.linspace(-radius_mm, radius_mm, STEPS)
+    chord = np.sqrt(np.maximum(radius_mm**2 - height**2, 0))
+    (one, side), (two, _) = cuts
+    one, two = np.clip(one, -chord, chord), np.clip(two, -chord, chord)
+    widest[halves] = np.maximum(side[:, None] * (one - two), 0).max(axis=1)
+    return widest
+
+
+def _cut(
+    outline: Outline,
+    lines: Lines,
+    virtual: Virtual,
+    u: Floats,
+    halves: NDArray[np.intp],
+    radius_mm: float,
+) -> tuple[Floats, Floats]:
+    """One camera's halves (H): x of the cut's image at STEPS heights, and the side it sees."""
+    camera = virtual.index[outline.mirror]
+    rows = np.flatnonzero(virtual.halved[outline.mirror])
+    half = np.searchsorted(halves, camera[rows])
+    x, y = _image(lines, u, outline.mirror, rows)
+    seam = outline.seam[rows]
+    side = np.sign(np.bincount(half[~seam], x[~seam], halves.size))
+    # One call of interp for all halves: each has a stretch of the number line of its own.
+    stretch = 16 * radius_mm
+    place = half[seam] * stretch + np.clip(y[seam], -4 * radius_mm, 4 * radius_mm)
+    order = np.argsort(place, kind="stable")
+    wanted = np.arange(halves.size)[:, None] * stretch + np.linspace(-radius_mm, radius_mm, STEPS)
+    curve = np.interp(wanted, place[order], x[seam][order])
+    return np.where(
+        np.bincount(half[seam], minlength=halves.size)[:, None] > 0, curve, np.nan
+    ), side
+
+
+def _image(
+    lines: Lines, u: Floats, mirror: NDArray[np.intp], rows: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Where lines pierce the plane through the origin across u: along x, and across it."""
+    u = u[:, mirror[rows]]
+    p, r = lines.point[:, rows], lines.toward[:, rows]
+    at = p - dot(p, u) / dot(r, u) * r
+    return at[0], u[1] * at[2] - u[2] * at[1]
