@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from tbcad.optics.camera import View
@@ -20,8 +19,7 @@ from tbcad.simulate.compiled import THREADS
 from tbcad.simulate.scene.object import GREY, Subject
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 PROGRAM = "povray"
 FAR_MM = 1e7

@@ -28,8 +28,8 @@ from tbcad.simulate.views.refocus import Focus, pinholes, refocus
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.simulate.views.tiles import Tiles
 from tbcad.simulate.views.two_plane import Slab, slab_along
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Cameras = Sequence[Reflector]
 
 PLACE = np.radians(30), np.radians(30), 640.0

@@ -6,7 +6,6 @@ from functools import partial
 
 import manifold3d
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Pnt
@@ -19,8 +18,6 @@ from tbcad.optics.power_diagram import bounded
 from tbcad.shell.envelope import body
 from tbcad.shell.solid import Solid, shell
 from tbcad.spec.design import load_spec
-
-Floats = NDArray[np.float64]
 
 SEGMENTS = 64
 FUSED = (8, 16)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder
 from OCP.Geom import (
     Geom_Circle,
@@ -38,8 +37,8 @@ from OCP.TopoDS import (
 )
 
 from tbcad.geometry.conics import Ellipse, EllipseArc, Spheroid
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Side = tuple[TopoDS_Edge, bool]
 Ring = Sequence[Side]
 

@@ -1,15 +1,13 @@
 """Checks of solids that a boolean of the kernel made: it can fail and pass for valid."""
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.solids import meshed, one_solid, plane_faces, volume
 from tbcad.geometry.vectors import norm
 from tbcad.shell.mesh import Mesh
 from tbcad.shell.solid import InvalidSolidError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 NEAR_MM = 1e-4
 COARSE_MM = 0.05

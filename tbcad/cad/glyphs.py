@@ -1,14 +1,13 @@
 """Numbers in relief, from squares: no font, so the same shape on every machine."""
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.solids import moved, polygon, prism
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Step = tuple[int, int]
 
 ROWS = 5

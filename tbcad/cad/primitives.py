@@ -1,7 +1,5 @@
 """Simple solids to look at."""
 
-import numpy as np
-from numpy.typing import NDArray
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakePolygon, BRepBuilderAPI_MakeVertex
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
@@ -9,8 +7,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Solid
 
 from tbcad.cad.solids import one_solid
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 def sphere(centre: Floats, radius: float) -> TopoDS_Solid:

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from manifold3d import Manifold, Mesh64, OpType
-from numpy.typing import NDArray
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import (
@@ -38,9 +37,7 @@ from OCP.TopTools import TopTools_ListOfShape
 
 from tbcad.shell.mesh import Mesh
 from tbcad.shell.solid import InvalidSolidError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
 # Facets of cylinders and cones: no coarser than a turn of this angle (radians).

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from tbcad.optics.camera import View
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.source import Geometry
-    from tbcad.simulate.picture_files import Bytes
     from tbcad.simulate.scene.shading import Scene
+    from tbcad.types import Bytes
 
 MOST_SAMPLES = 8
 WIDEST_DEG = 170

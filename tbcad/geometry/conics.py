@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

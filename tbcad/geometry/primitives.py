@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Round bodies are measured on polygons round them, of so many sides.
 SIDES = 32

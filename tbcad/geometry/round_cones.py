@@ -9,9 +9,8 @@ of that half-plane and nowhere else, so what is forbidden is always one symmetri
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

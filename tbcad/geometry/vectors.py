@@ -1,9 +1,8 @@
 """Products of arrays of vectors along their last axis."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 """Factors that mirror points and vectors in the plane x = 0."""

@@ -3,11 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import MIRROR
-from tbcad.mirrors.radii import Progress, Task, solve
+from tbcad.mirrors.radii import Task, solve
 from tbcad.optics import flat
 from tbcad.optics.camera import View, turned_to
 from tbcad.optics.cells import Cells, areas, cells_of
@@ -16,9 +15,7 @@ from tbcad.optics.power_diagram import bounded
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints, Progress
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,15 @@
 """Radius rules: what curvature each mirror gets."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.power_diagram import Boundary, UnsettledError
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.trace import coverage
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Progress = Callable[[str], None]
+from tbcad.types import Floats, Ints, Progress
 
 # Asked for is 0.01 mm of coverage; the proof's figures are steadier when the design is exact.
 CONVERGED_MM = 1e-4

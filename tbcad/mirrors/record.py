@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.mirrors.array import Design, Half
 from tbcad.spec.design import spec_dict
 
-Floats = NDArray[np.float64]
 Row = dict[str, str | float | None]
 
 SCHEMA = "tbcad-design/1"

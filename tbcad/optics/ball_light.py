@@ -14,8 +14,7 @@ from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.camera import View
 from tbcad.optics.trace import reflected
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
 POINTS = 24

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tbcad.geometry.vectors import MIRROR, unit
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tbcad.geometry.vectors import MIRROR, dot, norm, unit
 from tbcad.optics.power_diagram import Boundary, half_edges, radical_planes, settle
 from tbcad.optics.surfaces import Surfaces
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 # Corners nearer to each other than this are one: far below any maker's means, far above rounding.
 MERGED_MM = 1e-4

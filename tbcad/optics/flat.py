@@ -1,14 +1,11 @@
 """Flat mirrors, and the paper's paraxial radius that widens what they see (eqs. 1 and 2)."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, unit
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # A geodesic vertex has at most six neighbours; two rings of them bound every flat mirror.
 NEIGHBOURS = 19

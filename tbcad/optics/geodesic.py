@@ -1,12 +1,9 @@
 """The geodesic polyhedron whose vertices are the directions of the virtual cameras."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm, unit
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Directions closer than this to a symmetry plane lie on it; the splitting leaves errors of 1e-16.
 ON_PLANE = 1e-12

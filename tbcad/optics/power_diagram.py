@@ -8,14 +8,10 @@ do: the two corners then coincide. No tolerance decides the topology, only its s
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot
 from tbcad.optics.surfaces import Surfaces
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 # A corner counts as covered when another sphere lies deeper than this over it, mm. It only keeps
 # rounding from flipping an edge to and fro; arcs this short are merged later.

@@ -11,12 +11,9 @@ infinite. For k > 0, 2 r f is the power of x with respect to the sphere.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import MIRROR, dot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 
 @dataclass(frozen=True)

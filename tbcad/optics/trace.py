@@ -1,13 +1,10 @@
 """Exact rays from camera over mirror past the object, and what each mirror sees."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Cells
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Samples of each arc, first over all of it, then about the least; a parabola does the rest.
 SAMPLES = 9

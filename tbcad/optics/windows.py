@@ -3,16 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.ball_light import miss_off_balls
 from tbcad.optics.cells import Cells
 from tbcad.optics.trace import counted_sides
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 # Samples of each side, first over all of it, then about the least: after four rounds they are a
 # 512th of the side apart, and the least miss is right to a micrometre.

@@ -1,6 +1,6 @@
 """An export: the record, what was asked for, and the manifest."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,8 +12,7 @@ from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import closing, export_shells
 from tbcad.spec.errors import SpecError
-
-Progress = Callable[[str], None]
+from tbcad.types import Progress
 
 
 def export(

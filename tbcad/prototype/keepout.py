@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from tbcad.geometry.primitives import Body, triangles
@@ -18,8 +17,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import light
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.base.layout import Base
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Least distances are right to this, or to this share of them, on the safe side: where two faces are
 # parallel, to look closer would take forever.

@@ -1,11 +1,10 @@
 """The prototype built: its numbers, its printed parts as solids, and the drive that turns them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.cad.solids import centroid
 from tbcad.mirrors.array import Design
@@ -26,9 +25,7 @@ from tbcad.prototype.printing.placing import Part
 from tbcad.prototype.stage import stage_solids as stages
 from tbcad.prototype.stage.layout import StageNumbers, stage
 from tbcad.spec.prototype import Prototype as Keys
-
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
+from tbcad.types import Progress
 
 
 @dataclass(frozen=True)

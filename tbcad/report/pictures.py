@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pyvista
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0

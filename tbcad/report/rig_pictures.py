@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyvista
 import trimesh
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
+
 Record = dict[str, Any]
 
 

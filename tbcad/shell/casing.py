@@ -12,7 +12,6 @@ each with a low (y < 0) and a high end:
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Face
 
 from tbcad.cad.brep import Maker, Ring, Side
@@ -21,8 +20,8 @@ from tbcad.shell.bores import bores
 from tbcad.shell.boundary import boundary_chain, chain_ends
 from tbcad.shell.envelope import Body
 from tbcad.shell.front import Front
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Pair = tuple[Side, Side]
 
 X, Y, Z = np.eye(3)

@@ -7,15 +7,13 @@ the mesh are both built from the same closed forms and no boolean operation is n
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.conics import EllipseArc, Spheroid, offset_beyond, offset_to_hold
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.optics.cells import Cells
 from tbcad.spec.design import Flange, Shell
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 # The foot flange reaches past the ends of the seam flange, which stands on it, by this much.

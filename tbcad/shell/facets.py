@@ -16,9 +16,7 @@ from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import Chain
 from tbcad.shell.rim import Rim, rim_of, steps_of
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # A corner's inner point may lie this many strip widths away, where two arcs meet at a sharp angle.
 LONGEST_MITRE = 4.0

@@ -1,6 +1,5 @@
 """All files of both shells, from a design to a folder."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,7 @@ from tbcad.mirrors.record import part
 from tbcad.shell.envelope import Body, body
 from tbcad.shell.mesh import Mesh, mesh
 from tbcad.shell.solid import shell
-
-Progress = Callable[[str], None]
+from tbcad.types import Progress
 
 
 def export_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:

@@ -4,16 +4,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
 
 from tbcad.cad.brep import Maker, Side
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Arcs, Cells
 from tbcad.shell.boundary import boundary_chain
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

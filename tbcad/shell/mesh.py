@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.conics import EllipseArc, Spheroid
 from tbcad.geometry.vectors import MIRROR, dot, norm
@@ -14,9 +13,7 @@ from tbcad.shell.boundary import boundary_chain
 from tbcad.shell.envelope import Body, Holes
 from tbcad.shell.facets import Facets, facets
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 LEAST_AROUND_HOLE = 24
 

@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from tbcad.optics.cells import Cells
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 LEAST_STEPS = 3
 

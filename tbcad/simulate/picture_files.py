@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from tbcad.errors import InputError
-
-Bytes = NDArray[np.uint8]
+from tbcad.types import Bytes
 
 STILLS = (".png",)
 ANIMATED = (".gif", ".webp", ".png")

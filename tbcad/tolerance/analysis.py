@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tbcad import schedule
 from tbcad.errors import InputError
 from tbcad.mirrors.array import Design
@@ -28,9 +25,8 @@ from tbcad.tolerance.montecarlo.sharpness import Sharpness, Wanted, sharpness
 from tbcad.tolerance.process.process import BUILT_IN, Process, errors, load_process
 from tbcad.tolerance.prototype import builds
 from tbcad.tolerance.prototype.windows import designed
+from tbcad.types import Floats, Progress
 
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
 Halves = tuple[Nominal, Nominal]
 
 # Machines for each step of a search; what is told of the process itself has as many as asked for.

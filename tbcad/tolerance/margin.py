@@ -4,18 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tbcad.errors import InputError
 from tbcad.mirrors.array import Design, design
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.montecarlo.builds import reached
 from tbcad.tolerance.montecarlo.draws import Errors
+from tbcad.types import Floats, Progress
 
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
 WorstOf = Callable[[Design, Errors], Floats]
 """Least coverage, mm, (s,), of machines made after a design with some errors."""
 

@@ -1,13 +1,11 @@
 """Plots of an analysis: the yield, what each error costs, and which virtual cameras suffer."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.montecarlo.coverage import virtual
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 def panels(found: Analysis) -> tuple[Panel, ...]:

@@ -1,10 +1,5 @@
 """The design that a process needs: the same but for its margin."""
 
-from collections.abc import Callable
-
-import numpy as np
-from numpy.typing import NDArray
-
 from tbcad import schedule
 from tbcad.errors import InputError
 from tbcad.mirrors.array import Design
@@ -15,9 +10,7 @@ from tbcad.tolerance.montecarlo.builds import Task, simulate
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import nominals
 from tbcad.tolerance.process.process import Process, errors
-
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
+from tbcad.types import Floats, Progress
 
 # Machines on which the margin rests, and their seed.
 MACHINES = 400

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.tables import Cell, Table
@@ -15,8 +14,7 @@ from tbcad.tolerance.analysis import TRIED, Analysis
 from tbcad.tolerance.montecarlo.builds import Yield, yielded
 from tbcad.tolerance.plots import directions, in_words, panels
 from tbcad.tolerance.process.process import process_dict
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/1"
 SHARES = (0.01, 0.05, 0.5)

@@ -9,12 +9,11 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.spec.errors import SpecError, shown
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Row = dict[str, str]
 
 DENSITY_G_CM3 = 7.81  # 100Cr6 (AISI 52100), the usual steel of bearing balls

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.round_cones import RoundCones, met_within, spheres
 from tbcad.optics.ball_light import light
@@ -15,8 +14,7 @@ from tbcad.optics.camera import View
 from tbcad.prototype.balls.selection import Balls
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import Prototype as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Kept on top of every least angle, radians: far more than the solver's rounding and far less than
 # matters, so that no two balls come closer than they may.

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.cluster.vq import ClusterError, kmeans2
 
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 ROUNDS = 200
 # Mirrors nearer to each other than this, in degrees of polar angle, are the same to k-means.

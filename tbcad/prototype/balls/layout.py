@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import MIRROR
 from tbcad.mirrors.array import Design, Half
@@ -19,9 +18,7 @@ from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MOST_BALLS
 from tbcad.spec.prototype import Prototype as Keys
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # The post is taken to reach this many semi-major axes down, beyond all balls.
 POST_LENGTHS = 3

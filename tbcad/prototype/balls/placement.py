@@ -9,15 +9,11 @@ a mixed integer linear program.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array
 
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Floats, Ints
 
 # Nodes of the search, not seconds, so that every machine finds the same.
 NODES = 2000

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Half
@@ -13,10 +12,7 @@ from tbcad.optics.windows import Pieces, Windows, windows
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import Clusters
 from tbcad.spec.prototype import Prototype as Keys
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 HALVINGS = 40
 # Of rounding only: far below what the least stock step changes.

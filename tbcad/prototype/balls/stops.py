@@ -9,13 +9,10 @@ going through their upper ends in order.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.prototype.balls.groups import Clusters
 from tbcad.prototype.balls.placement import Task
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Azimuths tried for a ball are this many to its tolerance; the balls are gone through this often.
 TRIES = 4

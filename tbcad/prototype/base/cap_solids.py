@@ -6,7 +6,6 @@ In the cap's own frame the centre of its body is the origin and its axis, away f
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
@@ -21,8 +20,6 @@ from tbcad.prototype.base.layout import Base
 from tbcad.prototype.base.purchased import magnet_name
 from tbcad.prototype.drive.drive import Parts
 from tbcad.prototype.printing.placing import Part
-
-Floats = NDArray[np.float64]
 
 WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # least material before the pocket

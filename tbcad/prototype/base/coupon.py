@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_mesh, check_pads
@@ -21,8 +20,7 @@ from tbcad.prototype.printing.bed import room
 from tbcad.prototype.printing.placing import Part
 from tbcad.spec.base_keys import Base as Keys
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Bars are thinner than a pocket's floor, so that they reach into no pocket.
 OF_FLOOR = 0.8

@@ -5,15 +5,12 @@ be as thin as a knife. What is left between two gaps is left out too when it is 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.prototype.base.layout import Base
 from tbcad.prototype.base.profile import outward
 from tbcad.prototype.base.seats import Seats
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats
 
 STEP_MM = 0.25
 ROOM_MM = 1.0  # round the end of a boss

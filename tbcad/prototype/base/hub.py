@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.spec.base_keys import Base as Keys
 from tbcad.spec.base_keys import Drive
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 WALL_MM = 3.0  # round holes that take a load
 SCREW_MM = 3.4  # clearance hole of an M3 screw (ISO 273, medium)

@@ -1,14 +1,12 @@
 """The hub's solids and what is drilled out of them, about z."""
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
 from tbcad.prototype.base.hub import SCREW_MM, SLIT_MM, Hub
 from tbcad.spec.base_keys import Base as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
 THROUGH = 1.0  # tools stick out this far, so that no faces coincide

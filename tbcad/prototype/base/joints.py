@@ -14,9 +14,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.base.layout import Base
 from tbcad.prototype.base.profile import offset, outside
 from tbcad.prototype.base.screws import access, sizes
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats
 
 GRID_MM = 2.0
 AROUND_MM = 1.2  # least wall round a hole

@@ -8,7 +8,6 @@ axis over the sector of the balls. Ribs stand outside, highest at the hub where 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.ball_light import light
@@ -27,8 +26,7 @@ from tbcad.prototype.base.profile import (
 from tbcad.prototype.base.seats import Seats, seats
 from tbcad.spec.base_keys import Base as Keys
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 EDGE_MM = 2.0  # wall beyond the outermost bosses
 SHORTEST_MM = 8.0  # parts of the cross-section

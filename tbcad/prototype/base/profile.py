@@ -7,11 +7,9 @@ what lies inside of it is proved to be clear of the wall by its corners alone.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm, unit
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Corners of the polygon round the ellipse of light: few, so that the wall has few cones.
 CORNERS = 24

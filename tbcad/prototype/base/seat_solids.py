@@ -6,7 +6,6 @@ then.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
@@ -17,8 +16,6 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.solids import cut, cylinder, moved, revolved
 from tbcad.prototype.base.seats import Seats
-
-Floats = NDArray[np.float64]
 
 # Of the cup's radius: the way is a little narrower, so that the two meet at an angle.
 NARROWER = 0.4

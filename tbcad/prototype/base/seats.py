@@ -12,8 +12,7 @@ from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.spec.base_keys import Base as Keys
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads
 WEB_MM = 0.8  # between pocket and pads

@@ -4,7 +4,6 @@ Built about z with azimuth zero along x, then moved into the frame of the shell.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import COARSE_MM, checked
@@ -19,8 +18,7 @@ from tbcad.prototype.base.split import Split, downs, split
 from tbcad.prototype.base.split_solids import flanges, numbers, pieces, windows
 from tbcad.prototype.printing.placing import Part, laid
 from tbcad.shell.solid import InvalidSolidError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 SUNK_MM = 0.4
 # Tried in turn, mm; at 1e-6 meshes have gaps of some nanometres more often than not.

@@ -21,9 +21,7 @@ from tbcad.prototype.base.profile import offset
 from tbcad.prototype.base.screws import sizes
 from tbcad.prototype.printing.bed import as_text, lack, needed
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 MISS_MM = 1.0  # of a plane from any boss
 MOST = 4  # pieces

@@ -4,7 +4,6 @@ All is built in the carrier's own frame: z the axis, x azimuth zero.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import checked
@@ -17,8 +16,7 @@ from tbcad.prototype.base.layout import Base
 from tbcad.prototype.base.screws import access, sizes
 from tbcad.prototype.base.split import Split, downs
 from tbcad.prototype.printing.placing import Part, laid
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 FAR_MM = 2000.0
 FINE_MM = 0.02  # of meshes, for volumes

@@ -8,12 +8,10 @@ stands beside it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.balls.selection import Balls
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 GRAVITY = 9.80665  # m/s^2, standard
 NEGLIGIBLE = 1e-9  # of a mass's moment: rounding

@@ -4,11 +4,10 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.prototype.balls.layout import Prototype
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Value = str | int | float | None
 Row = dict[str, Value]
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.drive.balance import Balance, cap_volume
@@ -13,8 +12,6 @@ from tbcad.prototype.drive.drive import Drive, Part, Parts
 from tbcad.prototype.files.balls_csv import Row, Value, write_table
 from tbcad.spec.errors import SpecError, shown
 from tbcad.spec.motion_keys import Motion
-
-Floats = NDArray[np.float64]
 
 COLUMNS = (
     *("item", "quantity", "part", "what", "material", "mass_g", "total_mass_g"),

@@ -20,8 +20,7 @@ from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.drive.drive import Drive
 from tbcad.spec.errors import SpecError
 from tbcad.spec.motion_keys import Motion
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 LONGEST = 79
 DECIMALS = 4  # of a degree: far below a microstep, and 7 digits are what GRBL's floats hold

@@ -1,7 +1,6 @@
 """All files of the prototype: parts, tables, plan, record and assembly."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,7 @@ from tbcad.prototype.machine import Machine, machine
 from tbcad.prototype.stage.layout import leds
 from tbcad.spec.design import Spec
 from tbcad.spec.motion_keys import Motion
-
-Progress = Callable[[str], None]
+from tbcad.types import Progress
 
 SCHEMA = "tbcad-prototype/1"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads

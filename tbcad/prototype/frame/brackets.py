@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Body, Item, Prism, rod
 from tbcad.prototype.drive.drive import Part, Parts
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Clearance holes of ISO 273, medium, by thread.
 HOLES_MM = {3.0: 3.4, 4.0: 4.5, 5.0: 5.5, 6.0: 6.6, 6.35: 6.6}

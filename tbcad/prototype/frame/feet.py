@@ -1,7 +1,6 @@
 """What stands on the base plate: feet of the uprights, clamp of the post, bracket of the camera."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Body, Item, Rod, box, rod, slot
 from tbcad.geometry.vectors import unit
@@ -21,8 +20,7 @@ from tbcad.prototype.stage.layout import StageNumbers
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import Prototype as ProtoKeys
 from tbcad.spec.stage_keys import Frame as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 TALL_MM, DEEP_MM = 50.0, 48.0  # of the uprights' feet
 WEB_MM = 15.0  # from the middle to the feet's webs

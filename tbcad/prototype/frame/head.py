@@ -7,7 +7,6 @@ webs between plate and flange leave the middle to tube and motor.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Body, Item, box, rod, slot
 from tbcad.prototype.base.layout import Base
@@ -34,8 +33,7 @@ from tbcad.prototype.frame.purchased import (
 )
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import Frame as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 GAP_MM = 3.0  # between what turns and the plate
 SHOULDER_MM = 3.0

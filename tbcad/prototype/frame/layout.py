@@ -7,7 +7,6 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Item, Rod, box
 from tbcad.prototype.balls.layout import Prototype
@@ -30,8 +29,7 @@ from tbcad.prototype.stage.layout import StageNumbers
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import Prototype as Keys
 from tbcad.spec.stage_keys import Frame as FrameKeys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 ROUND_MM = 10.0  # plate beyond the brackets' feet
 TIGHT_MM = 4.0  # least of a screw beyond what it holds

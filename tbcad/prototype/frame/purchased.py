@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Item, Rod, box, rod
 from tbcad.prototype.base.layout import Base
 from tbcad.prototype.drive.drive import Drive, Part, pitch_diameter
 from tbcad.prototype.frame.brackets import SUNK_MM
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 PLATE_MM = 9.0  # so that M3x12 screws go 3 mm into a motor
 COUPLING_MM = 14.0  # length of a flange coupling with its gap to the motor; no list gives it

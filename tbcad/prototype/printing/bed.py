@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
 from tbcad.spec.base_keys import Base as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Parts are measured by coarse meshes whose facets may lie this far inside of them.
 SLACK_MM = 0.4

@@ -1,7 +1,6 @@
 """Solids of bodies: added ones fused, removed ones cut out."""
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.solids import (
@@ -20,8 +19,7 @@ from tbcad.geometry.primitives import Prism as Straight
 from tbcad.prototype.printing.placing import Part, laid
 from tbcad.shell.solid import InvalidSolidError
 from tbcad.spec.base_keys import Base as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 COARSE_MM = 0.02
 VOLUME_ERROR = 2e-3

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -13,7 +12,6 @@ from tbcad.cad.solids import meshed, without_lost
 from tbcad.prototype.printing.placing import Part
 from tbcad.shell.mesh import Mesh
 
-Floats = NDArray[np.float64]
 # base and cap turn with the base, stage and frame stand still; a tool is not in the rig.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 

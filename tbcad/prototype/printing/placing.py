@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
@@ -14,8 +13,7 @@ from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
 from tbcad.shell.mesh import Mesh
 from tbcad.spec.base_keys import Base as Keys
 from tbcad.spec.errors import SpecError
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Only to measure with; the parts themselves are meshed finely when they are written.
 COARSE_MM, COARSE_ANGLE = SLACK_MM / 2, 0.4

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Body, Item, Prism, Rod, Turned, box, rod
 from tbcad.geometry.vectors import norm
@@ -11,8 +10,7 @@ from tbcad.prototype.drive.drive import Part
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import Stage as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 DISC_MM = 3.0
 INSIDE_MM = 0.3  # how far the crown stays inside the capture sphere

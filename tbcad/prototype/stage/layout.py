@@ -9,7 +9,6 @@ light and the post can be thick. The disc stands as low as LED pockets beside it
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.primitives import Item
 from tbcad.geometry.vectors import norm
@@ -34,8 +33,7 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import Prototype as Keys
 from tbcad.spec.stage_keys import Frame as FrameKeys
 from tbcad.spec.stage_keys import Stage as StageKeys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 NECK_MM = 6.0  # radius where the crown leaves the sphere, at most
 FREE = 0.95  # ... and this share of the radius at which light grazes the sphere's bottom

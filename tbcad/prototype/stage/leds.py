@@ -1,7 +1,6 @@
 """Whether LEDs on the stage can be used: inside the sphere, apart, not in one plane, not hidden."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import Prototype
@@ -9,8 +8,7 @@ from tbcad.prototype.drive.drive import Part
 from tbcad.prototype.keepout import Room
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import Stage as Keys
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 POCKET_PLAY_MM = 0.1  # to either side
 FLAT_MM = 1.0  # least that the LEDs stand out of any plane, square root of the sum of squares

@@ -33,8 +33,7 @@ from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.photograph import BAND_ROWS, Band
 from tbcad.simulate.compiled import in_threads
 from tbcad.simulate.scene.reflector import Reflector
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"

@@ -11,13 +11,11 @@ from tbcad.optics.camera import View
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.scene.rays import Rays, unit_directions
 from tbcad.simulate.scene.shading import Scene, look
+from tbcad.types import Bytes, Progress
 
-Floats = NDArray[np.float64]
 Colours = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 Shift = tuple[float, float]
 Tracer = Callable[[range, Shift], Rays]
-Progress = Callable[[str], None]
 
 BAND_ROWS = 64  # also the height of a chunk of the light field's file
 CENTRE: Shift = (0.0, 0.0)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Literal
 
-from tbcad.simulate.capture.photograph import Band, Progress, Tracer, photograph
+from tbcad.simulate.capture.photograph import Band, Tracer, photograph
 from tbcad.simulate.prototype.merge import merge
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import runs, stand_ins
@@ -13,6 +13,7 @@ from tbcad.simulate.scene.facets import on_mesh, read_shells
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shading import Scene
+from tbcad.types import Progress
 
 Geometry = Literal["spheres", "mesh", "prototype"]
 Captured = list[tuple[Reflector, Callable[[], Iterable[Band]]]]

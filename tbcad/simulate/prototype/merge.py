@@ -7,7 +7,7 @@ is its colour. Its ray comes from the record: ball and base stand where the plan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -33,15 +33,11 @@ from tbcad.simulate.prototype.sight import (
 from tbcad.simulate.scene.rays import Rays, exact, pixel_directions
 from tbcad.simulate.scene.reflector import MARGIN_PX, pixels_of
 from tbcad.simulate.scene.shading import Scene
+from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-Bytes = NDArray[np.uint8]
 Colours = NDArray[np.float32]
 Numbers = NDArray[np.uint16]
 Resample = Literal["photograph", "exact"]
-Progress = Callable[[str], None]
 
 NOWHERE = -1
 

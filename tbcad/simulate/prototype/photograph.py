@@ -8,17 +8,13 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.capture.photograph import BAND_ROWS, shifts
 from tbcad.simulate.compiled import in_threads
 from tbcad.simulate.prototype.run import Run
 from tbcad.simulate.prototype.sight import colours, directions
 from tbcad.simulate.scene.shading import Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from tbcad.types import Bytes, Floats, Ints
 
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.optics.windows import rotated
 from tbcad.simulate.scene.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
+from tbcad.types import Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Model = TypeVar("Model")
 
 RECORD, PLAN = "prototype.json", "rotation_plan.csv"

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.camera import View
@@ -19,9 +18,7 @@ from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.windows import rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.scene.reflector import Reflector, Replaced
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 
 @dataclass(frozen=True)

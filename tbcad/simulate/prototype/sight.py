@@ -13,10 +13,8 @@ from tbcad.simulate.compiled import compiled
 from tbcad.simulate.prototype.run import Run
 from tbcad.simulate.scene.reflector import pitch
 from tbcad.simulate.scene.shading import Scene, look
+from tbcad.types import Bools, Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Colours = NDArray[np.float32]
 
 # Where a ball's front ends its body begins; for a bought ball both are the same sphere.

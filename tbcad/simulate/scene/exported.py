@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad.errors import InputError
@@ -19,8 +18,7 @@ from tbcad.optics.power_diagram import UnsettledError, bounded
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 NAME = "design.json"
 LARGEST_FILE = 200_000_000  # bytes; n = 60 takes 12 million

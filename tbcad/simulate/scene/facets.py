@@ -22,9 +22,7 @@ from tbcad.simulate.scene.embree import committed
 from tbcad.simulate.scene.exported import AGAIN, Exported
 from tbcad.simulate.scene.rays import Numbers, Rays, pixel_directions, reflected
 from tbcad.simulate.scene.reflector import Reflector
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 LARGEST_FILE = 4 << 30  # bytes
 # Mirrors whose apices are nearest to a facet, out of which the one it lies on is found.

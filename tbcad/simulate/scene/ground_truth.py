@@ -1,7 +1,5 @@
 """What a real camera in the same place would photograph, ray-traced: the ground truth."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,10 +9,9 @@ from tbcad.simulate.compiled import in_threads
 from tbcad.simulate.scene.shading import Scene, look
 from tbcad.simulate.scene.viewpoint import directions
 from tbcad.simulate.views.refocus import Focus, rays_through
+from tbcad.types import Floats, Progress
 
-Floats = NDArray[np.float64]
 Colours = NDArray[np.float32]
-Progress = Callable[[str], None]
 
 RAYS_A_PIECE = 1 << 15
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))

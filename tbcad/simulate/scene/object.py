@@ -5,13 +5,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
+from tbcad.types import Bytes, Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 Paint = Literal["own", "pattern", "plain"]
 
 LARGEST_FILE = 1 << 30  # bytes

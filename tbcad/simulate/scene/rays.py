@@ -10,9 +10,8 @@ from tbcad.optics.camera import View
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.scene.reflector import Reflector, pitch
+from tbcad.types import Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Numbers = NDArray[np.int32]
 Shift = tuple[float, float]
 

@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.mirrors.array import Design
 from tbcad.optics.camera import View
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Boxes about cells in the picture are widened by so many pixels: an arc may bulge beyond samples.
 MARGIN_PX = 2

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.scene.embree import committed
 from tbcad.simulate.scene.object import Subject, pattern
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from tbcad.types import Bytes, Floats, Ints
 
 # Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
 # the same in all directions, as light-field rendering presumes. No cast shadows.

@@ -1,13 +1,11 @@
 """Where a picture is wanted from: a pinhole that looks at the middle of the object."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import View
 from tbcad.simulate.scene.rays import unit_directions
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Room about the capture sphere in a picture.
 ROOM = 1.05

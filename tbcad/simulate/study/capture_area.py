@@ -9,9 +9,10 @@ from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Attempt, Progress, attempt, over, varied
+from tbcad.simulate.study.sweep import Attempt, attempt, over, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
 from tbcad.spec.design import Spec
+from tbcad.types import Progress
 
 RULES = ("flat", "paper", "traced")
 MEASURED = ("least_mm", "median_mm", "short", "reason")

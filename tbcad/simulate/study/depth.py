@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import Half
@@ -12,11 +11,10 @@ from tbcad.simulate.study.lens import Lens, Range, focal_length, lens_for, stop,
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Progress, attempt, varied
+from tbcad.simulate.study.sweep import attempt, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
 POINTS = tuple(f"{place}_{fan}" for place in PLACES for fan in FANS)

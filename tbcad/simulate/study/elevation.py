@@ -1,16 +1,14 @@
 """Radius of the mirrors against their polar angle (the paper's elevation, Fig. 7b)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.mirrors.array import Half, design
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Progress, varied
+from tbcad.simulate.study.sweep import varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper")
 COLUMNS = ("id", "polar_deg", "azimuth_deg", "traced_radius_mm", "paper_radius_mm", "nearly_flat")

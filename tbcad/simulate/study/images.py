@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import Half
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 PLACES = ("nearest", "centre", "farthest")
 FANS = ("tangential", "sagittal")

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, norm
@@ -13,8 +12,7 @@ from tbcad.optics.camera import turned_to
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import Reflector
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # Beyond this, one ray stands for a block of pixels: the paper's largest sensor, 8320 x 6208,
 # counted with 2080 x 1552 rays differs from all its pixels by less than 5e-5 of the count.

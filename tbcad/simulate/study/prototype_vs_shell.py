@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from tbcad.simulate.capture.light_field import in_memory
@@ -13,13 +12,11 @@ from tbcad.simulate.scene.object import Subject
 from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Progress
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
 from tbcad.simulate.study.views import Round, scores, truths
 from tbcad.simulate.views.synthesis import Method
 from tbcad.simulate.views.tiles import Tiles
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats, Progress
 
 COLUMNS = (
     *("elevation_deg", "azimuth_deg", "shell_psnr_db", "prototype_psnr_db"),

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import Half
@@ -13,11 +12,10 @@ from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import Counts, Sensor, counts, virtual_cameras
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Progress, attempt, over, varied
+from tbcad.simulate.study.sweep import attempt, over, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats, Progress
 
 MULTIPLES = (1, 2, 3, 4)
 COLUMNS = (

@@ -17,14 +17,13 @@ from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Progress, attempt, varied
+from tbcad.simulate.study.sweep import attempt, varied
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
-from tbcad.simulate.study.views import Bytes, Round, scores, truths
+from tbcad.simulate.study.views import Round, scores, truths
 from tbcad.simulate.views.synthesis import Method
 from tbcad.simulate.views.tiles import Tiles
 from tbcad.spec.design import Spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Bytes, Floats, Progress
 
 COLUMNS = (
     *("width_px", "height_px", "n", "elevation_deg", "azimuth_deg"),

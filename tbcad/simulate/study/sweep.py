@@ -9,9 +9,9 @@ from tbcad.mirrors.array import Design, design
 from tbcad.schedule import run
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
+from tbcad.types import Progress
 
 Result = TypeVar("Result")
-Progress = Callable[[str], None]
 
 LARGEST_N = 60
 

@@ -1,10 +1,8 @@
 """Views all round the object, and how like the truth a light field's are."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import View
@@ -14,10 +12,7 @@ from tbcad.simulate.scene.shading import Scene, depth_of
 from tbcad.simulate.scene.viewpoint import viewpoint
 from tbcad.simulate.views.synthesis import Method, synthesise
 from tbcad.simulate.views.tiles import Tiles
-
-Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-Progress = Callable[[str], None]
+from tbcad.types import Bytes, Floats, Progress
 
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 MOST_AZIMUTHS = 360

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
 from tbcad.simulate.views.ray_bundle import SPARSE, Sheaf, candidates, distance, pieces, walk
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from tbcad.types import Bytes, Floats, Ints
 
 # docs/decisions/0006: of 3 to 10 cameras and 0.2 to 0.4 pixels the best in PSNR and SSIM for the
 # time they take.

@@ -4,13 +4,10 @@ tests/simulate/test_nearest.py compares with a four-dimensional k-d tree over al
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
 from tbcad.simulate.views.ray_bundle import SPARSE, Sheaf, candidates, distance, pieces, walk
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Wanted rays in a row that are so near to each other that a few mirrors do for all of them.
 RUN = 64

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.views.tiles import Packed
 from tbcad.simulate.views.two_plane import Slab
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Wanted rays that go through the loops together: neighbours, so that few mirrors are near.
 RAYS_A_PIECE = 1 << 11

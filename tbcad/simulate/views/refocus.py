@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import View
-from tbcad.simulate.capture.photograph import Progress
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.scene.rays import unit_directions
-from tbcad.simulate.views.synthesis import Bools, Colours, Picture, Rays, colours, gather, reach
+from tbcad.simulate.views.synthesis import Colours, Picture, Rays, colours, gather, reach
 from tbcad.simulate.views.tiles import Tiles
 from tbcad.simulate.views.two_plane import slab_along
-
-Floats = NDArray[np.float64]
+from tbcad.types import Bools, Floats, Progress
 
 # The paper's 69 pinholes: so many points of a square lattice lie within this radius in its steps.
 LATTICE_RADIUS2 = 20

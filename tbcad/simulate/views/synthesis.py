@@ -15,10 +15,9 @@ from tbcad.simulate.views.nearest import nearest
 from tbcad.simulate.views.ray_bundle import Sheaf, candidates, sheaf_of
 from tbcad.simulate.views.tiles import Tiles
 from tbcad.simulate.views.two_plane import Slab, slab_along
+from tbcad.types import Bools, Floats
 
-Floats = NDArray[np.float64]
 Colours = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 Method = Literal["nearest", "blend"]
 Rays = tuple[Floats, Floats]
 """Origins and unit directions, (n, 3) each."""

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.simulate.capture.light_field import Frame, LightField
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 NEIGHBOURS = 6
 

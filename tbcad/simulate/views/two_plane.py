@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 # A ray at more than this to the direction has no place in its slab.
 LEAST_COSINE = 0.2

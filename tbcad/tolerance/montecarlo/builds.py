@@ -9,16 +9,13 @@ from statistics import NormalDist
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import Nominal
 from tbcad.tolerance.montecarlo.pointing import pointing
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Machines that a worker makes in one go: few enough that all workers end together.
 BATCH = 10

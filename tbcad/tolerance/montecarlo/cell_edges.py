@@ -17,13 +17,9 @@ of quadratics, for spheres and planes alike, and no topology is assumed.
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 # Samples of each edge, first over all of it, then about the least; a parabola does the rest.
 SAMPLES = 9

@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.scene.reflector import pitch
 from tbcad.tolerance.montecarlo.cell_edges import follow
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.tolerance.montecarlo.edge_model import Nominal, places, tables
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 
 @dataclass(frozen=True)

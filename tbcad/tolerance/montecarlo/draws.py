@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
+
 Distribution = Literal["normal", "uniform"]
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
@@ -12,9 +11,7 @@ from tbcad.optics.camera import View
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.tolerance.montecarlo.neighbour_pairs import Near, near
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats
 
 # No symmetry plane of a design holds this direction, so that no corner lies on a screen's axis;
 # for mirrors on the seam it points away from the seam, where both halves' outlines are open.

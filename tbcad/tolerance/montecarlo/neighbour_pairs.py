@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from tbcad.geometry.vectors import norm
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # An edge goes no farther than this many times the distance of its mirrors' farthest corners from
 # their apices: the spheres that are looked at cover what lies between there and the cells.

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.tolerance.montecarlo.edge_model import Nominal, axes, places, tables
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import reached
 from tbcad.tolerance.montecarlo.draws import NONE, Error, Errors
+from tbcad.types import Floats
 
-Floats = NDArray[np.float64]
 Worst = Callable[[Errors], Floats]
 """Least coverage of each of some machines made with some errors, mm, (s,)."""
 

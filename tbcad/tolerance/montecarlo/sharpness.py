@@ -4,11 +4,9 @@ An uncalibrated machine takes every pixel's ray for the designed one. A calibrat
 its rays go, but for what the calibration leaves.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.optics.camera import View
@@ -22,11 +20,7 @@ from tbcad.simulate.study.views import scores
 from tbcad.simulate.views.synthesis import Method
 from tbcad.simulate.views.tiles import Tiles
 from tbcad.tolerance.montecarlo.draws import Draws
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-Progress = Callable[[str], None]
+from tbcad.types import Bytes, Floats, Ints, Progress
 
 # Stream of random numbers, beside those of the kinds of error.
 LEFT_OVER = 2000

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import in_threads
 from tbcad.tolerance.montecarlo.builds import Covered, batches, joined
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.prototype.draws import draw
 from tbcad.tolerance.prototype.windows import Designed, seen
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 
 @dataclass(frozen=True)

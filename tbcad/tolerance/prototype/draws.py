@@ -4,12 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.tolerance.montecarlo.draws import Error, Errors, generator
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats
 
 # Streams of one machine begin here, beyond those of its shells (tbcad.tolerance.draws).
 FIRST_STREAM = 1000

@@ -3,12 +3,9 @@
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad.types import Floats, Ints
 
 # Steps to the point of a ball that shows the object's middle, and what of a cosine may be left.
 STEPS = 60

@@ -11,7 +11,6 @@ Both runs are taken in the frame of the machine, with the object turned in the s
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
@@ -23,10 +22,7 @@ from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw
 from tbcad.tolerance.prototype.rays import SAMPLES, highlights, least_misses
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad.types import Bools, Floats, Ints
 
 # In the camera: along no symmetry plane of a design, so that it meets no corner of a window.
 ASKEW = np.array([1.0, 0.1234, 0.0567])

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tbcad.mirrors.array import Half, design
 from tbcad.simulate.study.images import behind, images
 from tbcad.spec.design import load_spec
-
-Floats = NDArray[np.float64]
+from tbcad.types import Floats
 
 FAN = 1e-5  # distance of a fan's neighbouring ray from the apex, mm
 

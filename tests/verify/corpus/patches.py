@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.types import Floats
 from tests.verify.corpus.copies import load
 from tests.verify.corpus.facets import Corners
 
-Floats = NDArray[np.float64]
 TOUCHES_MM = 2e-5  # float32, 150 mm from the origin
 AIM = np.array([0.6, 0.15, 0.6])  # well inside both halves
 

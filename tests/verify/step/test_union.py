@@ -16,13 +16,12 @@ from scipy.integrate import quad
 from tbcad_verify.record.mirrors import from_json
 from tbcad_verify.record.record import Camera, Export, read_export
 from tbcad_verify.step.union import Cells, cells, of_balls, of_export
+from tbcad_verify.types import Floats
 
 from tbcad.mirrors.array import Design, design
 from tbcad.mirrors.record import rows
 from tbcad.optics.cells import areas
 from tbcad.spec.design import load_spec
-
-Floats = NDArray[np.float64]
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 NO_WALLS = np.zeros((0, 4))

@@ -17,8 +17,8 @@ from tbcad_verify.mesh.mesh import Mesh, distinct
 from tbcad_verify.mesh.segments import Segments, rounding
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import across, dot, norm, slices, unit
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 STEPS = 4
 RIDGE = 1e-10
 

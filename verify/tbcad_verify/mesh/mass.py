@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

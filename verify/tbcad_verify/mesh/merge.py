@@ -14,9 +14,8 @@ from tbcad_verify.mesh.mesh import Mesh, distinct, linked
 from tbcad_verify.mesh.segments import Edges, Segments
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
+from tbcad_verify.types import Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Pairs = tuple[Ints, Ints]
 
 # A splinter belongs to a surface if it lies on it to within this, everywhere.

@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import cross, dot
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import dot, unit
 from tbcad_verify.record.record import Camera
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh, linked
 from tbcad_verify.mesh.vectors import cross, dot, norm, slices, unit
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats
 
 # A concave edge is a crease beyond this and the rounding. Flat mirrors at n = 60 meet at 0.003.
 CONCAVE_RAD = 1e-3

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import dot, norm
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.printing.placing import SLACK_MM, Placing, place, words
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Check, Name, at_most, finite, told
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 UNIT = "problems"
 DIGITS = 9

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
+
 Groups = NDArray[np.int32]
 
 

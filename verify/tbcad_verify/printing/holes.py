@@ -12,10 +12,8 @@ from tbcad_verify.mesh.mesh import Mesh, linked
 from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges
 from tbcad_verify.mesh.vectors import across, dot, norm, unit
 from tbcad_verify.printing.circles import circles, gaps
+from tbcad_verify.types import Bools, Floats, Ints
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 Groups = NDArray[np.int32]
 
 # Neighbours in a hole's wall bend by no more than this: an octagon, 45 degrees, is a coarse hole; a
@@ -54,7 +52,7 @@ class Patches:
         count: G.
     """
 
-    facet: Indices
+    facet: Ints
     group: Groups
     count: int
 
@@ -87,7 +85,7 @@ def _flat(edges: Edges) -> Bools:
     return np.asarray(flat & (edges.noise < BLIND_RAD))
 
 
-def _joined(size: int, links: Indices, facet: Indices) -> Patches:
+def _joined(size: int, links: Ints, facet: Ints) -> Patches:
     """The given facets of `size`, in patches that links (2, L) between facets hold together."""
     number = np.full(size, -1)
     number[facet] = np.arange(facet.size)
@@ -97,7 +95,7 @@ def _joined(size: int, links: Indices, facet: Indices) -> Patches:
     return Patches(facet, group, count)
 
 
-def _bending(patches: Patches, bent: Indices) -> Patches:
+def _bending(patches: Patches, bent: Ints) -> Patches:
     """The patches with enough bends; `bent` has a facet of every bent edge."""
     enough = np.bincount(patches.group[bent], minlength=patches.count) >= BENDS
     mine = enough[patches.group]
@@ -112,7 +110,7 @@ def _label(patches: Patches, size: int) -> Groups:
     return label
 
 
-def _straight(mesh: Mesh, half: Indices, bend: Floats, label: Groups, count: int) -> Floats:
+def _straight(mesh: Mesh, half: Ints, bend: Floats, label: Groups, count: int) -> Floats:
     """(3, G) the direction along which each patch does not bend.
 
     Source: D. Cohen-Steiner, J.-M. Morvan, Restricted Delaunay Triangulations and Normal Cycle,

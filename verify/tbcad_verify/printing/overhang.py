@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 BED_MM = 0.01  # facets within this of the lowest point lie on the bed; far less than a layer
 # Normals of fine facets are in doubt by so much: faces at just the allowed lean are allowed.

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import across, norm
 from tbcad_verify.printing.overhang import overhang
@@ -14,8 +13,7 @@ from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.resting import Hull
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.turning import turn
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 SLACK_MM = 1e-3  # what no machine can tell, and float32 may have added
 AXIS_COS = math.cos(math.radians(0.01))

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from tbcad_verify.mesh.vectors import across, norm
 from tbcad_verify.report.checks import Unknown
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 MOST = 24  # faces of the hull that are tried, the largest first
 LEAST_SHARE = 0.002  # of the hull's area, of a face to rest on

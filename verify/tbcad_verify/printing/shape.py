@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.mass import Bulk
@@ -16,8 +15,7 @@ from tbcad_verify.printing.holes import Holes, holes
 from tbcad_verify.printing.pieces import Pieces, pieces
 from tbcad_verify.printing.resting import Hull, wrap
 from tbcad_verify.printing.walls import Walls, walls
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 def turn(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:

@@ -7,16 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, reach
 from tbcad_verify.mesh.segments import Edges, rounding
 from tbcad_verify.mesh.vectors import dot, norm, slices, unit
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 # How squarely the far side must look back at a ray. Where a wall between smooth sides is thinnest,
 # they look straight at each other, or the thickness would still fall to one side. Facets of a round
@@ -132,7 +128,7 @@ def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iter
         yield _on_lattice(mesh, np.flatnonzero(sound & (size == k)), _lattice(k))
 
 
-def _steps(length: Floats, step: float) -> Indices:
+def _steps(length: Floats, step: float) -> Ints:
     """(N,) into how many steps a length is divided, of `LATTICES`, such that all is affordable."""
     wanted = 2 ** np.ceil(np.log2(np.maximum(length / step, 1)))
     for most in LATTICES:
@@ -150,7 +146,7 @@ def _lattice(k: int) -> Floats:
     return (1 - INSET) * np.array(points, dtype=np.float64).T / k + INSET / 3
 
 
-def _on_lattice(mesh: Mesh, facets: Indices, lattice: Floats) -> Probes:
+def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> Probes:
     start = np.zeros((3, facets.size, lattice.shape[1]))
     for corner, weight in zip(mesh.faces[facets].T, lattice, strict=True):
         start += np.take(mesh.points, corner, axis=0).T[:, :, None] * weight

@@ -13,11 +13,10 @@ from tbcad_verify.programs.program_query import Command, Errand, Wanted, room
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
+from tbcad_verify.types import Progress
 
 AT_ONCE = 2
 ERRANDS = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
-
-Progress = Callable[[str], None]
 
 
 def client_checks(

@@ -17,8 +17,8 @@ from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, Name, Unknown, at_most, listed
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 Shapes = dict[str, tuple[Floats, NDArray[np.int64]]]
 
 CHECK = ("assembly", "mm")

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import cross, dot, norm, unit
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 def frame_of(pinhole: Floats) -> Floats:

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads, reach
 from tbcad_verify.mesh.vectors import dot, norm, slices, unit
 from tbcad_verify.prototype.nearest import to_segments
 from tbcad_verify.prototype.rig import Obstacles, Rig, to_ground
 from tbcad_verify.prototype.trace import Trace, nearest
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 LIFT_MM = 1e-3
 # What stands out of the capture sphere by less than this, as the object itself may, is no obstacle.

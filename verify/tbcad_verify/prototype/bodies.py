@@ -17,8 +17,6 @@ from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.report.checks import Check, Unknown, at_most, guarded, reason_of
 from tbcad_verify.shell.integrity import fold_check, mesh_checks
 
-Floats = NDArray[np.float64]
-
 ROTATION = 1e-9
 BED_MM = 0.05
 # Round bosses meet ribs in grooves that run out to a few degrees; what is closer is a fold.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import rounding
@@ -13,8 +12,7 @@ from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.bodies import Body
 from tbcad_verify.prototype.view import View
 from tbcad_verify.report.checks import Check, Unknown, at_most
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 # Facets may be a sphere's if their corners are this near to the recorded one, and face outward.
 NEAR_MM = (0.1, 0.03, 0.01, 0.003)

@@ -10,17 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
 from tbcad_verify.mesh.vectors import across, dot, unit
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.record import Camera
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 AROUND = 96  # directions of an outline
 NEIGHBOURS = 20

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
 from tbcad_verify.prototype.nearest import distances
 from tbcad_verify.prototype.swing import solid_of
 from tbcad_verify.prototype.view import View
 from tbcad_verify.report.checks import Check, at_most, listed, told
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 POINT_MM = 0.02  # edge of the cube that stands for a light
 CHECKS = {

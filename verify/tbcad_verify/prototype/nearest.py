@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import cross, dot, norm
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 Corners = tuple[Floats, Floats, Floats]  # of F triangles, (3, F) each
 
 

@@ -12,8 +12,7 @@ from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype_record import BALL_COLUMNS, BALLS, RECORD, Balls
 from tbcad_verify.record.prototype_tables import number_in
 from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 ANGLE = 1e-9  # radians, and of unit vectors
 CHECKS = (

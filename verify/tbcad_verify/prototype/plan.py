@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.prototype import axis, gcode
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.prototype_record import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad_verify.types import Floats, Ints
 
 ERROR_DEG = 1e-6
 PROGRAM_DEG = 1.0001e-4  # the digits of the program

@@ -20,8 +20,7 @@ from tbcad_verify.prototype.caps import Cap
 from tbcad_verify.prototype.seats import Held
 from tbcad_verify.prototype.view import View
 from tbcad_verify.report.checks import Unknown
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)

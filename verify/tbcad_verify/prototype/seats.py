@@ -12,9 +12,7 @@ from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.nearest import Corners, distances, to_segments
 from tbcad_verify.prototype.view import View
 from tbcad_verify.report.checks import Check, Unknown, at_least, at_most, guarded, offenders, told
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from tbcad_verify.types import Floats, Ints
 
 # A facet may be a pad's if it faces the ball to within this, near where the record has the pad.
 FACING = np.cos(np.radians(5.0))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
@@ -33,8 +32,7 @@ from tbcad_verify.report.checks import (
     told,
 )
 from tbcad_verify.run.results import Taker
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 PRINTING = "printability of the prototype"
 STAGES = (

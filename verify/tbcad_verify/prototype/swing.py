@@ -7,7 +7,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.mesh import Mesh
@@ -15,8 +14,7 @@ from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.rig import Rig
 from tbcad_verify.report.checks import Check, at_least, at_most, listed, told
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # clearances beyond this are not told apart
 LEAST_RAD = np.radians(0.5)  # between two looks, however near things are

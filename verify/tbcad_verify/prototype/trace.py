@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK
 from tbcad_verify.mesh.surfaces import Lines, reflect
@@ -13,9 +12,7 @@ from tbcad_verify.mesh.vectors import dot, slices
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.rig import Rig, to_base, to_ground
 from tbcad_verify.prototype.view import View
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad_verify.types import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces, reflect, seen_from
 from tbcad_verify.mesh.vectors import across, dot, norm, unit
@@ -24,10 +23,7 @@ from tbcad_verify.prototype.cells import (
 from tbcad_verify.prototype.nearest import to_segments
 from tbcad_verify.prototype.rig import Rig
 from tbcad_verify.prototype.trace import Trace, lengths, misses, nearest, times, trace
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 HALVINGS = 26
 RINGS = (0.25, 0.5, 0.75)  # of the way to the rim, each with one direction in EACH

@@ -13,9 +13,7 @@ from tbcad_verify.record.poses import HALVED
 from tbcad_verify.record.prototype_record import Prototype
 from tbcad_verify.record.record import Camera, Export
 from tbcad_verify.report.checks import Unknown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad_verify.types import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import limited
 from tbcad_verify.record.files import AGAIN, Blob
+from tbcad_verify.types import Floats
 
 # fmt: off
 COLUMNS = (
@@ -26,8 +27,6 @@ COLUMNS = (
 NUMBERS = COLUMNS[2:]
 MAY_BE_EMPTY = frozenset({"cx", "cy", "cz", "radius_mm"})
 MOST = 200_000
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

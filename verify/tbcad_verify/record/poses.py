@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.record import Camera, Export
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
 HALVED = 1e-9  # |ux| below which the seam cuts a mirror in two

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import (
@@ -44,8 +43,7 @@ from tbcad_verify.record.prototype_record import (
     Seats,
 )
 from tbcad_verify.record.prototype_tables import cells, read_plan, read_stops
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 TABLES = (BALLS, PLAN, STOPS, PROGRAM)
 SCHEMA = "tbcad-prototype/1"

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.record.prototype_tables import Plan, Stops
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 RECORD = "prototype.json"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"

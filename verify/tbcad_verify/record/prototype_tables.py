@@ -9,14 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import NAME, limited
 from tbcad_verify.record.files import AGAIN, Blob
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad_verify.types import Floats, Ints
 
 PLAN_COLUMNS = (
     *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import (
@@ -29,12 +28,11 @@ from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, 
 from tbcad_verify.record.mirrors import Mirrors, from_csv, from_json
 from tbcad_verify.record.prototype import read_prototype
 from tbcad_verify.record.prototype_record import RECORD, Prototype
+from tbcad_verify.types import Floats
 
 SCHEMA = "tbcad-design/1"
 TEXTS = ("design.json", "mirrors.csv", "manifest.json")
 MAX_PIXELS = 500_000_000
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

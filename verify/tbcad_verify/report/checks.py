@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
+
 Name = tuple[str, str, str]  # of a check: name, file, unit
 T = TypeVar("T")
 NAMED = 5  # how many offenders a line names

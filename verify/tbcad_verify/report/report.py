@@ -20,8 +20,8 @@ from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.report.checks import NAMED, Check, finite, passed
 from tbcad_verify.report.table import table
 from tbcad_verify.run.results import PER_MIRROR
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 DIGITS = 9
 NAME = "verify.json"
 

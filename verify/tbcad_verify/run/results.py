@@ -8,13 +8,12 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import Bulk
 from tbcad_verify.report.checks import Check
+from tbcad_verify.types import Floats
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 PER_MIRROR = (
     "coverage_facet_mm",

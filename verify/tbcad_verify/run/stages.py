@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tbcad_verify.mesh.mass import Bulk, bulk
 from tbcad_verify.mesh.mesh import Mesh, Topology, examine, merge
 from tbcad_verify.mesh.rays import in_threads
@@ -29,8 +26,6 @@ from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import fold_check, manifest_checks, mesh_checks, record_checks
 from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
 from tbcad_verify.shell.recover import Recovery, recover
-
-Floats = NDArray[np.float64]
 
 STAGES = (
     "reading",

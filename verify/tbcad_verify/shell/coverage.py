@@ -23,8 +23,7 @@ from tbcad_verify.shell.outline import (
     trace_outline,
     turns,
 )
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 ROUND = 0.25  # by which an outline's turns about the origin may differ from one
 CHECKS = {

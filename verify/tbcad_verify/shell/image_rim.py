@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from tbcad_verify.mesh.surfaces import Lines, Seen, nearest, reflect
 from tbcad_verify.mesh.vectors import across, dot, norm, unit
 from tbcad_verify.record.record import Camera
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 AZIMUTHS = 24
 NEWTON = 12

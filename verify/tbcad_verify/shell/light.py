@@ -12,9 +12,7 @@ from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, pixel_rows, re
 from tbcad_verify.mesh.surfaces import Lines, Seen, bounce, nearest, reflect
 from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.record.record import Camera
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tbcad_verify.types import Floats, Ints
 
 # Second rays start this far above the mirror, mm: a hundred times what float32 rounds.
 LIFT_MM = 1e-3

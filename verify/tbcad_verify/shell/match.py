@@ -14,9 +14,7 @@ from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import norm, slices, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.shell.recover import FLAT_MM, Recovery
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from tbcad_verify.types import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.vectors import norm
@@ -11,8 +10,7 @@ from tbcad_verify.report.checks import Check, Name, at_most, listed, offenders
 from tbcad_verify.shell.match import places
 from tbcad_verify.shell.optics import Bench
 from tbcad_verify.shell.recover import FORM_MM
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 POSITION_MM = 5e-3
 CHECKS = {

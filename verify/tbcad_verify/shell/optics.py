@@ -18,8 +18,7 @@ from tbcad_verify.shell.match import Match, match
 from tbcad_verify.shell.outline import Patches
 from tbcad_verify.shell.recover import Recovery, smooth
 from tbcad_verify.shell.recover import joined as joined_recoveries
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)

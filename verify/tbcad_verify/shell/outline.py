@@ -15,9 +15,7 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import Lines, Seen, Surfaces, bounce, nearest, reflect
 from tbcad_verify.mesh.vectors import across, dot, norm
 from tbcad_verify.record.poses import Virtual
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from tbcad_verify.types import Floats, Ints
 
 SAMPLES = np.linspace(0.0, 1.0, 4)
 SEAM_MM = 1e-6

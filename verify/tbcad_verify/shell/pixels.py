@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.record.record import Camera
 from tbcad_verify.report.checks import (
@@ -19,8 +18,7 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.shell import image_rim, light
 from tbcad_verify.shell.coverage import Coverage
 from tbcad_verify.shell.optics import Bench
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 CHECKS = {
     "light path": "blocked pixels",

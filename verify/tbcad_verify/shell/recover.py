@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.fits import Fits
 from tbcad_verify.mesh.merge import LEAST, heal
@@ -15,9 +14,7 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import Segments, folds, measure_edges, split
 from tbcad_verify.mesh.surfaces import Surfaces, bounce
 from tbcad_verify.mesh.vectors import dot, norm
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats
 
 # A patch is a mirror's only if its vertices lie on one sphere or plane to within this, RMS.
 FORM_MM = 1e-3

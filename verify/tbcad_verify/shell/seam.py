@@ -13,8 +13,7 @@ from tbcad_verify.mesh.surfaces import Lines
 from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.shell.outline import Outline
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 STEPS = 121
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from tbcad_verify.step.charts import Charts, lift
 from tbcad_verify.step.loops import inside
 from tbcad_verify.step.rims import Arcs, arc_length, roots
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 BEHIND = -1 + 1e-9  # the point that no map shows
 

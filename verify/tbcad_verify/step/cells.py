@@ -11,16 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import slices
 from tbcad_verify.step.charts import Charts, Rings, charts, rings, turned
 from tbcad_verify.step.rims import Arcs, arcs, joined
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 FIRST = 20
 MOST_NUMBERS = 1_000_000  # in one array of intermediate results

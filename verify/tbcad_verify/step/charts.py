@@ -22,9 +22,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import across, dot, slices
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from tbcad_verify.types import Floats, Ints
 
 COINCIDENT = 1e-12
 FAR = 1e4

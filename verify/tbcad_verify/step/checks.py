@@ -20,8 +20,7 @@ from tbcad_verify.step import part_checks
 from tbcad_verify.step.part_checks import Lump
 from tbcad_verify.step.reading import StepFile, examine, load
 from tbcad_verify.step.union import Cells, of_export
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
 CELL_SHARE = 1e-6  # of a cell's area

@@ -9,15 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tbcad_verify.step.rims import Arcs, arc_length, roots
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 CLOSED = 1e-8  # of the spread: how far apart one corner may be in two arcs
 RAY = np.array([0.8137159, 0.5812531])  # no direction that a symmetric design prefers

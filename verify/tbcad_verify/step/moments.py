@@ -18,13 +18,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import slices
 from tbcad_verify.step.charts import Charts
 from tbcad_verify.step.rims import Arcs
-
-Floats = NDArray[np.float64]
+from tbcad_verify.types import Floats
 
 NODES = 20
 MOST_PIECES = 64

@@ -18,13 +18,13 @@ from tbcad_verify.mesh.mass import Bulk
 from tbcad_verify.record.files import AGAIN, Blob, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
+from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 WAYS = ("sphere", "plane")
 FILES = (("part", "step"), ("answer", "json"))
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.step.charts import Rings
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from tbcad_verify.types import Floats, Ints
 
 SAME_CIRCLE = 1e-11
 

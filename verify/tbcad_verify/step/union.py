@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
@@ -25,10 +24,7 @@ from tbcad_verify.step.charts import lift
 from tbcad_verify.step.loops import facing, loops
 from tbcad_verify.step.moments import Moments, moments, whole_sphere
 from tbcad_verify.step.rims import Arcs
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Bools = NDArray[np.bool_]
+from tbcad_verify.types import Bools, Floats, Ints
 
 TOUCHING = 1e-11  # of the spread: corners that are one corner
 
