@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.compiled import THREADS
-from tbcad.simulate.scene.object import GREY, Subject
+from tbcad.simulate.scene.object import GREY, SceneObject
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT
 from tbcad.types import Floats
@@ -41,7 +41,7 @@ def installed() -> bool:
     return shutil.which(PROGRAM) is not None
 
 
-def write_scene(path: Path, at: Reflector, subject: Subject) -> None:
+def write_scene(path: Path, at: Reflector, subject: SceneObject) -> None:
     """Write what one camera has before it; the object is of one grey."""
     parts = [
         HEAD.format(grey=GREY, sky=0.75 * SKY_LIGHT),
@@ -53,7 +53,7 @@ def write_scene(path: Path, at: Reflector, subject: Subject) -> None:
     path.write_text("".join(parts), encoding="utf-8")
 
 
-def render(scene: Path, view: View) -> None:
+def render(scene: Path, view: Camera) -> None:
     """Write the picture beside the scene, in as many threads as ours."""
     command = [PROGRAM, f"+I{scene.name}", f"+O{scene.stem}.png", "+FN", "-D", "-V", "-A", "-GA"]
     command += [f"+W{view.width_px}", f"+H{view.height_px}", f"+WT{THREADS}", "File_Gamma=1.0"]
@@ -68,7 +68,7 @@ def alike(one: Path, other: Path) -> float:
     return float(np.mean(shown[0] == shown[1]))
 
 
-def _camera(view: View) -> str:
+def _camera(view: Camera) -> str:
     half = view.half_sizes
     up = -np.cross(view.forward, view.right)
     axes = view.forward, 2 * half[0] * view.right, 2 * half[1] * up
@@ -97,7 +97,7 @@ def _mirrors(at: Reflector) -> Iterable[str]:
         yield f"{ball}\n" if whole else f"intersection {{ {ball} {seam} {foot} }}\n"
 
 
-def _mesh(subject: Subject) -> str:
+def _mesh(subject: SceneObject) -> str:
     points, normals = _list(subject.points), _list(subject.normals)
     faces = ",".join(f"<{a},{b},{c}>" for a, b, c in subject.faces.tolist())
     return (

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from timing import Figure, Row, Spent, Work, at_least, at_most, spent_in_turns, told
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.compiled import THREADS
 from tbcad.simulate.picture_files import write_stills
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import GREY, Subject, built_in, load
+from tbcad.simulate.scene.object import GREY, SceneObject, built_in, load
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shading import Scene, scene_of
@@ -143,7 +143,7 @@ class Every:
         return found[~np.isnan(found[:, 0])]
 
 
-def all_rays(source: LightField, at: View) -> Every:
+def all_rays(source: LightField, at: Camera) -> Every:
     """What the tree is made of, and what it is asked for: rays that meet the capture sphere."""
     parts = []
     for frame in source.frames.values():
@@ -157,7 +157,7 @@ def all_rays(source: LightField, at: View) -> Every:
     return Every(slab, origin, direction, wanted)
 
 
-def plain(subject: Subject) -> Subject:
+def plain(subject: SceneObject) -> SceneObject:
     """The object in one grey."""
     colour = np.full((len(subject.faces), 3, 3), GREY)
     return replace(subject, albedo=colour, uv=None, texture=None, patterned=False)

@@ -12,7 +12,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, told
 
-from tbcad.mirrors.array import Design, Half, design, directions
+from tbcad.mirrors.array import Design, MirrorArray, design, directions
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded
 from tbcad.shell.envelope import body
@@ -74,14 +74,14 @@ def shells(made: Design) -> list[Solid]:
     ]
 
 
-def spheres(half: Half) -> list[tuple[list[float], float]]:
+def spheres(half: MirrorArray) -> list[tuple[list[float], float]]:
     """Centres and radii of one half's mirrors."""
     mirrors = half.mirrors
     centres = mirrors.apex - mirrors.radius[:, None] * mirrors.normal
     return list(zip(centres.tolist(), mirrors.radius.tolist(), strict=True))
 
 
-def meshed_spheres(half: Half) -> list[manifold3d.Manifold]:
+def meshed_spheres(half: MirrorArray) -> list[manifold3d.Manifold]:
     """All of one half's spheres as meshes, made beforehand: only the union is on the clock."""
     made = [
         manifold3d.Manifold.sphere(radius, SEGMENTS).translate(centre)
@@ -100,7 +100,7 @@ def united(parts: list[manifold3d.Manifold]) -> manifold3d.Manifold:
     return whole
 
 
-def exact_spheres(half: Half, count: int) -> list[BRepPrimAPI_MakeSphere]:
+def exact_spheres(half: MirrorArray, count: int) -> list[BRepPrimAPI_MakeSphere]:
     """Neighbouring mirrors from the middle of one half, as solids of the kernel."""
     middle = half.u[np.argmax(half.u.sum(axis=1))]
     near = np.argsort(-half.u @ middle, kind="stable")[:count]

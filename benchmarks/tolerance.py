@@ -18,7 +18,7 @@ from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, told
 
 from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import Design, Half, design
+from tbcad.mirrors.array import Design, MirrorArray, design
 from tbcad.mirrors.record import write_record
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
@@ -27,10 +27,10 @@ from tbcad.shell.files import closing, distances
 from tbcad.shell.mesh import mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import load_spec
-from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
 
 COUNTS = (100, 300, 1000)
 MESHED = 10
@@ -49,7 +49,7 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
     """
     made = design(load_spec(None))
     a, b = (nominal(at) for at in reflectors(made))
-    task = Task((a, b), ERRORS, SEED)
+    task = MonteCarloCase((a, b), ERRORS, SEED)
     fast = in_turns([partial(simulate, task, count) for count in COUNTS], rounds)
     each = [
         Figure(tuple(1000 * s / n for s in one.values)) for one, n in zip(fast, COUNTS, strict=True)
@@ -70,7 +70,7 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
 
 
 def _meshes(
-    made: Design, draws: tuple[Draws, Draws], folder: Path, halves: tuple[Nominal, Nominal]
+    made: Design, draws: tuple[Draws, Draws], folder: Path, halves: tuple[EdgeModel, EdgeModel]
 ) -> tuple[float, float]:
     """Seconds a machine, and the largest difference from the fast model, mm."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -98,7 +98,7 @@ def _write(made: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> No
         write_stl(folder / f"shell_{half.camera}.stl", facets)
 
 
-def _cells(half: Half, draws: Draws, k: int) -> Cells:
+def _cells(half: MirrorArray, draws: Draws, k: int) -> Cells:
     every, m, radius = half.cells.surfaces, len(half), draws.radius[k]
     apex = half.mirrors.apex + draws.centre[k] + radius[:, None] * half.mirrors.normal
     curvature = half.mirrors.curvature / (1 + radius * half.mirrors.curvature)

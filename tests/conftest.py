@@ -2,7 +2,7 @@
 
 import pytest
 
-from tbcad.mirrors.array import Design, Half, design
+from tbcad.mirrors.array import Design, MirrorArray, design
 from tbcad.shell.envelope import Body, body
 from tbcad.spec.design import load_spec
 
@@ -14,7 +14,7 @@ def paper_design() -> Design:
 
 
 @pytest.fixture(scope="session")
-def paper_half(paper_design: Design) -> Half:
+def paper_half(paper_design: Design) -> MirrorArray:
     return paper_design.halves[0]
 
 
@@ -25,7 +25,7 @@ def small_design() -> Design:
 
 
 @pytest.fixture(scope="session")
-def small_half(small_design: Design) -> Half:
+def small_half(small_design: Design) -> MirrorArray:
     return small_design.halves[0]
 
 

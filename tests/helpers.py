@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.shell.envelope import Body, body
 from tbcad.shell.files import distances
 from tbcad.shell.mesh import Mesh, mesh
@@ -104,5 +104,5 @@ def body_of(made: Design) -> Body:
 
 
 def mesh_of(made: Design) -> Mesh:
-    half: Half = made.halves[0]
+    half: MirrorArray = made.halves[0]
     return mesh(made.spec, half.body, body_of(made), distances(half))

@@ -13,7 +13,7 @@ from tbcad.screen import Stages, stages
 
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
-    from tbcad_verify.run.verify import Wishes
+    from tbcad_verify.run.verify import Options
 
     from tbcad.spec.design import Spec
 
@@ -161,24 +161,24 @@ def verify_command(
 
     Exit code 0: proved. 1: the proof fails. 2: not an export, or a broken one.
     """
-    from tbcad_verify.run.verify import Wishes
+    from tbcad_verify.run.verify import Options
 
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
     with stages(PROOF_STAGES) as told:
-        wishes = Wishes(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
+        wishes = Options(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
         report = _prove(folder, told, wishes)
     _show(report)
     return 0 if report.passed else 1
 
 
-def _prove(folder: Path, told: Stages, wishes: "Wishes | None" = None) -> "Report":
+def _prove(folder: Path, told: Stages, wishes: "Options | None" = None) -> "Report":
     """The proof knows nothing of tbcad; its own refusals become ours."""
     from tbcad_verify.errors import BadExport
-    from tbcad_verify.run.verify import Wishes, verify
+    from tbcad_verify.run.verify import Options, verify
 
     try:
-        return verify(folder, lambda text: told.stage(f"proof: {text}"), wishes or Wishes())
+        return verify(folder, lambda text: told.stage(f"proof: {text}"), wishes or Options())
     except BadExport as error:
         raise InputError(str(error)) from None
 

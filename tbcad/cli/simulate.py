@@ -25,7 +25,7 @@ from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.optics.camera import View
+    from tbcad.optics.camera import Camera
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.source import Geometry
     from tbcad.simulate.scene.shading import Scene
@@ -229,7 +229,7 @@ def _viewpoint(
     place: tuple[float, float, float],
     size: tuple[int, int],
     fov: float | None,
-) -> "View":
+) -> "Camera":
     from math import radians
 
     from tbcad.simulate.scene.viewpoint import viewpoint

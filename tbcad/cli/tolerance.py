@@ -47,11 +47,11 @@ def tolerance(
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.study.record import check_target, write
-    from tbcad.tolerance.analysis import Wishes, analyse
+    from tbcad.tolerance.analysis import Options, analyse
     from tbcad.tolerance.process.process import load_process
-    from tbcad.tolerance.report import json_text, study, words
+    from tbcad.tolerance.report import json_text, study, summary_text
 
-    wishes = Wishes(machines, seed, wanted, calibrated_mrad / 1000, scheduler).checked()
+    wishes = Options(machines, seed, wanted, calibrated_mrad / 1000, scheduler).checked()
     made_by = load_process(process, list(settings or []))
     check_target(out)
     with stages(6) as told:
@@ -60,6 +60,6 @@ def tolerance(
         subject = chosen(object_file, export.capture_mm)
         found = analyse(export, made_by, subject, wishes, told.stage, told.detail)
         files = write(study(found), out, {"tolerance.json": json_text(found).encode()})
-    typer.echo(words(found))
+    typer.echo(summary_text(found))
     typer.echo(f"{out}: {', '.join(file.name for file in files)}")
     return 0

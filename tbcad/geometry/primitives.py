@@ -44,7 +44,7 @@ Body: TypeAlias = Rod | Prism | Turned
 
 
 @dataclass(frozen=True)
-class Item:
+class Component:
     """A part in its place, in the frame of the shell.
 
     Attributes:

@@ -45,7 +45,7 @@ def spheres(centre: Floats, radius: Floats) -> RoundCones:
     return RoundCones(centre, centre, radius, radius)
 
 
-def met_within(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
+def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
     """Angles within which balls that go round the axis meet round cones, radians, (m, k).
 
     Args:

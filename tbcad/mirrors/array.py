@@ -6,9 +6,9 @@ import numpy as np
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import MIRROR
-from tbcad.mirrors.radii import Task, solve
+from tbcad.mirrors.radii import RadiusProblem, solve
 from tbcad.optics import flat
-from tbcad.optics.camera import View, turned_to
+from tbcad.optics.camera import Camera, turned_to
 from tbcad.optics.cells import Cells, areas, cells_of
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.power_diagram import bounded
@@ -19,7 +19,7 @@ from tbcad.types import Floats, Ints, Progress
 
 
 @dataclass(frozen=True)
-class Half:
+class MirrorArray:
     """One camera with its m mirrors, as arrays over mirrors in the order of their ids.
 
     Attributes:
@@ -39,7 +39,7 @@ class Half:
     """
 
     camera: str
-    view: View
+    view: Camera
     ellipsoid: Ellipsoid
     u: Floats
     theta0: Floats
@@ -72,7 +72,7 @@ class Half:
         """Height z of the foot plane, mm."""
         return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
 
-    def mirrored(self) -> "Half":
+    def mirrored(self) -> "MirrorArray":
         """The other camera's half."""
         return replace(
             self,
@@ -91,7 +91,7 @@ class Design:
     """The spec and the two halves that follow from it."""
 
     spec: Spec
-    halves: tuple[Half, Half]
+    halves: tuple[MirrorArray, MirrorArray]
 
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> Design:
@@ -122,7 +122,7 @@ def directions(n: int) -> tuple[Floats, Ints]:
     return u[order], place[faces]
 
 
-def _half_a(spec: Spec, progress: Progress) -> Half:
+def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = directions(optics.n)
@@ -134,7 +134,7 @@ def _half_a(spec: Spec, progress: Progress) -> Half:
     # The equatorial mirrors stay whole: the foot plane lies the greatest half width below them.
     foot = -float(size[u[:, 2] == 0].max())
     triangles, boundary = bounded(faces, every, kept)
-    task = Task(
+    task = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u), ellipsoid.normals(u), flat.paper_curvatures(theta0, theta1, size)
         ),
@@ -148,7 +148,7 @@ def _half_a(spec: Spec, progress: Progress) -> Half:
     cells, covered = solve(spec.mirrors.radius_rule, task, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
     camera = spec.camera
-    return Half(
+    return MirrorArray(
         camera="a",
         view=turned_to(
             ellipsoid.pinhole,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.power_diagram import Boundary, UnsettledError
+from tbcad.optics.power_diagram import Boundary, NotRegularError
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.trace import coverage
 from tbcad.spec.errors import SpecError
@@ -19,7 +19,7 @@ NAMED = 5
 
 
 @dataclass(frozen=True)
-class Task:
+class RadiusProblem:
     """What a rule starts from: poses, bounds and a dual triangulation to begin with.
 
     Attributes:
@@ -47,19 +47,19 @@ class Task:
         return cells_of(surfaces, self.boundary, start)
 
 
-def flat(task: Task) -> tuple[Cells, Floats]:
+def flat(task: RadiusProblem) -> tuple[Cells, Floats]:
     """Planar mirrors (Mukaigawa et al.): cells and their coverage (m,), mm."""
     cells = task.cells(np.zeros(len(task.mirrors)))
     return cells, coverage(cells, task.pinhole)
 
 
-def paper(task: Task) -> tuple[Cells, Floats]:
+def paper(task: RadiusProblem) -> tuple[Cells, Floats]:
     """Radii by eqs. 1 and 2; nearly flat where those want no curvature or hardly any."""
     cells = task.cells(np.maximum(task.mirrors.curvature, task.least))
     return cells, coverage(cells, task.pinhole)
 
 
-def traced(task: Task, progress: Progress = lambda _: None) -> tuple[Cells, Floats]:
+def traced(task: RadiusProblem, progress: Progress = lambda _: None) -> tuple[Cells, Floats]:
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
@@ -75,7 +75,7 @@ def traced(task: Task, progress: Progress = lambda _: None) -> tuple[Cells, Floa
     for _ in range(MAX_ITERATIONS):
         try:
             cells = task.cells(curvature, triangles)
-        except UnsettledError:
+        except NotRegularError:
             halvings += 1
             if halvings > MAX_HALVINGS:
                 break
@@ -96,7 +96,9 @@ def traced(task: Task, progress: Progress = lambda _: None) -> tuple[Cells, Floa
 RULES = {"flat": flat, "paper": paper, "traced": traced}
 
 
-def solve(rule: str, task: Task, progress: Progress = lambda _: None) -> tuple[Cells, Floats]:
+def solve(
+    rule: str, task: RadiusProblem, progress: Progress = lambda _: None
+) -> tuple[Cells, Floats]:
     """Cells and coverage (m,) by a rule: "traced", "paper" or "flat".
 
     Raises:
@@ -104,7 +106,7 @@ def solve(rule: str, task: Task, progress: Progress = lambda _: None) -> tuple[C
     """
     try:
         return traced(task, progress) if rule == "traced" else RULES[rule](task)
-    except UnsettledError as error:
+    except NotRegularError as error:
         raise SpecError(
             f"mirrors with radius rule {rule} do not close to one array ({error}): "
             "change mirrors.radius_rule, optics.n or optics.capture_diameter_mm"

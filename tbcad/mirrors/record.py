@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.spec.design import spec_dict
 
 Row = dict[str, str | float | None]
@@ -21,7 +21,7 @@ COLUMNS = (
 )
 
 
-def rows(half: Half) -> list[Row]:
+def rows(half: MirrorArray) -> list[Row]:
     """One record for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
     mirrors = half.mirrors
     numbers = np.column_stack(
@@ -75,7 +75,7 @@ def write_design(path: Path, design: Design, records: list[Row], shells: bool = 
     path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def camera(half: Half) -> dict[str, Any]:
+def camera(half: MirrorArray) -> dict[str, Any]:
     """Record of one camera."""
     view = half.view
     return {
@@ -89,7 +89,7 @@ def camera(half: Half) -> dict[str, Any]:
     }
 
 
-def part(half: Half) -> dict[str, str]:
+def part(half: MirrorArray) -> dict[str, str]:
     """Record of one part and its files."""
     name = f"shell_{half.camera}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}

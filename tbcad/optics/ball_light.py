@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.trace import reflected
 from tbcad.types import Floats
 
@@ -113,7 +113,7 @@ def light(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, 
     )
 
 
-def pixels(view: View, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
+def pixels(view: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
     """Number of pixels inside outlines (m, s, 3) turned by azimuths (m,), exact, (m,).
 
     Args:

@@ -10,7 +10,7 @@ from tbcad.types import Floats
 
 
 @dataclass(frozen=True)
-class View:
+class Camera:
     """Pinhole camera with square pixels.
 
     Attributes:
@@ -42,9 +42,9 @@ class View:
         """
         return _fill(self.forward, self.right, self.half_sizes, points - self.pinhole)
 
-    def mirrored(self) -> "View":
+    def mirrored(self) -> "Camera":
         """The other camera: mirror image in the plane x = 0, its rows running the other way."""
-        return View(
+        return Camera(
             self.pinhole * MIRROR,
             self.forward * MIRROR,
             -self.right * MIRROR,
@@ -62,7 +62,9 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
     return float(np.max(np.abs(across) / depth[:, None] / half_sizes))
 
 
-def turned_to(pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float) -> View:
+def turned_to(
+    pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
+) -> Camera:
     """The camera turned so that points (k, 3) fill the least share of its frame.
 
     The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
@@ -89,4 +91,4 @@ def turned_to(pinhole: Floats, points: Floats, width_px: int, height_px: int, hf
     )
     # What is left of the search beyond this is noise: a symmetric array gets a symmetric camera.
     forward, right = axes(np.round(found.x, 8) + 0.0)
-    return View(pinhole, forward, right, width_px, height_px, hfov)
+    return Camera(pinhole, forward, right, width_px, height_px, hfov)

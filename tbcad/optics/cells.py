@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tbcad.geometry.vectors import MIRROR, dot, norm, unit
-from tbcad.optics.power_diagram import Boundary, half_edges, radical_planes, settle
+from tbcad.optics.power_diagram import Boundary, flip_until_regular, half_edges, radical_planes
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
@@ -177,7 +177,7 @@ def cells_of(surfaces: Surfaces, boundary: Boundary, triangles: Ints) -> Cells:
     Raises:
         UnsettledError: when the mirrors bound no proper cells.
     """
-    settled, corners = settle(surfaces, triangles, boundary.seam)
+    settled, corners = flip_until_regular(surfaces, triangles, boundary.seam)
     return Cells(surfaces, boundary, settled, corners)
 
 

@@ -25,7 +25,7 @@ TOUCHING = 1e-7
 CHUNK = 4_000_000
 
 
-class UnsettledError(ArithmeticError):
+class NotRegularError(ArithmeticError):
     """The cells' topology was not found."""
 
 
@@ -126,7 +126,7 @@ def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats
     return g[q] - ratio[:, None] * g[p], h[q] - ratio * h[p]
 
 
-def settle(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tuple[Ints, Floats]:
+def flip_until_regular(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tuple[Ints, Floats]:
     """Flip edges until no corner is covered by the mirror across an edge.
 
     Args:
@@ -144,9 +144,9 @@ def settle(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tuple[Ints, Flo
     while steps <= MAX_STEPS:
         try:
             return _follow(surfaces, triangles, mirrors, steps)
-        except UnsettledError:
+        except NotRegularError:
             steps *= 4
-    raise UnsettledError(f"the cells do not settle in {MAX_STEPS} steps from flat mirrors")
+    raise NotRegularError(f"the cells do not settle in {MAX_STEPS} steps from flat mirrors")
 
 
 def _follow(surfaces: Surfaces, start: Ints, mirrors: int, steps: int) -> tuple[Ints, Floats]:
@@ -173,7 +173,7 @@ def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
         points[changed] = corners(surfaces, triangles[changed], mirrors)
     deepest = covered(surfaces, points)
     if not deepest > -TOUCHING:
-        raise UnsettledError(f"a corner lies {-deepest:.3g} mm inside another mirror")
+        raise NotRegularError(f"a corner lies {-deepest:.3g} mm inside another mirror")
     return points
 
 

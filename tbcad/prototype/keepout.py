@@ -16,7 +16,7 @@ from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import light
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.types import Floats
 
 # Least distances are right to this, or to this share of them, on the safe side: where two faces are
@@ -93,7 +93,7 @@ class Room:
         return result
 
 
-def room(made: Prototype, base: Base, capture: float, approach: float) -> Room:
+def room(made: Prototype, base: BaseLayout, capture: float, approach: float) -> Room:
     """The room that a prototype leaves.
 
     Args:
@@ -161,7 +161,7 @@ def _both(a: RoundCones, b: RoundCones) -> RoundCones:
     return RoundCones(*(np.concatenate([getattr(a, name), getattr(b, name)]) for name in names))
 
 
-def _sections(base: Base, swing: Floats) -> tuple[Section, ...]:
+def _sections(base: BaseLayout, swing: Floats) -> tuple[Section, ...]:
     low, high = base.sector[0] + float(swing[0]), base.sector[1] + float(swing[1])
     wall = np.vstack([base.inner, base.outer[::-1]])
     ribs = np.vstack([base.outline, base.inner[::-1]])
@@ -177,7 +177,7 @@ def _disc(low: float, high: float, radius: float) -> Floats:
     return np.array([[low, 0.0], [high, 0.0], [high, radius], [low, radius]])
 
 
-def _boss(base: Base, k: int) -> Floats:
+def _boss(base: BaseLayout, k: int) -> Floats:
     """Hull of a boss and its number in (z, r), (p, 2)."""
     seat, turn = base.seats, 2 * np.pi * np.arange(CIRCLE) / CIRCLE
     wide = float(seat.boss[k]) / np.cos(np.pi / CIRCLE)

@@ -11,20 +11,20 @@ from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import Prototype, prototype
 from tbcad.prototype.base.cap_solids import caps, magnets
 from tbcad.prototype.base.coupon import coupon
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.purchased import bought as bought_for_base
 from tbcad.prototype.base.solid import carrier
 from tbcad.prototype.base.split import Split, split
 from tbcad.prototype.drive.balance import Balance, Load, balance, ball_load
 from tbcad.prototype.drive.drive import Drive, Parts, chosen, load_drives, load_parts
 from tbcad.prototype.frame import frame_solids as frames
-from tbcad.prototype.frame.layout import FrameNumbers, bought_parts, frame
+from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import room
-from tbcad.prototype.printing.parts import Piece
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.parts import PrintedPart
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.stage import stage_solids as stages
-from tbcad.prototype.stage.layout import StageNumbers, stage
-from tbcad.spec.prototype import Prototype as Keys
+from tbcad.prototype.stage.layout import StageLayout, stage
+from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Progress
 
 
@@ -46,11 +46,11 @@ class Machine:
     """
 
     made: Prototype
-    base: Base
+    base: BaseLayout
     plan: Split
-    stage: StageNumbers
-    frame: FrameNumbers
-    pieces: tuple[Piece, ...]
+    stage: StageLayout
+    frame: FrameLayout
+    pieces: tuple[PrintedPart, ...]
     balance: Balance
     drive: Drive
     parts: Parts
@@ -102,38 +102,40 @@ def _swing(made: Prototype) -> tuple[float, float]:
     return float(made.stops.angle.min()), float(made.stops.angle.max())
 
 
-def _drive(made: Prototype, summed: Balance, keys: Keys, parts: Parts) -> Drive:
+def _drive(made: Prototype, summed: Balance, keys: PrototypeSpec, parts: Parts) -> Drive:
     acceleration = float(np.radians(keys.motion.acceleration_deg_s2))
     needed = summed.needed(*_swing(made), acceleration, keys.motion.safety)
     return chosen(keys.base.drive, needed, load_drives(parts))
 
 
-def _load(parts: list[Part], density: float) -> Load:
+def _load(parts: list[PlacedSolid], density: float) -> Load:
     mass = [part.mass_g(density) for part in parts]
     return Load(np.array(mass), np.array([centroid(part.shape) for part in parts]))
 
 
-def _bases(parts: list[Part]) -> Iterator[Piece]:
+def _bases(parts: list[PlacedSolid]) -> Iterator[PrintedPart]:
     for part in parts:
-        yield Piece(part, "base", "carrier of the balls, turns about the axis")
+        yield PrintedPart(part, "base", "carrier of the balls, turns about the axis")
 
 
-def _caps(numbers: Base, made: Prototype) -> Iterator[Piece]:
+def _caps(numbers: BaseLayout, made: Prototype) -> Iterator[PrintedPart]:
     own = np.flatnonzero(made.balls.cap).tolist()
     for k, part in zip(own, caps(numbers, made), strict=True):
-        yield Piece(part, "cap", f"stands in for ball {k + 1}, which is too large to buy", k)
+        yield PrintedPart(part, "cap", f"stands in for ball {k + 1}, which is too large to buy", k)
 
 
-def _stages(held: StageNumbers, keys: Keys) -> Iterator[Piece]:
+def _stages(held: StageLayout, keys: PrototypeSpec) -> Iterator[PrintedPart]:
     for item, part in zip(held.items, stages.parts(held, keys.base), strict=True):
-        yield Piece(part, "stage", item.what)
+        yield PrintedPart(part, "stage", item.what)
 
 
-def _frames(round_it: FrameNumbers, keys: Keys) -> Iterator[Piece]:
+def _frames(round_it: FrameLayout, keys: PrototypeSpec) -> Iterator[PrintedPart]:
     for item, part in zip(round_it.printed, frames.parts(round_it, keys.base), strict=True):
-        yield Piece(part, "frame", item.what)
+        yield PrintedPart(part, "frame", item.what)
 
 
-def _tools(numbers: Base) -> Iterator[Piece]:
+def _tools(numbers: BaseLayout) -> Iterator[PrintedPart]:
     for part in coupon(numbers):
-        yield Piece(part, "tool", "seats to try the fit of the balls before the base is printed")
+        yield PrintedPart(
+            part, "tool", "seats to try the fit of the balls before the base is printed"
+        )

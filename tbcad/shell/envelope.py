@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.geometry.conics import EllipseArc, Spheroid, offset_beyond, offset_to_hold
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.optics.cells import Cells
-from tbcad.spec.design import Flange, Shell
+from tbcad.spec.design import FlangeSpec, ShellSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -74,7 +74,7 @@ class Body:
         return self.foot_holes.direction
 
 
-def body(shell: Shell, cells: Cells, ellipsoid: Ellipsoid) -> Body:
+def body(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Body:
     """Back, flanges and holes round camera a's cells.
 
     Raises:
@@ -100,7 +100,7 @@ def _valleys(cells: Cells) -> Floats:
     return arcs.at(arc, share).reshape(-1, 3)
 
 
-def _flanged(shell: Shell, back: Spheroid, foot: float, x: float, z: float) -> Body:
+def _flanged(shell: ShellSpec, back: Spheroid, foot: float, x: float, z: float) -> Body:
     seam, base = shell.seam_flange, shell.foot_flange
     rim = _wider(back, seam.width_mm)
     outer = _wider(back, _foot_width(base, back, rim, foot, x, z))
@@ -141,7 +141,7 @@ def _round(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
 
 
 def _foot_width(
-    base: Flange, back: Spheroid, rim: Spheroid, foot: float, x: float, z: float
+    base: FlangeSpec, back: Spheroid, rim: Spheroid, foot: float, x: float, z: float
 ) -> float:
     """Width of the foot flange, at least so much that the seam flange stands on it."""
     low, high = rim.crossing(x, z)[:, 1]
@@ -158,7 +158,7 @@ def _foot_width(
     )
 
 
-def _holes(flange: Flange, line: EllipseArc, direction: Floats, margin: float) -> Holes:
+def _holes(flange: FlangeSpec, line: EllipseArc, direction: Floats, margin: float) -> Holes:
     """Bolts and dowels at even distances along a line, dowels near its ends and between."""
     count = flange.bolts + flange.dowels
     pitch = (line.length - 2 * margin) / (count - 1)

@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
-from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.mirrors.record import part
 from tbcad.shell.envelope import Body, body
 from tbcad.shell.mesh import Mesh, mesh
@@ -40,13 +40,13 @@ def closing(design: Design) -> Body:
     return body(design.spec.shell, first.body, first.ellipsoid)
 
 
-def distances(half: Half) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Distance of each mirror from the object, mm, (m,)."""
     return half.ellipsoid.radial_distance(half.u)
 
 
 def _export(
-    design: Design, half: Half, closing: Body, facets: Mesh, folder: Path, progress: Progress
+    design: Design, half: MirrorArray, closing: Body, facets: Mesh, folder: Path, progress: Progress
 ) -> None:
     """Write one half; closing and facets are camera a's."""
     files, mirrored = part(half), half.camera == "b"

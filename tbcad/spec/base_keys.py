@@ -23,7 +23,7 @@ Offsets: TypeAlias = Annotated[
 ]
 
 
-class Base(Section):
+class BaseSpec(Section):
     """The carrier with its seats, its hub, and how it is printed."""
 
     thickness_mm: float = Field(5.0, ge=1.2, le=30)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from tbcad.spec.errors import SpecError, fields, refused, section_of, unknown_key
-from tbcad.spec.prototype import Prototype
+from tbcad.spec.prototype import PrototypeSpec
 from tbcad.spec.section import Section, as_tuple
 
 _LARGEST_FILE = 1_000_000  # bytes; a design is a few thousand
@@ -42,7 +42,7 @@ Point: TypeAlias = Annotated[
 RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
 
 
-class Optics(Section):
+class OpticsSpec(Section):
     """Where the mirrors, the cameras and the object are."""
 
     n: int = Field(18, ge=1, le=60)
@@ -55,7 +55,7 @@ class Optics(Section):
     """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole."""
 
 
-class Camera(Section):
+class CameraSpec(Section):
     """The sensor and lens of both cameras."""
 
     width_px: int = Field(2080, ge=16, le=32_768)
@@ -66,7 +66,7 @@ class Camera(Section):
     """Angle of view across the columns."""
 
 
-class Mirrors(Section):
+class MirrorsSpec(Section):
     """How the mirrors are curved."""
 
     radius_rule: RadiusRule = "traced"
@@ -79,7 +79,7 @@ class Mirrors(Section):
     """Thickness of the mirror coat; the modelled sphere is smaller by it."""
 
 
-class Flange(Section):
+class FlangeSpec(Section):
     """A flange with its bolt and dowel holes."""
 
     width_mm: float = Field(12.0, ge=4, le=100)
@@ -107,25 +107,25 @@ class Flange(Section):
         return self
 
 
-class FootFlange(Flange):
+class FootFlangeSpec(FlangeSpec):
     """The flange that carries the shell on its base plate."""
 
     bolts: int = Field(5, ge=2, le=60)
     """Number of bolt holes."""
 
 
-class Shell(Section):
+class ShellSpec(Section):
     """The body behind the mirrors."""
 
     wall_mm: float = Field(3.0, ge=0.4, le=50)
     """Material behind the deepest valley between mirrors."""
-    seam_flange: Flange = Flange()
+    seam_flange: FlangeSpec = FlangeSpec()
     """Joins the two halves at x = 0."""
-    foot_flange: FootFlange = FootFlange()
+    foot_flange: FootFlangeSpec = FootFlangeSpec()
     """Joins a half to the base plate."""
 
 
-class Mesh(Section):
+class MeshSpec(Section):
     """How fine the STL and 3MF are."""
 
     ray_error_mm: float = Field(0.05, ge=0.01, le=10)
@@ -136,7 +136,7 @@ class Mesh(Section):
     """Distance of all other facets (back, flanges, holes) from the exact surface."""
 
 
-class Step(Section):
+class StepSpec(Section):
     """How the STEP is written."""
 
     pcurves: bool = False
@@ -150,13 +150,13 @@ class Spec(Section):
     """Name of the design, for file headers and reports."""
     schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(1, alias="schema")
     """Version of this table's keys."""
-    optics: Optics = Optics()
-    camera: Camera = Camera()
-    mirrors: Mirrors = Mirrors()
-    shell: Shell = Shell()
-    mesh: Mesh = Mesh()
-    step: Step = Step()
-    prototype: Prototype = Prototype()
+    optics: OpticsSpec = OpticsSpec()
+    camera: CameraSpec = CameraSpec()
+    mirrors: MirrorsSpec = MirrorsSpec()
+    shell: ShellSpec = ShellSpec()
+    mesh: MeshSpec = MeshSpec()
+    step: StepSpec = StepSpec()
+    prototype: PrototypeSpec = PrototypeSpec()
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
@@ -169,7 +169,7 @@ class Spec(Section):
         return self
 
 
-def _check_capture_sphere(optics: Optics) -> None:
+def _check_capture_sphere(optics: OpticsSpec) -> None:
     radius, to_pinhole = optics.capture_diameter_mm / 2, math.hypot(*optics.camera_mm)
     if radius >= to_pinhole:
         raise ValueError(

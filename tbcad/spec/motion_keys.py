@@ -7,7 +7,7 @@ from pydantic import Field
 from tbcad.spec.section import Section
 
 
-class Motion(Section):
+class MotionSpec(Section):
     """How the base is driven from stop to stop, and what the controller is told."""
 
     axis: Literal["X", "A"] = "X"

@@ -4,11 +4,11 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
-from tbcad.spec.base_keys import Base
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import shown
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 from tbcad.spec.section import Section, as_tuple
-from tbcad.spec.stage_keys import Frame, Stage
+from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 MOST_BALLS = 1000
 
@@ -34,7 +34,7 @@ def _names(value: object) -> object:
     raise ValueError(f'{shown(value)} is not allowed: give a list such as ["metric", "my.csv"]')
 
 
-class Prototype(Section):
+class PrototypeSpec(Section):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
     k: Annotated[int | Literal["auto"], BeforeValidator(_count)] = 16
@@ -75,11 +75,11 @@ class Prototype(Section):
     """Largest swing of the base that the drive allows."""
     stop_error_deg: float = Field(0.5, gt=0, le=20)
     """Error of direction that a mirror may have from sharing a stop of the base with others."""
-    base: Base = Base()
+    base: BaseSpec = BaseSpec()
     """The printed carrier of the balls."""
-    motion: Motion = Motion()
+    motion: MotionSpec = MotionSpec()
     """How it is driven from stop to stop."""
-    stage: Stage = Stage()
+    stage: StageSpec = StageSpec()
     """What the object stands on."""
-    frame: Frame = Frame()
+    frame: FrameSpec = FrameSpec()
     """What holds stage, base and camera."""

@@ -29,7 +29,7 @@ def _places(value: object) -> object:
 Places: TypeAlias = Annotated[tuple[_Place, ...], BeforeValidator(_places)]
 
 
-class Stage(Section):
+class StageSpec(Section):
     """What the object stands on, with LEDs at known places to calibrate with."""
 
     top_mm: float = Field(-20.0, ge=-1000, le=1000)
@@ -54,7 +54,7 @@ class Stage(Section):
     it); less in posts of less than 18 mm."""
 
 
-class Frame(Section):
+class FrameSpec(Section):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
     floor_mm: float = Field(-230.0, ge=-3000, le=-10)

@@ -12,22 +12,22 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import Design
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import Exported
-from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.shading import scene_of
 from tbcad.simulate.study.views import round_of, truths
 from tbcad.tolerance.margin import Margin, check_share, margin
-from tbcad.tolerance.montecarlo.builds import Result, Task, Yield, simulate, yielded
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, Result, Yield, simulate, yielded
 from tbcad.tolerance.montecarlo.draws import Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import Nominal, nominals
-from tbcad.tolerance.montecarlo.sensitivity import Alone, alone, kinds
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominals
+from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect, kinds, one_at_a_time
 from tbcad.tolerance.montecarlo.sharpness import Sharpness, Wanted, sharpness
 from tbcad.tolerance.process.process import BUILT_IN, Process, errors, load_process
 from tbcad.tolerance.prototype import builds
 from tbcad.tolerance.prototype.windows import designed
 from tbcad.types import Floats, Progress
 
-Halves = tuple[Nominal, Nominal]
+Halves = tuple[EdgeModel, EdgeModel]
 
 # Machines for each step of a search; what is told of the process itself has as many as asked for.
 TRIED = 100
@@ -42,7 +42,7 @@ SHELL = (
 
 
 @dataclass(frozen=True)
-class Wishes:
+class Options:
     """What is asked.
 
     Attributes:
@@ -59,7 +59,7 @@ class Wishes:
     left: float = 0.5e-3
     scheduler: str | None = None
 
-    def checked(self) -> Wishes:
+    def checked(self) -> Options:
         """These wishes.
 
         Raises:
@@ -76,7 +76,7 @@ class Wishes:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ProcessOption:
     """A process as a choice for this design.
 
     Attributes:
@@ -91,7 +91,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Stands:
+class PrototypeYield:
     """The prototype, made by the process.
 
     Attributes:
@@ -114,7 +114,7 @@ class Analysis:
         cameras: camera a and b as designed.
         halves: the same for the fast model.
         result: the machines.
-        alone: each kind of error by itself, the worst first.
+        single_errors: each kind of error by itself, the worst first.
         choices: every built-in process.
         margin: that this process needs.
         sharpness: of pictures.
@@ -122,16 +122,16 @@ class Analysis:
     """
 
     process: Process
-    wishes: Wishes
+    wishes: Options
     target: float
     cameras: tuple[Reflector, Reflector]
     halves: Halves
     result: Result
-    alone: tuple[Alone, ...]
-    choices: tuple[Choice, ...]
+    single_errors: tuple[SingleErrorEffect, ...]
+    choices: tuple[ProcessOption, ...]
     margin: Margin
     sharpness: Sharpness
-    stands: Stands | None
+    stands: PrototypeYield | None
 
     @property
     def yielded(self) -> Yield:
@@ -142,8 +142,8 @@ class Analysis:
 def analyse(
     export: Exported,
     process: Process,
-    subject: Subject,
-    wishes: Wishes,
+    subject: SceneObject,
+    wishes: Options,
     stage: Progress,
     detail: Progress,
 ) -> Analysis:
@@ -170,10 +170,10 @@ def analyse(
     each = partial(_each, wishes.scheduler)
     target = export.capture_mm
     stage(f"{wishes.machines} machines by {process.name}")
-    result = simulate(Task(halves, made, wishes.seed), wishes.machines, each)
+    result = simulate(MonteCarloCase(halves, made, wishes.seed), wishes.machines, each)
 
     def worst_of(halves: Halves, errors: Errors) -> Floats:
-        return simulate(Task(halves, errors, wishes.seed), TRIED, each).worst
+        return simulate(MonteCarloCase(halves, errors, wishes.seed), TRIED, each).worst
 
     # Every kind is held against no error at all, and each search begins where its loss was told.
     @cache
@@ -182,7 +182,7 @@ def analyse(
 
     stage("each kind of error alone")
     found = [
-        alone(made, kind, wishes.wanted, target, _told(worst, detail, kind))
+        one_at_a_time(made, kind, wishes.wanted, target, _told(worst, detail, kind))
         for kind in kinds(made)
         if kind in SHELL
     ]
@@ -230,18 +230,18 @@ def _choice(
     name: str,
     worst: Callable[[Errors], Floats],
     after: Callable[[Design, Errors], Floats],
-    wishes: Wishes,
+    wishes: Options,
     detail: Progress,
-) -> Choice:
+) -> ProcessOption:
     made = _errors(export, load_process(name))
     detail(name)
     share = yielded(worst(made), export.capture_mm)
     needed = margin(export.spec, made, wishes.wanted, after, lambda text: detail(f"{name}: {text}"))
-    return Choice(name, share, needed)
+    return ProcessOption(name, share, needed)
 
 
 def _sharpness(
-    export: Exported, made: Errors, subject: Subject, wishes: Wishes, detail: Progress
+    export: Exported, made: Errors, subject: SceneObject, wishes: Options, detail: Progress
 ) -> Sharpness:
     scene, m = scene_of(subject), len(export.reflectors[0])
     views = round_of(*VIEWPOINTS).views(export.capture_mm)
@@ -252,7 +252,7 @@ def _sharpness(
     )
 
 
-def _stands(export: Exported, made: Errors, wishes: Wishes, each: Any) -> Stands:
+def _stands(export: Exported, made: Errors, wishes: Options, each: Any) -> PrototypeYield:
     at = designed(export.reflectors, read_plan(export))
     plain, known = (
         builds.simulate(
@@ -260,4 +260,4 @@ def _stands(export: Exported, made: Errors, wishes: Wishes, each: Any) -> Stands
         )
         for calibrated in (False, True)
     )
-    return Stands(plain, known)
+    return PrototypeYield(plain, known)

@@ -8,7 +8,7 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import Design, design
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.tolerance.montecarlo.builds import reached
+from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.types import Floats, Progress
 
@@ -72,7 +72,7 @@ def margin(
         except SpecError as error:
             return Margin(None, share, f"mirrors of margin {now:.2f} mm: {error}")
         share = float((seen >= target).mean())
-        lacking = target - reached(seen, wanted)
+        lacking = target - coverage_at_yield(seen, wanted)
         if share >= wanted and (lacking > -STEP_MM or now == 0):
             return Margin(now, share)
         now = max(0.0, round(ceil((now + lacking) / STEP_MM - 1e-9) * STEP_MM, 6))

@@ -25,8 +25,8 @@ def _curve(found: Analysis) -> Panel:
 
 
 def _bars(found: Analysis) -> Panel:
-    loss = np.array([one.loss for one in found.alone])
-    names = tuple(in_words(one.kind) for one in found.alone)
+    loss = np.array([one.loss for one in found.single_errors])
+    names = tuple(in_words(one.kind) for one in found.single_errors)
     bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
     return Panel("What each kind of error costs alone", "mm of coverage", "", (bars,), names=names)
 

@@ -6,7 +6,7 @@ from tbcad.mirrors.array import Design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec
 from tbcad.tolerance.margin import check_share, margin, with_margin
-from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import nominals
 from tbcad.tolerance.process.process import Process, errors
@@ -47,5 +47,5 @@ def for_process(
 
 
 def _worst(design: Design, errors: Errors) -> Floats:
-    task = Task(nominals(reflectors(design)), errors, SEED)
+    task = MonteCarloCase(nominals(reflectors(design)), errors, SEED)
     return simulate(task, MACHINES, schedule.run).worst

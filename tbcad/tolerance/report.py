@@ -29,7 +29,7 @@ NOTES = (
 )
 
 
-def words(found: Analysis) -> str:
+def summary_text(found: Analysis) -> str:
     """One paragraph."""
     process, target = found.process, found.target
     lines = [
@@ -38,8 +38,8 @@ def words(found: Analysis) -> str:
         f"{np.median(found.result.worst):.2f} mm (median; 1 % see less than "
         f"{np.quantile(found.result.worst, 0.01):.2f})."
     ]
-    if found.alone:
-        first = found.alone[0]
+    if found.single_errors:
+        first = found.single_errors[0]
         lines.append(
             f"Most is lost by {in_words(first.kind)}: {first.loss:.2f} mm by itself; "
             f"{_factor(first.times)}."
@@ -72,7 +72,7 @@ def document(found: Analysis) -> dict[str, Any]:
     worst = found.result.worst
     return {
         "schema": SCHEMA,
-        "words": words(found),
+        "words": summary_text(found),
         "process": process_dict(found.process),
         "machines": len(worst),
         "seed": found.wishes.seed,
@@ -83,7 +83,7 @@ def document(found: Analysis) -> dict[str, Any]:
         "pointing_mm": _pointing(found),
         "alone": [
             {"kind": a.kind, "loss_mm": a.loss, "tail_mm": a.tail, "may_be_times": _finite(a.times)}
-            for a in found.alone
+            for a in found.single_errors
         ],
         "margin_needed_mm": found.margin.mm,
         "margin_reason": found.margin.reason,
@@ -127,13 +127,14 @@ def _summary(found: Analysis) -> Table:
         ("margin needed", "mm", found.margin.mm, None, ""),
     ]
     rows += [
-        (f"loss by {in_words(one.kind)} alone", "mm", one.loss, None, "") for one in found.alone
+        (f"loss by {in_words(one.kind)} alone", "mm", one.loss, None, "")
+        for one in found.single_errors
     ]
     rows += [
         (f"good machines by {choice.name}", "%", 100 * choice.yielded.share, None, "")
         for choice in found.choices
     ]
-    return Table("tolerance-summary", COLUMNS, tuple(rows), (words(found), *NOTES))
+    return Table("tolerance-summary", COLUMNS, tuple(rows), (summary_text(found), *NOTES))
 
 
 def _machines(found: Analysis) -> Table:
@@ -151,7 +152,7 @@ def _machines(found: Analysis) -> Table:
 def _alone(found: Analysis) -> Table:
     process = dict(found.process)
     rows = []
-    for one in found.alone:
+    for one in found.single_errors:
         key = next((key for key in process if key.rpartition("_")[0] == one.kind), one.kind)
         now = [float(getattr(process[key], name, math.nan)) for name in ("magnitude", "mean")]
         may = [None if math.isinf(one.times) else one.times * value for value in now]

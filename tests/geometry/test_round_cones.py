@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.geometry.round_cones import RoundCones, met_within, spheres
+from tbcad.geometry.round_cones import RoundCones, contact_angle, spheres
 
 
 def at(along: float, out: float) -> np.ndarray:
@@ -13,29 +13,29 @@ def at(along: float, out: float) -> np.ndarray:
 def test_two_balls_of_one_height_touch_at_the_chord() -> None:
     """Closed form: 2 * 80 * sin(angle / 2) = 15 + 9."""
     balls = spheres(at(-20, 80), np.array([15.0]))
-    found = met_within(at(-20, 80), np.array([9.0]), balls)[0, 0]
+    found = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
     assert found == pytest.approx(2 * np.arcsin(24 / 160), rel=1e-12)
 
 
 def test_wall_is_added_to_the_reach() -> None:
     balls = spheres(at(-20, 80), np.array([15.0])).grown(4)
-    found = met_within(at(-20, 80), np.array([9.0]), balls)[0, 0]
+    found = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
     assert found == pytest.approx(2 * np.arcsin(28 / 160), rel=1e-12)
 
 
 def test_balls_far_along_the_axis_never_meet() -> None:
-    assert met_within(at(30, 80), np.array([9.0]), spheres(at(-20, 80), np.array([15.0]))) == 0
+    assert contact_angle(at(30, 80), np.array([9.0]), spheres(at(-20, 80), np.array([15.0]))) == 0
 
 
 def test_ball_over_the_axis_is_always_met() -> None:
     cone = RoundCones(at(0, 0), at(0, 50), np.array([5.0]), np.array([1.0]))
-    assert met_within(at(0, 4), np.array([2.0]), cone)[0, 0] == np.pi
+    assert contact_angle(at(0, 4), np.array([2.0]), cone)[0, 0] == np.pi
 
 
 def test_capsule_across_the_way_is_met_at_the_tangent() -> None:
     """A ray out from the axis at the ball's height: sin(angle) * out = radii."""
     cone = RoundCones(at(0, 0), at(0, 1000), np.array([3.0]), np.array([3.0]))
-    found = met_within(at(0, 100), np.array([7.0]), cone)[0, 0]
+    found = contact_angle(at(0, 100), np.array([7.0]), cone)[0, 0]
     assert found == pytest.approx(np.arcsin(10 / 100), rel=1e-9)
 
 
@@ -54,7 +54,7 @@ def test_against_many_spheres(
     ends = (np.array([point[:2]]) for point in (start, end))
     cone = RoundCones(*ends, np.array([start[2]]), np.array([end[2]]))
     height, way, size = ball
-    found = met_within(at(height, way), np.array([size]), cone)[0, 0]
+    found = contact_angle(at(height, way), np.array([size]), cone)[0, 0]
     share = np.linspace(0, 1, 1001)[:, None]
     along, out, radius = (p + share * (q - p) for p, q in zip(start, end, strict=True))
     turn = np.linspace(0, np.pi, 361)

@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import Half, design, directions
+from tbcad.mirrors.array import MirrorArray, design, directions
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
 
-def half_of(*settings: str) -> Half:
+def half_of(*settings: str) -> MirrorArray:
     return design(load_spec(None, settings)).halves[0]
 
 
-def attempt(*settings: str) -> tuple[Half | None, str]:
+def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
     """The half, or what the refusal says."""
     try:
         return half_of(*settings), ""

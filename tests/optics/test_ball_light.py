@@ -3,7 +3,7 @@ import pytest
 
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics import ball_light
 from tbcad.optics.trace import miss_distances, reflected
 
@@ -11,18 +11,18 @@ CAPTURE = 30.0
 
 
 @pytest.fixture(scope="module")
-def some(paper_half: Half) -> np.ndarray:
+def some(paper_half: MirrorArray) -> np.ndarray:
     return np.arange(0, len(paper_half), 60)
 
 
 @pytest.fixture(scope="module")
-def outline(paper_half: Half, some: np.ndarray) -> np.ndarray:
+def outline(paper_half: MirrorArray, some: np.ndarray) -> np.ndarray:
     at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[some])
     pinhole = norm(paper_half.view.pinhole)
     return ball_light.outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
 
 
-def test_poses_turned_are_the_mirrors(paper_half: Half) -> None:
+def test_poses_turned_are_the_mirrors(paper_half: MirrorArray) -> None:
     ellipsoid, mirrors = paper_half.ellipsoid, paper_half.mirrors
     at = ball_light.poses(ellipsoid, paper_half.polar)
     frame = ellipsoid.frame()
@@ -31,7 +31,7 @@ def test_poses_turned_are_the_mirrors(paper_half: Half) -> None:
 
 
 def test_rays_off_the_outline_touch_the_capture_sphere(
-    paper_half: Half, some: np.ndarray, outline: np.ndarray
+    paper_half: MirrorArray, some: np.ndarray, outline: np.ndarray
 ) -> None:
     mirrors, azimuth = paper_half.mirrors, paper_half.azimuth[some]
     point = ball_light.turned(outline, azimuth[:, None]) @ paper_half.ellipsoid.frame()
@@ -41,7 +41,9 @@ def test_rays_off_the_outline_touch_the_capture_sphere(
     assert miss == pytest.approx(CAPTURE, abs=1e-6)
 
 
-def test_light_lies_in_its_hulls(paper_half: Half, some: np.ndarray, outline: np.ndarray) -> None:
+def test_light_lies_in_its_hulls(
+    paper_half: MirrorArray, some: np.ndarray, outline: np.ndarray
+) -> None:
     """Rays over all of the part in use, by points along them."""
     pinhole = norm(paper_half.view.pinhole)
     camera = np.array([pinhole, 0.0, 0.0])
@@ -80,7 +82,7 @@ def test_area_of_an_ellipse(a: float, b: float) -> None:
     assert ball_light.enclosed(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
 
 
-def test_pixels_against_counting(paper_half: Half) -> None:
+def test_pixels_against_counting(paper_half: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
     view, mirrors, i = paper_half.view, paper_half.mirrors, 400
     at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[[i]])
@@ -107,7 +109,7 @@ def test_rays_past_a_ball_miss_by_infinity() -> None:
     assert miss[1] == 0
 
 
-def test_facing_an_apex(paper_half: Half) -> None:
+def test_facing_an_apex(paper_half: MirrorArray) -> None:
     """By the scalar product with the axis."""
     pinhole = paper_half.view.pinhole
     way = unit(paper_half.mirrors.apex - pinhole)

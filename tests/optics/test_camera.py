@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.camera import turned_to
 
 
-def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: Half) -> None:
+def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: MirrorArray) -> None:
     """89 degrees across 2080 x 1552 pixels hold camera a's 847 mirrors."""
     view = paper_half.view
     assert view.fill(paper_half.cells.corners) <= 1
@@ -13,7 +13,7 @@ def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: Half) -> None:
     assert abs(view.forward[1]) < 1e-9  # the array is symmetric, and so is the camera
 
 
-def test_no_small_turn_does_better(paper_half: Half) -> None:
+def test_no_small_turn_does_better(paper_half: MirrorArray) -> None:
     view, corners = paper_half.view, paper_half.cells.corners
     best = view.fill(corners)
     for turn in (-1e-3, 1e-3):
@@ -27,7 +27,7 @@ def test_no_small_turn_does_better(paper_half: Half) -> None:
             assert other.fill(corners) >= best - 1e-9
 
 
-def test_mirrored_camera_sees_the_mirrored_array_alike(paper_half: Half) -> None:
+def test_mirrored_camera_sees_the_mirrored_array_alike(paper_half: MirrorArray) -> None:
     flipped = paper_half.cells.corners * [-1, 1, 1]
     view = paper_half.view
     assert view.mirrored().fill(flipped) == pytest.approx(view.fill(paper_half.cells.corners))

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Half, design
+from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells, areas, cells_of
 from tbcad.optics.power_diagram import bounded, covered
 from tbcad.optics.surfaces import Surfaces, planes
@@ -88,7 +88,7 @@ def test_euler_characteristic(n: int) -> None:
     assert len(corners) - len(cells.arcs) + cells.mirrors == 1
 
 
-def test_each_arc_lies_in_two_rings_or_one(paper_half: Half) -> None:
+def test_each_arc_lies_in_two_rings_or_one(paper_half: MirrorArray) -> None:
     cells = paper_half.cells
     _, sides = cells.rings
     counts = np.bincount(sides // 2, minlength=len(cells.arcs))
@@ -97,7 +97,7 @@ def test_each_arc_lies_in_two_rings_or_one(paper_half: Half) -> None:
     assert len(np.unique(sides)) == len(sides)
 
 
-def test_rings_close(paper_half: Half) -> None:
+def test_rings_close(paper_half: MirrorArray) -> None:
     cells = paper_half.cells
     offsets, sides = cells.rings
     tail = np.where(sides % 2, cells.arcs.end[sides // 2], cells.arcs.start[sides // 2])

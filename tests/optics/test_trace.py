@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import Half, design
+from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells
 from tbcad.optics.trace import coverage, miss_distances, reflected
 from tbcad.spec.design import load_spec
@@ -16,7 +16,7 @@ def test_reflection_at_a_plane() -> None:
     assert out[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
 
 
-def test_ray_over_the_apex_passes_the_origin(paper_half: Half) -> None:
+def test_ray_over_the_apex_passes_the_origin(paper_half: MirrorArray) -> None:
     mirrors = paper_half.mirrors
     assert miss_distances(PINHOLE, mirrors.apex, mirrors.normal).max() < 1e-9
 
@@ -54,14 +54,14 @@ def test_coverage_against_brute_force(rule: str) -> None:
         assert found == pytest.approx(half.coverage[i], rel=4e-3)
 
 
-def test_the_seam_does_not_limit_halved_mirrors(paper_half: Half) -> None:
+def test_the_seam_does_not_limit_halved_mirrors(paper_half: MirrorArray) -> None:
     """With the cut counted a halved mirror would see nothing: its apex lies on the cut."""
     halved = paper_half.u[:, 0] == 0
     assert halved.sum() == 37
     assert coverage(paper_half.cells, PINHOLE)[halved].min() > 60
 
 
-def test_smaller_radius_sees_more(paper_half: Half) -> None:
+def test_smaller_radius_sees_more(paper_half: MirrorArray) -> None:
     cells = paper_half.cells
     before = coverage(cells, PINHOLE)
     finer = Cells(

@@ -3,31 +3,31 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import unit
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import miss_off_balls
 from tbcad.optics.trace import coverage
 from tbcad.optics.windows import Pieces, Windows, rotated, windows
 
 
 @pytest.fixture(scope="module")
-def seen(paper_half: Half) -> Windows:
+def seen(paper_half: MirrorArray) -> Windows:
     return windows(paper_half.cells, paper_half.view.pinhole)
 
 
-def own(half: Half, turn: float = 0.0) -> Pieces:
+def own(half: MirrorArray, turn: float = 0.0) -> Pieces:
     """Every mirror's own sphere, its window turned a little about the upright."""
     axis = np.broadcast_to([0.0, 0.0, 1.0], half.u.shape)
     mirrors = half.mirrors
     return Pieces(mirrors.centre, mirrors.radius, axis, np.full(len(half), turn))
 
 
-def test_own_spheres_cover_what_the_shell_covers(paper_half: Half, seen: Windows) -> None:
+def test_own_spheres_cover_what_the_shell_covers(paper_half: MirrorArray, seen: Windows) -> None:
     expected = coverage(paper_half.cells, paper_half.view.pinhole)
     assert seen.coverage(own(paper_half)) == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.parametrize("i", [0, 7, 300, 846])
-def test_turned_windows_against_brute_force(paper_half: Half, seen: Windows, i: int) -> None:
+def test_turned_windows_against_brute_force(paper_half: MirrorArray, seen: Windows, i: int) -> None:
     """2001 points on every side, turned by another library."""
     turn = 0.004
     found = seen.coverage(own(paper_half, turn))[i]
@@ -41,14 +41,16 @@ def test_turned_windows_against_brute_force(paper_half: Half, seen: Windows, i: 
     assert found == pytest.approx(2 * miss.min(), abs=1e-3)
 
 
-def test_windows_hold_their_own_apex_and_not_the_next(paper_half: Half, seen: Windows) -> None:
+def test_windows_hold_their_own_apex_and_not_the_next(
+    paper_half: MirrorArray, seen: Windows
+) -> None:
     way = unit(paper_half.mirrors.apex - seen.pinhole)
     none = np.zeros(len(way))
     assert seen.surround(way, way, none).all()
     assert not seen.surround(np.roll(way, 60, axis=0), way, none).any()
 
 
-def test_only_some(paper_half: Half, seen: Windows) -> None:
+def test_only_some(paper_half: MirrorArray, seen: Windows) -> None:
     kept = np.arange(len(paper_half)) % 7 == 0
     found = seen.only(kept).coverage(own(paper_half))
     assert np.isinf(found[~kept]).all()

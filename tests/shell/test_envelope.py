@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Half, design
+from tbcad.mirrors.array import MirrorArray, design
 from tbcad.shell.envelope import Body, body
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
 
-def test_wall_behind_the_deepest_valley(small_half: Half, small_body: Body) -> None:
+def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Body) -> None:
     """Least distance from any corner or arc to the back is the wall, within the samples."""
     arcs = small_half.body.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, 9))
@@ -50,7 +50,7 @@ def test_holes_by_kind(small_body: Body) -> None:
     assert sorted(small_body.foot_holes.radius) == [2.0] * 2 + [2.15] * 5
 
 
-def test_too_many_holes_are_refused(small_half: Half) -> None:
+def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     spec = load_spec(None, ["shell.seam_flange.bolts=60"])
     with pytest.raises(SpecError, match="holes") as caught:
         body(spec.shell, small_half.body, small_half.ellipsoid)

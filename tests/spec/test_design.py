@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from tbcad.errors import InputError
 from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.spec.design import FootFlange, Optics, Spec, load_spec, spec_dict
+from tbcad.spec.design import FootFlangeSpec, OpticsSpec, Spec, load_spec, spec_dict
 from tbcad.spec.errors import SpecError, allowed, fields, nearest, section_of
 from tbcad.spec.prototype import GradeName
 
@@ -51,7 +51,7 @@ class TestDefaults:
 
     def test_stay_where_a_section_is_given_in_part(self, file: Path) -> None:
         file.write_text("[shell.foot_flange]\nwidth_mm = 20\n")
-        assert load_spec(file).shell.foot_flange == FootFlange(width_mm=20)
+        assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
         assert load_spec(file).shell.foot_flange.bolts == 5
         assert load_spec(file).shell.seam_flange.bolts == 6
 
@@ -278,7 +278,9 @@ class TestTogether:
             "optics.capture_diameter_mm": repr(capture),
         }
         if min(a - c, 2 * c) > capture / 2 * (1 + 1e-9):
-            optics = Optics(semi_minor_mm=semi_minor, camera_mm=camera, capture_diameter_mm=capture)
+            optics = OpticsSpec(
+                semi_minor_mm=semi_minor, camera_mm=camera, capture_diameter_mm=capture
+            )
             assert load_spec(None, options).optics == optics
         elif min(a - c, 2 * c) < capture / 2 * (1 - 1e-9):
             with pytest.raises(SpecError, match="capture sphere"):

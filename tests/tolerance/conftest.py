@@ -4,10 +4,10 @@ import pytest
 
 from tbcad.mirrors.array import Design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
 
 
 @pytest.fixture(scope="session")
-def halves(small_design: Design) -> tuple[Nominal, Nominal]:
+def halves(small_design: Design) -> tuple[EdgeModel, EdgeModel]:
     a, b = (nominal(at) for at in reflectors(small_design))
     return a, b

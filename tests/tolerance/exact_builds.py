@@ -18,7 +18,7 @@ from tbcad_verify.shell.outline import least_miss, reflect_on_fits, trace_outlin
 from tbcad_verify.shell.recover import recover
 
 from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
@@ -29,7 +29,7 @@ from tbcad.tolerance.montecarlo.draws import Draws
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 
 
-def made(half: Half, draws: Draws, k: int) -> Cells:
+def made(half: MirrorArray, draws: Draws, k: int) -> Cells:
     """Cells of machine k before its shell is scaled and moved."""
     every, m = half.cells.surfaces, len(half)
     radius = 1 / every.curvature[:m] + draws.radius[k]
@@ -46,7 +46,7 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
     return replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
 
 
-def slowly(half: Half, draws: Draws, k: int) -> np.ndarray:
+def slowly(half: MirrorArray, draws: Draws, k: int) -> np.ndarray:
     """Coverage of each mirror of machine k by tbcad.optics.trace, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
@@ -111,7 +111,7 @@ def _least(bench: Bench) -> np.ndarray:
     return 2 * np.min([least_miss(o, at, virtual) for o, at in pairs], axis=0)
 
 
-def brutally(half: Half, draws: Draws, k: int, mirror: int, ways: int = 4_000) -> float:
+def brutally(half: MirrorArray, draws: Draws, k: int, mirror: int, ways: int = 4_000) -> float:
     """Coverage of a mirror of machine k by bisection of where each way from its apex ends, mm.
 
     Every sphere and plane is looked at, scaled as it is, without any circle or corner.
@@ -153,7 +153,7 @@ def brutally(half: Half, draws: Draws, k: int, mirror: int, ways: int = 4_000) -
     return float(2 * trace.miss_distances(half.view.pinhole, point, normal).min())
 
 
-def surrounded(half: Half, shift: np.ndarray) -> np.ndarray:
+def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
     """Whether each whole mirror's rays go round the object's middle, the camera moved, (m,).
 
     By the angle that the outline's image turns about the middle, along finely sampled arcs.

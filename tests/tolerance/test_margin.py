@@ -12,7 +12,7 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.margin import MOST_MM, STEP_MM, Margin, margin, with_margin
-from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import nominal
 from tbcad.tolerance.process.process import errors, load_process
@@ -155,7 +155,7 @@ class TestRealDesigns:
     @staticmethod
     def worst(made: Design, errors: Errors) -> np.ndarray:
         a, b = (nominal(at) for at in reflectors(made))
-        return simulate(Task((a, b), errors, 1), 40).worst
+        return simulate(MonteCarloCase((a, b), errors, 1), 40).worst
 
     @pytest.mark.parametrize(
         ("n", "process", "wanted"), [(4, "sla", 0.9), (4, "sls", 0.5), (5, "cnc", 0.9)]

@@ -11,7 +11,7 @@ from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance import process_design
-from tbcad.tolerance.montecarlo.builds import Task, simulate
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import nominal
 from tbcad.tolerance.process.process import errors, load_process
 from tbcad.tolerance.process_design import for_process
@@ -34,7 +34,9 @@ def test_the_margin_is_enough_and_a_little_less_is_not() -> None:
     for margin in (found, found - 0.03):
         tried = load_spec(None, ["n=4", f"mirrors.margin_mm={margin}"])
         a, b = (nominal(at) for at in reflectors(design(tried)))
-        worst = simulate(Task((a, b), errors(process), process_design.SEED), MACHINES).worst
+        worst = simulate(
+            MonteCarloCase((a, b), errors(process), process_design.SEED), MACHINES
+        ).worst
         shares.append((worst >= 60).mean())
     assert shares[0] >= wanted > shares[1]
 

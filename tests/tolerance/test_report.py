@@ -16,27 +16,27 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.record import contents_of
 from tbcad.simulate.study.tables import SUMMARY
 from tbcad.spec.design import load_spec
-from tbcad.tolerance.analysis import Analysis, Choice, Stands, Wishes
+from tbcad.tolerance.analysis import Analysis, Options, ProcessOption, PrototypeYield
 from tbcad.tolerance.margin import Margin
-from tbcad.tolerance.montecarlo.builds import Task, Yield, simulate, yielded
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, Yield, simulate, yielded
 from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import nominal
-from tbcad.tolerance.montecarlo.sensitivity import Alone
+from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
 from tbcad.tolerance.process.process import load_process
 from tbcad.tolerance.prototype.builds import PrototypeResult
-from tbcad.tolerance.report import document, json_text, study, words
+from tbcad.tolerance.report import document, json_text, study, summary_text
 
 MACHINES, TARGET = 25, 60.0
 ALONE = (
-    Alone("sphere_centre", 1.25, 1.75, 0.375),
-    Alone("facets", 0.36, 0.36, 1.5),
-    Alone("camera_tilt", 0.0, 0.0, math.inf),
+    SingleErrorEffect("sphere_centre", 1.25, 1.75, 0.375),
+    SingleErrorEffect("facets", 0.36, 0.36, 1.5),
+    SingleErrorEffect("camera_tilt", 0.0, 0.0, math.inf),
 )
 CHOICES = (
-    Choice("fdm", Yield(0.0, 0.0, 0.04), Margin(None, 0.2, "it would need more than 20 mm")),
-    Choice("sla", Yield(0.25, 0.2, 0.3), Margin(3.71, 0.99)),
-    Choice("diamond", Yield(1.0, 0.96, 1.0), Margin(0.56, 0.99)),
+    ProcessOption("fdm", Yield(0.0, 0.0, 0.04), Margin(None, 0.2, "it would need more than 20 mm")),
+    ProcessOption("sla", Yield(0.25, 0.2, 0.3), Margin(3.71, 0.99)),
+    ProcessOption("diamond", Yield(1.0, 0.96, 1.0), Margin(0.56, 0.99)),
 )
 SHARP = Sharpness(np.array([0.9, 0.8]), np.array([[0.7, 0.6]]), np.array([[0.84, 0.74]]))
 
@@ -54,12 +54,12 @@ def found(little: Design) -> Analysis:
     errors = Errors(sphere_centre=Error(0.012))
     return Analysis(
         process=load_process("sla"),
-        wishes=Wishes(machines=MACHINES, seed=4),
+        wishes=Options(machines=MACHINES, seed=4),
         target=TARGET,
         cameras=cameras,
         halves=halves,
-        result=simulate(Task(halves, errors, 4), MACHINES),
-        alone=ALONE,
+        result=simulate(MonteCarloCase(halves, errors, 4), MACHINES),
+        single_errors=ALONE,
         choices=CHOICES,
         margin=CHOICES[1].margin,
         sharpness=SHARP,
@@ -67,14 +67,14 @@ def found(little: Design) -> Analysis:
     )
 
 
-def stands(plain: float, known: float, offset: float = 2.0) -> Stands:
+def stands(plain: float, known: float, offset: float = 2.0) -> PrototypeYield:
     """Ten prototypes each, the shares of which are good."""
 
     def result(share: float) -> PrototypeResult:
         coverage = np.where(np.arange(10) < round(10 * share), 61.0, 59.0)
         return PrototypeResult(coverage[:, None], np.full((10, 3), offset))
 
-    return Stands(result(plain), result(known))
+    return PrototypeYield(result(plain), result(known))
 
 
 def rows_of(found: Analysis, name: str) -> list[dict[str, str]]:
@@ -88,7 +88,7 @@ def percent(pattern: str, text: str) -> float:
 
 class TestWords:
     def test_machines(self, found: Analysis) -> None:
-        said, worst = words(found), found.result.worst
+        said, worst = summary_text(found), found.result.worst
         share = yielded(worst, TARGET)
         assert 0 < share.share < 1
         assert percent(r"^Made by sla \(.*?\), ", said) == pytest.approx(
@@ -102,28 +102,28 @@ class TestWords:
     def test_worst_kind_of_error(self, found: Analysis) -> None:
         assert (
             "Most is lost by sphere centre: 1.25 mm by itself; alone it may be 0.38 times"
-            in words(found)
+            in summary_text(found)
         )
 
     def test_nothing_is_lost(self, found: Analysis) -> None:
-        harmless = words(replace(found, alone=ALONE[2:]))
+        harmless = summary_text(replace(found, single_errors=ALONE[2:]))
         assert "camera tilt: 0.00 mm by itself; harmless." in harmless
         assert "times" not in harmless
-        assert "lost" not in words(replace(found, alone=()))
+        assert "lost" not in summary_text(replace(found, single_errors=()))
 
     def test_design_that_falls_short(self, found: Analysis) -> None:
-        said = words(replace(found, alone=(replace(ALONE[0], times=0.0),)))
+        said = summary_text(replace(found, single_errors=(replace(ALONE[0], times=0.0),)))
         assert "the design itself falls short" in said
         assert "may be" not in said
 
     def test_margin(self, found: Analysis) -> None:
-        said = words(found)
+        said = summary_text(found)
         command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
         assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
         assert "No margin" not in said
 
     def test_no_margin(self, found: Analysis) -> None:
-        said = words(replace(found, margin=CHOICES[0].margin))
+        said = summary_text(replace(found, margin=CHOICES[0].margin))
         assert "No margin was found that makes it do: it would need more than 20 mm." in said
         assert "A margin of" not in said
 
@@ -131,22 +131,22 @@ class TestWords:
         assert (
             "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
             "none was found for fdm."
-        ) in words(found)
-        every = words(replace(found, choices=CHOICES[1:]))
+        ) in summary_text(found)
+        every = summary_text(replace(found, choices=CHOICES[1:]))
         assert "diamond with 0.56 mm." in every
         assert "none" not in every
-        none = words(replace(found, choices=CHOICES[:1]))
+        none = summary_text(replace(found, choices=CHOICES[:1]))
         assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_pictures(self, found: Analysis) -> None:
         assert (
             "SSIM 0.850 as designed, 0.650 taken for the designed machine, 0.790 once calibrated."
-            in words(found)
+            in summary_text(found)
         )
 
     def test_prototype(self, found: Analysis) -> None:
-        assert "Prototype" not in words(found)
-        said = words(replace(found, stands=stands(0.0, 0.7)))
+        assert "Prototype" not in summary_text(found)
+        said = summary_text(replace(found, stands=stands(0.0, 0.7)))
         assert percent("Prototype: ", said) == 0
         assert percent("without calibration, ", said) == 70
 
@@ -155,13 +155,13 @@ class TestWords:
         self, found: Analysis, wanted: float, text: str
     ) -> None:
         """100 % is not 99.9 %."""
-        said = words(replace(found, wishes=replace(found.wishes, wanted=wanted)))
+        said = summary_text(replace(found, wishes=replace(found.wishes, wanted=wanted)))
         assert f"Margins needed for {text}:" in said
 
     def test_changed_process_is_not_advised_under_the_old_name(self, found: Analysis) -> None:
         """The built-in process of that name would get another margin."""
         changed = load_process("sla", ["sphere_radius_um=0"])
-        said = words(replace(found, process=changed, margin=Margin(1.82, 0.99)))
+        said = summary_text(replace(found, process=changed, margin=Margin(1.82, 0.99)))
         assert "--for-process sla --yield" not in said
 
 
@@ -170,7 +170,7 @@ class TestJson:
         read = json.loads(json_text(found))
         worst = found.result.worst
         assert read["schema"] == "tbcad-tolerance/1"
-        assert read["words"] == words(found)
+        assert read["words"] == summary_text(found)
         assert (read["machines"], read["seed"], read["target_mm"]) == (MACHINES, 4, TARGET)
         assert read["yield"]["share"] == (worst >= TARGET).mean()
         assert read["worst_camera_mm"]["0.5"] == np.median(worst)
@@ -217,7 +217,7 @@ class TestTables:
     def test_summary(self, found: Analysis) -> None:
         table = study(found).summary
         assert table.columns == SUMMARY
-        assert words(found) in table.notes
+        assert summary_text(found) in table.notes
         told = {str(row[0]): row[2] for row in table.rows}
         read: dict[str, Any] = document(found)
         assert told["good machines"] == 100 * read["yield"]["share"]

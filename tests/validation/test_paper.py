@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Half, design, directions
+from tbcad.mirrors.array import MirrorArray, design, directions
 from tbcad.optics import flat
 from tbcad.spec.design import load_spec
 
@@ -21,7 +21,7 @@ def camera_a(n: int) -> tuple[np.ndarray, np.ndarray]:
     return every[(every[:, 0] >= 0) & (every[:, 2] >= 0)], every
 
 
-def half_of(*settings: str) -> Half:
+def half_of(*settings: str) -> MirrorArray:
     return design(load_spec(None, settings)).halves[0]
 
 
@@ -109,7 +109,7 @@ def test_radii_that_reach_60_mm() -> None:
     assert np.median(ratio) == pytest.approx(0.88, rel=0.021)
 
 
-def test_graph_of_the_cells(paper_half: Half) -> None:
+def test_graph_of_the_cells(paper_half: MirrorArray) -> None:
     """V - E + F = 1. Before: 1738 - 2584 + 847, with a corner split in two at 44 places."""
     arcs = paper_half.cells.arcs
     corners = len(np.unique(np.concatenate([arcs.start, arcs.end])))
@@ -117,7 +117,7 @@ def test_graph_of_the_cells(paper_half: Half) -> None:
     assert corners - len(arcs) + 847 == 1
 
 
-def test_equatorial_mirrors_stay_whole(paper_half: Half) -> None:
+def test_equatorial_mirrors_stay_whole(paper_half: MirrorArray) -> None:
     """The foot plane lies half a mirror below z = 0: all of their apices and widths are above."""
     equator = paper_half.u[:, 2] == 0
     assert equator.sum() == 36 or equator.sum() == 37

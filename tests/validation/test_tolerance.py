@@ -18,11 +18,11 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, seen
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import Nominal, axes, nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, axes, nominal
 from tbcad.tolerance.montecarlo.pointing import pointing
 from tests.tolerance.exact_builds import brutally, meshed, proved, slowly
 
-Halves = tuple[Nominal, Nominal]
+Halves = tuple[EdgeModel, EdgeModel]
 
 # What a careless maker might leave; even scale only, as the slow means know no other.
 COARSE = Errors(
@@ -46,7 +46,7 @@ def halves(small_design: Design) -> Halves:
     return halves_of(small_design)
 
 
-def perfect(half: Nominal) -> Draws:
+def perfect(half: EdgeModel) -> Draws:
     return draw(Errors(), 1, range(1), len(half))[0]
 
 
@@ -132,7 +132,7 @@ def test_larger_machine_covers_more_in_proportion(halves: Halves, size: float) -
     assert max(rays.offset.max(), rays.angle.max()) < 1e-12
 
 
-def lever(half: Nominal, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def lever(half: EdgeModel, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First-order offset and angle of rays to apices P moved by start and turned by (m, 3).
 
     A ray along d that meets the tangent plane x off the apex finds the normal turned by x k
@@ -157,19 +157,19 @@ def lever(half: Nominal, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndarra
     return np.linalg.norm(moved, axis=1), np.linalg.norm(bent, axis=1)
 
 
-def shifted(half: Nominal, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def shifted(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
     shift = size * row(1.0, 2.0, -1.0)
     return replace(perfect(half), camera_shift=shift), shift, np.zeros((1, 3))
 
 
-def tilted(half: Nominal, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def tilted(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
     turn = size / 100 * row(1.0, 2.0, -1.0)
     way = half.table[:-2, :3] - half.view.pinhole
     way /= np.linalg.norm(way, axis=1)[:, None]
     return replace(perfect(half), camera_tilt=turn), np.zeros((1, 3)), np.cross(turn, way)
 
 
-def longer(half: Nominal, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def longer(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
     """A pixel then stands for an angle of lesser tangent from the optical axis."""
     way = half.table[:-2, :3] - half.view.pinhole
     way /= np.linalg.norm(way, axis=1)[:, None]
@@ -181,7 +181,7 @@ def longer(half: Nominal, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("error", [shifted, tilted, longer])
 def test_pointing_error_is_the_lever_of_a_curved_mirror(
-    halves: Halves, error: Callable[[Nominal, float], tuple[Draws, np.ndarray, np.ndarray]]
+    halves: Halves, error: Callable[[EdgeModel, float], tuple[Draws, np.ndarray, np.ndarray]]
 ) -> None:
     for half in halves:
         draws, start, turn = error(half, 1e-4)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
-from tbcad_verify.run.verify import Wishes, verify
+from tbcad_verify.run.verify import Options, verify
 from tbcad_verify.run.watch import SECONDS
 
 ABOUT = """Prove on the files in DIR, which `tbcad build` wrote, that every virtual camera sees the
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not options.time_limit > 0:
         parser.error("--time-limit must be more than 0 seconds")
     try:
-        wishes = Wishes(
+        wishes = Options(
             seconds=options.time_limit,
             printers=tuple(options.printer),
             clients=options.clients,
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
 
 
-def _verify(folder: Path, wishes: Wishes, quiet: bool) -> int:
+def _verify(folder: Path, wishes: Options, quiet: bool) -> int:
     from rich.console import Console
 
     report = verify(folder, (lambda _: None) if quiet else _say, wishes)

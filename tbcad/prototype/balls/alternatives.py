@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass
 
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import Clusters
-from tbcad.prototype.balls.selection import SAME_MM, Balls, Stand, choose, fit, stand
+from tbcad.prototype.balls.selection import SAME_MM, BallCandidates, Balls, choose, fit, stand
 from tbcad.spec.design import Spec
-from tbcad.spec.prototype import Prototype as Keys
+from tbcad.spec.prototype import PrototypeSpec
 
 
 @dataclass(frozen=True)
-class Choice:
+class BallAlternative:
     """What one way to choose the balls costs.
 
     Attributes:
@@ -41,17 +41,19 @@ WAYS = {
 }
 
 
-def choices(spec: Spec, half: Half, groups: Clusters, catalogue: Catalogue) -> list[Choice]:
+def choices(
+    spec: Spec, half: MirrorArray, groups: Clusters, catalogue: Catalogue
+) -> list[BallAlternative]:
     """What each way to choose the balls costs, for groups of camera a's mirrors."""
     here = stand(half, groups, spec.optics.capture_diameter_mm)
     keys = [(name, spec.prototype.model_copy(update=way)) for name, way in WAYS.items()]
     return [_choice(name, here, choose(here, way, catalogue), way) for name, way in keys]
 
 
-def _choice(name: str, here: Stand, balls: Balls, keys: Keys) -> Choice:
+def _choice(name: str, here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallAlternative:
     found = fit(here, balls, keys)
     short = found.coverage < here.target - SAME_MM
-    return Choice(
+    return BallAlternative(
         name,
         found.kept,
         float(found.pixels.sum()),

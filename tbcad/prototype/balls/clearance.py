@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.round_cones import RoundCones, met_within, spheres
+from tbcad.geometry.round_cones import RoundCones, contact_angle, spheres
 from tbcad.optics.ball_light import light
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.prototype.balls.selection import Balls
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import Prototype as Keys
+from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Floats
 
 # Kept on top of every least angle, radians: far more than the solver's rounding and far less than
@@ -34,7 +34,9 @@ class Obstacle:
     azimuth: float
 
 
-def apart(balls: Balls, keys: Keys, pinhole: float, capture: float) -> tuple[Floats, Floats]:
+def apart(
+    balls: Balls, keys: PrototypeSpec, pinhole: float, capture: float
+) -> tuple[Floats, Floats]:
     """Least differences of azimuth so that no balls touch, and so that light passes, (k, k) each.
 
     Args:
@@ -44,11 +46,11 @@ def apart(balls: Balls, keys: Keys, pinhole: float, capture: float) -> tuple[Flo
         capture: radius of the capture sphere, mm.
     """
     centre, radius = balls.body_centre[:, :2], balls.body_radius
-    touch = met_within(centre, radius, spheres(centre, radius).grown(keys.ball_wall_mm))
+    touch = contact_angle(centre, radius, spheres(centre, radius).grown(keys.ball_wall_mm))
     to_object, to_camera = light(balls.outline, pinhole, capture)
     dark = np.maximum(
-        met_within(centre, radius, to_object.grown(keys.light_margin_mm)),
-        met_within(centre, radius, to_camera.grown(keys.light_margin_mm)),
+        contact_angle(centre, radius, to_object.grown(keys.light_margin_mm)),
+        contact_angle(centre, radius, to_camera.grown(keys.light_margin_mm)),
     )
     # Of a pair each must leave the other's light alone.
     return _between(touch), _between(np.maximum(dark, dark.T))
@@ -60,7 +62,7 @@ def _between(angle: Floats) -> Floats:
     return result
 
 
-def obstacles(keys: Keys, frame: Floats, view: View, length: float) -> list[Obstacle]:
+def obstacles(keys: PrototypeSpec, frame: Floats, view: Camera, length: float) -> list[Obstacle]:
     """The post below the object and the camera's body behind its pinhole.
 
     Args:
@@ -85,7 +87,7 @@ def _obstacle(start: Floats, end: Floats, radius: float) -> Obstacle:
     return Obstacle(RoundCones(first, second, size, size), azimuth)
 
 
-def free(balls: Balls, keys: Keys, things: Iterable[Obstacle]) -> tuple[Floats, Floats]:
+def free(balls: Balls, keys: PrototypeSpec, things: Iterable[Obstacle]) -> tuple[Floats, Floats]:
     """Least and largest azimuth (k,) of each ball such that it meets nothing in between.
 
     Raises:
@@ -94,7 +96,7 @@ def free(balls: Balls, keys: Keys, things: Iterable[Obstacle]) -> tuple[Floats, 
     floor, ceiling = np.full(len(balls), -np.pi), np.full(len(balls), np.pi)
     for thing in things:
         cone = thing.cone.grown(keys.ball_wall_mm)
-        half = met_within(balls.body_centre[:, :2], balls.body_radius, cone)[0]
+        half = contact_angle(balls.body_centre[:, :2], balls.body_radius, cone)[0]
         if half.max() >= np.pi:
             raise SpecError(
                 f"ball {int(half.argmax()) + 1} meets the post or the camera at every angle of "

@@ -5,19 +5,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.vectors import MIRROR
-from tbcad.mirrors.array import Design, Half
+from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls import selection as ball
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
 from tbcad.prototype.balls.clearance import apart, edges, free, obstacles
 from tbcad.prototype.balls.groups import Clusters, clusters, most_groups
-from tbcad.prototype.balls.placement import Placement, Task, greedy, place
-from tbcad.prototype.balls.selection import Balls, Fit, Stand
+from tbcad.prototype.balls.placement import Placement, PlacementProblem, greedy, place
+from tbcad.prototype.balls.selection import BallCandidates, Balls, Fit
 from tbcad.prototype.balls.stops import Requests, Stops, plan, requests, settled
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MOST_BALLS
-from tbcad.spec.prototype import Prototype as Keys
+from tbcad.spec.prototype import MOST_BALLS, PrototypeSpec
 from tbcad.types import Floats, Ints
 
 # The post is taken to reach this many semi-major axes down, beyond all balls.
@@ -45,12 +44,12 @@ class Prototype:
             turned by 180 degrees about z, (m,).
     """
 
-    half: Half
+    half: MirrorArray
     grade: Grade
     groups: Clusters
     balls: Balls
     fit: Fit
-    task: Task
+    task: PlacementProblem
     placement: Placement
     greedy: Placement
     stops: Stops
@@ -177,7 +176,7 @@ def _check_half_turn(spec: Spec) -> None:
         )
 
 
-def _curved(half: Half) -> Half:
+def _curved(half: MirrorArray) -> MirrorArray:
     if np.isnan(half.mirrors.radius).any():
         raise SpecError(
             "a prototype of balls needs curved mirrors, but mirrors.radius_rule is flat: set it "
@@ -186,7 +185,7 @@ def _curved(half: Half) -> Half:
     return half
 
 
-def _stand(spec: Spec, half: Half) -> tuple[Stand, Balls]:
+def _stand(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
     """The groups and their balls, for the number of them that the spec gives or asks for."""
     keys = spec.prototype
     catalogue = load_catalogue(keys.catalogues).only(keys.grade, keys.largest_ball_mm)
@@ -205,7 +204,7 @@ def _stand(spec: Spec, half: Half) -> tuple[Stand, Balls]:
     )
 
 
-def _near(keys: Keys, half: Half, k: int) -> bool:
+def _near(keys: PrototypeSpec, half: MirrorArray, k: int) -> bool:
     """Whether the errors of direction of k groups are within the limits, before all else."""
     groups = clusters(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
     error = np.degrees(np.abs(groups.polar[groups.of] - half.polar))
@@ -215,19 +214,21 @@ def _near(keys: Keys, half: Half, k: int) -> bool:
     )
 
 
-def _grouped(spec: Spec, half: Half, k: int, catalogue: Catalogue) -> tuple[Stand, Balls]:
+def _grouped(
+    spec: Spec, half: MirrorArray, k: int, catalogue: Catalogue
+) -> tuple[BallCandidates, Balls]:
     keys = spec.prototype
     groups = clusters(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
     here = ball.stand(half, groups, spec.optics.capture_diameter_mm)
     return here, ball.choose(here, keys, catalogue)
 
 
-def _task(spec: Spec, half: Half, balls: Balls, wanted: Requests) -> Task:
+def _task(spec: Spec, half: MirrorArray, balls: Balls, wanted: Requests) -> PlacementProblem:
     keys, ellipsoid = spec.prototype, half.ellipsoid
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, spec.optics.capture_diameter_mm / 2
     length = POST_LENGTHS * ellipsoid.semi_major
     floor, ceiling = free(balls, keys, obstacles(keys, ellipsoid.frame(), half.view, length))
-    return Task(
+    return PlacementProblem(
         apart=np.maximum(*apart(balls, keys, pinhole, capture)),
         low=wanted.low(len(balls)),
         high=wanted.high(len(balls)),
@@ -238,7 +239,7 @@ def _task(spec: Spec, half: Half, balls: Balls, wanted: Requests) -> Task:
     )
 
 
-def _twins(half: Half) -> Ints:
+def _twins(half: MirrorArray) -> Ints:
     """Mirror (m,) that is each one's image in the plane y = 0.
 
     Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's

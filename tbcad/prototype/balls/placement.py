@@ -23,7 +23,7 @@ STEP = np.radians(0.25)  # by which the greedy layout's half swing grows
 
 
 @dataclass(frozen=True)
-class Task:
+class PlacementProblem:
     """What azimuths must keep, over k balls, radians.
 
     Attributes:
@@ -83,7 +83,7 @@ class Placement:
     outermost: float
 
 
-def greedy(task: Task) -> Placement:
+def greedy(task: PlacementProblem) -> Placement:
     """Balls one after the other, the widest group first, each as near to azimuth 0 as it can.
 
     Where post or camera rule that out: those with least room first, for a swing that grows until
@@ -104,13 +104,13 @@ def greedy(task: Task) -> Placement:
     return _placement(task, plain, 0.0)
 
 
-def _windows(task: Task, reach: float) -> tuple[Floats, Floats]:
+def _windows(task: PlacementProblem, reach: float) -> tuple[Floats, Floats]:
     """Azimuths (k,) between which each ball must stand for half a swing."""
     low = np.maximum(task.high - reach, task.floor + reach)
     return low, np.minimum(task.low + reach, task.ceiling - reach)
 
 
-def _filled(task: Task, low: Floats, high: Floats, rank: Floats) -> Floats | None:
+def _filled(task: PlacementProblem, low: Floats, high: Floats, rank: Floats) -> Floats | None:
     """Azimuths (k,) found in one go by rising rank; None when a ball has no place left."""
     azimuth = np.zeros(len(task))
     placed: list[int] = []
@@ -127,7 +127,7 @@ def _filled(task: Task, low: Floats, high: Floats, rank: Floats) -> Floats | Non
     return azimuth
 
 
-def place(task: Task) -> Placement:
+def place(task: PlacementProblem) -> Placement:
     """Azimuths with the least swing, and of those with that swing the least outermost azimuth.
 
     The search stops at NODES nodes with the best found.
@@ -145,7 +145,7 @@ def place(task: Task) -> Placement:
     return _placement(task, min(options, key=task.outermost), 2 * bound)
 
 
-def _least_swing(task: Task, first: Placement) -> tuple[Floats, float] | None:
+def _least_swing(task: PlacementProblem, first: Placement) -> tuple[Floats, float] | None:
     """Azimuths (k,) and the bound on half the swing; None when there are none.
 
     A tight first bound makes the search short, so the greedy layout's is tried although the post
@@ -161,11 +161,11 @@ def _least_swing(task: Task, first: Placement) -> tuple[Floats, float] | None:
     return None
 
 
-def _placement(task: Task, azimuth: Floats, bound: float) -> Placement:
+def _placement(task: PlacementProblem, azimuth: Floats, bound: float) -> Placement:
     return Placement(azimuth, 2 * task.reach(azimuth), bound, task.outermost(azimuth))
 
 
-def _not_placed(task: Task) -> str:
+def _not_placed(task: PlacementProblem) -> str:
     return (
         f"found no place for {len(task)} balls on one base within a swing of "
         f"{np.degrees(task.most):.0f} degrees, clear of each other, the post and the camera: make "
@@ -174,7 +174,7 @@ def _not_placed(task: Task) -> str:
     )
 
 
-def _solved(task: Task, most: float, outermost: bool) -> tuple[Floats, float] | None:
+def _solved(task: PlacementProblem, most: float, outermost: bool) -> tuple[Floats, float] | None:
     """Azimuths (k,) and a bound on the objective: half the swing, or the outermost azimuth.
 
     Variables: k azimuths, half the swing, the outermost azimuth, and for each pair that must stay
@@ -212,7 +212,7 @@ def _settled(azimuth: Floats) -> Floats:
 
 
 def _rows(
-    task: Task, first: Ints, second: Ints, highest: Floats, lowest: Floats
+    task: PlacementProblem, first: Ints, second: Ints, highest: Floats, lowest: Floats
 ) -> tuple[coo_array, Floats]:
     """All constraints as rows (matrix, least value)."""
     k, ball, pair = len(task), np.arange(len(task)), np.arange(len(first))

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import Poses, facing, outlines, pixels, poses, turned
 from tbcad.optics.windows import Pieces, Windows, windows
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import Clusters
-from tbcad.spec.prototype import Prototype as Keys
+from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
 
 HALVINGS = 40
@@ -117,7 +117,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Stand:
+class BallCandidates:
     """Groups of camera a's mirrors, and balls tried in their places.
 
     Attributes:
@@ -127,7 +127,7 @@ class Stand:
         target: coverage wanted, mm.
     """
 
-    half: Half
+    half: MirrorArray
     groups: Clusters
     windows: Windows
     target: float
@@ -158,17 +158,17 @@ class Stand:
         direction = away / norm(away)[:, None]
         return self.windows.surround(direction, direction, np.zeros(len(half)))
 
-    def only(self, mirrors: Bools) -> "Stand":
+    def only(self, mirrors: Bools) -> "BallCandidates":
         """The same, computing coverage for some mirrors only; infinite for the others."""
         return replace(self, windows=self.windows.only(mirrors))
 
 
-def stand(half: Half, groups: Clusters, target: float) -> Stand:
+def stand(half: MirrorArray, groups: Clusters, target: float) -> BallCandidates:
     """Groups of mirrors ready to try balls in their places; target is a coverage in mm."""
-    return Stand(half, groups, windows(half.cells, half.view.pinhole), target)
+    return BallCandidates(half, groups, windows(half.cells, half.view.pinhole), target)
 
 
-def choose(here: Stand, keys: Keys, catalogue: Catalogue) -> Balls:
+def choose(here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue) -> Balls:
     """The ball of each group, by the spec's rule; groups beyond stock get caps if it says so."""
     if keys.snap == "nearest":
         radius, stock = _nearest(here.groups.radius, catalogue, keys.caps)
@@ -177,7 +177,9 @@ def choose(here: Stand, keys: Keys, catalogue: Catalogue) -> Balls:
     return balls_of(here, radius, stock, catalogue, keys.cap_rim_mm)
 
 
-def balls_of(here: Stand, radius: Floats, stock: Ints, catalogue: Catalogue, rim: float) -> Balls:
+def balls_of(
+    here: BallCandidates, radius: Floats, stock: Ints, catalogue: Catalogue, rim: float
+) -> Balls:
     """Balls with reflecting radii (k,) in the places of the groups, caps with a rim (mm)."""
     ellipsoid = here.half.ellipsoid
     at = poses(ellipsoid, here.groups.polar)
@@ -203,7 +205,7 @@ def _bodies(radius: Floats, edge: Floats) -> tuple[Floats, Floats]:
     return np.sqrt(2) * edge, drop + edge
 
 
-def possible(here: Stand, catalogue: Catalogue, moved: bool) -> Bools:
+def possible(here: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:
     """Whether the smallest ball shows the target in each mirror's cell, (m,).
 
     Where it does not, the mirror is too far from its group for any ball.
@@ -212,7 +214,7 @@ def possible(here: Stand, catalogue: Catalogue, moved: bool) -> Bools:
     return here.coverage(smallest, moved) >= here.target - SAME_MM
 
 
-def fit(here: Stand, balls: Balls, keys: Keys) -> Fit:
+def fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> Fit:
     """What the balls show in place of the mirrors."""
     half, groups = here.half, here.groups
     moved = keys.picture == "moved"
@@ -233,7 +235,7 @@ def fit(here: Stand, balls: Balls, keys: Keys) -> Fit:
     )
 
 
-def _counted(half: Half, outline: Floats) -> Floats:
+def _counted(half: MirrorArray, outline: Floats) -> Floats:
     """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
     share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
     return share * pixels(half.view, half.ellipsoid.frame(), outline, half.azimuth)
@@ -246,7 +248,9 @@ def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, 
     return np.where(beyond, made, catalogue.diameter[stock] / 2), np.where(beyond, MADE, stock)
 
 
-def _covering(here: Stand, keys: Keys, catalogue: Catalogue) -> tuple[Floats, Ints]:
+def _covering(
+    here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue
+) -> tuple[Floats, Ints]:
     """Largest stock ball, or cap, that shows the target for every mirror of its group."""
     groups, moved = here.groups, keys.picture == "moved"
     hopeless = ~possible(here, catalogue, moved)
@@ -280,7 +284,7 @@ def _largest(holds: Callable[[Ints], Bools], count: int, last: int) -> Ints:
     return low
 
 
-def _largest_radius(here: Stand, low: Floats, hopeless: Bools, moved: bool) -> Floats:
+def _largest_radius(here: BallCandidates, low: Floats, hopeless: Bools, moved: bool) -> Floats:
     """Largest reflecting radius (k,) that shows the target for every mirror asked for, mm."""
     mirror = here.half.mirrors.radius
     high = np.maximum(low, 10 * here.groups.mean(mirror))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.prototype.balls.groups import Clusters
-from tbcad.prototype.balls.placement import Task
+from tbcad.prototype.balls.placement import PlacementProblem
 from tbcad.types import Floats, Ints
 
 # Azimuths tried for a ball are this many to its tolerance; the balls are gone through this often.
@@ -86,7 +86,7 @@ def requests(groups: Clusters, azimuth: Floats, error: float) -> Requests:
     return Requests(groups.of, azimuth, tolerance[groups.of])
 
 
-def fewest(low: Floats, high: Floats) -> tuple[Floats, Ints]:
+def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     """The fewest points that hit all intervals [low, high] (m,).
 
     Returns:
@@ -106,7 +106,7 @@ def fewest(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     return np.array(points), which
 
 
-def settled(task: Task, wanted: Requests, azimuth: Floats) -> Floats:
+def settled(task: PlacementProblem, wanted: Requests, azimuth: Floats) -> Floats:
     """Azimuths (k,) moved where they are free to, so that fewer stops do; the swing stays.
 
     Ball after ball, each is tried at small steps over all that the others, the swing and the
@@ -129,7 +129,7 @@ def settled(task: Task, wanted: Requests, azimuth: Floats) -> Floats:
 
 
 def _tried(
-    task: Task, azimuth: Floats, ball: int, step: float, limits: tuple[float, float]
+    task: PlacementProblem, azimuth: Floats, ball: int, step: float, limits: tuple[float, float]
 ) -> Floats:
     """Azimuths that a ball may have while the others stay, its present one first."""
     reach, far = limits
@@ -147,7 +147,7 @@ def _tried(
 def _count(wanted: Requests, azimuth: Floats, ball: int, place: float) -> int:
     moved = azimuth.copy()
     moved[ball] = place
-    return len(fewest(*_intervals(wanted, moved))[0])
+    return len(min_stabbing_points(*_intervals(wanted, moved))[0])
 
 
 def _intervals(wanted: Requests, azimuth: Floats) -> tuple[Floats, Floats]:
@@ -177,7 +177,7 @@ def _middles(exact: Floats, low: Floats, high: Floats) -> Floats:
 
     No stop lies outside of the swing that the first and the last mirror need.
     """
-    _, which = fewest(low, high)
+    _, which = min_stabbing_points(low, high)
     ends = [_each(np.minimum, exact, which), _each(np.maximum, exact, which)]
     least = np.maximum(_each(np.maximum, low, which), high.min())
     most = np.minimum(_each(np.minimum, high, which), low.max())

@@ -16,16 +16,16 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
 from tbcad.cad.solids import moved, one_solid, revolved
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.purchased import magnet_name
 from tbcad.prototype.drive.drive import Parts
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.placing import PlacedSolid
 
 WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # least material before the pocket
 
 
-def caps(base: Base, made: Prototype) -> list[Part]:
+def caps(base: BaseLayout, made: Prototype) -> list[PlacedSolid]:
     """A cap for each ball that is not bought, in its seat, its front up when it is printed.
 
     Raises:
@@ -34,24 +34,24 @@ def caps(base: Base, made: Prototype) -> list[Part]:
     return [_cap(base, made, k) for k in np.flatnonzero(made.balls.cap).tolist()]
 
 
-def _cap(base: Base, made: Prototype, k: int) -> Part:
+def _cap(base: BaseLayout, made: Prototype, k: int) -> PlacedSolid:
     seats, name = base.seats, f"cap_{k + 1}"
     line = _section(base, float(made.balls.radius[k]), float(made.balls.body_depth[k]), k)
     axes = seats.axes[k]
     shape = one_solid(name, moved(revolved(line), axes, seats.centre[k]))
     # Turned over, so that the front is up and the flat lies on the bed.
     over = axes.T @ np.diag([1.0, -1.0, -1.0])
-    return Part(name, shape, over, np.array([0, 0, flat(base, k)]) - seats.centre[k] @ over)
+    return PlacedSolid(name, shape, over, np.array([0, 0, flat(base, k)]) - seats.centre[k] @ over)
 
 
-def flat(base: Base, k: int) -> float:
+def flat(base: BaseLayout, k: int) -> float:
     """Distance of the flat behind the centre of the body, clear of the pads, mm."""
     seats = base.seats
     angle = seats.tilt - np.arcsin((seats.pad[k] + WEB_MM) / seats.radius[k])
     return float(seats.radius[k] * np.cos(angle))
 
 
-def pocket(base: Base, k: int, depth: float) -> tuple[float, float]:
+def pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
     """Radius and depth of the pocket for the cap's own magnet, mm; zeros where there is none.
 
     Args:
@@ -68,7 +68,7 @@ def pocket(base: Base, k: int, depth: float) -> tuple[float, float]:
     return max(fitting), keys.magnet_height_mm
 
 
-def magnets(base: Base, made: Prototype, parts: Parts) -> dict[str, int]:
+def magnets(base: BaseLayout, made: Prototype, parts: Parts) -> dict[str, int]:
     """Magnets in the caps' own pockets, by name.
 
     Raises:
@@ -79,7 +79,7 @@ def magnets(base: Base, made: Prototype, parts: Parts) -> dict[str, int]:
     return dict(Counter(magnet_name(base, 2 * r - play, parts) for r in radii if r))
 
 
-def _section(base: Base, front: float, depth: float, k: int) -> TopoDS_Face:
+def _section(base: BaseLayout, front: float, depth: float, k: int) -> TopoDS_Face:
     """Half section (x out, z along) in y = 0: front, body, flat, pocket."""
     body, behind = float(base.seats.radius[k]), flat(base, k)
     wide, deep = pocket(base, k, depth)

@@ -14,11 +14,11 @@ from tbcad.cad.checks import check_mesh, check_pads
 from tbcad.cad.glyphs import ROWS, relief, width
 from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, ring
 from tbcad.prototype.base import seat_solids as seat
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import room
-from tbcad.prototype.printing.placing import Part
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -55,7 +55,7 @@ class Row:
 Place = tuple[Row, Floats]
 
 
-def coupon(base: Base) -> list[Part]:
+def coupon(base: BaseLayout) -> list[PlacedSolid]:
     """Plates with a seat for each size and each offset of the pads, as few as the bed allows.
 
     Raises:
@@ -65,18 +65,18 @@ def coupon(base: Base) -> list[Part]:
     seats = replace(base.seats, back=base.seats.bottom + base.keys.floor_mm)
     plates = _plates(rows_of(seats, base.keys), base.keys)
     return [
-        Part(name, _plate(name, seats, base.keys, rows), np.eye(3), np.zeros(3))
+        PlacedSolid(name, _plate(name, seats, base.keys, rows), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
     ]
 
 
-def rows_of(seats: Seats, keys: Keys) -> list[Row]:
+def rows_of(seats: Seats, keys: BaseSpec) -> list[Row]:
     """A row for each size, the largest first."""
     sizes, first = np.unique(np.round(seats.radius, 6), return_index=True)
     return [_row(seats, keys, int(k)) for k in first[np.argsort(-sizes)]]
 
 
-def _row(seats: Seats, keys: Keys, k: int) -> Row:
+def _row(seats: Seats, keys: BaseSpec, k: int) -> Row:
     name = f"{2 * seats.radius[k]:.2f}".rstrip("0").rstrip(".")
     wide = 2 * float(seats.boss[k])
     signs = max(width(_sign(offset)) for offset in keys.coupon_offsets_mm)
@@ -86,7 +86,7 @@ def _row(seats: Seats, keys: Keys, k: int) -> Row:
     return Row(k, name, first, cell, (across, max(wide, _bar(keys)) + GAP_MM))
 
 
-def _bar(keys: Keys) -> float:
+def _bar(keys: BaseSpec) -> float:
     """Width of the bars, mm."""
     return keys.digit_mm + 2 * BESIDE_MM
 
@@ -96,7 +96,7 @@ def _sign(offset: float) -> str:
     return "0" if text in ("+0", "-0") else text
 
 
-def _plates(rows: Iterable[Row], keys: Keys) -> Iterator[list[list[Place]]]:
+def _plates(rows: Iterable[Row], keys: BaseSpec) -> Iterator[list[list[Place]]]:
     """Rows on shelves, shelves on plates, each with its left end on the shelf's middle line."""
     wide, deep = room(keys)[:2]
     shelves: list[list[Place]] = []
@@ -116,7 +116,7 @@ def _plates(rows: Iterable[Row], keys: Keys) -> Iterator[list[list[Place]]]:
     yield shelves
 
 
-def _check(row: Row, keys: Keys) -> None:
+def _check(row: Row, keys: BaseSpec) -> None:
     across, depth = row.size
     if (np.array(row.size) > room(keys)[:2]).any():
         raise SpecError(
@@ -125,7 +125,7 @@ def _check(row: Row, keys: Keys) -> None:
         )
 
 
-def _plate(name: str, seats: Seats, keys: Keys, shelves: list[list[Place]]) -> TopoDS_Solid:
+def _plate(name: str, seats: Seats, keys: BaseSpec, shelves: list[list[Place]]) -> TopoDS_Solid:
     bodies = _bars(keys, shelves)
     contacts, pads = [], []
     for row, left in (place for shelf in shelves for place in shelf):
@@ -142,7 +142,7 @@ def _plate(name: str, seats: Seats, keys: Keys, shelves: list[list[Place]]) -> T
     return solid
 
 
-def _bars(keys: Keys, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
+def _bars(keys: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
     """A bar under each shelf, and one at the left that joins them."""
     half, ends = _bar(keys) / 2, [shelf[-1][1][0] + shelf[-1][0].size[0] for shelf in shelves]
     middles = [float(shelf[0][1][1]) for shelf in shelves]
@@ -154,7 +154,7 @@ def _bars(keys: Keys, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
     return [*bars, _slab((0.0, low), (_bar(keys), high), keys)]
 
 
-def _slab(low: tuple[float, float], high: tuple[float, float], keys: Keys) -> TopoDS_Shape:
+def _slab(low: tuple[float, float], high: tuple[float, float], keys: BaseSpec) -> TopoDS_Shape:
     (a, b), (c, d) = low, high
     corners = np.array([[a, b, 0], [c, b, 0], [c, d, 0], [a, d, 0]], dtype=float)
     return prism(polygon(corners), np.array([0, 0, OF_FLOOR * keys.floor_mm]))
@@ -167,12 +167,12 @@ def _middle(row: Row, left: Floats, n: int, seats: Seats) -> Floats:
     return middle
 
 
-def _seat(seats: Seats, keys: Keys, k: int, offset: float) -> TopoDS_Shape:
+def _seat(seats: Seats, keys: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
     """A seat in its own frame."""
     return cut(ring(_wall(seats, keys, k), 0.0, 2 * np.pi), [seat.hollow(seats, k, offset)])
 
 
-def _wall(seats: Seats, keys: Keys, k: int) -> Floats:
+def _wall(seats: Seats, keys: BaseSpec, k: int) -> Floats:
     """Half section (z, r) of what a hollow is cut out of, (n, 2)."""
     front, back, boss = float(seats.front[k]), float(seats.back[k]), float(seats.boss[k])
     # On the cone, tangent to the sphere round the cup, z + r is this.
@@ -183,7 +183,7 @@ def _wall(seats: Seats, keys: Keys, k: int) -> Floats:
     return np.array([[front, 0.0], [front, boss], *slope, *end, [back, 0.0]])
 
 
-def _texts(row: Row, keys: Keys, left: Floats) -> list[TopoDS_Shape]:
+def _texts(row: Row, keys: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
     at = left + np.array([row.first / 2, 0.0])
     found = _text(row.name, keys, at)
@@ -195,6 +195,6 @@ def _texts(row: Row, keys: Keys, left: Floats) -> list[TopoDS_Shape]:
     return found
 
 
-def _text(text: str, keys: Keys, at: Floats) -> list[TopoDS_Shape]:
+def _text(text: str, keys: BaseSpec, at: Floats) -> list[TopoDS_Shape]:
     place = np.array([*at, OF_FLOOR * keys.floor_mm])
     return relief(text, keys.digit_mm, keys.relief_mm, SUNK_MM, np.eye(3), place)

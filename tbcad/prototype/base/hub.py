@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.spec.base_keys import Base as Keys
-from tbcad.spec.base_keys import Drive
+from tbcad.spec.base_keys import BaseSpec, Drive
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -82,7 +81,7 @@ class Hub:
     source: str
 
 
-def hub(keys: Keys, front: float) -> Hub:
+def hub(keys: BaseSpec, front: float) -> Hub:
     """The hub whose disc begins at z = front.
 
     Raises:
@@ -114,7 +113,7 @@ def hub(keys: Keys, front: float) -> Hub:
     )
 
 
-def _check(keys: Keys, pattern: Pattern, hole: float) -> None:
+def _check(keys: BaseSpec, pattern: Pattern, hole: float) -> None:
     least = 1.5
     most = pattern.circle - max(hole, pattern.head[0]) - 2 * least
     if keys.shaft_mm > most:

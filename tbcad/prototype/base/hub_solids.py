@@ -5,7 +5,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
 from tbcad.prototype.base.hub import SCREW_MM, SLIT_MM, Hub
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -22,7 +22,7 @@ def body(hub: Hub) -> list[TopoDS_Shape]:
     return [disc, cylinder(hub.face * UP, UP, hub.boss, hub.back - hub.face + THROUGH)]
 
 
-def holes(hub: Hub, keys: Keys) -> list[TopoDS_Shape]:
+def holes(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
     """Bore, the drive's holes, and those of the lock."""
     start, length = hub.face - THROUGH, hub.front - hub.face + 2 * THROUGH
     found = [cylinder(start * UP, UP, hub.bore, length)]
@@ -37,7 +37,7 @@ def holes(hub: Hub, keys: Keys) -> list[TopoDS_Shape]:
     return found + (locks[hub.lock](hub, keys) if hub.lock else [])
 
 
-def _set_screws(hub: Hub, keys: Keys) -> list[TopoDS_Shape]:
+def _set_screws(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
     found = []
     for turn in SCREWS.tolist():
         out = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -45,7 +45,7 @@ def _set_screws(hub: Hub, keys: Keys) -> list[TopoDS_Shape]:
     return found
 
 
-def _insert(at: Floats, out: Floats, end: float, keys: Keys) -> list[TopoDS_Shape]:
+def _insert(at: Floats, out: Floats, end: float, keys: BaseSpec) -> list[TopoDS_Shape]:
     """A screw's hole from a point outward, and the insert's hole at its end."""
     insert = at + (end + THROUGH) * out
     return [
@@ -54,7 +54,7 @@ def _insert(at: Floats, out: Floats, end: float, keys: Keys) -> list[TopoDS_Shap
     ]
 
 
-def _clamp(hub: Hub, keys: Keys) -> list[TopoDS_Shape]:
+def _clamp(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
     """A slit away from the ribs, and a screw across it."""
     half, far, top = SLIT_MM / 2, -hub.boss - THROUGH, hub.back - SLIT_MM
     corners = [[0, half], [far, half], [far, -half], [0, -half]]

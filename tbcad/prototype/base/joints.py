@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import offset, outside
 from tbcad.prototype.base.screws import access, sizes
 from tbcad.types import Bools, Floats
@@ -61,7 +61,7 @@ class Joint:
     labels: Floats
 
 
-def profile(base: Base) -> Floats:
+def profile(base: BaseLayout) -> Floats:
     """Cross-section of the flanges, from within the wall, (z, r), mm, (n, 2).
 
     It begins off the hub and ends before the wall does.
@@ -72,12 +72,12 @@ def profile(base: Base) -> Floats:
     return np.vstack([line, offset(line, height)[::-1]])
 
 
-def _top(base: Base) -> Floats:
+def _top(base: BaseLayout) -> Floats:
     return offset(base.inner, base.keys.thickness_mm + base.keys.joint_height_mm)
 
 
 def holes(
-    base: Base, plane: Plane, within: Floats, others: Sequence[tuple[Plane, Floats]]
+    base: BaseLayout, plane: Plane, within: Floats, others: Sequence[tuple[Plane, Floats]]
 ) -> Joint | None:
     """Dowels, screws and numbers of a joint, or None where they have no room.
 
@@ -126,7 +126,7 @@ def _label(room: "_Room", side: int, taken: Floats, free: float) -> Floats:
 
 @dataclass(frozen=True)
 class _Room:
-    base: Base
+    base: BaseLayout
     plane: Plane
     within: Floats
     others: Sequence[tuple[Plane, Floats]]

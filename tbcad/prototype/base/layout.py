@@ -24,7 +24,7 @@ from tbcad.prototype.base.profile import (
     trimmed,
 )
 from tbcad.prototype.base.seats import Seats, seats
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -44,7 +44,7 @@ LOWER_MM = 0.6  # rings than ribs, whose tops would touch their cones along a li
 
 
 @dataclass(frozen=True)
-class Base:
+class BaseLayout:
     """What the carrier is made of, in the ellipsoid's frame unless said otherwise.
 
     Attributes:
@@ -60,7 +60,7 @@ class Base:
         seats: one for each ball, in the frame of the shell.
     """
 
-    keys: Keys
+    keys: BaseSpec
     frame: Floats
     light: Light
     inner: Floats
@@ -106,7 +106,7 @@ class Base:
         return float(np.abs(self.sector).max() + swing / 2)
 
 
-def base(keys: Keys, made: Prototype) -> Base:
+def base(keys: BaseSpec, made: Prototype) -> BaseLayout:
     """The base for a prototype's balls.
 
     Raises:
@@ -118,7 +118,7 @@ def base(keys: Keys, made: Prototype) -> Base:
     nose = float(behind.pinhole / 2 - behind.level / 2)
     held = hub(keys, nose - keys.light_clearance_mm)
     inner, sector = _inner(keys, seat, frame, behind, held), _sector(keys, seat, made)
-    return Base(
+    return BaseLayout(
         keys=keys,
         frame=frame,
         light=behind,
@@ -132,7 +132,7 @@ def base(keys: Keys, made: Prototype) -> Base:
     )
 
 
-def _light(keys: Keys, made: Prototype) -> Light:
+def _light(keys: BaseSpec, made: Prototype) -> Light:
     """The level of all light with its margins.
 
     On a sphere about a point the sum of distances is at most that at the point plus the diameter.
@@ -173,7 +173,7 @@ def _plane(points: Floats) -> Floats:
     return np.stack([points[..., 0], norm(points[..., 1:])], axis=-1)
 
 
-def _inner(keys: Keys, seat: Seats, frame: Floats, behind: Light, held: Hub) -> Floats:
+def _inner(keys: BaseSpec, seat: Seats, frame: Floats, behind: Light, held: Hub) -> Floats:
     """The wall's inner line: round the light, from the hub's rim to beyond the last boss.
 
     It lies behind the fronts of all bosses, and so deep at each that the ribs end where it does.
@@ -201,7 +201,7 @@ def _end(seat: Seats, frame: Floats) -> float:
     return float((np.maximum(tops, fronts) + wide).max() + EDGE_MM)
 
 
-def _sector(keys: Keys, seat: Seats, made: Prototype) -> tuple[float, float]:
+def _sector(keys: BaseSpec, seat: Seats, made: Prototype) -> tuple[float, float]:
     """Azimuths between which the wall carries all bosses and has room for the edges' ribs."""
     azimuth = made.placement.azimuth
     out = _plane((seat.centre + seat.front[:, None] * seat.axis) @ made.half.ellipsoid.frame().T)
@@ -221,7 +221,7 @@ def _sector(keys: Keys, seat: Seats, made: Prototype) -> tuple[float, float]:
     return low, high
 
 
-def _ribs(keys: Keys, seat: Seats, made: Prototype, sector: tuple[float, float]) -> Floats:
+def _ribs(keys: BaseSpec, seat: Seats, made: Prototype, sector: tuple[float, float]) -> Floats:
     """Azimuths of the ribs: both edges, and between them where they meet bosses least."""
     even = np.linspace(*sector, keys.ribs)
     step = even[1] - even[0]
@@ -235,7 +235,7 @@ def _ribs(keys: Keys, seat: Seats, made: Prototype, sector: tuple[float, float])
     return np.array([sector[0], *inner, sector[1]])
 
 
-def _outline(keys: Keys, inner: Floats, held: Hub) -> Floats:
+def _outline(keys: BaseSpec, inner: Floats, held: Hub) -> Floats:
     """Outer line of the ribs, from the hub's outer end, so that they are its gussets."""
     line = offset(inner, keys.thickness_mm + keys.rib_height_mm)
     radius = held.boss or held.disc
@@ -243,7 +243,7 @@ def _outline(keys: Keys, inner: Floats, held: Hub) -> Floats:
     return shortened(hull(np.vstack([[corner], line[line[:, 0] > corner[0]]])), BACK_MM)
 
 
-def _rings(keys: Keys, inner: Floats) -> tuple[Floats, ...]:
+def _rings(keys: BaseSpec, inner: Floats) -> tuple[Floats, ...]:
     """Cross-sections of the ring ribs at even distances along the wall, the last at its end."""
     length = np.concatenate([[0.0], np.cumsum(norm(np.diff(inner, axis=0)))])
     at = (length[-1] - BACK_MM / 2) * np.arange(1, keys.rings + 1) / keys.rings
@@ -265,7 +265,7 @@ def _rings(keys: Keys, inner: Floats) -> tuple[Floats, ...]:
     )
 
 
-def _standing_out(keys: Keys, seat: Seats, frame: Floats, outer: Floats) -> Seats:
+def _standing_out(keys: BaseSpec, seat: Seats, frame: Floats, outer: Floats) -> Seats:
     """The seats with bosses so long that their ends stand out of the wall.
 
     Beside its meridian a boss is only farther from the axis, so the ends' points on it decide.

@@ -2,10 +2,10 @@
 
 from collections import Counter
 
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import sizes
 from tbcad.prototype.base.split import Split, split
-from tbcad.prototype.drive.drive import Part, load_parts
+from tbcad.prototype.drive.drive import PurchasedPart, load_parts
 from tbcad.spec.errors import SpecError
 
 # In the hub: set screws, or the one screw of the clamp.
@@ -13,7 +13,7 @@ LOCKS = {"set-screws": 2, "clamp": 1}
 PLAY_MM = 1e-6
 
 
-def bought(base: Base, plan: Split | None = None) -> dict[str, int]:
+def bought(base: BaseLayout, plan: Split | None = None) -> dict[str, int]:
     """Purchased parts of the base, without balls and without what bolts the drive to it.
 
     Args:
@@ -30,7 +30,7 @@ def bought(base: Base, plan: Split | None = None) -> dict[str, int]:
     return dict(sorted(found.items()))
 
 
-def magnets(base: Base) -> dict[str, int]:
+def magnets(base: BaseLayout) -> dict[str, int]:
     """Magnets behind the balls, by name; those in caps are not among them.
 
     Raises:
@@ -40,7 +40,7 @@ def magnets(base: Base) -> dict[str, int]:
     return dict(Counter(magnet_name(base, size, parts) for size in sizes_mm if size > 0))
 
 
-def fasteners(base: Base, plan: Split) -> dict[str, int]:
+def fasteners(base: BaseLayout, plan: Split) -> dict[str, int]:
     """Screws, inserts and dowels of hub and joints, by name.
 
     Raises:
@@ -55,7 +55,7 @@ def fasteners(base: Base, plan: Split) -> dict[str, int]:
     return {name: count for name, count in found.items() if count}
 
 
-def magnet_name(base: Base, size: float, parts: dict[str, Part]) -> str:
+def magnet_name(base: BaseLayout, size: float, parts: dict[str, PurchasedPart]) -> str:
     """Name of the disc magnet of a diameter (mm) and of the spec's height.
 
     Raises:
@@ -75,7 +75,7 @@ def _same(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return all(abs(a - b) < PLAY_MM for a, b in zip(one, other, strict=True))
 
 
-def _hub(base: Base, parts: dict[str, Part]) -> dict[str, int]:
+def _hub(base: BaseLayout, parts: dict[str, PurchasedPart]) -> dict[str, int]:
     """Inserts of the drive's holes and of the lock, and the lock's screws."""
     held, keys = base.hub, base.keys
     found: Counter[str] = Counter()
@@ -92,13 +92,13 @@ def _hub(base: Base, parts: dict[str, Part]) -> dict[str, int]:
     return dict(found)
 
 
-def _across(base: Base) -> float:
+def _across(base: BaseLayout) -> float:
     """Length of the clamp's screw hole, mm."""
     held = base.hub
     return float(2 * (held.boss**2 - ((held.bore + held.boss) / 2) ** 2) ** 0.5)
 
 
-def _screw(kind: str, room: float, parts: dict[str, Part]) -> str:
+def _screw(kind: str, room: float, parts: dict[str, PurchasedPart]) -> str:
     """The longest M3 screw no longer than a length (mm)."""
     fit = [
         part
@@ -110,7 +110,7 @@ def _screw(kind: str, room: float, parts: dict[str, Part]) -> str:
     return max(fit, key=lambda part: part.sizes[1]).name
 
 
-def _insert(base: Base, parts: dict[str, Part]) -> str:
+def _insert(base: BaseLayout, parts: dict[str, PurchasedPart]) -> str:
     """The longest M3 insert that the holes of the spec take."""
     keys = base.keys
     fit = [

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from tbcad.prototype.drive.drive import Part, load_parts
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.drive.drive import PurchasedPart, load_parts
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 
 FLOOR_MM = 1.0  # below holes
@@ -22,7 +22,7 @@ class Sizes:
     head: float
 
 
-def sizes(keys: Keys) -> Sizes:
+def sizes(keys: BaseSpec) -> Sizes:
     """The longest dowel and the shortest M3 screw for the flanges' thickness.
 
     Raises:
@@ -50,11 +50,11 @@ def sizes(keys: Keys) -> Sizes:
     return Sizes(pin.name, pin.sizes[1] / 2 + BEYOND_MM, screw.name, screw.sizes[2])
 
 
-def _is(part: Part, size: float) -> bool:
+def _is(part: PurchasedPart, size: float) -> bool:
     return abs(part.sizes[0] - size) < 1e-9
 
 
-def _check_insert(keys: Keys) -> None:
+def _check_insert(keys: BaseSpec) -> None:
     if keys.joint_mm < keys.insert_depth_mm + FLOOR_MM:
         raise SpecError(
             f"flanges of {keys.joint_mm:g} mm are too thin for inserts: make "

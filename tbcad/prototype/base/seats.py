@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -88,7 +88,7 @@ class Seats:
         return self.centre[:, None] - self.radius[:, None, None] * self.pad_normals
 
 
-def seats(keys: Keys, made: Prototype) -> Seats:
+def seats(keys: BaseSpec, made: Prototype) -> Seats:
     """One seat for each body of the prototype.
 
     Raises:
@@ -138,7 +138,7 @@ def _front(radius: Floats, pad: Floats, tilt: float) -> Floats:
     return result
 
 
-def _check_cups(keys: Keys, radius: Floats, pad: Floats, front: Floats) -> None:
+def _check_cups(keys: BaseSpec, radius: Floats, pad: Floats, front: Floats) -> None:
     if (shut := front < 0).any():
         raise SpecError(
             f"the cup of ball {_first(shut)} would close round it: make "
@@ -154,7 +154,7 @@ def _check_cups(keys: Keys, radius: Floats, pad: Floats, front: Floats) -> None:
         )
 
 
-def _pockets(keys: Keys, radius: Floats, pad: Floats, tilt: float) -> tuple[Floats, Floats]:
+def _pockets(keys: BaseSpec, radius: Floats, pad: Floats, tilt: float) -> tuple[Floats, Floats]:
     """Magnets and radii of pockets, both (k,)."""
     room = radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
     if keys.hold == "glue":

@@ -12,11 +12,11 @@ from tbcad.cad.solids import cut, fused, polygon, prism, ring, volume_by_meshes
 from tbcad.prototype.base import hub_solids as hubs
 from tbcad.prototype.base import seat_solids as seat
 from tbcad.prototype.base.gaps import arcs, gaps
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import Split, downs, split
 from tbcad.prototype.base.split_solids import flanges, numbers, pieces, windows
-from tbcad.prototype.printing.placing import Part, laid
+from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.shell.solid import InvalidSolidError
 from tbcad.types import Floats
 
@@ -29,7 +29,7 @@ ROOT = 0.6
 LABEL_ROOM = 0.85  # of a boss's end
 
 
-def carrier(base: Base, plan: Split | None = None) -> list[Part]:
+def carrier(base: BaseLayout, plan: Split | None = None) -> list[PlacedSolid]:
     """The carrier laid on the bed: in one piece where it fits, else in as few as can be.
 
     Args:
@@ -44,10 +44,10 @@ def carrier(base: Base, plan: Split | None = None) -> list[Part]:
     solid = whole(base, plan)
     if plan.joints:
         return pieces(base, plan, solid)
-    return [laid("carrier", solid, downs(base, plan.pieces[0]), base.axes, base.keys)]
+    return [placed_on_bed("carrier", solid, downs(base, plan.pieces[0]), base.axes, base.keys)]
 
 
-def whole(base: Base, plan: Split | None = None) -> TopoDS_Solid:
+def whole(base: BaseLayout, plan: Split | None = None) -> TopoDS_Solid:
     """The carrier before it is cut up, about z, with the flanges of its joints.
 
     Raises:
@@ -67,7 +67,7 @@ def whole(base: Base, plan: Split | None = None) -> TopoDS_Solid:
     raise faults[0]
 
 
-def bodies(base: Base, seats: Seats, plan: Split | None = None) -> list[TopoDS_Shape]:
+def bodies(base: BaseLayout, seats: Seats, plan: Split | None = None) -> list[TopoDS_Shape]:
     """What the carrier is the union of."""
     plan = plan or Split((np.zeros((0, 4)),), ())
     labels = numbers(base, plan)
@@ -76,7 +76,7 @@ def bodies(base: Base, seats: Seats, plan: Split | None = None) -> list[TopoDS_S
     return [_wall(base), *_struts(base, plan), *hubs.body(base.hub), *bosses, *labels]
 
 
-def tools(base: Base, seats: Seats) -> list[TopoDS_Shape]:
+def tools(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: cups with their pockets, ways of the balls, holes."""
     own = [(seat.hollow(seats, k), k) for k in range(len(seats))]
     own += [(seat.way(seats, k), k) for k in range(len(seats))]
@@ -84,12 +84,12 @@ def tools(base: Base, seats: Seats) -> list[TopoDS_Shape]:
     return [*placed, *hubs.holes(base.hub, base.keys)]
 
 
-def _wall(base: Base) -> TopoDS_Shape:
+def _wall(base: BaseLayout) -> TopoDS_Shape:
     low, high = base.sector
     return ring(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
 
 
-def _struts(base: Base, plan: Split) -> list[TopoDS_Shape]:
+def _struts(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     """Ribs, rings and flanges, left out where numbers are read."""
     low, high = base.sector
     # Their ends lie within the ribs at the edges, not in a plane with other faces.
@@ -105,12 +105,12 @@ def _struts(base: Base, plan: Split) -> list[TopoDS_Shape]:
     return [cut(fused([*struts, *joints]), [*_ends(base), *windows(base, plan)])]
 
 
-def _ends(base: Base) -> list[TopoDS_Shape]:
+def _ends(base: BaseLayout) -> list[TopoDS_Shape]:
     seats = base.own_seats
     return [seat.placed(seat.column(seats, k, COLUMN_MM), seats, k) for k in range(len(seats))]
 
 
-def _ribs(base: Base) -> list[TopoDS_Shape]:
+def _ribs(base: BaseLayout) -> list[TopoDS_Shape]:
     """Plates along meridians; those at the edges end with the wall."""
     section, thick = _rib_section(base), base.keys.rib_mm
     sides = np.full(len(base.ribs), -0.5)
@@ -128,7 +128,7 @@ def _ribs(base: Base) -> list[TopoDS_Shape]:
     ]
 
 
-def _rib_section(base: Base) -> Floats:
+def _rib_section(base: BaseLayout) -> Floats:
     """Polygon (n, 2) of (z, r): from the middle of the wall to the ribs' outline."""
     held, middle = base.hub, base.middle
     reach = ROOT * (held.boss or held.disc)
@@ -147,7 +147,7 @@ def _plate(section: Floats, azimuth: float, thickness: float, side: float) -> To
     return prism(polygon(at), thickness * across)
 
 
-def _number(base: Base, seats: Seats, k: int) -> list[TopoDS_Shape]:
+def _number(base: BaseLayout, seats: Seats, k: int) -> list[TopoDS_Shape]:
     """The ball's number, from 1, on the end of its boss; its top is toward the camera."""
     text, room = str(k + 1), LABEL_ROOM * float(seats.boss[k])
     up, _, out = seats.axes[k]

@@ -16,10 +16,10 @@ from scipy.spatial import ConvexHull
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.base.joints import Joint, Plane, holes
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import offset
 from tbcad.prototype.base.screws import sizes
-from tbcad.prototype.printing.bed import as_text, lack, needed
+from tbcad.prototype.printing.bed import as_text, needed, shortfall
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
@@ -52,7 +52,7 @@ class Split:
         return low.index(True)
 
 
-def split(base: Base) -> Split:
+def split(base: BaseLayout) -> Split:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
     Raises:
@@ -71,7 +71,7 @@ def split(base: Base) -> Split:
     )
 
 
-def downs(base: Base, planes: Floats) -> list[Floats]:
+def downs(base: BaseLayout, planes: Floats) -> list[Floats]:
     """Directions of the carrier's own frame that may point down when a piece is printed.
 
     Args:
@@ -109,7 +109,7 @@ Tree = tuple[tuple[Floats, ...], tuple[Cut, ...]]
 
 @dataclass
 class _Search:
-    base: Base
+    base: BaseLayout
     cuts: dict[bytes, list[tuple[float, Plane]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -153,7 +153,7 @@ class _Search:
 
     def lack(self, piece: Floats) -> float:
         """By how much the bed is too small for a piece, mm; 0 or less: it fits."""
-        return lack(self._corners(piece), downs(self.base, piece), self.base.keys)
+        return shortfall(self._corners(piece), downs(self.base, piece), self.base.keys)
 
     def least_bed(self) -> Floats:
         """The bed that the best cut into two needs, or the base as a whole, mm, (3,)."""
@@ -241,7 +241,7 @@ def _half_sphere(count: int) -> Floats:
     return np.stack([share, side * np.cos(turn), side * np.sin(turn)], axis=1)
 
 
-def _bodies(base: Base) -> _Bodies:
+def _bodies(base: BaseLayout) -> _Bodies:
     """Bosses with their numbers, and last the hub."""
     seats, hub = base.own_seats, base.hub
     start = seats.centre + seats.front[:, None] * seats.axis
@@ -254,7 +254,7 @@ def _bodies(base: Base) -> _Bodies:
     )
 
 
-def _clouds(base: Base) -> tuple[Floats, Floats, Floats]:
+def _clouds(base: BaseLayout) -> tuple[Floats, Floats, Floats]:
     """The wall's middle (a, p, 3), points round all of the base (c, 3), tops of flanges (t, 3)."""
     keys = base.keys
     count = int(np.ceil((base.sector[1] - base.sector[0]) / STEP)) + 1

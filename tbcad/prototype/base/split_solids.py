@@ -12,10 +12,10 @@ from tbcad.cad.solids import common, cut, cylinder, polygon, prism, ring, volume
 from tbcad.geometry.vectors import unit
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import ACCESS_MM, LABEL_MM, Joint, profile
-from tbcad.prototype.base.layout import Base
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import access, sizes
 from tbcad.prototype.base.split import Split, downs
-from tbcad.prototype.printing.placing import Part, laid
+from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 
 FAR_MM = 2000.0
@@ -26,12 +26,12 @@ SUNK_MM = 0.4
 LABEL_ROOM = 0.95
 
 
-def flanges(base: Base, plan: Split) -> list[TopoDS_Shape]:
+def flanges(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     """Both flanges of each joint in one."""
     return [_flange(base, joint) for joint in plan.joints]
 
 
-def _flange(base: Base, joint: Joint) -> TopoDS_Shape:
+def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
     low, high = base.sector
     # Its ends lie within the ribs at the edges.
     inside = 0.7 * base.keys.rib_mm / float(base.inner[:, 1].max())
@@ -54,7 +54,7 @@ def _beyond(row: Floats) -> TopoDS_Shape:
     return prism(_square(row[:3], float(row[3])), FAR_MM * row[:3])
 
 
-def numbers(base: Base, plan: Split) -> list[TopoDS_Shape]:
+def numbers(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     """The number of the piece, from 1, on the outer face of each of its flanges."""
     return [
         solid
@@ -64,7 +64,7 @@ def numbers(base: Base, plan: Split) -> list[TopoDS_Shape]:
     ]
 
 
-def windows(base: Base, plan: Split) -> list[TopoDS_Shape]:
+def windows(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     """What ribs and rings leave free over these numbers."""
     return [
         cylinder(place + (base.keys.joint_mm - SPOT_MM) * out, out, LABEL_MM, ACCESS_MM)
@@ -73,7 +73,7 @@ def windows(base: Base, plan: Split) -> list[TopoDS_Shape]:
     ]
 
 
-def _number(base: Base, plan: Split, out: Floats, place: Floats) -> list[TopoDS_Shape]:
+def _number(base: BaseLayout, plan: Split, out: Floats, place: Floats) -> list[TopoDS_Shape]:
     """A number whose top points away from the axis."""
     at = place + base.keys.joint_mm * out
     away = at * [1.0, 1.0, 0.0]
@@ -84,7 +84,7 @@ def _number(base: Base, plan: Split, out: Floats, place: Floats) -> list[TopoDS_
     return relief(text, height, base.keys.relief_mm, SUNK_MM, axes, at)
 
 
-def pieces(base: Base, plan: Split, whole: TopoDS_Solid) -> list[Part]:
+def pieces(base: BaseLayout, plan: Split, whole: TopoDS_Solid) -> list[PlacedSolid]:
     """The pieces laid on the bed.
 
     Args:
@@ -97,7 +97,7 @@ def pieces(base: Base, plan: Split, whole: TopoDS_Solid) -> list[Part]:
         InvalidSolidError: when the kernel fails.
     """
     return [
-        laid(
+        placed_on_bed(
             f"carrier_{n + 1}",
             _piece(base, plan, n, whole),
             downs(base, planes),
@@ -108,7 +108,7 @@ def pieces(base: Base, plan: Split, whole: TopoDS_Solid) -> list[Part]:
     ]
 
 
-def _piece(base: Base, plan: Split, n: int, whole: TopoDS_Solid) -> TopoDS_Solid:
+def _piece(base: BaseLayout, plan: Split, n: int, whole: TopoDS_Solid) -> TopoDS_Solid:
     planes, tools = plan.pieces[n], holes(base, plan, n)
     expected = volume_by_cut_mesh(whole, planes, tools, FINE_MM)
     shape = cut(whole, [*(_beyond(row) for row in planes), *tools])
@@ -119,7 +119,7 @@ def _piece(base: Base, plan: Split, n: int, whole: TopoDS_Solid) -> TopoDS_Solid
     return checked(f"carrier_{n + 1}", shape, expected, contacts, pads)
 
 
-def holes(base: Base, plan: Split, n: int) -> list[TopoDS_Shape]:
+def holes(base: BaseLayout, plan: Split, n: int) -> list[TopoDS_Shape]:
     """What is cut out of a piece at its joints, from beyond the plane."""
     found = []
     for joint in plan.joints:
@@ -130,7 +130,7 @@ def holes(base: Base, plan: Split, n: int) -> list[TopoDS_Shape]:
     return found
 
 
-def _side(base: Base, joint: Joint, side: int) -> list[TopoDS_Shape]:
+def _side(base: BaseLayout, joint: Joint, side: int) -> list[TopoDS_Shape]:
     """Holes of a joint above (1) or below its plane (-1): dowels, inserts, screws, their heads."""
     keys, size, out = base.keys, sizes(base.keys), side * joint.plane.normal
     pin = keys.dowel_mm + (keys.dowel_slip_mm if side > 0 else keys.dowel_press_mm)

@@ -49,7 +49,7 @@ _LARGEST = 1e6
 
 
 @dataclass(frozen=True)
-class Part:
+class PurchasedPart:
     """A purchased part.
 
     Attributes:
@@ -75,7 +75,7 @@ class Part:
         return self.sizes[SIZES[self.kind].index(size)]
 
 
-Parts = dict[str, Part]
+Parts = dict[str, PurchasedPart]
 
 
 @dataclass(frozen=True)
@@ -93,15 +93,15 @@ class Drive:
     """
 
     name: str
-    motor: Part
-    pinion: Part | None
-    wheel: Part | None
-    belt: Part | None
-    coupling: Part | None
+    motor: PurchasedPart
+    pinion: PurchasedPart | None
+    wheel: PurchasedPart | None
+    belt: PurchasedPart | None
+    coupling: PurchasedPart | None
     efficiency: float
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[PurchasedPart, ...]:
         """All parts, one of each."""
         found = (self.motor, self.pinion, self.wheel, self.belt, self.coupling)
         return tuple(part for part in found if part)
@@ -144,7 +144,7 @@ class Drive:
         return centre_distance(length, pitch_diameter(self.pinion), pitch_diameter(self.wheel))
 
 
-def pitch_diameter(wheel: Part) -> float:
+def pitch_diameter(wheel: PurchasedPart) -> float:
     """Pitch diameter of a toothed wheel, mm."""
     return wheel["teeth"] * wheel["pitch_mm"] / math.pi
 
@@ -190,12 +190,14 @@ def load_parts(folder: Traversable | None = None) -> Parts:
     return parts
 
 
-def _part(where: str, kind: str, row: Row) -> Part:
+def _part(where: str, kind: str, row: Row) -> PurchasedPart:
     for column in ("part", "what", "material", "source"):
         if not row[column]:
             raise SpecError(f"{where}, column {column}: empty: fill it in")
     mass, *sizes = (_number(where, row, key) for key in ("mass_g", *SIZES[kind]))
-    return Part(kind, row["part"], row["what"], row["material"], mass, tuple(sizes), row["source"])
+    return PurchasedPart(
+        kind, row["part"], row["what"], row["material"], mass, tuple(sizes), row["source"]
+    )
 
 
 def load_drives(parts: Parts, folder: Traversable | None = None) -> tuple[Drive, ...]:
@@ -219,7 +221,7 @@ def _drive(where: str, row: Row, parts: Parts) -> Drive:
     return Drive(row["drive"], motor, pinion, wheel, belt, found["coupling"], efficiency)
 
 
-def _named(where: str, row: Row, column: str, parts: Parts) -> Part | None:
+def _named(where: str, row: Row, column: str, parts: Parts) -> PurchasedPart | None:
     if not row[column]:
         return None
     part = parts.get(row[column])

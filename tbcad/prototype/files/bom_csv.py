@@ -8,10 +8,10 @@ import numpy as np
 
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.drive.balance import Balance, cap_volume
-from tbcad.prototype.drive.drive import Drive, Part, Parts
+from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.files.balls_csv import Row, Value, write_table
 from tbcad.spec.errors import SpecError, shown
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 
 COLUMNS = (
     *("item", "quantity", "part", "what", "material", "mass_g", "total_mass_g"),
@@ -90,7 +90,7 @@ def write_bom(path: Path, records: list[Row]) -> None:
 
 
 def drive_record(
-    summed: Balance, drive: Drive, motion: Motion, swing: tuple[float, float], radius: float
+    summed: Balance, drive: Drive, motion: MotionSpec, swing: tuple[float, float], radius: float
 ) -> dict[str, Value | list[float]]:
     """What the drive must bear and does, for design.json.
 
@@ -129,7 +129,7 @@ def _values(quantity: int, name: str, what: str, material: str, mass: float) -> 
     return [quantity, name, what, material, mass, quantity * mass]
 
 
-def _bought(part: Part, quantity: int) -> list[Value]:
+def _bought(part: PurchasedPart, quantity: int) -> list[Value]:
     what = _values(quantity, part.name, part.what, part.material, part.mass_g)
     return [*what, None, BOUGHT]
 

@@ -3,13 +3,13 @@
 from pathlib import Path
 
 from tbcad.prototype.files.balls_csv import Row, write_table
-from tbcad.prototype.frame.layout import FrameNumbers
+from tbcad.prototype.frame.layout import FrameLayout
 
 COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 
 
-def rows(frame: FrameNumbers) -> list[Row]:
+def rows(frame: FrameLayout) -> list[Row]:
     """One record for each hole, numbered from 1.
 
     x runs along the plate, from the uprights to the camera, and y across it, both from the corner

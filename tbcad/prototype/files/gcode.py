@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tbcad.prototype.balls.layout import Prototype
 from tbcad.prototype.drive.drive import Drive
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 from tbcad.types import Floats
 
 LONGEST = 79
@@ -42,7 +42,7 @@ class Run:
     mirrors: NDArray[np.int64]
 
 
-def run(made: Prototype, motion: Motion) -> Run:
+def run(made: Prototype, motion: MotionSpec) -> Run:
     """The stops, and where to begin so that play in the drive is taken up before the first.
 
     Raises:
@@ -67,7 +67,7 @@ def free(made: Prototype) -> tuple[float, float]:
     return low, min(float((task.ceiling - azimuth).min()), task.most / 2)
 
 
-def program(made: Prototype, drive: Drive, motion: Motion) -> list[str]:
+def program(made: Prototype, drive: Drive, motion: MotionSpec) -> list[str]:
     """Lines of the program, each shorter than 80 characters.
 
     Raises:
@@ -96,7 +96,7 @@ def write_program(path: Path, lines: list[str]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
-def minutes(todo: Run, motion: Motion) -> float:
+def minutes(todo: Run, motion: MotionSpec) -> float:
     """How long the program takes, without the pauses and without what people do."""
     way = 2 * (float(todo.angle[-1]) - todo.start) * 2
     rest = motion.settle_s
@@ -105,7 +105,7 @@ def minutes(todo: Run, motion: Motion) -> float:
     return way / motion.feed_deg_min + 2 * len(todo.angle) * rest / 60
 
 
-def _header(todo: Run, drive: Drive, motion: Motion) -> Iterator[str]:
+def _header(todo: Run, drive: Drive, motion: MotionSpec) -> Iterator[str]:
     number = SETTING[motion.axis]
     yield f"(rotation plan: {len(todo.angle)} stops, twice, about {minutes(todo, motion):.0f} min)"
     yield f"({drive.name}, {drive.motor.name}, {drive.ratio:g} turns of the motor a turn)"
@@ -118,7 +118,7 @@ def _header(todo: Run, drive: Drive, motion: Motion) -> Iterator[str]:
         yield "(the camera's release is a relay on the coolant output)"
 
 
-def _photographs(todo: Run, motion: Motion) -> Iterator[str]:
+def _photographs(todo: Run, motion: MotionSpec) -> Iterator[str]:
     """One run through all stops, from below."""
     yield f"G1 {_place(todo.start, motion)} F{motion.feed_deg_min:g}"
     stops = zip(todo.angle.tolist(), todo.mirrors.tolist(), strict=True)
@@ -128,7 +128,7 @@ def _photographs(todo: Run, motion: Motion) -> Iterator[str]:
         yield from _photograph(stop, motion)
 
 
-def _photograph(stop: int, motion: Motion) -> Iterator[str]:
+def _photograph(stop: int, motion: MotionSpec) -> Iterator[str]:
     if motion.settle_s:
         yield _dwell(motion.settle_s)
     if motion.trigger == "pause":
@@ -145,7 +145,7 @@ def _dwell(seconds: float) -> str:
     return f"G4 P{seconds:.3f}"
 
 
-def _place(angle: float, motion: Motion) -> str:
+def _place(angle: float, motion: MotionSpec) -> str:
     """The axis' word for an angle in degrees, cut toward zero so that no limit is passed."""
     scale = 10**DECIMALS
     return f"{motion.axis}{math.trunc(angle * scale) / scale + 0.0:.{DECIMALS}f}"

@@ -6,18 +6,18 @@ from typing import Any
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
-from tbcad.prototype.printing.parts import Piece, printed
+from tbcad.prototype.printing.parts import PrintedPart, printed
 from tbcad.shell.solid import Solid
 
 KINDS = ("step", "stl", "3mf")
 
 
-def files(piece: Piece) -> dict[str, str]:
+def files(piece: PrintedPart) -> dict[str, str]:
     """Names of a part's files by their kind."""
     return {kind: f"{piece.name}.{kind}" for kind in KINDS}
 
 
-def write_piece(folder: Path, piece: Piece, tolerance: float, pcurves: bool) -> None:
+def write_piece(folder: Path, piece: PrintedPart, tolerance: float, pcurves: bool) -> None:
     """Write a part's files.
 
     Args:
@@ -32,7 +32,7 @@ def write_piece(folder: Path, piece: Piece, tolerance: float, pcurves: bool) -> 
     write_3mf(folder / names["3mf"], piece.name, mesh)
 
 
-def record(piece: Piece) -> dict[str, Any]:
+def record(piece: PrintedPart) -> dict[str, Any]:
     """Record of a part for prototype.json; y = x @ axes + origin is a point on the bed."""
     part = piece.part
     return {

@@ -15,7 +15,7 @@ from tbcad.prototype.files.part_files import record, write_piece
 from tbcad.prototype.machine import Machine, machine
 from tbcad.prototype.stage.layout import leds
 from tbcad.spec.design import Spec
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 from tbcad.types import Progress
 
 SCHEMA = "tbcad-prototype/1"
@@ -96,7 +96,7 @@ def _choices(made: Prototype, spec: Spec) -> list[dict[str, Any]]:
     ]
 
 
-def _swing(built: Machine, motion: Motion) -> list[float]:
+def _swing(built: Machine, motion: MotionSpec) -> list[float]:
     """Base angles that the program drives between: it starts below the first stop."""
     todo = gcode.run(built.made, motion)
     angles = [todo.start, motion.home_deg, *todo.angle.tolist()]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Item, Prism, rod
-from tbcad.prototype.drive.drive import Part, Parts
+from tbcad.geometry.primitives import Body, Component, Prism, rod
+from tbcad.prototype.drive.drive import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -28,7 +28,7 @@ class Bracket:
         foot: corners of its foot on the plate, the same, (f, 2); none: it does not stand on it.
     """
 
-    item: Item
+    item: Component
     holes: Floats
     foot: Floats
 
@@ -63,7 +63,7 @@ def drilled(places: Sequence[Floats], along: Floats, diameter: float) -> list[Bo
 
 def fitting(
     parts: Parts, kind: str, key: str, hint: str, order: str = "length_mm", **sizes: float
-) -> Part:
+) -> PurchasedPart:
     """The shortest purchased part of a kind that is at least so large and else just so.
 
     Args:

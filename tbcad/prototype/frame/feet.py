@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Item, Rod, box, rod, slot
+from tbcad.geometry.primitives import Body, Component, Rod, box, rod, slot
 from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import View
-from tbcad.prototype.drive.drive import Part
+from tbcad.optics.camera import Camera
+from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     HOLES_MM,
@@ -16,10 +16,10 @@ from tbcad.prototype.frame.brackets import (
     slab,
     webs,
 )
-from tbcad.prototype.stage.layout import StageNumbers
+from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import Prototype as ProtoKeys
-from tbcad.spec.stage_keys import Frame as Keys
+from tbcad.spec.prototype import PrototypeSpec as ProtoKeys
+from tbcad.spec.stage_keys import FrameSpec
 from tbcad.types import Floats
 
 TALL_MM, DEEP_MM = 50.0, 48.0  # of the uprights' feet
@@ -36,7 +36,7 @@ FOOT_TRAVEL_MM = 10.0
 AXIAL_MM = 1e-6
 
 
-def upright_foot(keys: Keys, axes: Floats, face: float, side: int) -> Bracket:
+def upright_foot(keys: FrameSpec, axes: Floats, face: float, side: int) -> Bracket:
     """A foot on the front (side 1) or the back (side -1) of both uprights.
 
     Args:
@@ -70,7 +70,7 @@ def upright_foot(keys: Keys, axes: Floats, face: float, side: int) -> Bracket:
     removed = drilled(down, thick * axes[2], HOLES_MM[5.0])
     removed += drilled(sideways, side * thick * axes[0], HOLES_MM[5.0])
     name = "upright_foot_front" if side > 0 else "upright_foot_back"
-    item = Item(
+    item = Component(
         name,
         "foot of the uprights",
         tuple(added),
@@ -82,7 +82,7 @@ def upright_foot(keys: Keys, axes: Floats, face: float, side: int) -> Bracket:
     return Bracket(item, np.array([[out, y] for y in across]), foot)
 
 
-def stage_foot(keys: Keys, axes: Floats, stage: StageNumbers, insert: Part) -> Bracket:
+def stage_foot(keys: FrameSpec, axes: Floats, stage: StageLayout, insert: PurchasedPart) -> Bracket:
     """A clamp round the post, with a channel for the wires below."""
     low, radius = keys.floor_mm, stage.post + COLLAR_WALL_MM
     reach = max((radius + SCREW_HEAD_MM / 2 + 2) / np.sqrt(2), EAR_MM + SCREW_HEAD_MM / 2 + 1)
@@ -102,7 +102,7 @@ def stage_foot(keys: Keys, axes: Floats, stage: StageNumbers, insert: Part) -> B
     width, height = CHANNEL_MM[0] / 2, min(CHANNEL_MM[1], keys.flange_mm - 3)
     channel = np.array([-width, -half - 1, low - 1]), np.array([width, 0.0, low + height])
     removed.append(box(*channel, axes))
-    item = Item(
+    item = Component(
         "stage_foot",
         "clamp of the stage's post",
         added,
@@ -113,7 +113,9 @@ def stage_foot(keys: Keys, axes: Floats, stage: StageNumbers, insert: Part) -> B
     return Bracket(item, places, corners)
 
 
-def _clamp(axes: Floats, stage: StageNumbers, ear: float, top: float, insert: Part) -> list[Body]:
+def _clamp(
+    axes: Floats, stage: StageLayout, ear: float, top: float, insert: PurchasedPart
+) -> list[Body]:
     """Slit, screw's hole across it, and the insert's hole."""
     low = stage.foot + 1
     slit = np.array([0.0, -SLIT_MM / 2, low]), np.array([ear + 1, SLIT_MM / 2, top + 1])
@@ -127,7 +129,7 @@ def _clamp(axes: Floats, stage: StageNumbers, ear: float, top: float, insert: Pa
     ]
 
 
-def camera_bracket(keys: Keys, axes: Floats, own: ProtoKeys, view: View) -> Bracket:
+def camera_bracket(keys: FrameSpec, axes: Floats, own: ProtoKeys, view: Camera) -> Bracket:
     """A plate along the camera's axis, on its outer side, with a slot for its tripod thread.
 
     Raises:
@@ -166,7 +168,7 @@ def camera_bracket(keys: Keys, axes: Floats, own: ProtoKeys, view: View) -> Brac
         *webs(web, inner, keys.web_mm, axes),
     ]
     places = np.array([[x, y] for x in (start + 20, end - 14) for y in (9 - half, half - 9)])
-    item = Item(
+    item = Component(
         "camera_bracket",
         "bracket of the camera",
         tuple(added),
@@ -177,7 +179,7 @@ def camera_bracket(keys: Keys, axes: Floats, own: ProtoKeys, view: View) -> Brac
 
 
 def _camera_slot(
-    keys: Keys, axes: Floats, view: View, out: Floats, radius: float
+    keys: FrameSpec, axes: Floats, view: Camera, out: Floats, radius: float
 ) -> tuple[Body, ...]:
     away = out @ axes
     start = view.pinhole - keys.camera_screw_mm * view.forward + (radius - THROUGH_MM) * away
@@ -185,7 +187,7 @@ def _camera_slot(
     return slot(start, view.forward, keys.camera_travel_mm, HOLES_MM[6.35] / 2, depth)
 
 
-def _foot_slots(keys: Keys, axes: Floats, places: Floats) -> list[Body]:
+def _foot_slots(keys: FrameSpec, axes: Floats, places: Floats) -> list[Body]:
     depth = (keys.flange_mm + 2 * THROUGH_MM) * axes[2]
     found: list[Body] = []
     for place in places:
@@ -194,7 +196,7 @@ def _foot_slots(keys: Keys, axes: Floats, places: Floats) -> list[Body]:
     return found
 
 
-def _check_camera(keys: Keys, axes: Floats, own: ProtoKeys, view: View) -> None:
+def _check_camera(keys: FrameSpec, axes: Floats, own: ProtoKeys, view: Camera) -> None:
     if abs(float(view.forward @ axes[1])) > AXIAL_MM:
         raise SpecError(
             "the camera does not look along the plane of the frame, so there is no bracket for it: "

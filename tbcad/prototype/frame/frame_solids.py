@@ -2,13 +2,13 @@
 
 from OCP.TopoDS import TopoDS_Solid
 
-from tbcad.prototype.frame.layout import FrameNumbers
+from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.printing.item_solids import printed, solid
-from tbcad.prototype.printing.placing import Part
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.spec.base_keys import BaseSpec
 
 
-def parts(numbers: FrameNumbers, keys: Keys) -> list[Part]:
+def parts(numbers: FrameLayout, keys: BaseSpec) -> list[PlacedSolid]:
     """Head, feet, clamp and bracket, laid on the bed.
 
     Raises:
@@ -18,7 +18,7 @@ def parts(numbers: FrameNumbers, keys: Keys) -> list[Part]:
     return [printed(item, keys) for item in numbers.printed]
 
 
-def bought(numbers: FrameNumbers) -> list[tuple[str, TopoDS_Solid]]:
+def bought(numbers: FrameLayout) -> list[tuple[str, TopoDS_Solid]]:
     """Simple solids of plate, uprights, bearings, shaft, wheels, motor and camera, by name.
 
     Raises:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Item, box, rod, slot
-from tbcad.prototype.base.layout import Base
-from tbcad.prototype.drive.drive import Drive, Part, Parts
+from tbcad.geometry.primitives import Body, Component, box, rod, slot
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.frame.brackets import (
     HOLES_MM,
     SUNK_MM,
@@ -32,7 +32,7 @@ from tbcad.prototype.frame.purchased import (
     wheel_radius,
 )
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Frame as Keys
+from tbcad.spec.stage_keys import FrameSpec
 from tbcad.types import Floats
 
 GAP_MM = 3.0  # between what turns and the plate
@@ -63,19 +63,19 @@ class Head:
         screws: heights of its screws, mm.
     """
 
-    item: Item
-    bought: tuple[Item, ...]
+    item: Component
+    bought: tuple[Component, ...]
     front: float
     rear: float
     bearings: tuple[float, ...]
-    shaft: Part | None
+    shaft: PurchasedPart | None
     motor: float
     face: float
     top: float
     screws: tuple[float, float]
 
 
-def head(keys: Keys, base: Base, drive: Drive, axes: Floats, parts: Parts) -> Head:
+def head(keys: FrameSpec, base: BaseLayout, drive: Drive, axes: Floats, parts: Parts) -> Head:
     """The head for a drive.
 
     Args:
@@ -100,7 +100,7 @@ def head(keys: Keys, base: Base, drive: Drive, axes: Floats, parts: Parts) -> He
         added.append(along(base, plan.front - SUNK_MM, held.rear, held.tube))
         removed += _seats(keys, base, plan, held)
     w = base.frame[0]
-    item = Item(
+    item = Component(
         "bearing_head",
         "head with bearings and motor",
         tuple(added),
@@ -121,7 +121,7 @@ def head(keys: Keys, base: Base, drive: Drive, axes: Floats, parts: Parts) -> He
     )
 
 
-def _plan(keys: Keys, base: Base, drive: Drive) -> Plan:
+def _plan(keys: FrameSpec, base: BaseLayout, drive: Drive) -> Plan:
     reach, face = drive.centre_mm, base.hub.face
     if drive.wheel and drive.belt:
         travel = keys.belt_travel_mm / 2
@@ -144,7 +144,7 @@ def _plan(keys: Keys, base: Base, drive: Drive) -> Plan:
     return Plan(face - STAGE_MM, -half, max(half, REACH_MM), half)
 
 
-def _bearings(base: Base, plan: Plan, parts: Parts) -> Bearings:
+def _bearings(base: BaseLayout, plan: Plan, parts: Parts) -> Bearings:
     bore, key = base.keys.shaft_mm, "prototype.base.shaft_mm"
     hint = "set it to 8, 10 or 12, or add one to the list"
     bearing = fitting(parts, "bearings", key, hint, "width_mm", bore_mm=bore)
@@ -156,13 +156,13 @@ def _bearings(base: Base, plan: Plan, parts: Parts) -> Bearings:
     return Bearings(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + WALL_MM)
 
 
-def _plate(base: Base, plan: Plan) -> list[Body]:
+def _plate(base: BaseLayout, plan: Plan) -> list[Body]:
     low = np.array([plan.back, plan.low, -plan.half])
     return [box(low, np.array([plan.front, plan.high, plan.half]), base.frame)]
 
 
 def _flange(
-    keys: Keys, base: Base, plan: Plan, axes: Floats, at: tuple[float, float, float]
+    keys: FrameSpec, base: BaseLayout, plan: Plan, axes: Floats, at: tuple[float, float, float]
 ) -> list[Body]:
     face, low, top = at
     half = keys.uprights_mm / 2 + 10
@@ -179,14 +179,14 @@ def _flange(
     return [plate, *webs(corners, WEB_MM, keys.web_mm, axes)]
 
 
-def _screws(keys: Keys, axes: Floats, face: float, heights: tuple[float, float]) -> list[Body]:
+def _screws(keys: FrameSpec, axes: Floats, face: float, heights: tuple[float, float]) -> list[Body]:
     places = [
         np.array([face, side * keys.uprights_mm / 2, z]) @ axes for z in heights for side in (-1, 1)
     ]
     return drilled(places, keys.flange_mm * axes[0], HOLES_MM[5.0])
 
 
-def _seats(keys: Keys, base: Base, plan: Plan, held: Bearings) -> list[Body]:
+def _seats(keys: FrameSpec, base: BaseLayout, plan: Plan, held: Bearings) -> list[Body]:
     """Seats to either end, and between them a bore that leaves a shoulder."""
     width, outer = held.bearing["width_mm"], held.bearing["outer_mm"]
     seat, beyond = (outer + keys.bearing_fit_mm) / 2, held.rear - 2 * held.tube
@@ -197,7 +197,9 @@ def _seats(keys: Keys, base: Base, plan: Plan, held: Bearings) -> list[Body]:
     ]
 
 
-def _motor_holes(keys: Keys, base: Base, drive: Drive, plan: Plan, parts: Parts) -> list[Body]:
+def _motor_holes(
+    keys: FrameSpec, base: BaseLayout, drive: Drive, plan: Plan, parts: Parts
+) -> list[Body]:
     """Pilot and screws: slots along the plate for a belt, a window for a motor on the axis."""
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plan.back - THROUGH_MM
@@ -218,7 +220,9 @@ def _motor_holes(keys: Keys, base: Base, drive: Drive, plan: Plan, parts: Parts)
     return found
 
 
-def _circle(base: Base, start: float, depth: Floats, circle: float, hole: float) -> list[Body]:
+def _circle(
+    base: BaseLayout, start: float, depth: Floats, circle: float, hole: float
+) -> list[Body]:
     turn = np.pi / 4 + np.arange(4) * np.pi / 2
     places = circle / 2 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     at = [local(base, start, float(out), float(side)) for out, side in places]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Item, Rod, box
+from tbcad.geometry.primitives import Component, Rod, box
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.base.layout import Base
-from tbcad.prototype.drive.drive import Drive, Part, Parts
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
@@ -25,10 +25,10 @@ from tbcad.prototype.frame.feet import camera_bracket, stage_foot, upright_foot
 from tbcad.prototype.frame.head import Head, head
 from tbcad.prototype.frame.purchased import PLATE_MM
 from tbcad.prototype.keepout import Room, least
-from tbcad.prototype.stage.layout import StageNumbers
+from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import Prototype as Keys
-from tbcad.spec.stage_keys import Frame as FrameKeys
+from tbcad.spec.prototype import PrototypeSpec
+from tbcad.spec.stage_keys import FrameSpec as FrameKeys
 from tbcad.types import Floats
 
 ROUND_MM = 10.0  # plate beyond the brackets' feet
@@ -41,7 +41,7 @@ HELD = ("rotary_stage",)  # the hub is bolted on it
 
 
 @dataclass(frozen=True)
-class FrameNumbers:
+class FrameLayout:
     """The frame, in the frame of the shell.
 
     Attributes:
@@ -62,13 +62,13 @@ class FrameNumbers:
 
     axes: Floats
     head: Head
-    printed: tuple[Item, ...]
-    bought: tuple[Item, ...]
+    printed: tuple[Component, ...]
+    bought: tuple[Component, ...]
     holes: Floats
     holds: tuple[str, ...]
     corner: Floats
-    plate: Part
-    upright: Part
+    plate: PurchasedPart
+    upright: PurchasedPart
     length: float
     screws: dict[str, int]
     light: dict[str, float]
@@ -76,14 +76,14 @@ class FrameNumbers:
 
 
 def frame(
-    spec: tuple[FrameKeys, Keys],
+    spec: tuple[FrameKeys, PrototypeSpec],
     made: Prototype,
-    base: Base,
-    stage: StageNumbers,
+    base: BaseLayout,
+    stage: StageLayout,
     drive: Drive,
     space: Room,
     parts: Parts,
-) -> FrameNumbers:
+) -> FrameLayout:
     """The frame round a base and a stage.
 
     Args:
@@ -107,7 +107,7 @@ def frame(
     bought = (ground, *bars, *top.bought, *_camera(own, made))
     printed = (top.item, *(bracket.item for bracket in brackets))
     light, swept = _clear(keys, (*printed, *bought), space)
-    return FrameNumbers(
+    return FrameLayout(
         axes=axes,
         head=top,
         printed=printed,
@@ -124,7 +124,7 @@ def frame(
     )
 
 
-def bought_parts(numbers: FrameNumbers, stage: StageNumbers) -> dict[str, int]:
+def bought_parts(numbers: FrameLayout, stage: StageLayout) -> dict[str, int]:
     """Quantity of purchased parts of stage and frame by name, without the drive and the LEDs."""
     kinds = ("bearing_front", "bearing_rear", "collar", "shaft")
     found = Counter(item.part for item in numbers.bought if item.name in kinds and item.part)
@@ -136,10 +136,10 @@ def bought_parts(numbers: FrameNumbers, stage: StageNumbers) -> dict[str, int]:
 
 def _brackets(
     keys: FrameKeys,
-    own: Keys,
+    own: PrototypeSpec,
     made: Prototype,
     axes: Floats,
-    stage: StageNumbers,
+    stage: StageLayout,
     top: Head,
     parts: Parts,
 ) -> list[Bracket]:
@@ -152,7 +152,7 @@ def _brackets(
 
 def _uprights(
     keys: FrameKeys, axes: Floats, top: Head, parts: Parts
-) -> tuple[Part, float, list[Item]]:
+) -> tuple[PurchasedPart, float, list[Component]]:
     """Part and length of the uprights, and their bodies."""
     length = top.top - keys.floor_mm
     hint = "make prototype.frame.floor_mm greater, or add a longer one"
@@ -163,13 +163,13 @@ def _uprights(
         low = np.array([top.face - EXTRUSION_MM, y - half, keys.floor_mm])
         body = box(low, np.array([top.face, y + half, top.top]), axes)
         what = f"{part.what}, cut to {length:.1f} mm"
-        items.append(Item(name, what, (body,), part=part.name))
+        items.append(Component(name, what, (body,), part=part.name))
     return part, length, items
 
 
 def _plate(
     keys: FrameKeys, axes: Floats, brackets: list[Bracket], parts: Parts
-) -> tuple[Part, Item, Floats]:
+) -> tuple[PurchasedPart, Component, Floats]:
     """The least plate under all feet, its middle under theirs, with tapped holes; its corner."""
     feet = np.vstack([bracket.foot for bracket in brackets])
     low, high = feet.min(axis=0) - ROUND_MM, feet.max(axis=0) + ROUND_MM
@@ -192,20 +192,20 @@ def _plate(
     corners = np.array([*(middle - half), bottom]), np.array([*(middle + half), keys.floor_mm])
     places = [np.array([*p, bottom]) @ axes for b in brackets for p in b.holes]
     holes = drilled(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
-    item = Item("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
+    item = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
     return part, item, middle - half
 
 
-def _camera(own: Keys, made: Prototype) -> list[Item]:
+def _camera(own: PrototypeSpec, made: Prototype) -> list[Component]:
     if own.camera_diameter_mm == 0:
         return []
     view, radius = made.half.view, own.camera_diameter_mm / 2
     body = Rod(view.pinhole, -view.forward, radius, own.camera_length_mm)
-    return [Item("camera", "camera behind its pinhole", (body,))]
+    return [Component("camera", "camera behind its pinhole", (body,))]
 
 
 def _screws(
-    keys: FrameKeys, own: Keys, drive: Drive, brackets: list[Bracket], parts: Parts
+    keys: FrameKeys, own: PrototypeSpec, drive: Drive, brackets: list[Bracket], parts: Parts
 ) -> dict[str, int]:
     """Screws and nuts: on the uprights with T-nuts, in the plate, of motor, clamp and camera."""
     on_uprights = 4 + 2 * 2
@@ -223,7 +223,7 @@ def _screws(
 
 
 def _clear(
-    keys: FrameKeys, items: tuple[Item, ...], space: Room
+    keys: FrameKeys, items: tuple[Component, ...], space: Room
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Least distances to light and to what the base sweeps, of all that stands still.
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Item, Rod, box, rod
-from tbcad.prototype.base.layout import Base
-from tbcad.prototype.drive.drive import Drive, Part, pitch_diameter
+from tbcad.geometry.primitives import Component, Rod, box, rod
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.drive import Drive, PurchasedPart, pitch_diameter
 from tbcad.prototype.frame.brackets import SUNK_MM
 from tbcad.types import Floats
 
@@ -35,9 +35,9 @@ class Plan:
 class Bearings:
     """Parts on the shaft, where the tube round them ends, and its radius."""
 
-    bearing: Part
-    shaft: Part
-    collar: Part
+    bearing: PurchasedPart
+    shaft: PurchasedPart
+    collar: PurchasedPart
     rear: float
     tube: float
 
@@ -48,18 +48,20 @@ def middles(plan: Plan, held: Bearings) -> tuple[float, ...]:
     return plan.front - half, held.rear + half
 
 
-def local(base: Base, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
+def local(base: BaseLayout, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
     """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
     result: Floats = np.array([along, out, side]) @ base.frame
     return result
 
 
-def along(base: Base, start: float, end: float, radius: float, out: float = 0.0) -> Rod:
+def along(base: BaseLayout, start: float, end: float, radius: float, out: float = 0.0) -> Rod:
     """A cylinder between two places along the axis, or beside it, mm."""
     return rod(local(base, start, out), local(base, end, out), radius)
 
 
-def bought(base: Base, drive: Drive, plan: Plan, held: Bearings | None) -> tuple[Item, ...]:
+def bought(
+    base: BaseLayout, drive: Drive, plan: Plan, held: Bearings | None
+) -> tuple[Component, ...]:
     """All bodies of purchased parts."""
     found = [_motor(base, drive, plan)]
     if drive.wheel and drive.pinion:
@@ -70,38 +72,41 @@ def bought(base: Base, drive: Drive, plan: Plan, held: Bearings | None) -> tuple
     if drive.coupling:
         one, start = drive.coupling, base.hub.face
         body = along(base, start, start - COUPLING_MM + 2, one["flange_mm"] / 2)
-        found.append(Item("coupling", one.what, (body,), part=one.name, turns=True))
+        found.append(Component("coupling", one.what, (body,), part=one.name, turns=True))
     return (*found, *(_running(base, plan, held) if held else ()))
 
 
-def _running(base: Base, plan: Plan, held: Bearings) -> list[Item]:
+def _running(base: BaseLayout, plan: Plan, held: Bearings) -> list[Component]:
     """Bearings, shaft and the collar that bears what the base weighs along the axis."""
     one, shaft, collar = held.bearing, held.shaft, held.collar
     end = base.hub.front - shaft["length_mm"]
     body = along(base, base.hub.front, end, shaft["diameter_mm"] / 2)
-    found = [Item("shaft", shaft.what, (body,), part=shaft.name, turns=True)]
+    found = [Component("shaft", shaft.what, (body,), part=shaft.name, turns=True)]
     names = ("bearing_front", "bearing_rear")
     for name, middle in zip(names, middles(plan, held), strict=True):
         ends = middle + one["width_mm"] / 2, middle - one["width_mm"] / 2
         hole = along(base, ends[0] + 1, ends[1] - 1, one["bore_mm"] / 2)
         ring = along(base, *ends, one["outer_mm"] / 2)
-        found.append(Item(name, one.what, (ring,), (hole,), part=one.name))
+        found.append(Component(name, one.what, (ring,), (hole,), part=one.name))
     hole = along(base, held.rear + 1, end - 2, collar["bore_mm"] / 2)
     ring = along(base, held.rear, held.rear - collar["width_mm"], collar["outer_mm"] / 2)
-    return [*found, Item("collar", collar.what, (ring,), (hole,), part=collar.name, turns=True)]
+    return [
+        *found,
+        Component("collar", collar.what, (ring,), (hole,), part=collar.name, turns=True),
+    ]
 
 
-def wheel_radius(part: Part) -> float:
+def wheel_radius(part: PurchasedPart) -> float:
     """Radius of a toothed wheel over its rims, mm."""
     return pitch_diameter(part) / 2 + PULLEY_RIM_MM
 
 
 def _wheel(
-    name: str, base: Base, part: Part, start: float, out: float, turns: bool = False
-) -> Item:
+    name: str, base: BaseLayout, part: PurchasedPart, start: float, out: float, turns: bool = False
+) -> Component:
     end, radius = start - part["width_mm"], wheel_radius(part)
     hole = along(base, start + 1, end - 1, part["bore_mm"] / 2, out)
-    return Item(
+    return Component(
         name,
         part.what,
         (along(base, start, end, radius, out),),
@@ -111,12 +116,12 @@ def _wheel(
     )
 
 
-def _motor(base: Base, drive: Drive, plan: Plan) -> Item:
+def _motor(base: BaseLayout, drive: Drive, plan: Plan) -> Component:
     """A motor behind the plate with its pilot and shaft, or a stage before it."""
     motor = drive.motor
     if motor.kind == "stages":
         body = along(base, base.hub.face, plan.front, motor["top_mm"] / 2)
-        return Item("rotary_stage", motor.what, (body,), part=motor.name)
+        return Component("rotary_stage", motor.what, (body,), part=motor.name)
     half, out = motor["frame_mm"] / 2, drive.centre_mm
     low = np.array([plan.back - motor["length_mm"], out - half, -half])
     ends = plan.back - SUNK_MM, plan.back + motor["pilot_height_mm"]
@@ -127,4 +132,4 @@ def _motor(base: Base, drive: Drive, plan: Plan) -> Item:
         along(base, *ends, motor["pilot_mm"] / 2, out),
         along(base, plan.back, tip, motor["shaft_mm"] / 2, out),
     )
-    return Item("motor", motor.what, added, part=motor.name)
+    return Component("motor", motor.what, added, part=motor.name)

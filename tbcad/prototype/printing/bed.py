@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tbcad.geometry.vectors import unit
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.types import Floats
 
 # Parts are measured by coarse meshes whose facets may lie this far inside of them.
@@ -13,12 +13,12 @@ SLACK_MM = 0.4
 TURNS = np.radians(np.arange(0, 180, 5))
 
 
-def room(keys: Keys) -> Floats:
+def room(keys: BaseSpec) -> Floats:
     """Width, depth and height that a part may have, mm, (3,)."""
     return np.array(keys.bed_mm) - np.array([2, 2, 1]) * keys.bed_margin_mm - SLACK_MM
 
 
-def fitting(corners: Floats, down: Floats, keys: Keys) -> Floats | None:
+def fitting(corners: Floats, down: Floats, keys: BaseSpec) -> Floats | None:
     """A way of laying a part so that it fits, or None.
 
     Args:
@@ -34,12 +34,12 @@ def fitting(corners: Floats, down: Floats, keys: Keys) -> Floats | None:
     return ways[int(fits.argmax())] if fits.any() else None
 
 
-def lack(corners: Floats, downs: Sequence[Floats], keys: Keys) -> float:
+def shortfall(corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> float:
     """By how much the bed is too small for corners (n, 3), mm; 0 or less: they fit."""
     return float(_lacks(_sizes(corners, downs), keys).min())
 
 
-def needed(corners: Floats, downs: Sequence[Floats], keys: Keys) -> Floats:
+def needed(corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> Floats:
     """Least bed for corners (n, 3), laid the way that lacks least of the bed, mm, (3,)."""
     sizes = _sizes(corners, downs)
     size = sizes[_lacks(sizes, keys).argmin()]
@@ -52,7 +52,7 @@ def _sizes(corners: Floats, downs: Sequence[Floats]) -> Floats:
     return np.concatenate([np.ptp(corners @ _ways(down), axis=1) for down in downs])
 
 
-def _lacks(sizes: Floats, keys: Keys) -> Floats:
+def _lacks(sizes: Floats, keys: BaseSpec) -> Floats:
     result: Floats = (sizes - room(keys)).max(axis=1)
     return result
 

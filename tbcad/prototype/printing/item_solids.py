@@ -14,11 +14,11 @@ from tbcad.cad.solids import (
     volume,
     volume_by_meshes,
 )
-from tbcad.geometry.primitives import Body, Item, Rod, Turned
+from tbcad.geometry.primitives import Body, Component, Rod, Turned
 from tbcad.geometry.primitives import Prism as Straight
-from tbcad.prototype.printing.placing import Part, laid
+from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.shell.solid import InvalidSolidError
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.types import Floats
 
 COARSE_MM = 0.02
@@ -34,7 +34,7 @@ def shape(body: Body) -> TopoDS_Shape:
     return prism(polygon(_upward(body)), body.along)
 
 
-def solid(item: Item) -> TopoDS_Solid:
+def solid(item: Component) -> TopoDS_Solid:
     """The one solid of a part, in the frame of the shell.
 
     Raises:
@@ -51,7 +51,7 @@ def solid(item: Item) -> TopoDS_Solid:
     return found
 
 
-def printed(item: Item, keys: Keys) -> Part:
+def printed(item: Component, keys: BaseSpec) -> PlacedSolid:
     """A part laid on the printer's bed.
 
     Raises:
@@ -59,7 +59,7 @@ def printed(item: Item, keys: Keys) -> Part:
         InvalidSolidError: when the kernel fails.
     """
     downs = [np.array(down) for down in item.downs]
-    return laid(item.name, solid(item), downs, np.eye(3), keys)
+    return placed_on_bed(item.name, solid(item), downs, np.eye(3), keys)
 
 
 def _upward(body: Straight) -> Floats:

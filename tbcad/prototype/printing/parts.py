@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.cad.solids import meshed, without_lost
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.shell.mesh import Mesh
 
 # base and cap turn with the base, stage and frame stand still; a tool is not in the rig.
@@ -20,7 +20,7 @@ SAME_MM = 2e-5
 
 
 @dataclass(frozen=True)
-class Piece:
+class PrintedPart:
     """One printed part.
 
     Attributes:
@@ -31,7 +31,7 @@ class Piece:
         quantity: how many are printed.
     """
 
-    part: Part
+    part: PlacedSolid
     role: Role
     what: str
     ball: int = -1
@@ -43,7 +43,7 @@ class Piece:
         return self.part.name
 
 
-def printed(piece: Piece, tolerance: float) -> Mesh:
+def printed(piece: PrintedPart, tolerance: float) -> Mesh:
     """The part's mesh on the printer's bed, its coordinates those of an STL, of 32 bits.
 
     Args:

@@ -11,7 +11,7 @@ from tbcad.cad.solids import meshed, moved, one_solid, volume
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
 from tbcad.shell.mesh import Mesh
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
@@ -22,7 +22,7 @@ TOUCHING_MM = 0.05
 
 
 @dataclass(frozen=True)
-class Part:
+class PlacedSolid:
     """A printed part.
 
     Attributes:
@@ -52,7 +52,9 @@ class Part:
         return self.volume / 1000 * density
 
 
-def laid(name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, keys: Keys) -> Part:
+def placed_on_bed(
+    name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, keys: BaseSpec
+) -> PlacedSolid:
     """A part on the bed, the way round that needs the least support of those that fit.
 
     Args:
@@ -76,10 +78,10 @@ def laid(name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, 
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
     solid = one_solid(name, moved(shape, axes, np.zeros(3)))
-    return Part(name, solid, axes.T @ best, origin)
+    return PlacedSolid(name, solid, axes.T @ best, origin)
 
 
-def _too_large(name: str, corners: Floats, downs: Sequence[Floats], keys: Keys) -> str:
+def _too_large(name: str, corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> str:
     """What to say of a part that does not fit: the bed that the nearest way needs."""
     bed = as_text(needed(corners, downs, keys))
     return (

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Item, Prism, Rod, Turned, box, rod
+from tbcad.geometry.primitives import Body, Component, Prism, Rod, Turned, box, rod
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.drive.drive import Part
+from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Stage as Keys
+from tbcad.spec.stage_keys import StageSpec
 from tbcad.types import Floats
 
 DISC_MM = 3.0
@@ -48,7 +48,9 @@ class Sizes:
         return self.post - self.wall - PLUG_PLAY_MM
 
 
-def crown(keys: Keys, led: Part, leds: Floats, pockets: Floats, at: Sizes) -> Item:
+def crown(
+    keys: StageSpec, led: PurchasedPart, leds: Floats, pockets: Floats, at: Sizes
+) -> Component:
     """Plate, neck and plug in one turned body, with pillars and studs on it."""
     studs = [
         Rod(np.array([*place, at.plate - 1]), np.array(UP), _stud(keys), STUD_HEIGHT_MM + 1)
@@ -64,7 +66,7 @@ def crown(keys: Keys, led: Part, leds: Floats, pockets: Floats, at: Sizes) -> It
         removed += _pocket(keys, led, place, floor, end, at.plate)
     inward = np.array([*(SIDE[:2] * (at.plug - SEAT_MM)), at.joint - PLUG_MM / 2])
     removed.append(Rod(inward, SIDE, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
-    return Item(
+    return Component(
         "stage_crown",
         "crown of the object stage with pockets for LEDs",
         tuple(added),
@@ -92,7 +94,7 @@ def _profile(at: Sizes) -> Floats:
 
 
 def _pocket(
-    keys: Keys, led: Part, place: Floats, floor: float, end: float, plate: float
+    keys: StageSpec, led: PurchasedPart, place: Floats, floor: float, end: float, plate: float
 ) -> list[Body]:
     """Pocket, the wires' way down, and their groove to the bore."""
     hole, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
@@ -104,18 +106,18 @@ def _pocket(
     ]
 
 
-def _groove(keys: Keys, place: Floats, low: float, high: float) -> Prism:
+def _groove(keys: StageSpec, place: Floats, low: float, high: float) -> Prism:
     out = np.array([*place[:2], 0.0]) / norm(place[:2])
     axes = np.stack([out, np.cross(UP, out), UP])
     half, length = keys.wire_mm / 2, float(norm(place[:2]))
     return box(np.array([0.0, -half, low]), np.array([length, half, high]), axes)
 
 
-def _stud(keys: Keys) -> float:
+def _stud(keys: StageSpec) -> float:
     return min(STUD_MM, keys.disc_mm / 10)
 
 
-def _studs(keys: Keys, leds: Floats, wire: float) -> Floats:
+def _studs(keys: StageSpec, leds: Floats, wire: float) -> Floats:
     """Places (2, 2) of the disc's studs, where they are farthest from the grooves."""
     away = max(STUDS * keys.disc_mm / 2, wire + 0.2 + _stud(keys))
     if away + _stud(keys) + 0.8 > keys.disc_mm / 2:
@@ -136,12 +138,12 @@ def _studs(keys: Keys, leds: Floats, wire: float) -> Floats:
     return np.stack([one, -one])
 
 
-def disc(keys: Keys, leds: Floats, plate: float, wire: float) -> Item:
+def disc(keys: StageSpec, leds: Floats, plate: float, wire: float) -> Component:
     """The disc under the object; its holes take the studs two ways round, half a turn apart."""
     holes = _studs(keys, leds, wire)
     radius = _stud(keys) + STUD_PLAY_MM
     low = plate - THROUGH_MM
-    return Item(
+    return Component(
         "stage_disc",
         "disc under the object, turned by 180 degrees for the other half",
         (Rod(np.array([0, 0, plate]), np.array(UP), keys.disc_mm / 2, DISC_MM),),
@@ -153,12 +155,12 @@ def disc(keys: Keys, leds: Floats, plate: float, wire: float) -> Item:
     )
 
 
-def post_tube(post: float, wall: float, joint: float, foot: float) -> Item:
+def post_tube(post: float, wall: float, joint: float, foot: float) -> Component:
     """A tube, with a hole for the set screw that holds the plug."""
     top, bottom = np.array([0, 0, joint]), np.array([0, 0, foot])
     beyond = np.array([0, 0, THROUGH_MM])
     screw = Rod(top - [0, 0, PLUG_MM / 2], SIDE, SET_SCREW_MM / 2, post + THROUGH_MM)
-    return Item(
+    return Component(
         "stage_post",
         "post of the object stage",
         (rod(bottom, top, post),),

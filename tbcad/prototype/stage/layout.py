@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Item
+from tbcad.geometry.primitives import Component
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.drive.drive import Part, Parts
+from tbcad.prototype.drive.drive import Parts, PurchasedPart
 from tbcad.prototype.keepout import Room, least
 from tbcad.prototype.stage.crown import (
     DISC_MM,
@@ -30,9 +30,9 @@ from tbcad.prototype.stage.crown import (
 )
 from tbcad.prototype.stage.leds import check_leds
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import Prototype as Keys
-from tbcad.spec.stage_keys import Frame as FrameKeys
-from tbcad.spec.stage_keys import Stage as StageKeys
+from tbcad.spec.prototype import PrototypeSpec
+from tbcad.spec.stage_keys import FrameSpec as FrameKeys
+from tbcad.spec.stage_keys import StageSpec as StageKeys
 from tbcad.types import Floats
 
 NECK_MM = 6.0  # radius where the crown leaves the sphere, at most
@@ -43,7 +43,7 @@ GRAZING_MM = 0.15
 
 
 @dataclass(frozen=True)
-class StageNumbers:
+class StageLayout:
     """The object stage; the axis of the post is z through the origin.
 
     Attributes:
@@ -69,17 +69,17 @@ class StageNumbers:
     foot: float
     post: float
     wire: float
-    led: Part
+    led: PurchasedPart
     leds: Floats
     pockets: Floats
-    items: tuple[Item, ...]
+    items: tuple[Component, ...]
     light: float
     swept: float
 
 
 def stage(
-    spec: tuple[StageKeys, FrameKeys, Keys], made: Prototype, space: Room, parts: Parts
-) -> StageNumbers:
+    spec: tuple[StageKeys, FrameKeys, PrototypeSpec], made: Prototype, space: Room, parts: Parts
+) -> StageLayout:
     """The stage that fits into the room that balls, base and light leave.
 
     Args:
@@ -109,7 +109,7 @@ def stage(
     top = crown(keys, led, leds, pockets, Sizes(plate, rim, neck, wire, post, wall, joint))
     items = (disc(keys, leds, plate, wire), top, post_tube(post, wall, joint, foot))
     light, swept = _clear(items, space, frame)
-    return StageNumbers(
+    return StageLayout(
         top=keys.top_mm,
         disc=keys.disc_mm / 2,
         plate=plate,
@@ -126,7 +126,7 @@ def stage(
     )
 
 
-def leds(numbers: StageNumbers) -> list[tuple[str, Floats, Floats]]:
+def leds(numbers: StageLayout) -> list[tuple[str, Floats, Floats]]:
     """Name, middle of the dome (mm, (3,)) and unit direction (3,) of each LED."""
     return [(f"led_{i}", place, np.array(UP)) for i, place in enumerate(numbers.leds, 1)]
 
@@ -146,7 +146,7 @@ def _grazed(made: Prototype, capture: float) -> float:
     return capture * float(np.sin(down.min()))
 
 
-def _sizes(keys: Keys, grazed: float) -> tuple[float, float, float]:
+def _sizes(keys: PrototypeSpec, grazed: float) -> tuple[float, float, float]:
     """Radii of post, wires' bore and neck."""
     post = keys.post_diameter_mm / 2
     if post == 0:
@@ -178,7 +178,7 @@ def _rim(keys: StageKeys, space: Room, plate: float, neck: float) -> float:
     return rim
 
 
-def _clear(items: tuple[Item, ...], space: Room, frame: FrameKeys) -> tuple[float, float]:
+def _clear(items: tuple[Component, ...], space: Room, frame: FrameKeys) -> tuple[float, float]:
     """Least distances to light outside the sphere and to what the base sweeps.
 
     Raises:

@@ -4,10 +4,10 @@ import numpy as np
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.drive.drive import Part
+from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.keepout import Room
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Stage as Keys
+from tbcad.spec.stage_keys import StageSpec
 from tbcad.types import Floats
 
 POCKET_PLAY_MM = 0.1  # to either side
@@ -15,7 +15,7 @@ FLAT_MM = 1.0  # least that the LEDs stand out of any plane, square root of the 
 
 
 def check_leds(
-    keys: Keys, made: Prototype, space: Room, led: Part, pockets: Floats, plate: float
+    keys: StageSpec, made: Prototype, space: Room, led: PurchasedPart, pockets: Floats, plate: float
 ) -> None:
     """Refuse LEDs that are outside the sphere, collide, are in one plane or hidden.
 
@@ -82,6 +82,6 @@ def _check_seen(places: Floats, made: Prototype, pillar: float, tip: float) -> N
         )
 
 
-def pillar_radius(keys: Keys, led: Part) -> float:
+def pillar_radius(keys: StageSpec, led: PurchasedPart) -> float:
     """Radius of the pillar round a pocket, mm."""
     return led["flange_mm"] / 2 + POCKET_PLAY_MM + keys.led_wall_mm

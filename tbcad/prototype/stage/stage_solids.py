@@ -1,12 +1,12 @@
 """The object stage as solids."""
 
 from tbcad.prototype.printing.item_solids import printed
-from tbcad.prototype.printing.placing import Part
-from tbcad.prototype.stage.layout import StageNumbers
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.stage.layout import StageLayout
+from tbcad.spec.base_keys import BaseSpec
 
 
-def parts(numbers: StageNumbers, keys: Keys) -> list[Part]:
+def parts(numbers: StageLayout, keys: BaseSpec) -> list[PlacedSolid]:
     """Disc, crown and post, laid on the bed.
 
     Raises:

@@ -12,7 +12,7 @@ from tbcad.errors import InputError
 from tbcad.simulate import picture_files
 from tbcad.simulate.capture import light_field
 from tbcad.simulate.capture.source import Captured
-from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.object import SceneObject
 
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
@@ -20,7 +20,7 @@ LARGEST_OBJECT = 4 << 30  # bytes, unpacked
 
 
 def write_capture(
-    folder: Path, captured: Captured, subject: Subject, capture_mm: float, facts: dict[str, Any]
+    folder: Path, captured: Captured, subject: SceneObject, capture_mm: float, facts: dict[str, Any]
 ) -> dict[str, Any]:
     """Write all files of a capture into a folder, and return its record.
 
@@ -44,14 +44,14 @@ def write_capture(
     return record
 
 
-def write_object(path: Path, subject: Subject) -> None:
+def write_object(path: Path, subject: SceneObject) -> None:
     """Write an object with all that gives its colours; the bytes are the same each time."""
     values = {field.name: getattr(subject, field.name) for field in fields(subject)}
     arrays = {name: np.asarray(value) for name, value in values.items() if value is not None}
     np.savez_compressed(path, allow_pickle=False, **arrays)
 
 
-def read_object(folder: Path) -> Subject:
+def read_object(folder: Path) -> SceneObject:
     """Read the object of a capture.
 
     Raises:
@@ -70,8 +70,8 @@ def read_object(folder: Path) -> Subject:
         raise InputError(f"{path} is damaged: {error}: capture again") from error
 
 
-def _subject(arrays: dict[str, Any]) -> Subject:
-    made = Subject(
+def _subject(arrays: dict[str, Any]) -> SceneObject:
+    made = SceneObject(
         name=str(arrays["name"]),
         points=arrays["points"].astype(np.float64),
         faces=arrays["faces"].astype(np.int64),

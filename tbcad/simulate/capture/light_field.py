@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.photograph import BAND_ROWS, Band
 from tbcad.simulate.compiled import in_threads
@@ -60,7 +60,7 @@ class Frame:
         planes: arrays `colour`, `mirror`, `origin`, `direction` as above.
     """
 
-    view: View
+    view: Camera
     u: Floats
     mirrors: Surfaces
     boxes: NDArray[np.int64]
@@ -193,7 +193,7 @@ def in_memory(
     return LightField(frames, capture_mm, {})
 
 
-def _write_view(group: h5py.Group, view: View) -> None:
+def _write_view(group: h5py.Group, view: Camera) -> None:
     group.attrs["pinhole_mm"] = view.pinhole
     group.attrs["forward"] = view.forward
     group.attrs["right"] = view.right
@@ -273,7 +273,7 @@ def _frame(group: h5py.Group) -> Frame:
     inside = (boxes >= 0) & (boxes <= np.repeat([width, height], 2))
     if boxes.shape != (m, 4) or boxes.dtype != np.int64 or not inside.all():
         raise ValueError("boxes of mirrors lie outside of the picture")
-    return Frame(View(pinhole, forward, right, width, height, hfov), u, mirrors, boxes, planes)
+    return Frame(Camera(pinhole, forward, right, width, height, hfov), u, mirrors, boxes, planes)
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Floats:

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.scene.rays import Rays, unit_directions
 from tbcad.simulate.scene.shading import Scene, look
@@ -37,7 +37,7 @@ class Band:
 
 
 def photograph(
-    view: View, trace: Tracer, scene: Scene, samples: int = 1, progress: Progress = lambda _: None
+    view: Camera, trace: Tracer, scene: Scene, samples: int = 1, progress: Progress = lambda _: None
 ) -> Iterator[Band]:
     """The bands of a camera's picture from top to bottom; few are in memory at a time.
 
@@ -62,7 +62,7 @@ def row_bands(height: int) -> list[range]:
     return [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
 
 
-def _band(view: View, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
+def _band(view: Camera, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
     rays, colour = _through(view, trace, scene, rows, CENTRE)
     if samples > 1:
         taken = (_through(view, trace, scene, rows, shift)[1] for shift in shifts(samples))
@@ -77,7 +77,7 @@ def shifts(samples: int) -> list[Shift]:
 
 
 def _through(
-    view: View, trace: Tracer, scene: Scene, rows: range, shift: Shift
+    view: Camera, trace: Tracer, scene: Scene, rows: range, shift: Shift
 ) -> tuple[Rays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
@@ -87,7 +87,7 @@ def _through(
 
 
 def _hidden(
-    view: View, rays: Rays, colour: Colours, scene: Scene, rows: range, shift: Shift
+    view: Camera, rays: Rays, colour: Colours, scene: Scene, rows: range, shift: Shift
 ) -> Rays:
     """Paint the object where the camera sees it directly, and take the rays away there."""
     way = unit_directions(view, rows, shift).reshape(-1, 3)

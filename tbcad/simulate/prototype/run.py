@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.windows import rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.scene.reflector import Reflector, Replaced
+from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.types import Floats, Ints
 
 
@@ -40,7 +40,7 @@ class Run:
     """
 
     at: Reflector
-    view: View
+    view: Camera
     balls: Floats
     stop: Ints
     ball: Ints
@@ -58,16 +58,16 @@ def runs(reflectors: tuple[Reflector, Reflector], plan: Plan) -> tuple[Run, Run]
     return _run(a, a.view, plan, 0, np.ones(3)), _run(b, a.view, plan, 1, HALF_TURN)
 
 
-def stand_ins(run: Run) -> Replaced:
+def stand_ins(run: Run) -> SubstitutedReflector:
     """What a light field records of a run: the shell's camera and cells, with balls for mirrors.
 
     `u` are the directions of the balls: where the virtual cameras really were.
     """
     at = run.at
-    return Replaced(at.camera, at.view, unit(run.stands.apex), at.cells, run.stands)
+    return SubstitutedReflector(at.camera, at.view, unit(run.stands.apex), at.cells, run.stands)
 
 
-def _run(at: Reflector, view: View, plan: Plan, half: int, turn: Floats) -> Run:
+def _run(at: Reflector, view: Camera, plan: Plan, half: int, turn: Floats) -> Run:
     ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * turn
     place = (ball, plan.angle[stop])
     apex, normal = (_at(points * turn, frame, *place) for points in (plan.apex, plan.normal))
@@ -85,8 +85,8 @@ def _run(at: Reflector, view: View, plan: Plan, half: int, turn: Floats) -> Run:
     )
 
 
-def _carried(view: View, turn: Floats) -> View:
-    return View(
+def _carried(view: Camera, turn: Floats) -> Camera:
+    return Camera(
         view.pinhole * turn,
         view.forward * turn,
         view.right * turn,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.prototype.run import Run
 from tbcad.simulate.scene.reflector import pitch
@@ -56,7 +56,7 @@ def in_balls(scene: Scene, seen: Sight) -> Colours:
     return colour
 
 
-def in_front(scene: Scene, view: View, way: Floats, reach: Floats) -> tuple[Bools, Colours]:
+def in_front(scene: Scene, view: Camera, way: Floats, reach: Floats) -> tuple[Bools, Colours]:
     """Where (n,) the object stands nearer than a reach (n,), mm, and its colours there (n, 3)."""
     direct = look(scene, np.broadcast_to(view.pinhole, way.shape), way)
     front = np.isfinite(direct.depth) & (direct.depth < reach)
@@ -70,7 +70,7 @@ def colours(run: Run, scene: Scene, way: Floats, stop: Ints) -> Colours:
     return np.where(front[:, None], direct, in_balls(scene, seen))
 
 
-def directions(view: View, places: Floats) -> Floats:
+def directions(view: Camera, places: Floats) -> Floats:
     """Unit directions (n, 3) through columns and rows (n, 2); whole numbers are pixel centres."""
     size = np.array([view.width_px, view.height_px])
     across, downward = (places - (size - 1) / 2).T * pitch(view)
@@ -78,7 +78,7 @@ def directions(view: View, places: Floats) -> Floats:
     return unit(view.forward + across[:, None] * view.right + downward[:, None] * down)
 
 
-def places_of(view: View, way: Floats) -> Floats:
+def places_of(view: Camera, way: Floats) -> Floats:
     """Column and row (n, 2) where directions (n, 3) appear; NaN outside of the pixels' centres."""
     axes = np.stack([view.right, np.cross(view.forward, view.right), view.forward])
     last = np.array([view.width_px - 1.0, view.height_px - 1.0])

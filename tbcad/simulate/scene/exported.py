@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import directions
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.cells import cells_of
-from tbcad.optics.power_diagram import UnsettledError, bounded
+from tbcad.optics.power_diagram import NotRegularError, bounded
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
@@ -145,7 +145,7 @@ def _reflector(path: Path, document: _Document, spec: Spec, camera: _Camera) -> 
         cells = cells_of(
             mirrors.joined(walls), boundary, triangles[:, ::-1] if mirrored else triangles
         )
-    except UnsettledError as error:
+    except NotRegularError as error:
         raise InputError(
             f"{path}: the mirrors of camera {camera.id} bound no cells: {error}: {AGAIN}"
         ) from None
@@ -177,12 +177,12 @@ def _surfaces(path: Path, mirrors: list[_Mirror]) -> tuple[Floats, Surfaces]:
     return u, Surfaces(apex, normal, curvature[:, 0])
 
 
-def _view(path: Path, camera: _Camera) -> View:
+def _view(path: Path, camera: _Camera) -> Camera:
     forward, right = np.array(camera.forward), np.array(camera.right)
     gram = np.array([forward @ forward - 1, right @ right - 1, forward @ right])
     if np.abs(gram).max() > ROUNDING:
         raise InputError(f"{path}: camera {camera.id} has axes that are not square: {AGAIN}")
-    return View(
+    return Camera(
         np.array(camera.pinhole_mm),
         forward,
         right,

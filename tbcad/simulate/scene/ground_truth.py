@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import shifts
 from tbcad.simulate.compiled import in_threads
 from tbcad.simulate.scene.shading import Scene, look
@@ -17,7 +17,7 @@ RAYS_A_PIECE = 1 << 15
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
-def pinhole_picture(scene: Scene, view: View, samples: int = 4) -> Colours:
+def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
     """The picture (h, w, 3), 0 to 255, of a pinhole camera, samples x samples rays a pixel."""
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     for shift in shifts(samples):
@@ -27,7 +27,11 @@ def pinhole_picture(scene: Scene, view: View, samples: int = 4) -> Colours:
 
 
 def lens_picture(
-    scene: Scene, view: View, focus: Focus, samples: int = 256, progress: Progress = lambda _: None
+    scene: Scene,
+    view: Camera,
+    focus: Focus,
+    samples: int = 256,
+    progress: Progress = lambda _: None,
 ) -> Colours:
     """The picture (h, w, 3), 0 to 255, of a camera with a thin lens.
 

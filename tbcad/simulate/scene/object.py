@@ -22,7 +22,7 @@ KNOT_FACETS = (240, 40)
 
 
 @dataclass(frozen=True)
-class Subject:
+class SceneObject:
     """A triangle mesh with a colour at each corner of each facet, or a picture on it.
 
     Attributes:
@@ -51,7 +51,7 @@ class Subject:
         return float(np.linalg.norm(self.points, axis=1).max())
 
 
-def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own") -> Subject:
+def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own") -> SceneObject:
     """Read a triangle mesh in millimetres, z up, about the origin.
 
     Args:
@@ -73,7 +73,7 @@ def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own")
     patterned = not colours and paint != "plain"
     normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
     plain = np.full((len(faces), 3, 3), GREY)
-    made = Subject(path.name, points, faces, normals, plain, patterned=patterned)
+    made = SceneObject(path.name, points, faces, normals, plain, patterned=patterned)
     made = replace(made, **colours)
     _check_size(path, made, capture_mm)
     return made
@@ -81,12 +81,12 @@ def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own")
 
 def chosen(
     path: Path | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
-) -> Subject:
+) -> SceneObject:
     """The object of a file, as `load` reads it, or without one the built-in one."""
     return load(path, capture_mm, fit, paint) if path else built_in(capture_mm)
 
 
-def built_in(capture_mm: float) -> Subject:
+def built_in(capture_mm: float) -> SceneObject:
     """A trefoil knot with a hue that runs along it: it hides parts of itself from every side."""
     t, s = (np.linspace(0, 2 * np.pi, k, endpoint=False) for k in KNOT_FACETS)
     middle = _knot(t)
@@ -95,7 +95,7 @@ def built_in(capture_mm: float) -> Subject:
     faces = _grid(*KNOT_FACETS)
     normals = _ring(t, s).reshape(-1, 3)
     hue = np.broadcast_to((t / (2 * np.pi))[:, None], KNOT_FACETS).ravel()
-    return Subject(
+    return SceneObject(
         "trefoil knot", points.reshape(-1, 3), faces, normals, rainbow(hue)[faces], patterned=False
     )
 
@@ -168,7 +168,7 @@ def _check(path: Path, points: Floats, faces: Ints) -> None:
         raise InputError(f"{path} has points that are not finite: repair the mesh")
 
 
-def _check_size(path: Path, made: Subject, capture_mm: float) -> None:
+def _check_size(path: Path, made: SceneObject, capture_mm: float) -> None:
     used = made.points[np.unique(made.faces)]
     size, reach = np.ptp(used, axis=0), 2 * float(np.linalg.norm(used, axis=1).max())
     if size.max() == 0:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.scene.reflector import Reflector, pitch
@@ -55,7 +55,7 @@ class Rays:
         )
 
 
-def pixel_directions(view: View, rows: range, shift: Shift = (0.0, 0.0)) -> Floats:
+def pixel_directions(view: Camera, rows: range, shift: Shift = (0.0, 0.0)) -> Floats:
     """Directions (h, w, 3) through pixels, their component along `forward` one.
 
     Args:
@@ -69,7 +69,7 @@ def pixel_directions(view: View, rows: range, shift: Shift = (0.0, 0.0)) -> Floa
 
 
 def unit_directions(
-    view: View, rows: range, shift: Shift = (0.0, 0.0), depth: float = 1.0, aside: Floats = HERE
+    view: Camera, rows: range, shift: Shift = (0.0, 0.0), depth: float = 1.0, aside: Floats = HERE
 ) -> Floats:
     """Unit vectors (h, w, 3) toward what pixels see at a depth, from a place beside the pinhole.
 
@@ -83,7 +83,7 @@ def unit_directions(
     return _toward(*_lattice(view, rows, shift), depth, aside)
 
 
-def _lattice(view: View, rows: range, shift: Shift) -> tuple[Floats, Floats]:
+def _lattice(view: Camera, rows: range, shift: Shift) -> tuple[Floats, Floats]:
     """Directions to columns (w, 3), and what rows add to them (h, 3)."""
     width = pitch(view)
     across = (np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]) * width

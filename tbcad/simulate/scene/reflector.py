@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.mirrors.array import Design
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
@@ -27,7 +27,7 @@ class Reflector:
     """
 
     camera: str
-    view: View
+    view: Camera
     u: Floats
     cells: Cells
 
@@ -86,7 +86,7 @@ class Reflector:
 
 
 @dataclass(frozen=True)
-class Replaced(Reflector):
+class SubstitutedReflector(Reflector):
     """A camera with other surfaces in the place of its mirrors.
 
     Attributes:
@@ -107,7 +107,7 @@ def reflectors(design: Design) -> tuple[Reflector, Reflector]:
     return a, b
 
 
-def pixels_of(view: View, points: Floats) -> Floats:
+def pixels_of(view: Camera, points: Floats) -> Floats:
     """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
     ray = points - view.pinhole
     across = np.stack([view.right, np.cross(view.forward, view.right)])
@@ -117,6 +117,6 @@ def pixels_of(view: View, points: Floats) -> Floats:
     return result
 
 
-def pitch(view: View) -> float:
+def pitch(view: Camera) -> float:
     """Width of a pixel at unit distance."""
     return float(2 * view.half_sizes[0] / view.width_px)

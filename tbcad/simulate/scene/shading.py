@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.scene.embree import committed
-from tbcad.simulate.scene.object import Subject, pattern
+from tbcad.simulate.scene.object import SceneObject, pattern
 from tbcad.types import Bytes, Floats, Ints
 
 # Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
@@ -31,7 +31,7 @@ class Scene:
         radius: of the sphere about the origin that holds it, mm.
     """
 
-    subject: Subject
+    subject: SceneObject
     embree: Any
     shade: Floats
     radius: float
@@ -50,7 +50,7 @@ class Seen:
     depth: Floats
 
 
-def scene_of(subject: Subject) -> Scene:
+def scene_of(subject: SceneObject) -> Scene:
     """Put an object into Embree and light it."""
     embree = committed(subject.points, subject.faces)
     lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
@@ -92,7 +92,7 @@ def shaded(scene: Scene, facet: Ints, weight: Floats) -> Floats:
     return np.asarray(_albedo(subject, facet, weight) * light[:, None])
 
 
-def _albedo(subject: Subject, facet: Ints, weight: Floats) -> Floats:
+def _albedo(subject: SceneObject, facet: Ints, weight: Floats) -> Floats:
     if subject.patterned:
         corners = subject.points[subject.faces[facet]]
         return pattern(np.einsum("nk,nkx->nx", weight, corners))

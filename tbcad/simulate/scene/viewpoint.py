@@ -3,7 +3,7 @@
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.types import Floats
 
@@ -18,7 +18,7 @@ def viewpoint(
     capture_mm: float,
     size: tuple[int, int] = (640, 480),
     hfov: float | None = None,
-) -> View:
+) -> Camera:
     """A pinhole camera that looks at the origin, z up.
 
     Args:
@@ -47,7 +47,7 @@ def viewpoint(
         raise InputError("--azimuth is not a number: give degrees")
     forward, right = _axes(azimuth, elevation)
     wide = hfov if hfov is not None else _fitting(capture_mm / 2 / distance, size)
-    return View(-distance * forward, forward, right, *size, wide)
+    return Camera(-distance * forward, forward, right, *size, wide)
 
 
 def _axes(azimuth: float, elevation: float) -> tuple[Floats, Floats]:
@@ -61,6 +61,6 @@ def _fitting(sine: float, size: tuple[int, int]) -> float:
     return float(2 * np.arctan(half))
 
 
-def directions(view: View, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+def directions(view: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
     """Unit directions (h, w, 3) of all pixels."""
     return unit_directions(view, range(view.height_px), shift)

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.simulate.study.plot import Panel, Series
@@ -62,7 +62,7 @@ def _row(spec: Spec) -> list[Cell]:
     return [n, cameras, closed, *measured, flat.value if flat else None, convex]
 
 
-def _closed(half: Half) -> float:
+def _closed(half: MirrorArray) -> float:
     return float(2 * half.ellipsoid.camera_distance * np.sin(half.theta0.min()))
 
 

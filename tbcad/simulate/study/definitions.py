@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.mirrors.array import Half, directions
+from tbcad.mirrors.array import MirrorArray, directions
 from tbcad.simulate.study.paper import claimed
 from tbcad.simulate.study.pixels import Sensor, counts, virtual_cameras
 from tbcad.simulate.study.sweep import attempt, varied
@@ -53,7 +53,7 @@ def _pixels(spec: Spec, radii: str) -> list[tuple[Cell, ...]]:
     return [_row(spec, name, radii, value) for name, value in found.items()]
 
 
-def _readings(spec: Spec, half: Half) -> dict[str, float]:
+def _readings(spec: Spec, half: MirrorArray) -> dict[str, float]:
     sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
     counted = counts(half, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
     cameras = virtual_cameras(half)

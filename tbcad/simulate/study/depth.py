@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.images import FANS, PLACES, Images, images
 from tbcad.simulate.study.lens import Lens, Range, focal_length, lens_for, stop, stops
 from tbcad.simulate.study.paper import claimed, claims
@@ -98,7 +98,7 @@ class Optics:
 def depth(spec: Spec, optics: Optics, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
     radius, lens = spec.optics.capture_diameter_mm / 2, _lens(spec, optics.checked())
-    found: dict[str, tuple[Half, Images]] = {}
+    found: dict[str, tuple[MirrorArray, Images]] = {}
     reasons = []
     for rule in RULES:
         progress(f"radii by rule {rule}")
@@ -120,7 +120,7 @@ def _lens(spec: Spec, optics: Optics) -> Lens:
     return lens_for(np.radians(camera.hfov_deg), camera.width_px, pixel, optics.wide_open)
 
 
-def _rows(rule: str, half: Half, at: Images) -> list[tuple[Cell, ...]]:
+def _rows(rule: str, half: MirrorArray, at: Images) -> list[tuple[Cell, ...]]:
     numbers = np.column_stack(
         [
             np.degrees(half.polar),
@@ -140,7 +140,7 @@ def span(values: Floats) -> Range:
     return Range(float(values.min()), float(values.max()))
 
 
-def _ranges(found: dict[str, tuple[Half, Images]]) -> dict[str, Range]:
+def _ranges(found: dict[str, tuple[MirrorArray, Images]]) -> dict[str, Range]:
     ranges = {f"{rule} radii, along the axis": span(at.depth) for rule, (_, at) in found.items()}
     ranges |= {f"{rule} radii, distances": span(at.distance) for rule, (_, at) in found.items()}
     paper = Range(claimed("depth_near"), claimed("depth_far"))
@@ -148,7 +148,7 @@ def _ranges(found: dict[str, tuple[Half, Images]]) -> dict[str, Range]:
 
 
 def _stop_rows(
-    found: dict[str, tuple[Half, Images]], lens: Lens, optics: Optics
+    found: dict[str, tuple[MirrorArray, Images]], lens: Lens, optics: Optics
 ) -> tuple[tuple[Cell, ...], ...]:
     rows: list[tuple[Cell, ...]] = []
     for name, over in _ranges(found).items():
@@ -159,7 +159,9 @@ def _stop_rows(
     return tuple(rows)
 
 
-def _summary(found: dict[str, tuple[Half, Images]], stopped: Table) -> tuple[tuple[Cell, ...], ...]:
+def _summary(
+    found: dict[str, tuple[MirrorArray, Images]], stopped: Table
+) -> tuple[tuple[Cell, ...], ...]:
     near, far = claims()["depth_near"], claims()["depth_far"]
     rows: list[tuple[Cell, ...]] = []
     for rule, (_, at) in found.items():
@@ -179,7 +181,7 @@ def _summary(found: dict[str, tuple[Half, Images]], stopped: Table) -> tuple[tup
     return tuple(rows)
 
 
-def _panels(found: dict[str, tuple[Half, Images]], lens: Lens) -> tuple[Panel, ...]:
+def _panels(found: dict[str, tuple[MirrorArray, Images]], lens: Lens) -> tuple[Panel, ...]:
     series = [
         Series(
             label, np.degrees(found[rule][0].polar), found[rule][1].distance[:, place, fan], mark
@@ -201,7 +203,7 @@ def _panels(found: dict[str, tuple[Half, Images]], lens: Lens) -> tuple[Panel, .
     return Panel(*what, tuple(series)), _blur_panel(found, lens)
 
 
-def _blur_panel(found: dict[str, tuple[Half, Images]], lens: Lens) -> Panel:
+def _blur_panel(found: dict[str, tuple[MirrorArray, Images]], lens: Lens) -> Panel:
     series: list[Series] = []
     ranges = {name: over for name, over in _ranges(found).items() if name in DRAWN}
     for k, (name, over) in enumerate(ranges.items()):

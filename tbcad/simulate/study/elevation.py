@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.mirrors.array import Half, design
+from tbcad.mirrors.array import MirrorArray, design
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
 from tbcad.simulate.study.sweep import varied
@@ -41,7 +41,7 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
     return Study("elevation", summary, (mirrors, correlated), panels)
 
 
-def _rows(halves: dict[str, Half], spec: Spec) -> tuple[tuple[Cell, ...], ...]:
+def _rows(halves: dict[str, MirrorArray], spec: Spec) -> tuple[tuple[Cell, ...], ...]:
     traced, paper = halves["traced"], halves["paper"]
     longest = spec.mirrors.max_radius_widths * traced.size
     numbers = np.column_stack(
@@ -59,7 +59,7 @@ def _rows(halves: dict[str, Half], spec: Spec) -> tuple[tuple[Cell, ...], ...]:
     )
 
 
-def _correlations(rule: str, half: Half) -> list[tuple[Cell, ...]]:
+def _correlations(rule: str, half: MirrorArray) -> list[tuple[Cell, ...]]:
     radius = half.mirrors.radius
     values = {"radius": radius, "log radius": np.log(radius)}
     angles = {"polar angle": half.polar, "absolute azimuth": np.abs(half.azimuth)}
@@ -75,7 +75,7 @@ def correlation(x: Floats, y: Floats) -> float:
     return float(np.corrcoef(x, y)[0, 1])
 
 
-def _summary(halves: dict[str, Half], correlated: Table) -> tuple[tuple[Cell, ...], ...]:
+def _summary(halves: dict[str, MirrorArray], correlated: Table) -> tuple[tuple[Cell, ...], ...]:
     where = "Fig. 7b"
     rows: list[tuple[Cell, ...]] = []
     for rule in RULES:
@@ -97,7 +97,7 @@ def _summary(halves: dict[str, Half], correlated: Table) -> tuple[tuple[Cell, ..
     )
 
 
-def _panel(halves: dict[str, Half], what: str, logarithmic: str) -> Panel:
+def _panel(halves: dict[str, MirrorArray], what: str, logarithmic: str) -> Panel:
     styles = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
     series = tuple(
         Series(
@@ -111,6 +111,6 @@ def _panel(halves: dict[str, Half], what: str, logarithmic: str) -> Panel:
     return Panel(f"Mirrors' {what}", "polar angle about w, deg", "mm", series, logarithmic)
 
 
-def _drawn(half: Half, logarithmic: str) -> float:
+def _drawn(half: MirrorArray, logarithmic: str) -> float:
     radius = half.mirrors.radius
     return correlation(np.log(radius) if logarithmic else radius, half.polar)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.types import Floats
 
 PLACES = ("nearest", "centre", "farthest")
@@ -51,7 +51,7 @@ def behind(curvature: Floats, incidence: Floats, distance: Floats) -> tuple[Floa
     return tangential, sagittal
 
 
-def images(half: Half, radius: float) -> Images:
+def images(half: MirrorArray, radius: float) -> Images:
     """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
     mirrors, pinhole = half.mirrors, half.view.pinhole
     toward = mirrors.apex - pinhole

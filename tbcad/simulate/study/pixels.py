@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, norm
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.camera import turned_to
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
 from tbcad.simulate.scene.rays import exact
@@ -71,7 +71,7 @@ def sensor_of(text: str) -> Sensor:
 
 
 def counts(
-    half: Half, sensors: tuple[Sensor, ...], radius: float, most_rays: int = MOST_RAYS
+    half: MirrorArray, sensors: tuple[Sensor, ...], radius: float, most_rays: int = MOST_RAYS
 ) -> list[Counts]:
     """Count the pixels of a camera with each sensor, the lens and mirrors as they are.
 
@@ -99,7 +99,7 @@ def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
     return -(-sensor.width_px // step), -(-sensor.height_px // step)
 
 
-def _counted(half: Half, sensor: Sensor, sampled: tuple[int, int], radius: float) -> Counts:
+def _counted(half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius: float) -> Counts:
     """Counts of the rays themselves, through the middles of so many columns and rows."""
     corners = half.cells.corners
     full = turned_to(half.view.pinhole, corners, sensor.width_px, sensor.height_px, half.view.hfov)
@@ -122,6 +122,6 @@ def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
     return on[1:], seen[1:]
 
 
-def virtual_cameras(half: Half) -> int:
+def virtual_cameras(half: MirrorArray) -> int:
     """Virtual cameras of both halves together; those that the seam halves count once."""
     return 2 * len(half) - int((half.u[:, 0] == 0).sum())

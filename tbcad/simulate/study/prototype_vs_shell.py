@@ -8,7 +8,7 @@ from scipy.stats import t as student
 from tbcad.simulate.capture.light_field import in_memory
 from tbcad.simulate.capture.source import Geometry, cameras
 from tbcad.simulate.scene.exported import Exported
-from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.simulate.study.plot import Panel, Series
 from tbcad.simulate.study.record import Study
@@ -66,7 +66,7 @@ def paired(one: Floats, other: Floats) -> Difference:
 
 def stand_in(
     export: Exported,
-    subject: Subject,
+    subject: SceneObject,
     places: Round,
     method: Method,
     samples: int = 3,

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.definitions import definitions
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import Counts, Sensor, counts, virtual_cameras
@@ -174,7 +174,7 @@ def _rows(spec: Spec, sensors: tuple[Sensor, ...]) -> list[tuple[Cell, ...]]:
     ]
 
 
-def _cells(half: Half, counted: Counts) -> tuple[Cell, ...]:
+def _cells(half: MirrorArray, counted: Counts) -> tuple[Cell, ...]:
     cameras = virtual_cameras(half)
     # Both cameras' pictures are mirror images, pixel by pixel.
     seeing, on = (2 * float(x.sum()) for x in (counted.seen, counted.on))

@@ -10,7 +10,7 @@ from scipy.stats import linregress
 
 from tbcad.simulate.capture.light_field import NAME, LightField, write, writing
 from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.scene.object import Subject
+from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.scene.shading import Scene, scene_of
@@ -67,7 +67,7 @@ def cases(spec: Spec, sensors: tuple[Sensor, ...]) -> tuple[Case, ...]:
 
 def ssim(
     spec: Spec,
-    subject: Subject,
+    subject: SceneObject,
     sensors: tuple[Sensor, ...],
     places: Round,
     method: Method,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.quality import likeness
 from tbcad.simulate.scene.ground_truth import pinhole_picture, whole
 from tbcad.simulate.scene.shading import Scene, depth_of
@@ -32,7 +32,7 @@ class Round:
     azimuth_deg: Floats
     distance_mm: float
 
-    def views(self, capture_mm: float) -> list[View]:
+    def views(self, capture_mm: float) -> list[Camera]:
         """The cameras, 640 x 480, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
         return [
@@ -56,7 +56,7 @@ def round_of(elevations_deg: tuple[float, ...], azimuths: int, distance_mm: floa
     return Round(elevation, azimuth, distance_mm)
 
 
-def truths(scene: Scene, views: list[View], progress: Progress) -> list[Bytes]:
+def truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
     """What a real camera would see from each viewpoint, (h, w, 3)."""
     pictures = []
     for k, view in enumerate(views):
@@ -68,7 +68,7 @@ def truths(scene: Scene, views: list[View], progress: Progress) -> list[Bytes]:
 def scores(
     tiles: Tiles,
     scene: Scene,
-    views: list[View],
+    views: list[Camera],
     pictures: list[Bytes],
     method: Method,
     progress: Progress,

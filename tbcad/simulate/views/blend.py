@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.compiled import compiled, in_threads
-from tbcad.simulate.views.ray_bundle import SPARSE, Sheaf, candidates, distance, pieces, walk
+from tbcad.simulate.views.ray_bundle import (
+    SPARSE,
+    Sheaf,
+    candidates,
+    distance,
+    greedy_descent,
+    pieces,
+)
 from tbcad.types import Bytes, Floats, Ints
 
 # docs/decisions/0006: of 3 to 10 cameras and 0.2 to 0.4 pixels the best in PSNR and SSIM for the
@@ -65,7 +72,7 @@ def _blend(
             weight = 1 - angle[j] / angle[CAMERAS]
             if k < 0 or weight <= 0:
                 continue
-            last[k] = walk(points, tiles[k], last[k], ray, z, 0.0)
+            last[k] = greedy_descent(points, tiles[k], last[k], ray, z, 0.0)
             if distance(points, last[k], ray, z, 0.0) <= limit**2:
                 _lend(points, tiles[k], colour, last[k], ray, z, weight, result[i])
         if result[i, 3] > 0:

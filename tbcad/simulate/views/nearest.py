@@ -6,7 +6,14 @@ tests/simulate/test_nearest.py compares with a four-dimensional k-d tree over al
 import numpy as np
 
 from tbcad.simulate.compiled import compiled, in_threads
-from tbcad.simulate.views.ray_bundle import SPARSE, Sheaf, candidates, distance, pieces, walk
+from tbcad.simulate.views.ray_bundle import (
+    SPARSE,
+    Sheaf,
+    candidates,
+    distance,
+    greedy_descent,
+    pieces,
+)
 from tbcad.types import Floats, Ints
 
 # Wanted rays in a row that are so near to each other that a few mirrors do for all of them.
@@ -49,7 +56,7 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
             if least >= best:
                 came[k] = least + way
                 continue
-            last[k] = walk(points, tiles[k], last[k], ray, 0.0, 1.0)
+            last[k] = greedy_descent(points, tiles[k], last[k], ray, 0.0, 1.0)
             away = np.sqrt(distance(points, last[k], ray, 0.0, 1.0))
             came[k] = away + way
             if away < best:

@@ -95,7 +95,7 @@ def distance(points: Floats, pixel: int, wanted: Floats, depth: float, slopes: f
 
 
 @compiled
-def walk(
+def greedy_descent(
     points: Floats, tile: Ints, start: int, wanted: Floats, depth: float, slopes: float
 ) -> int:
     """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.compiled import THREADS, in_threads
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.synthesis import Colours, Picture, Rays, colours, gather, reach
@@ -30,7 +30,7 @@ class Focus:
     aperture_mm: float
     plane_mm: float
 
-    def check(self, view: View, capture_mm: float) -> None:
+    def check(self, view: Camera, capture_mm: float) -> None:
         """Refuse what cannot be.
 
         Raises:
@@ -56,7 +56,7 @@ def pinholes() -> Floats:
 
 
 def rays_through(
-    view: View, focus: Focus, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
+    view: Camera, focus: Focus, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
 ) -> Rays:
     """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
 
@@ -76,7 +76,7 @@ def rays_through(
     return np.broadcast_to(start, way.shape), way
 
 
-def refocus(tiles: Tiles, view: View, focus: Focus) -> Picture:
+def refocus(tiles: Tiles, view: Camera, focus: Focus) -> Picture:
     """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
     Args:
@@ -109,7 +109,7 @@ def refocus(tiles: Tiles, view: View, focus: Focus) -> Picture:
 
 
 def refocus_sweep(
-    tiles: Tiles, view: View, aperture_mm: float, count: int, progress: Progress = lambda _: None
+    tiles: Tiles, view: Camera, aperture_mm: float, count: int, progress: Progress = lambda _: None
 ) -> list[NDArray[np.uint8]]:
     """Pictures (h, w, 3) focused on planes from the back of the capture sphere to its front."""
     half = tiles.source.capture_mm / 2
@@ -120,7 +120,7 @@ def refocus_sweep(
     return pictures
 
 
-def _meeting(tiles: Tiles, view: View, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
+def _meeting(tiles: Tiles, view: Camera, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
     """Rays from a place on the lens that meet the capture sphere (n, 3), and which, (h, w)."""
     origin, way = rays_through(view, focus, place)
     start = origin[0, 0]

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.compiled import compiled
 from tbcad.simulate.scene.viewpoint import directions
 from tbcad.simulate.views.blend import blend
@@ -47,7 +47,7 @@ class Picture:
 
 
 def synthesise(
-    tiles: Tiles, view: View, method: Method = "nearest", depth: Depth | None = None
+    tiles: Tiles, view: Camera, method: Method = "nearest", depth: Depth | None = None
 ) -> Picture:
     """The picture that a pinhole camera would see.
 

@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.simulate.compiled import in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import Nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel
 from tbcad.tolerance.montecarlo.pointing import pointing
 from tbcad.types import Floats, Ints
 
@@ -24,7 +24,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Task:
+class MonteCarloCase:
     """What a worker needs to make machines.
 
     Attributes:
@@ -33,7 +33,7 @@ class Task:
         seed: of all machines.
     """
 
-    halves: tuple[Nominal, Nominal]
+    halves: tuple[EdgeModel, EdgeModel]
     errors: Errors
     seed: int
 
@@ -100,7 +100,9 @@ class Yield:
     high: float
 
 
-def simulate(task: Task, machines: int, each: Each = in_threads, first: int = 0) -> Result:
+def simulate(
+    task: MonteCarloCase, machines: int, each: Each = in_threads, first: int = 0
+) -> Result:
     """Make machines and see what they see; the same whoever works, and in what batches.
 
     Args:
@@ -122,7 +124,7 @@ def batches(machines: int, first: int) -> list[range]:
 class Work:
     """Makes machines of a task; it can be sent to another process."""
 
-    task: Task
+    task: MonteCarloCase
 
     def __call__(self, machines: range) -> Result:
         """What the machines of these numbers see."""
@@ -146,7 +148,7 @@ def joined(results: Sequence[Seen]) -> Seen:
     return kind(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
 
 
-def reached(worst: Floats, share: float) -> float:
+def coverage_at_yield(worst: Floats, share: float) -> float:
     """Coverage, mm, that a share of the machines reach with their worst camera (s,).
 
     It is the target or more exactly where that share of them is good: an order statistic, nothing

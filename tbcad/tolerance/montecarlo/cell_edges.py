@@ -34,7 +34,7 @@ PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
 
 
 @compiled
-def follow(
+def trace_cell_edges(
     surfaces: Floats,
     pair: Ints,
     offset: Ints,

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.simulate.scene.reflector import pitch
-from tbcad.tolerance.montecarlo.cell_edges import follow
+from tbcad.tolerance.montecarlo.cell_edges import trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import Draws
-from tbcad.tolerance.montecarlo.edge_model import Nominal, places, tables
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, places, tables
 from tbcad.types import Floats, Ints
 
 
@@ -28,20 +28,20 @@ class Seen:
     pixels: Floats
 
 
-def seen(half: Nominal, draws: Draws) -> Seen:
+def seen(half: EdgeModel, draws: Draws) -> Seen:
     """What each mirror of one half sees, for s machines."""
     found = np.empty((len(draws), len(half), 3))
     near = half.near
     pairs = zip(tables(half, draws), places(half, draws), strict=True)
     for machine, (table, place) in enumerate(pairs):
-        found[machine] = follow(
+        found[machine] = trace_cell_edges(
             table, near.pair, near.offset, near.face, near.reach, half.halved, place, half.screen
         )
     area = np.abs(found[..., 2]) * (draws.focal[:, None] / pitch(half.view)) ** 2
     return Seen(2 * np.sqrt(found[..., 0]), found[..., 1].astype(np.int64), area)
 
 
-def virtual(halves: tuple[Nominal, Nominal]) -> Ints:
+def virtual(halves: tuple[EdgeModel, EdgeModel]) -> Ints:
     """Number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
 
     The two halves of a mirror on the seam are one virtual camera's; mirror i of camera b is
@@ -52,7 +52,9 @@ def virtual(halves: tuple[Nominal, Nominal]) -> Ints:
     return np.concatenate([np.arange(len(a)), np.where(b.halved, np.arange(len(b)), own)])
 
 
-def coverage(halves: tuple[Nominal, Nominal], draws: tuple[Draws, Draws]) -> tuple[Floats, Floats]:
+def coverage(
+    halves: tuple[EdgeModel, EdgeModel], draws: tuple[Draws, Draws]
+) -> tuple[Floats, Floats]:
     """Exact coverage diameter (mm) and pixels of v virtual cameras of s machines, two of (s, v).
 
     The halves of a mirror on the seam count together: the lesser diameter, all pixels. A mirror

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, unit
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.tolerance.montecarlo.neighbour_pairs import Near, near
@@ -19,7 +19,7 @@ ASKEW = np.array([1.0, 0.1234, 0.0567])
 
 
 @dataclass(frozen=True)
-class Nominal:
+class EdgeModel:
     """One camera's half as designed: m mirrors and two planes.
 
     Attributes:
@@ -30,7 +30,7 @@ class Nominal:
         screen: two axes and normal u of the plane through the object that each faces, (m, 3, 3).
     """
 
-    view: View
+    view: Camera
     table: Floats
     near: Near
     halved: Bools
@@ -41,22 +41,22 @@ class Nominal:
         return len(self.halved)
 
 
-def nominal(at: Reflector) -> Nominal:
+def nominal(at: Reflector) -> EdgeModel:
     """What the fast model needs of one camera with its mirrors."""
     every = at.cells.surfaces
     table = np.column_stack([every.apex, every.normal, every.curvature])
     first = unit(ASKEW - dot(at.u, ASKEW)[:, None] * at.u)
     screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
-    return Nominal(at.view, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
+    return EdgeModel(at.view, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
 
 
-def nominals(cameras: tuple[Reflector, Reflector]) -> tuple[Nominal, Nominal]:
+def nominals(cameras: tuple[Reflector, Reflector]) -> tuple[EdgeModel, EdgeModel]:
     """The same of both cameras."""
     a, b = cameras
     return nominal(a), nominal(b)
 
 
-def tables(half: Nominal, draws: Draws) -> Floats:
+def tables(half: EdgeModel, draws: Draws) -> Floats:
     """The surfaces of s machines before their shells are scaled and moved, (s, m + 2, 7).
 
     A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
@@ -77,12 +77,12 @@ def tables(half: Nominal, draws: Draws) -> Floats:
     return table
 
 
-def axes(view: View) -> Floats:
+def axes(view: Camera) -> Floats:
     """Right, down and forward of a camera, (3, 3)."""
     return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
 
 
-def places(half: Nominal, draws: Draws) -> Floats:
+def places(half: EdgeModel, draws: Draws) -> Floats:
     """What tbcad.tolerance.edges needs of each machine beside its surfaces, (s, 6, 3).
 
     Camera and object are moved into the frame of the shell instead of the shell out to them.

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.tolerance.montecarlo.draws import Draws
-from tbcad.tolerance.montecarlo.edge_model import Nominal, axes, places, tables
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, axes, places, tables
 from tbcad.types import Floats
 
 
@@ -26,7 +26,7 @@ class Pointing:
     offset: Floats
 
 
-def pointing(half: Nominal, draws: Draws) -> Pointing:
+def pointing(half: EdgeModel, draws: Draws) -> Pointing:
     """Errors of the rays of one half's middle pixels, for s machines.
 
     A pixel is where it is on the sensor: moved and turned cameras and wrong focal lengths count.
@@ -42,13 +42,13 @@ def pointing(half: Nominal, draws: Draws) -> Pointing:
     return Pointing(np.arctan2(norm(np.cross(made, designed)), dot(made, designed)), offset)
 
 
-def _rays(half: Nominal) -> Floats:
+def _rays(half: EdgeModel) -> Floats:
     """From the pinhole to the apices as designed, (m, 3)."""
     result: Floats = half.table[: len(half), :3] - half.view.pinhole
     return result
 
 
-def _ways(half: Nominal, draws: Draws, camera: list[Floats]) -> Floats:
+def _ways(half: EdgeModel, draws: Draws, camera: list[Floats]) -> Floats:
     """Rays of the same pixels of the made cameras, whose axes are three of (s, 1, 3), (s, m, 3)."""
     across, down, depth = (_rays(half) @ axes(half.view).T)[..., None].swapaxes(0, 1)
     focal = draws.focal[:, None, None] * depth

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from tbcad.tolerance.montecarlo.builds import reached
+from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.draws import NONE, Error, Errors
 from tbcad.types import Floats
 
@@ -20,7 +20,7 @@ EXACT = 0.02
 
 
 @dataclass(frozen=True)
-class Alone:
+class SingleErrorEffect:
     """What one kind of error costs when there is no other.
 
     Attributes:
@@ -56,7 +56,9 @@ def _times(error: Error, times: float) -> Error:
     return replace(error, spread=error.spread * times, mean=error.mean * times)
 
 
-def alone(errors: Errors, kind: str, wanted: float, target: float, worst: Worst) -> Alone:
+def one_at_a_time(
+    errors: Errors, kind: str, wanted: float, target: float, worst: Worst
+) -> SingleErrorEffect:
     """One kind of error by itself.
 
     Args:
@@ -68,8 +70,8 @@ def alone(errors: Errors, kind: str, wanted: float, target: float, worst: Worst)
     """
     mine = only(errors, kind)
     designed, seen = worst(Errors()), worst(mine)
-    tail = reached(seen, wanted)
-    return Alone(
+    tail = coverage_at_yield(seen, wanted)
+    return SingleErrorEffect(
         kind,
         float(designed.mean() - seen.mean()),
         float(designed.mean()) - tail,
@@ -84,7 +86,7 @@ def loosest(errors: Errors, wanted: float, target: float, worst: Worst) -> float
     """
 
     def left(times: float) -> float:
-        return reached(worst(scaled(errors, times)), wanted) - target
+        return coverage_at_yield(worst(scaled(errors, times)), wanted) - target
 
     room = left(0.0)
     if room < 0:

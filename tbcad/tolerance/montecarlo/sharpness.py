@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, in_memory
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.rays import exact
-from tbcad.simulate.scene.reflector import Reflector, Replaced
+from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.simulate.scene.shading import Scene
 from tbcad.simulate.study.views import scores
 from tbcad.simulate.views.synthesis import Method
@@ -37,7 +37,7 @@ class Wanted:
     """
 
     capture_mm: float
-    views: list[View]
+    views: list[Camera]
     truths: list[Bytes]
 
 
@@ -92,7 +92,7 @@ def sharpness(
 
 
 @dataclass(frozen=True)
-class AsMade(Replaced):
+class AsMade(SubstitutedReflector):
     """A camera and its mirrors, where they have come to be.
 
     The cells are those of the design: they only say where in the picture a mirror may be.
@@ -125,7 +125,7 @@ def actual(at: Reflector, draws: Draws, machine: int) -> AsMade:
     return AsMade(at.camera, _view(at.view, draws, machine), at.u, at.cells, grown)
 
 
-def _view(view: View, draws: Draws, machine: int) -> View:
+def _view(view: Camera, draws: Draws, machine: int) -> Camera:
     turn = Rotation.from_rotvec(draws.camera_tilt[machine])
     half = np.tan(view.hfov / 2) / draws.focal[machine]
     return replace(

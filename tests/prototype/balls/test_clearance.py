@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import turned
 from tbcad.optics.trace import reflected
 from tbcad.prototype.balls.catalogue import load_catalogue
@@ -16,7 +16,7 @@ K = 12
 
 
 @pytest.fixture(scope="module")
-def balls(paper_half: Half) -> Balls:
+def balls(paper_half: MirrorArray) -> Balls:
     """As large as stock has them, so that they stand in each other's light too."""
     groups = clusters(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
     here = stand(paper_half, groups, 60.0)
@@ -45,7 +45,9 @@ def gaps(start: np.ndarray, end: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return result
 
 
-def test_light_passes_beyond_the_angle_and_hardly_within(paper_half: Half, balls: Balls) -> None:
+def test_light_passes_beyond_the_angle_and_hardly_within(
+    paper_half: MirrorArray, balls: Balls
+) -> None:
     """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
     pinhole = norm(paper_half.view.pinhole)
     _, dark = apart(balls, KEYS, pinhole, 30.0)
@@ -65,7 +67,7 @@ def test_light_passes_beyond_the_angle_and_hardly_within(paper_half: Half, balls
     assert nearest.max() < 2.6
 
 
-def test_balls_touch_within_the_angle(paper_half: Half, balls: Balls) -> None:
+def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> None:
     touch, _ = apart(balls, KEYS, norm(paper_half.view.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
@@ -73,7 +75,7 @@ def test_balls_touch_within_the_angle(paper_half: Half, balls: Balls) -> None:
         assert norm(other - balls.body_centre[j]) == pytest.approx(60 + KEYS.ball_wall_mm)
 
 
-def test_post_lies_straight_below(paper_half: Half, balls: Balls) -> None:
+def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None:
     """Its half-plane is opposite to the mirrors; only the lowest polar angles come near it."""
     frame = paper_half.ellipsoid.frame()
     post, camera = obstacles(KEYS, frame, paper_half.view, 400.0)

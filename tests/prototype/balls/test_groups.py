@@ -3,25 +3,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import Half
+from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.groups import clusters
 from tbcad.spec.errors import SpecError
 
 
-def test_one_group_is_the_mean(paper_half: Half) -> None:
+def test_one_group_is_the_mean(paper_half: MirrorArray) -> None:
     groups = clusters(paper_half.polar, paper_half.mirrors.radius, 1, 0.25)
     assert groups.polar == pytest.approx([paper_half.polar.mean()])
     assert groups.radius == pytest.approx([paper_half.mirrors.radius.mean()])
 
 
-def test_by_polar_angle_alone_groups_are_bands(paper_half: Half) -> None:
+def test_by_polar_angle_alone_groups_are_bands(paper_half: MirrorArray) -> None:
     groups = clusters(paper_half.polar, paper_half.mirrors.radius, 16, 0.0)
     order = np.argsort(paper_half.polar, kind="stable")
     assert (np.diff(groups.of[order]) >= 0).all()
     assert (np.diff(groups.polar) > 0).all()
 
 
-def test_every_mirror_is_in_the_nearest_group(paper_half: Half) -> None:
+def test_every_mirror_is_in_the_nearest_group(paper_half: MirrorArray) -> None:
     """What k-means promises, whatever its start."""
     polar, radius = np.degrees(paper_half.polar), paper_half.mirrors.radius
     groups = clusters(paper_half.polar, radius, 16, 0.25)
@@ -30,7 +30,7 @@ def test_every_mirror_is_in_the_nearest_group(paper_half: Half) -> None:
     assert (away.argmin(axis=1) == groups.of).all()
 
 
-def test_worst_direction_is_nearly_the_least_possible(paper_half: Half) -> None:
+def test_worst_direction_is_nearly_the_least_possible(paper_half: MirrorArray) -> None:
     """16 even bands over 90 degrees would be off by 2.81 at most."""
     groups = clusters(paper_half.polar, paper_half.mirrors.radius, 16, 0.25)
     error = np.degrees(np.abs(groups.polar[groups.of] - paper_half.polar))
@@ -38,7 +38,7 @@ def test_worst_direction_is_nearly_the_least_possible(paper_half: Half) -> None:
 
 
 @pytest.mark.parametrize("k", [848, 847, 5000])
-def test_more_groups_than_mirrors(paper_half: Half, k: int) -> None:
+def test_more_groups_than_mirrors(paper_half: MirrorArray, k: int) -> None:
     with pytest.raises(SpecError, match=rf"prototype.k is {k}, but camera a has 847 mirrors"):
         clusters(paper_half.polar, paper_half.mirrors.radius, k, 0.25)
 

@@ -10,8 +10,8 @@ from tbcad.mirrors.array import Design, design
 from tbcad.optics.trace import reflected
 from tbcad.prototype.balls.alternatives import choices
 from tbcad.prototype.balls.layout import Prototype, pictures, prototype
-from tbcad.prototype.balls.selection import SAME_MM, Stand, choose, fit, stand
-from tbcad.prototype.balls.stops import fewest, plan, requests
+from tbcad.prototype.balls.selection import SAME_MM, BallCandidates, choose, fit, stand
+from tbcad.prototype.balls.stops import min_stabbing_points, plan, requests
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError
 
@@ -26,7 +26,7 @@ def made(paper_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def here(made: Prototype) -> Stand:
+def here(made: Prototype) -> BallCandidates:
     return stand(made.half, made.groups, 60.0)
 
 
@@ -39,7 +39,7 @@ class TestBalls:
         assert made.fit.coverage.min() > 60
         assert made.fit.possible.all()
 
-    def test_the_next_larger_ball_would_not(self, made: Prototype, here: Stand) -> None:
+    def test_the_next_larger_ball_would_not(self, made: Prototype, here: BallCandidates) -> None:
         catalogue, stock = made.balls.catalogue, made.balls.stock
         larger = np.where(
             made.balls.cap,
@@ -66,12 +66,12 @@ class TestBalls:
         bought = ~made.balls.cap
         assert (made.balls.body_centre[bought] == made.balls.centre[bought]).all()
 
-    def test_without_caps_the_largest_ball(self, made: Prototype, here: Stand) -> None:
+    def test_without_caps_the_largest_ball(self, made: Prototype, here: BallCandidates) -> None:
         balls = choose(here, KEYS.model_copy(update={"caps": False}), made.balls.catalogue)
         assert balls.radius.max() == 30
         assert not balls.cap.any()
 
-    def test_nearest(self, made: Prototype, here: Stand) -> None:
+    def test_nearest(self, made: Prototype, here: BallCandidates) -> None:
         keys = KEYS.model_copy(update={"snap": "nearest"})
         balls = choose(here, keys, made.balls.catalogue)
         every = made.balls.catalogue.diameter / 2
@@ -80,7 +80,9 @@ class TestBalls:
         assert np.abs(balls.radius - made.groups.radius)[bought] == pytest.approx(away[bought])
         assert fit(here, balls, keys).coverage.min() < 60
 
-    def test_pictures_left_in_place_need_tiny_balls(self, made: Prototype, here: Stand) -> None:
+    def test_pictures_left_in_place_need_tiny_balls(
+        self, made: Prototype, here: BallCandidates
+    ) -> None:
         keys = KEYS.model_copy(update={"picture": "fixed"})
         balls = choose(here, keys, made.balls.catalogue)
         found = fit(here, balls, keys)
@@ -199,7 +201,7 @@ class TestStops:
     def test_are_the_fewest_and_fewer_than_greedys(self, made: Prototype) -> None:
         wanted = requests(made.groups, made.half.azimuth, np.radians(KEYS.stop_error_deg))
         angle = wanted.azimuth - made.placement.azimuth[wanted.ball]
-        points, _ = fewest(angle - wanted.tolerance, angle + wanted.tolerance)
+        points, _ = min_stabbing_points(angle - wanted.tolerance, angle + wanted.tolerance)
         assert len(points) == len(made.stops)
         other = plan(made.groups, made.half.polar, wanted, made.greedy.azimuth)
         assert len(made.stops) <= len(other)

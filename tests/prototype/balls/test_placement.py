@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tbcad.prototype.balls.clearance import BETWEEN
-from tbcad.prototype.balls.placement import SLACK, Task, greedy, place
+from tbcad.prototype.balls.placement import SLACK, PlacementProblem, greedy, place
 from tbcad.spec.errors import SpecError
 
 
 def task(
     apart: np.ndarray, half: np.ndarray, ceiling: float = np.pi, most: float = 2 * np.pi
-) -> Task:
+) -> PlacementProblem:
     k = len(half)
     limit = np.full(k, ceiling)
-    return Task(apart, -half, half, -limit, limit, np.zeros(k), most)
+    return PlacementProblem(apart, -half, half, -limit, limit, np.zeros(k), most)
 
 
 def least_swing(apart: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
@@ -33,7 +33,7 @@ def least_swing(apart: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
 
 
 @st.composite
-def tasks(draw: st.DrawFn) -> Task:
+def tasks(draw: st.DrawFn) -> PlacementProblem:
     k = draw(st.integers(1, 5))
     apart = np.zeros((k, k))
     for i in range(k):
@@ -42,12 +42,12 @@ def tasks(draw: st.DrawFn) -> Task:
     low = np.array([draw(st.floats(-1.6, -0.2)) for _ in range(k)])
     high = np.array([draw(st.floats(0.2, 1.6)) for _ in range(k)])
     limit = np.full(k, 2 * np.pi)
-    return Task(apart, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
+    return PlacementProblem(apart, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
 
 
 @settings(max_examples=50, deadline=None)
 @given(tasks())
-def test_swing_is_the_least_of_all_orders(given_task: Task) -> None:
+def test_swing_is_the_least_of_all_orders(given_task: PlacementProblem) -> None:
     found = place(given_task)
     expected = least_swing(given_task.apart, given_task.low, given_task.high)
     assert found.swing == pytest.approx(expected, abs=3 * SLACK)
@@ -88,7 +88,7 @@ def test_of_equal_swings_the_least_outermost_azimuth() -> None:
     apart = np.zeros((3, 3))
     limit = np.full(3, np.pi)
     low, high = -np.array([1.0, 1.0, 0.5]), np.array([1.0, 1.0, 0.5])
-    found = place(Task(apart, low, high, -limit, limit, edge, 6.0))
+    found = place(PlacementProblem(apart, low, high, -limit, limit, edge, 6.0))
     assert found.outermost == pytest.approx(1.4, abs=1e-4)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.prototype.balls.stops import between, fewest
+from tbcad.prototype.balls.stops import between, min_stabbing_points
 
 
 def exhaustive(low: np.ndarray, high: np.ndarray) -> int:
@@ -23,14 +23,14 @@ def exhaustive(low: np.ndarray, high: np.ndarray) -> int:
 def test_fewest_against_exhaustive_search(intervals: list[tuple[int, int]]) -> None:
     low = np.array([float(start) for start, _ in intervals])
     high = low + [float(length) for _, length in intervals]
-    points, which = fewest(low, high)
+    points, which = min_stabbing_points(low, high)
     assert len(points) == exhaustive(low, high)
     assert (low <= points[which]).all()
     assert (points[which] <= high).all()
 
 
 def test_one_point_for_what_touches() -> None:
-    points, which = fewest(np.array([1.0, 0.0]), np.array([2.0, 1.0]))
+    points, which = min_stabbing_points(np.array([1.0, 0.0]), np.array([2.0, 1.0]))
     assert points.tolist() == [1.0]
     assert which.tolist() == [0, 0]
 

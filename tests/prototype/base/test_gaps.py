@@ -8,17 +8,17 @@ from hypothesis import strategies as st
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import prototype
 from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, arcs, gaps
-from tbcad.prototype.base.layout import Base, base
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.base.layout import BaseLayout, base
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 
 
 @pytest.fixture(scope="module")
-def whole(paper_design: Design) -> Base:
-    return base(Keys(), prototype(load_spec(None), paper_design))
+def whole(paper_design: Design) -> BaseLayout:
+    return base(BaseSpec(), prototype(load_spec(None), paper_design))
 
 
-def test_arcs_miss_every_number(whole: Base) -> None:
+def test_arcs_miss_every_number(whole: BaseLayout) -> None:
     seats = whole.own_seats
     for ring in whole.rings:
         z, r = ring.mean(axis=0)
@@ -33,7 +33,7 @@ def test_arcs_miss_every_number(whole: Base) -> None:
                 assert not ((along > 0) & (beside < seats.boss[k])).any()
 
 
-def test_a_rib_without_bosses_is_whole_and_others_are_not(whole: Base) -> None:
+def test_a_rib_without_bosses_is_whole_and_others_are_not(whole: BaseLayout) -> None:
     sides = [0.0, -0.5, -0.5, -1.0]
     counts = [len(gaps(whole, a, s)) for a, s in zip(whole.ribs.tolist(), sides, strict=True)]
     assert counts[0] == counts[-1] == 0  # the edges' ribs stand beyond all bosses

@@ -10,19 +10,19 @@ from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import light
 from tbcad.prototype.balls.layout import Prototype, prototype
 from tbcad.prototype.base.hub import hub
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.layout import _sector as sector
 from tbcad.prototype.base.profile import Light, hull, offset, outside, thinned, trimmed
 from tbcad.prototype.base.seats import APART_MM, free_of_ways, resized, seats
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
-KEYS = Keys()
+KEYS = BaseSpec()
 
 
-def keys(**changed: object) -> Keys:
-    return Keys.model_validate(KEYS.model_dump() | changed)
+def keys(**changed: object) -> BaseSpec:
+    return BaseSpec.model_validate(KEYS.model_dump() | changed)
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +36,19 @@ def paper(paper_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def whole(paper: Prototype) -> Base:
+def whole(paper: Prototype) -> BaseLayout:
     return base(KEYS, paper)
 
 
 class TestSeats:
-    def test_pads_are_tangent_to_the_bodies(self, whole: Base, paper: Prototype) -> None:
+    def test_pads_are_tangent_to_the_bodies(self, whole: BaseLayout, paper: Prototype) -> None:
         seat = whole.seats
         away = dot(seat.contacts - paper.body_centres()[:, None], seat.pad_normals)
         assert np.abs(away + paper.balls.body_radius[:, None]).max() < 1e-9
         assert np.abs(norm(seat.pad_normals) - 1).max() < 1e-12
 
     def test_pads_stand_at_the_angle_of_the_spec_a_third_of_a_turn_apart(
-        self, whole: Base, paper: Prototype
+        self, whole: BaseLayout, paper: Prototype
     ) -> None:
         normal = whole.seats.pad_normals
         tilt = dot(normal, paper.normals()[:, None])
@@ -58,13 +58,13 @@ class TestSeats:
         assert pairs == pytest.approx(np.full(pairs.shape, apart))
 
     def test_frames_are_right_handed_and_their_first_row_points_to_the_camera(
-        self, whole: Base
+        self, whole: BaseLayout
     ) -> None:
         axes = whole.seats.axes
         assert np.linalg.det(axes) == pytest.approx(np.ones(len(axes)))
         assert (axes[:, 0] @ whole.frame[0] > 0).all()
 
-    def test_magnets_do_not_touch(self, whole: Base) -> None:
+    def test_magnets_do_not_touch(self, whole: BaseLayout) -> None:
         seat = whole.seats
         top = seat.bottom - KEYS.magnet_height_mm
         assert top - seat.radius == pytest.approx(np.full(len(seat), KEYS.magnet_gap_mm))
@@ -76,7 +76,7 @@ class TestSeats:
         assert (seat.magnet == 0).all()
         assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
 
-    def test_balls_go_in_past_the_pads_of_others(self, whole: Base) -> None:
+    def test_balls_go_in_past_the_pads_of_others(self, whole: BaseLayout) -> None:
         assert free_of_ways(whole.seats).min() > APART_MM
 
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
@@ -90,13 +90,13 @@ class TestSeats:
         assert dot(seat.way[:, None], seat.pad_normals).min() > 0
         assert free_of_ways(seat).min() > APART_MM
 
-    def test_moved_pads(self, whole: Base) -> None:
+    def test_moved_pads(self, whole: BaseLayout) -> None:
         moved = resized(whole.seats, np.array([0.0, 0.2]))
         assert norm(moved[:, 1]) - norm(moved[:, 0]) == pytest.approx(np.full((16, 3), 0.2))
 
 
 class TestLight:
-    def test_all_light_is_within_the_level(self, whole: Base, paper: Prototype) -> None:
+    def test_all_light_is_within_the_level(self, whole: BaseLayout, paper: Prototype) -> None:
         random = np.random.default_rng(1)
         for cone in light(paper.balls.outline, whole.light.pinhole, 30.0):
             share = random.random((len(cone), 500, 1))
@@ -107,7 +107,7 @@ class TestLight:
             rim = reach[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
             assert whole.light.beyond(middle + rim).max() <= -2 * KEYS.light_clearance_mm + 1e-9
 
-    def test_the_wall_is_beyond_it(self, whole: Base) -> None:
+    def test_the_wall_is_beyond_it(self, whole: BaseLayout) -> None:
         parts = np.stack([whole.inner[:-1], whole.inner[1:]], axis=1)
         assert whole.light.least_beyond(parts).min() >= 0
 
@@ -128,7 +128,7 @@ class TestProfile:
         points = np.array([[0, 0], [1, 2], [2, 2.5], [3, 0], [1.5, 1]], dtype=float)
         assert hull(points).tolist() == [[0, 0], [1, 2], [2, 2.5], [3, 0]]
 
-    def test_offset_lines_keep_their_distance(self, whole: Base) -> None:
+    def test_offset_lines_keep_their_distance(self, whole: BaseLayout) -> None:
         away = outside(whole.inner, offset(whole.inner, 5.0))
         assert away == pytest.approx(np.full(len(away), 5.0))
 
@@ -144,7 +144,7 @@ class TestProfile:
         assert trimmed(line, 4.0).tolist() == [[0, 0], [2, 4], [4, 5]]
         assert trimmed(line, 8.0).tolist() == [[0, 0], [2, 4], [8, 7]]
 
-    def test_bosses_begin_inside_and_end_outside_of_the_wall(self, whole: Base) -> None:
+    def test_bosses_begin_inside_and_end_outside_of_the_wall(self, whole: BaseLayout) -> None:
         seat, frame = whole.seats, whole.frame
         for length, sign in ((seat.front, -1), (seat.back, 1)):
             for side in (-1, 1):
@@ -154,7 +154,7 @@ class TestProfile:
                 line = whole.inner if sign < 0 else whole.outer
                 assert (sign * outside(line, at)).min() > -1e-9
 
-    def test_the_sector_holds_all_bosses(self, whole: Base, paper: Prototype) -> None:
+    def test_the_sector_holds_all_bosses(self, whole: BaseLayout, paper: Prototype) -> None:
         low, high = whole.sector
         azimuth = paper.placement.azimuth
         assert low < azimuth.min() < azimuth.max() < high
@@ -165,7 +165,7 @@ class TestProfile:
 
 
 class TestHub:
-    def test_it_stands_beyond_the_light(self, whole: Base) -> None:
+    def test_it_stands_beyond_the_light(self, whole: BaseLayout) -> None:
         held = whole.hub
         assert whole.light.beyond(np.array([held.front, 0.0])) >= 0
         assert held.front > held.back > held.face == whole.hub_face

@@ -37,17 +37,17 @@ from tbcad.prototype.base.cap_solids import caps, flat, pocket
 from tbcad.prototype.base.coupon import _wall as seat_section
 from tbcad.prototype.base.coupon import coupon, rows_of
 from tbcad.prototype.base.hub import hub
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.solid import bodies, carrier, tools
 from tbcad.prototype.base.split import downs
-from tbcad.prototype.printing.placing import Part, laid
+from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.shell.solid import InvalidSolidError, Solid
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
 UP = np.array([0.0, 0.0, 1.0])
-KEYS = Keys(coupon_offsets_mm=(-0.1, 0.2))
+KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
 
 
 @pytest.fixture(scope="module")
@@ -57,18 +57,18 @@ def made(small_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype) -> Base:
+def numbers(made: Prototype) -> BaseLayout:
     return base(KEYS, made)
 
 
 @pytest.fixture(scope="module")
-def part(numbers: Base) -> Part:
+def part(numbers: BaseLayout) -> PlacedSolid:
     (only,) = carrier(numbers)
     return only
 
 
 @pytest.fixture(scope="module")
-def mesh(part: Part) -> trimesh.Trimesh:
+def mesh(part: PlacedSolid) -> trimesh.Trimesh:
     return as_trimesh(part.shape)
 
 
@@ -90,7 +90,7 @@ def quartered(corners: np.ndarray) -> np.ndarray:
 
 
 class TestCarrier:
-    def test_it_is_watertight(self, part: Part, mesh: trimesh.Trimesh) -> None:
+    def test_it_is_watertight(self, part: PlacedSolid, mesh: trimesh.Trimesh) -> None:
         assert mesh.is_watertight
         assert mesh.is_winding_consistent
         assert mesh.body_count == 1
@@ -99,7 +99,7 @@ class TestCarrier:
         assert part.mass_g(1.27) == pytest.approx(part.volume * 1.27e-3)
 
     def test_ball_centres_are_recovered_from_the_pads(
-        self, numbers: Base, made: Prototype, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, made: Prototype, mesh: trimesh.Trimesh
     ) -> None:
         centre, radius = made.body_centres(), made.balls.body_radius
         for k, (contacts, normals) in enumerate(
@@ -117,7 +117,7 @@ class TestCarrier:
             recovered = np.linalg.solve([n for n, _ in planes], [d for _, d in planes])
             assert norm(recovered - centre[k]) < 1e-3
 
-    def test_pads_are_whole(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_pads_are_whole(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         areas = mesh.area_faces
         for contacts, normals, pad in zip(
             numbers.seats.contacts, numbers.seats.pad_normals, numbers.seats.pad, strict=True
@@ -128,7 +128,7 @@ class TestCarrier:
                 assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_balls_touch_nothing_but_their_pads(
-        self, numbers: Base, made: Prototype, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, made: Prototype, mesh: trimesh.Trimesh
     ) -> None:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=1)
         points = np.vstack([points, mesh.vertices])
@@ -144,7 +144,9 @@ class TestCarrier:
             assert room.min() > -1e-6
             assert room[~at_pad].min() > KEYS.clearance_mm - 0.03
 
-    def test_no_facet_reaches_into_the_light(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_no_facet_reaches_into_the_light(
+        self, numbers: BaseLayout, mesh: trimesh.Trimesh
+    ) -> None:
         corners = mesh.triangles @ numbers.frame.T
         for _ in range(4):
             # The bound is below all of a facet; where it is too low, of its quarters.
@@ -152,7 +154,9 @@ class TestCarrier:
         assert not len(corners)
         assert numbers.light.beyond(mesh.vertices @ numbers.frame.T).min() > 0
 
-    def test_volume_against_booleans_of_meshes(self, numbers: Base, part: Part) -> None:
+    def test_volume_against_booleans_of_meshes(
+        self, numbers: BaseLayout, part: PlacedSolid
+    ) -> None:
         """The kernel's booleans can lose a piece and pass for valid; other booleans tell."""
         seats = numbers.own_seats
         added, removed = bodies(numbers, seats), tools(numbers, seats)
@@ -160,7 +164,7 @@ class TestCarrier:
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
             check_volume("carrier", part.shape, part.volume * 1.01)
 
-    def test_balls_can_be_put_in(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_balls_can_be_put_in(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         points = np.vstack([mesh.vertices, mesh.triangles_center])
         found = numbers.seats
         for centre, way, radius in zip(found.centre, found.way, found.radius, strict=True):
@@ -171,7 +175,7 @@ class TestCarrier:
             inside = (along > 0) & (along < length) & (beside < radius)
             assert not inside.any()
 
-    def test_numbers_stand_on_the_bosses(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_numbers_stand_on_the_bosses(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         found = numbers.seats
         for k in range(len(found)):
             top = found.centre[k] + (found.back[k] + KEYS.relief_mm) * found.axis[k]
@@ -181,7 +185,9 @@ class TestCarrier:
             squares = "".join(SIGNS[str(k + 1)]).count("#")
             assert area == pytest.approx(squares * square**2, rel=1e-6)
 
-    def test_nothing_stands_over_the_numbers(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_nothing_stands_over_the_numbers(
+        self, numbers: BaseLayout, mesh: trimesh.Trimesh
+    ) -> None:
         found = numbers.seats
         turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
         for k in range(len(found)):
@@ -194,43 +200,43 @@ class TestCarrier:
             ways = np.broadcast_to(found.axis[k], points.shape)
             assert not mesh.ray.intersects_any(points, ways).any()
 
-    def test_the_hub_is_about_the_axis(self, numbers: Base, mesh: trimesh.Trimesh) -> None:
+    def test_the_hub_is_about_the_axis(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         local = mesh.vertices @ numbers.frame.T
         assert local[:, 0].min() == pytest.approx(numbers.hub_face)
         bore = np.isclose(norm(local[:, 1:]), KEYS.shaft_mm / 2)
         assert bore.sum() > 40
 
-    def test_it_is_laid_on_the_bed(self, part: Part) -> None:
+    def test_it_is_laid_on_the_bed(self, part: PlacedSolid) -> None:
         low, high = bounds(part.on_bed)
         assert low[2] == pytest.approx(0, abs=0.5)
         assert (high - low <= np.array(KEYS.bed_mm) - [6, 6, 3]).all()
         assert volume(part.on_bed) == pytest.approx(part.volume)
 
-    def test_a_bed_too_small(self, numbers: Base, part: Part) -> None:
-        small = Keys(bed_mm=(120.0, 120.0, 120.0))
+    def test_a_bed_too_small(self, numbers: BaseLayout, part: PlacedSolid) -> None:
+        small = BaseSpec(bed_mm=(120.0, 120.0, 120.0))
         with pytest.raises(
             SpecError, match=r"make prototype\.base\.bed_mm at least \d+ x \d+"
         ) as said:
-            laid("carrier", part.shape, downs(numbers, np.zeros((0, 4))), np.eye(3), small)
+            placed_on_bed("carrier", part.shape, downs(numbers, np.zeros((0, 4))), np.eye(3), small)
         bed = [
             float(size) for size in re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))[0]
         ]
-        assert laid(
+        assert placed_on_bed(
             "carrier",
             part.shape,
             downs(numbers, np.zeros((0, 4))),
             np.eye(3),
-            Keys(bed_mm=tuple(bed)),
+            BaseSpec(bed_mm=tuple(bed)),
         )
 
-    def test_the_same_bytes(self, numbers: Base, part: Part, tmp_path: Path) -> None:
+    def test_the_same_bytes(self, numbers: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
         for name, again in (("one", part), ("two", carrier(numbers)[0])):
             write_step(tmp_path / name, Solid(again.name, again.shape, ()))
         assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_booleans_in_parallel_give_the_same_bytes(
-    numbers: Base, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    numbers: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Faces come in the same order, in two threads or one, by oriented boxes or plain ones."""
     found = numbers.own_seats
@@ -260,7 +266,7 @@ def plain(kind: type, used: list[str]) -> type:
 
 
 class TestSeat:
-    def test_volume_against_a_closed_form(self, numbers: Base) -> None:
+    def test_volume_against_a_closed_form(self, numbers: BaseLayout) -> None:
         found = numbers.seats
         for k in range(len(found)):
             cup, pad, radius, pocket_radius = (
@@ -282,14 +288,14 @@ class TestHub:
     @pytest.mark.parametrize("lock", ["set-screws", "clamp"])
     @pytest.mark.parametrize("drive", ["nema17-belt", "nema17-direct", "stage-60"])
     def test_every_drive(self, drive: str, lock: str) -> None:
-        keys = Keys.model_validate({"drive": drive, "lock": lock})
+        keys = BaseSpec.model_validate({"drive": drive, "lock": lock})
         held = hub(keys, -60.0)
         solid = one_solid("hub", cut(fused(hubs.body(held)), hubs.holes(held, keys)))
         assert as_trimesh(solid).is_watertight
         assert bounds(solid)[:, 2] == pytest.approx([held.face, held.front])
 
     def test_volume_of_a_stages_hub(self) -> None:
-        keys = Keys(drive="stage-60")
+        keys = BaseSpec(drive="stage-60")
         held = hub(keys, -60.0)
         solid = cut(fused(hubs.body(held)), hubs.holes(held, keys))
         thick = held.front - held.face
@@ -299,7 +305,9 @@ class TestHub:
 
 
 class TestCaps:
-    def test_fronts_and_bodies_are_exact_spheres(self, numbers: Base, made: Prototype) -> None:
+    def test_fronts_and_bodies_are_exact_spheres(
+        self, numbers: BaseLayout, made: Prototype
+    ) -> None:
         parts = caps(numbers, made)
         assert len(parts) == made.balls.cap.sum() > 0
         for k, found in zip(np.flatnonzero(made.balls.cap), parts, strict=True):
@@ -316,7 +324,7 @@ class TestCaps:
             assert first == pytest.approx(made.body_centres()[k], abs=1e-9)
             assert second == pytest.approx(made.centres()[k], abs=1e-9)
 
-    def test_volume_against_a_closed_form(self, numbers: Base, made: Prototype) -> None:
+    def test_volume_against_a_closed_form(self, numbers: BaseLayout, made: Prototype) -> None:
         for k, found in zip(np.flatnonzero(made.balls.cap), caps(numbers, made), strict=True):
             body, front = float(made.balls.body_radius[k]), float(made.balls.radius[k])
             edge, behind = body / np.sqrt(2), flat(numbers, k)
@@ -326,7 +334,9 @@ class TestCaps:
             wide, deep = pocket(numbers, k, float(made.balls.body_depth[k]))
             assert found.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
 
-    def test_they_are_watertight_and_printed_front_up(self, numbers: Base, made: Prototype) -> None:
+    def test_they_are_watertight_and_printed_front_up(
+        self, numbers: BaseLayout, made: Prototype
+    ) -> None:
         for k, found in zip(np.flatnonzero(made.balls.cap), caps(numbers, made), strict=True):
             whole = as_trimesh(found.shape)
             assert whole.is_watertight
@@ -335,7 +345,7 @@ class TestCaps:
             assert low[2] == pytest.approx(0, abs=1e-6)
             assert high[2] == pytest.approx(flat(numbers, k) + made.balls.body_depth[k])
 
-    def test_they_rest_on_the_pads(self, numbers: Base, made: Prototype) -> None:
+    def test_they_rest_on_the_pads(self, numbers: BaseLayout, made: Prototype) -> None:
         for k in np.flatnonzero(made.balls.cap).tolist():
             along = dot(numbers.seats.contacts[k] - numbers.seats.centre[k], numbers.seats.axis[k])
             steep = np.cos(numbers.seats.tilt)
@@ -344,23 +354,25 @@ class TestCaps:
             assert edge.max() < flat(numbers, k)
 
     def test_glued_caps_have_no_pocket(self, made: Prototype) -> None:
-        glued = base(Keys(hold="glue"), made)
+        glued = base(BaseSpec(hold="glue"), made)
         assert pocket(glued, 0, 5.0) == (0.0, 0.0)
         assert as_trimesh(caps(glued, made)[0].shape).is_watertight
 
 
 @pytest.fixture(scope="module")
-def plates(numbers: Base) -> list[Part]:
+def plates(numbers: BaseLayout) -> list[PlacedSolid]:
     return coupon(numbers)
 
 
 class TestCoupon:
-    def test_they_fit_and_are_watertight(self, plates: list[Part]) -> None:
+    def test_they_fit_and_are_watertight(self, plates: list[PlacedSolid]) -> None:
         for plate in plates:
             assert as_trimesh(plate.shape).is_watertight
             assert (np.ptp(bounds(plate.shape), axis=0) < 256).all()
 
-    def test_every_size_has_pads_at_every_offset(self, numbers: Base, plates: list[Part]) -> None:
+    def test_every_size_has_pads_at_every_offset(
+        self, numbers: BaseLayout, plates: list[PlacedSolid]
+    ) -> None:
         """A seat's pads are sqrt(3) sin(tilt) times the radius of the sphere in it apart."""
         found = numbers.seats
         rows = rows_of(found, KEYS)
@@ -377,7 +389,7 @@ class TestCoupon:
         sizes = len(rows) * len(KEYS.coupon_offsets_mm)
         assert np.isin(np.round(area, 5), np.round(np.pi * found.pad**2, 5)).sum() == 3 * sizes
 
-    def test_walls_are_thick_enough(self, numbers: Base, plates: list[Part]) -> None:
+    def test_walls_are_thick_enough(self, numbers: BaseLayout, plates: list[PlacedSolid]) -> None:
         """Nowhere from a cup or pocket outward is there less than on the carrier."""
         found = numbers.seats
         for k in range(len(found)):
@@ -391,10 +403,12 @@ class TestCoupon:
             assert pocket[:, 1].min() >= found.pocket[k] + KEYS.cup_wall_mm - 1e-9
             assert deep[:, 0].max() == pytest.approx(found.bottom[k] + KEYS.floor_mm)
 
-    def test_it_takes_less_than_the_carrier(self, plates: list[Part], part: Part) -> None:
+    def test_it_takes_less_than_the_carrier(
+        self, plates: list[PlacedSolid], part: PlacedSolid
+    ) -> None:
         assert sum(plate.volume for plate in plates) < part.volume / 3
 
-    def test_offsets_move_the_pads(self, numbers: Base) -> None:
+    def test_offsets_move_the_pads(self, numbers: BaseLayout) -> None:
         found = numbers.seats
         shapes = [cut(seat.boss(found, 0), [seat.hollow(found, 0, by)]) for by in (0.0, 0.2)]
         pad, normal = found.pad[0], found.local_normals[0, 0]
@@ -405,7 +419,7 @@ class TestCoupon:
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_a_row_larger_than_the_bed(self, made: Prototype) -> None:
-        crowded = base(Keys(coupon_offsets_mm=(0.1,) * 9, bed_mm=(100.0, 100.0, 100.0)), made)
+        crowded = base(BaseSpec(coupon_offsets_mm=(0.1,) * 9, bed_mm=(100.0, 100.0, 100.0)), made)
         with pytest.raises(SpecError, match=r"make prototype.base.bed_mm larger or"):
             coupon(crowded)
 
@@ -428,7 +442,7 @@ def test_several_solids_are_refused() -> None:
         one_solid("pair", apart)
 
 
-def test_a_lost_pad_is_noticed(numbers: Base) -> None:
+def test_a_lost_pad_is_noticed(numbers: BaseLayout) -> None:
     found = numbers.seats
     whole = cut(seat.boss(found, 0), [seat.hollow(found, 0)])
     contacts = -found.radius[0] * found.local_normals[0]

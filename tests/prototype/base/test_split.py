@@ -10,26 +10,26 @@ from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import Prototype, prototype
 from tbcad.prototype.base.joints import profile
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.profile import outside
 from tbcad.prototype.base.purchased import bought, fasteners, magnets
 from tbcad.prototype.base.screws import access, sizes
 from tbcad.prototype.base.split import Split, split
 from tbcad.prototype.drive.drive import load_parts
-from tbcad.prototype.printing.bed import lack, needed, room
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.printing.bed import needed, room, shortfall
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
-KEYS = Keys()
+KEYS = BaseSpec()
 DOWN = [np.array([0.0, 0.0, -1.0])]
 
 
-def keys(**changed: object) -> Keys:
-    return Keys.model_validate(KEYS.model_dump() | changed)
+def keys(**changed: object) -> BaseSpec:
+    return BaseSpec.model_validate(KEYS.model_dump() | changed)
 
 
-def cube(size: float) -> Keys:
+def cube(size: float) -> BaseSpec:
     return keys(bed_mm=[size] * 3)
 
 
@@ -44,7 +44,9 @@ def paper(paper_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module", params=["small", "paper in two", "paper in three"])
-def cut(request: pytest.FixtureRequest, made: Prototype, paper: Prototype) -> tuple[Base, Split]:
+def cut(
+    request: pytest.FixtureRequest, made: Prototype, paper: Prototype
+) -> tuple[BaseLayout, Split]:
     at = {"small": (made, 150.0), "paper in two": (paper, 180.0), "paper in three": (paper, 160.0)}
     chosen, bed = at[request.param]
     numbers = base(cube(bed), chosen)
@@ -53,7 +55,7 @@ def cut(request: pytest.FixtureRequest, made: Prototype, paper: Prototype) -> tu
     return numbers, plan
 
 
-def rims(numbers: Base) -> np.ndarray:
+def rims(numbers: BaseLayout) -> np.ndarray:
     """Points round both ends of all bosses, (k, 2, n, 3)."""
     found, turn = numbers.own_seats, np.linspace(0, 2 * np.pi, 90)
     circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
@@ -69,7 +71,7 @@ class TestPlanes:
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
 
-    def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[Base, Split]) -> None:
+    def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[BaseLayout, Split]) -> None:
         numbers, plan = cut
         corners = rims(numbers).reshape(len(numbers.seats), -1, 3)
         for joint in plan.joints:
@@ -79,14 +81,14 @@ class TestPlanes:
             assert (away.min(axis=1) > 0).any()
             assert (away.max(axis=1) < 0).any()
 
-    def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[Base, Split]) -> None:
+    def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[BaseLayout, Split]) -> None:
         numbers, plan = cut
         held, turn = numbers.hub, np.linspace(0, 2 * np.pi, 60)
         for z in (held.face, held.front):
             rim = np.stack([held.disc * np.cos(turn), held.disc * np.sin(turn), 0 * turn + z], 1)
             assert {plan.piece_of(point) for point in rim} == {0}
 
-    def test_pieces_fill_space_once(self, cut: tuple[Base, Split]) -> None:
+    def test_pieces_fill_space_once(self, cut: tuple[BaseLayout, Split]) -> None:
         points = np.random.default_rng(1).normal(size=(3000, 3)) * 150
         inside = [(points @ one[:, :3].T < one[:, 3]).all(axis=1) for one in cut[1].pieces]
         assert (np.sum(inside, axis=0) == 1).all()
@@ -107,7 +109,7 @@ class TestPlanes:
 
 
 class TestJoints:
-    def test_two_dowels_and_two_screws_or_more(self, cut: tuple[Base, Split]) -> None:
+    def test_two_dowels_and_two_screws_or_more(self, cut: tuple[BaseLayout, Split]) -> None:
         for joint in cut[1].joints:
             assert len(joint.dowels) == 2
             assert len(joint.screws) >= 2
@@ -117,7 +119,9 @@ class TestJoints:
             assert apart.min() >= 8.0
             assert norm(joint.dowels[1] - joint.dowels[0]) > 40
 
-    def test_holes_are_in_the_flanges_and_off_all_seats(self, cut: tuple[Base, Split]) -> None:
+    def test_holes_are_in_the_flanges_and_off_all_seats(
+        self, cut: tuple[BaseLayout, Split]
+    ) -> None:
         numbers, plan = cut
         seat, used = numbers.own_seats, numbers.keys
         for joint in plan.joints:
@@ -133,7 +137,7 @@ class TestJoints:
             beside = norm(away - deep[..., None] * seat.axis) - seat.pocket
             assert (beside[(deep > 0) & (deep < seat.back)] > used.insert_hole_mm / 2 + 1).all()
 
-    def test_heads_are_reached_from_outside(self, cut: tuple[Base, Split]) -> None:
+    def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, Split]) -> None:
         numbers, plan = cut
         free = access(sizes(numbers.keys))
         assert free > 5.5 / 2
@@ -149,7 +153,7 @@ class TestJoints:
                     away = norm(axis - ends[0] - deep[:, None] * up)
                     assert away.min() > norm(rim[0, 0] - ends[0]) + 5.5 / 2 - 0.1
 
-    def test_flanges_are_behind_the_light(self, cut: tuple[Base, Split]) -> None:
+    def test_flanges_are_behind_the_light(self, cut: tuple[BaseLayout, Split]) -> None:
         numbers, _ = cut
         line = profile(numbers)
         parts = np.stack([line, np.roll(line, -1, axis=0)], axis=1)
@@ -181,14 +185,14 @@ class TestBed:
     def test_a_box(self) -> None:
         corners = np.array(np.meshgrid([0, 100], [0, 50], [0, 20]), dtype=float).reshape(3, -1).T
         exact = keys(bed_mm=[100.0, 50.0, 20.0], bed_margin_mm=0.0)
-        assert lack(corners, DOWN, exact) == pytest.approx(0.4)
+        assert shortfall(corners, DOWN, exact) == pytest.approx(0.4)
         assert needed(corners, DOWN, exact).tolist() == [101, 51, 21]
         assert room(KEYS).tolist() == pytest.approx([249.6, 249.6, 252.6])
 
     def test_it_is_turned_to_fit(self) -> None:
         corners = np.array([[0, 0, 0], [0, 120, 0], [10, 0, 0], [10, 120, 0]], dtype=float)
-        assert lack(corners, DOWN, cube(100.0)) <= 0
-        assert lack(corners * 1.3, DOWN, cube(100.0)) > 0
+        assert shortfall(corners, DOWN, cube(100.0)) <= 0
+        assert shortfall(corners * 1.3, DOWN, cube(100.0)) > 0
 
 
 class TestBought:
@@ -205,7 +209,7 @@ class TestBought:
         assert set(found) <= set(load_parts())
         assert not any(name.startswith(("DOWEL", "M3x")) for name in found)
 
-    def test_joints_need_more(self, cut: tuple[Base, Split]) -> None:
+    def test_joints_need_more(self, cut: tuple[BaseLayout, Split]) -> None:
         numbers, plan = cut
         found, screws = fasteners(numbers, plan), sum(len(j.screws) for j in plan.joints)
         assert found["DOWEL-3x12"] == 2 * len(plan.joints)

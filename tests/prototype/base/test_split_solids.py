@@ -19,29 +19,29 @@ from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import prototype
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.screws import access, sizes
 from tbcad.prototype.base.solid import bodies, carrier, tools, whole
 from tbcad.prototype.base.split import Split, split
 from tbcad.prototype.base.split_solids import holes
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.shell.mesh import Mesh
 from tbcad.shell.solid import InvalidSolidError, Solid
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 
-KEYS = Keys(bed_mm=(160.0, 160.0, 160.0))
+KEYS = BaseSpec(bed_mm=(160.0, 160.0, 160.0))
 Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
-Cut = tuple[Base, Split, list[Part], list[trimesh.Trimesh]]
+Cut = tuple[BaseLayout, Split, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
-def cut_up(numbers: Base) -> Cut:
+def cut_up(numbers: BaseLayout) -> Cut:
     plan = split(numbers)
     parts = carrier(numbers, plan)
     return numbers, plan, parts, [as_trimesh(part) for part in parts]
 
 
-def as_trimesh(part: Part) -> trimesh.Trimesh:
+def as_trimesh(part: PlacedSolid) -> trimesh.Trimesh:
     found = meshed(part.shape, 0.02)
     return trimesh.Trimesh(found.vertices, found.triangles, process=False)
 
@@ -55,7 +55,7 @@ def small(small_design: Design) -> Cut:
 @pytest.fixture(scope="module")
 def paper(paper_design: Design) -> Cut:
     made = prototype(load_spec(None), paper_design)
-    return cut_up(base(Keys(bed_mm=(180.0, 180.0, 180.0)), made))
+    return cut_up(base(BaseSpec(bed_mm=(180.0, 180.0, 180.0)), made))
 
 
 def check_pieces(cut: Cut) -> None:
@@ -199,7 +199,7 @@ def piece_at(plan: Split, joint: Joint, side: int) -> int:
     return plan.piece_of(joint.dowels[0] + side * joint.plane.normal)
 
 
-def hole_volume(numbers: Base, joint: Joint) -> float:
+def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
     """Of dowels' and screws' holes and of inserts, without what is taken off for the heads."""
     used, depth = numbers.keys, sizes(numbers.keys).dowel_depth
     pins = [used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm]
@@ -209,12 +209,12 @@ def hole_volume(numbers: Base, joint: Joint) -> float:
     return float(dowels + len(joint.screws) * (insert + through))
 
 
-def heads_volume(numbers: Base, joint: Joint) -> float:
+def heads_volume(numbers: BaseLayout, joint: Joint) -> float:
     """At most all of what is kept clear for the heads."""
     return float(len(joint.screws) * np.pi * access(sizes(numbers.keys)) ** 2 * 25.2)
 
 
-def cylinders(part: Part) -> list[Cylinder]:
+def cylinders(part: PlacedSolid) -> list[Cylinder]:
     """Radius, a point and the direction of each cylindrical face."""
     found = []
     for face in faces(part.shape):

@@ -21,7 +21,7 @@ from tbcad.prototype.drive.drive import (
     pitch_diameter,
 )
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
@@ -186,4 +186,4 @@ class TestMotion:
             **{"home_deg": 200.0, "approach_deg": -1.0, "feed_deg_min": float("nan")},
         }.items():
             with pytest.raises(ValidationError):
-                Motion.model_validate({key: value})
+                MotionSpec.model_validate({key: value})

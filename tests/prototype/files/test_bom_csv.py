@@ -20,7 +20,7 @@ from tbcad.prototype.files.bom_csv import (
 )
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
@@ -145,7 +145,7 @@ def test_same_bytes(made: Prototype, drive: Drive, tmp_path: Path) -> None:
 def test_record_of_the_drive(made: Prototype) -> None:
     summed = balance(made.half.ellipsoid.frame(), ball_load(made, 1.27))
     low, high = (float(made.stops.angle[i]) for i in (0, -1))
-    motion = Motion()
+    motion = MotionSpec()
     needed = summed.needed(low, high, np.radians(motion.acceleration_deg_s2), motion.safety)
     drive = chosen("nema17-belt", needed, DRIVES)
     record = json.loads(json.dumps(drive_record(summed, drive, motion, (low, high), 120.0)))

@@ -13,9 +13,9 @@ from tbcad.prototype.drive.drive import Drive, chosen, load_drives, load_parts
 from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import Motion
+from tbcad.spec.motion_keys import MotionSpec
 
-MOTION = Motion()
+MOTION = MotionSpec()
 # What GRBL 1.1h takes, by modal group (grbl/gcode.c); only these are used here.
 GROUPS = {
     **{"G0": 1, "G1": 1, "G4": 0, "G92": 0, "G92.1": 0, "G90": 3, "G91": 3, "G94": 5},
@@ -151,19 +151,19 @@ def test_pauses_for_people(made: Prototype, drive: Drive) -> None:
 
 
 def test_it_ends_where_it_began(made: Prototype, drive: Drive) -> None:
-    motion = Motion(home_deg=-12.5)
+    motion = MotionSpec(home_deg=-12.5)
     assert sent(program(made, drive, motion)).at == -12.5
 
 
 def test_other_axis(made: Prototype, drive: Drive) -> None:
-    plain, other = (program(made, drive, Motion(axis=axis)) for axis in ("X", "A"))
+    plain, other = (program(made, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
     assert sent(other, "A").shots == sent(plain).shots
     assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
     assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
 
 
 def test_a_person_as_trigger(made: Prototype, drive: Drive) -> None:
-    lines = program(made, drive, Motion(trigger="pause"))
+    lines = program(made, drive, MotionSpec(trigger="pause"))
     machine = sent(lines)
     assert not machine.shots
     assert len(machine.pauses) == 2 + 2 * len(made.stops)
@@ -186,9 +186,13 @@ def test_time(made: Prototype, drive: Drive) -> None:
 
 @pytest.mark.parametrize(
     "motion",
-    [Motion(settle_s=0.0, exposure_s=0.0), Motion(approach_deg=0.0), Motion(approach_deg=30)],
+    [
+        MotionSpec(settle_s=0.0, exposure_s=0.0),
+        MotionSpec(approach_deg=0.0),
+        MotionSpec(approach_deg=30),
+    ],
 )
-def test_other_motions(made: Prototype, drive: Drive, motion: Motion) -> None:
+def test_other_motions(made: Prototype, drive: Drive, motion: MotionSpec) -> None:
     machine = sent(program(made, drive, motion))
     low, high = np.degrees(free(made))
     assert low <= min(machine.moves)
@@ -199,14 +203,14 @@ def test_other_motions(made: Prototype, drive: Drive, motion: Motion) -> None:
 def test_the_approach_ends_where_something_stands(small_design: Design) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
     tight = prototype(spec, small_design)
-    start = run(tight, Motion(approach_deg=20)).start
+    start = run(tight, MotionSpec(approach_deg=20)).start
     assert start == pytest.approx(np.degrees(free(tight)[0]))
     assert start == pytest.approx(-90)
 
 
 def test_a_start_out_of_reach(made: Prototype) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
-        run(made, Motion(home_deg=170))
+        run(made, MotionSpec(home_deg=170))
 
 
 def test_written(made: Prototype, drive: Drive, tmp_path: Path) -> None:

@@ -11,21 +11,21 @@ from tbcad.geometry.primitives import Rod
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import prototype
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.drive.drive import Drive, load_drives, load_parts
 from tbcad.prototype.frame.brackets import fitting, rig_axes
-from tbcad.prototype.frame.layout import FrameNumbers, bought_parts, frame
+from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import Room, room
-from tbcad.prototype.stage.layout import StageNumbers, stage
+from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Frame, Stage
+from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
 SPEC = load_spec(None, ["n=6", "prototype.k=4"])
 # A ball of the small design stands so near to the hub that a motor's pinion is 2 mm off.
-KEYS = Frame(clearance_mm=1.5)
+KEYS = FrameSpec(clearance_mm=1.5)
 CAPTURE = 30.0
 
 
@@ -40,16 +40,16 @@ class Rig:
         self.own = spec.prototype
         self.made = prototype(spec, design)
         keys = spec.prototype.base.model_copy(update={"drive": name})
-        self.base: Base = base(keys, self.made)
+        self.base: BaseLayout = base(keys, self.made)
         self.space: Room = room(self.made, self.base, CAPTURE, 0.0)
-        self.stage: StageNumbers = self.staged(KEYS)
+        self.stage: StageLayout = self.staged(KEYS)
 
-    def staged(self, keys: Frame) -> StageNumbers:
-        return stage((Stage(), keys, self.own), self.made, self.space, PARTS)
+    def staged(self, keys: FrameSpec) -> StageLayout:
+        return stage((StageSpec(), keys, self.own), self.made, self.space, PARTS)
 
     def frame(
         self, one: Drive, own: dict[str, object] | None = None, **changed: object
-    ) -> FrameNumbers:
+    ) -> FrameLayout:
         keys = KEYS.model_copy(update=changed)
         held = self.own.model_copy(update=own or {})
         return frame((keys, held), self.made, self.base, self.stage, one, self.space, PARTS)
@@ -61,7 +61,7 @@ def rig(small_design: Design) -> Rig:
 
 
 @pytest.fixture(scope="module")
-def numbers(rig: Rig) -> FrameNumbers:
+def numbers(rig: Rig) -> FrameLayout:
     return rig.frame(drive("nema17-belt"))
 
 
@@ -72,14 +72,14 @@ def refusal(rig: Rig, one: Drive, own: dict[str, object] | None = None, **change
 
 
 class TestFrame:
-    def test_axes_are_level_across_and_up(self, rig: Rig, numbers: FrameNumbers) -> None:
+    def test_axes_are_level_across_and_up(self, rig: Rig, numbers: FrameLayout) -> None:
         assert numbers.axes @ numbers.axes.T == pytest.approx(np.eye(3))
         assert numbers.axes[2].tolist() == [0, 0, 1]
         assert abs(numbers.axes[1] @ rig.base.frame[0]) < 1e-12
         assert rig_axes(np.array([0.6, 0.48, -0.64])) @ [0, 0, 1] == pytest.approx([0, 0, 1])
 
     def test_bearings_and_shaft_are_on_the_axis_beyond_the_hub(
-        self, rig: Rig, numbers: FrameNumbers
+        self, rig: Rig, numbers: FrameLayout
     ) -> None:
         w, hub = rig.base.frame[0], rig.base.hub
         for item in numbers.bought:
@@ -95,7 +95,7 @@ class TestFrame:
         assert end <= numbers.head.rear - PARTS["COLLAR-8"]["width_mm"]
 
     def test_the_belt_is_tight_in_the_middle_of_the_slots(
-        self, rig: Rig, numbers: FrameNumbers
+        self, rig: Rig, numbers: FrameLayout
     ) -> None:
         one = drive("nema17-belt")
         (pinion,) = (item for item in numbers.bought if item.name == "pinion")
@@ -103,7 +103,7 @@ class TestFrame:
         assert isinstance(body, Rod)
         assert norm(np.cross(body.start, rig.base.frame[0])) == pytest.approx(one.centre_mm)
 
-    def test_all_that_stands_still_is_clear(self, numbers: FrameNumbers) -> None:
+    def test_all_that_stands_still_is_clear(self, numbers: FrameLayout) -> None:
         still = {item.name for item in (*numbers.printed, *numbers.bought) if not item.turns}
         assert set(numbers.swept) == still
         assert set(numbers.light) == still - {"camera"}
@@ -113,10 +113,10 @@ class TestFrame:
     def test_the_paper_design_is_clear_with_all_defaults(self, paper_design: Design) -> None:
         whole = Rig(load_spec(None), paper_design)
         found = frame(
-            (Frame(), whole.own),
+            (FrameSpec(), whole.own),
             whole.made,
             whole.base,
-            whole.staged(Frame()),
+            whole.staged(FrameSpec()),
             drive("nema17-belt", 2),
             whole.space,
             PARTS,
@@ -125,7 +125,7 @@ class TestFrame:
         assert min(found.light.values()) > 3
         assert whole.stage.swept > 20
 
-    def test_what_is_bought(self, rig: Rig, numbers: FrameNumbers) -> None:
+    def test_what_is_bought(self, rig: Rig, numbers: FrameLayout) -> None:
         found = bought_parts(numbers, rig.stage)
         assert set(found) <= set(PARTS)
         kinds = Counter({PARTS[name].kind: 0 for name in found})
@@ -138,13 +138,13 @@ class TestFrame:
         # Every hole of the plate has a screw, every T-nut one, the motor four, clamp, camera.
         assert kinds["screws"] == len(numbers.holes) + 8 + 4 + 1 + 1
 
-    def test_uprights_are_cut_from_what_is_sold(self, numbers: FrameNumbers) -> None:
+    def test_uprights_are_cut_from_what_is_sold(self, numbers: FrameLayout) -> None:
         bars = [item for item in numbers.bought if item.name.startswith("upright")]
         assert len(bars) == 2
         assert numbers.upright["length_mm"] >= numbers.length
         assert numbers.length == pytest.approx(numbers.head.top - KEYS.floor_mm)
 
-    def test_the_plate_lies_under_all_feet(self, numbers: FrameNumbers) -> None:
+    def test_the_plate_lies_under_all_feet(self, numbers: FrameLayout) -> None:
         reach = np.ptp(numbers.holes, axis=0)
         assert numbers.plate["length_mm"] > reach[0]
         assert numbers.plate["width_mm"] > reach[1]
@@ -213,5 +213,5 @@ class TestRefusals:
             fitting(PARTS, "bearings", "key", "set it to 8", "width_mm", bore_mm=9.0)
 
 
-def test_the_same_frame_twice(rig: Rig, numbers: FrameNumbers) -> None:
+def test_the_same_frame_twice(rig: Rig, numbers: FrameLayout) -> None:
     assert repr(rig.frame(drive("nema17-belt"))) == repr(numbers)

@@ -16,24 +16,24 @@ from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.drive.drive import load_drives, load_parts
 from tbcad.prototype.frame.frame_solids import bought, parts
-from tbcad.prototype.frame.layout import FrameNumbers, frame
+from tbcad.prototype.frame.layout import FrameLayout, frame
 from tbcad.prototype.keepout import Room, room
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.stage import stage_solids as stages
-from tbcad.prototype.stage.layout import StageNumbers, stage
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.prototype.stage.layout import StageLayout, stage
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Frame, Stage
+from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 LISTS = load_parts()
 DRIVE = load_drives(LISTS)[0]
 SPEC = load_spec(None, ["n=6", "prototype.k=4"])
-KEYS = Frame(clearance_mm=1.5)
-PRINTER = Keys()
+KEYS = FrameSpec(clearance_mm=1.5)
+PRINTER = BaseSpec()
 
 
 @pytest.fixture(scope="module")
@@ -42,32 +42,32 @@ def made(small_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def carrier(made: Prototype) -> Base:
+def carrier(made: Prototype) -> BaseLayout:
     return base(PRINTER, made)
 
 
 @pytest.fixture(scope="module")
-def space(made: Prototype, carrier: Base) -> Room:
+def space(made: Prototype, carrier: BaseLayout) -> Room:
     return room(made, carrier, 30.0, 0.0)
 
 
 @pytest.fixture(scope="module")
-def stand(made: Prototype, space: Room) -> StageNumbers:
-    return stage((Stage(), KEYS, SPEC.prototype), made, space, LISTS)
+def stand(made: Prototype, space: Room) -> StageLayout:
+    return stage((StageSpec(), KEYS, SPEC.prototype), made, space, LISTS)
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype, carrier: Base, space: Room, stand: StageNumbers) -> FrameNumbers:
+def numbers(made: Prototype, carrier: BaseLayout, space: Room, stand: StageLayout) -> FrameLayout:
     return frame((KEYS, SPEC.prototype), made, carrier, stand, DRIVE, space, LISTS)
 
 
 @pytest.fixture(scope="module")
-def solids(numbers: FrameNumbers) -> dict[str, Part]:
+def solids(numbers: FrameLayout) -> dict[str, PlacedSolid]:
     return {part.name: part for part in parts(numbers, PRINTER)}
 
 
 @pytest.fixture(scope="module")
-def things(numbers: FrameNumbers) -> dict[str, TopoDS_Shape]:
+def things(numbers: FrameLayout) -> dict[str, TopoDS_Shape]:
     return dict(bought(numbers))
 
 
@@ -90,7 +90,7 @@ def cylinders(shape: TopoDS_Shape) -> list[tuple[np.ndarray, np.ndarray, float]]
 
 
 class TestSolids:
-    def test_each_is_watertight(self, solids: dict[str, Part]) -> None:
+    def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
         assert len(solids) == 5
         for part in solids.values():
             mesh = as_trimesh(part.shape)
@@ -99,13 +99,13 @@ class TestSolids:
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
 
-    def test_each_fits_on_the_bed(self, solids: dict[str, Part]) -> None:
+    def test_each_fits_on_the_bed(self, solids: dict[str, PlacedSolid]) -> None:
         for part in solids.values():
             size = np.ptp(meshed(part.on_bed, 0.1).vertices, axis=0)
             assert (size < np.array(PRINTER.bed_mm) - PRINTER.bed_margin_mm).all()
 
     def test_bearing_seats_and_bearings_are_on_the_axis(
-        self, carrier: Base, solids: dict[str, Part], things: dict[str, TopoDS_Shape]
+        self, carrier: BaseLayout, solids: dict[str, PlacedSolid], things: dict[str, TopoDS_Shape]
     ) -> None:
         w, seat = carrier.frame[0], (22 + KEYS.bearing_fit_mm) / 2
         head = cylinders(solids["bearing_head"].shape)
@@ -118,7 +118,7 @@ class TestSolids:
             assert norm(np.cross(way, w)) < 1e-9
 
     def test_motor_holes_are_a_square_of_31_mm(
-        self, carrier: Base, solids: dict[str, Part], numbers: FrameNumbers
+        self, carrier: BaseLayout, solids: dict[str, PlacedSolid], numbers: FrameLayout
     ) -> None:
         w, out, side = carrier.frame
         holes = [
@@ -134,7 +134,7 @@ class TestSolids:
         assert np.array(along) - numbers.head.motor == pytest.approx(np.array(ends), abs=1e-5)
 
     def test_the_bracket_puts_the_pinhole_where_the_record_has_it(
-        self, made: Prototype, solids: dict[str, Part]
+        self, made: Prototype, solids: dict[str, PlacedSolid]
     ) -> None:
         """From the bracket alone: its face and slot, and the camera's radius and thread."""
         view, own = made.half.view, SPEC.prototype
@@ -157,7 +157,9 @@ class TestSolids:
         assert norm(pinhole - view.pinhole) < 1e-6
         assert up == pytest.approx(view.forward, abs=1e-9)
 
-    def test_the_clamp_holds_the_post(self, solids: dict[str, Part], stand: StageNumbers) -> None:
+    def test_the_clamp_holds_the_post(
+        self, solids: dict[str, PlacedSolid], stand: StageLayout
+    ) -> None:
         radius = stand.post + KEYS.post_play_mm / 2
         bores = [
             (point, way)
@@ -170,7 +172,7 @@ class TestSolids:
             assert abs(way[2]) == pytest.approx(1)
 
     def test_bought_bodies_have_their_volumes(
-        self, things: dict[str, TopoDS_Shape], numbers: FrameNumbers
+        self, things: dict[str, TopoDS_Shape], numbers: FrameLayout
     ) -> None:
         shaft = np.pi * 4**2 * 100
         ring = np.pi * (11**2 - 4**2) * 7
@@ -183,7 +185,7 @@ class TestSolids:
         assert volume(things["plate"]) == pytest.approx(length * width * thick - holes, rel=1e-9)
 
     def test_the_plates_holes_are_below_those_of_the_brackets(
-        self, solids: dict[str, Part], numbers: FrameNumbers
+        self, solids: dict[str, PlacedSolid], numbers: FrameLayout
     ) -> None:
         through = [
             (point, radius)
@@ -200,10 +202,10 @@ class TestClearance:
     def test_nothing_meets_the_base(
         self,
         made: Prototype,
-        carrier: Base,
-        solids: dict[str, Part],
+        carrier: BaseLayout,
+        solids: dict[str, PlacedSolid],
         things: dict[str, TopoDS_Shape],
-        numbers: FrameNumbers,
+        numbers: FrameLayout,
     ) -> None:
         """Points of the base in many positions, and points of the meshes."""
         still = [part.shape for part in solids.values()]
@@ -227,9 +229,9 @@ class TestClearance:
     def test_no_ray_hits_the_frame(
         self,
         made: Prototype,
-        solids: dict[str, Part],
+        solids: dict[str, PlacedSolid],
         things: dict[str, TopoDS_Shape],
-        stand: StageNumbers,
+        stand: StageLayout,
     ) -> None:
         shapes = [part.shape for part in solids.values()]
         shapes += [part.shape for part in stages.parts(stand, PRINTER)[1:]]
@@ -251,10 +253,10 @@ class TestClearance:
 
     @pytest.mark.parametrize("teeth", [60, 120])
     def test_printed_and_bought_do_not_overlap(
-        self, made: Prototype, carrier: Base, space: Room, stand: StageNumbers, teeth: int
+        self, made: Prototype, carrier: BaseLayout, space: Room, stand: StageLayout, teeth: int
     ) -> None:
         drive = next(d for d in load_drives(LISTS) if d.wheel and d.wheel["teeth"] == teeth)
-        keys = Frame(clearance_mm=0.5)
+        keys = FrameSpec(clearance_mm=0.5)
         found = frame((keys, SPEC.prototype), made, carrier, stand, drive, space, LISTS)
         static = {part.name: part.shape for part in parts(found, PRINTER)}
         static |= {part.name: part.shape for part in stages.parts(stand, PRINTER)}
@@ -278,12 +280,12 @@ def allowed(pair: set[str]) -> float:
     return 2.0
 
 
-def test_a_bed_too_small_is_refused(numbers: FrameNumbers) -> None:
+def test_a_bed_too_small_is_refused(numbers: FrameLayout) -> None:
     with pytest.raises(SpecError, match="does not fit on the printer's bed"):
-        parts(numbers, Keys(bed_mm=(90.0, 90.0, 90.0)))
+        parts(numbers, BaseSpec(bed_mm=(90.0, 90.0, 90.0)))
 
 
-def test_the_same_bytes_twice(numbers: FrameNumbers, tmp_path: Path) -> None:
+def test_the_same_bytes_twice(numbers: FrameLayout, tmp_path: Path) -> None:
     one, two = (meshed(parts(numbers, PRINTER)[0].shape, 0.05) for _ in range(2))
     assert one.vertices.tobytes() == two.vertices.tobytes()
     assert one.triangles.tobytes() == two.triangles.tobytes()

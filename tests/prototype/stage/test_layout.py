@@ -12,13 +12,13 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.layout import Base, base
+from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
-from tbcad.prototype.stage.layout import GRAZING_MM, StageNumbers, leds, stage
+from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, leds, stage
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Frame, Stage
+from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 PARTS = load_parts()
 SPEC = load_spec(None, ["n=6", "prototype.k=4"])
@@ -32,19 +32,19 @@ def made(small_design: Design) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def carrier(made: Prototype) -> Base:
+def carrier(made: Prototype) -> BaseLayout:
     return base(SPEC.prototype.base, made)
 
 
 @pytest.fixture(scope="module")
-def space(made: Prototype, carrier: Base) -> Room:
+def space(made: Prototype, carrier: BaseLayout) -> Room:
     return room(made, carrier, CAPTURE, 0.0)
 
 
-def staged(made: Prototype, space: Room, **changed: object) -> StageNumbers:
+def staged(made: Prototype, space: Room, **changed: object) -> StageLayout:
     post = changed.pop("post", 20.0)
     own = SPEC.prototype.model_copy(update={"post_diameter_mm": post})
-    return stage((Stage.model_validate(changed), Frame(), own), made, space, PARTS)
+    return stage((StageSpec.model_validate(changed), FrameSpec(), own), made, space, PARTS)
 
 
 def refusal(made: Prototype, space: Room, **changed: object) -> str:
@@ -60,12 +60,12 @@ class TestStage:
         found = leds(staged(made, space))
         assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
         assert np.array([place for _, place, _ in found]).tolist() == [
-            list(place) for place in Stage().leds_mm
+            list(place) for place in StageSpec().leds_mm
         ]
         assert all((direction == UP).all() for _, _, direction in found)
 
     def test_leds_are_inside_the_sphere_and_not_in_a_plane(self) -> None:
-        places = np.array(Stage().leds_mm)
+        places = np.array(StageSpec().leds_mm)
         assert (norm(places) + 1.5 < CAPTURE).all()
         # Six times the volume of their tetrahedron over the area of its largest face.
         sides = places[1:] - places[0]
@@ -75,7 +75,7 @@ class TestStage:
     def test_room_below_the_object_is_what_was_found(self, made: Prototype, space: Room) -> None:
         numbers = staged(made, space)
         assert numbers.light > -GRAZING_MM
-        assert numbers.swept > Frame().clearance_mm
+        assert numbers.swept > FrameSpec().clearance_mm
         assert numbers.post == 10.0
 
     def test_a_stage_without_leds(self, made: Prototype, space: Room) -> None:
@@ -135,21 +135,21 @@ class TestStage:
         place: tuple[float, float, float],
         words: str,
     ) -> None:
-        places = list(Stage().leds_mm)
+        places = list(StageSpec().leds_mm)
         places[number - 1] = place
         assert words in refusal(made, space, leds_mm=places)
 
     def test_leds_in_one_plane_are_refused(self, made: Prototype, space: Room) -> None:
-        places = [(x, y, -15.0) for x, y, _ in Stage().leds_mm]
+        places = [(x, y, -15.0) for x, y, _ in StageSpec().leds_mm]
         assert "nearly in one plane" in refusal(made, space, leds_mm=places)
 
     def test_a_floor_too_high_is_refused(self, made: Prototype, space: Room) -> None:
         with pytest.raises(SpecError, match=r"make prototype\.frame\.floor_mm"):
-            stage((Stage(), Frame(floor_mm=-60.0), SPEC.prototype), made, space, PARTS)
+            stage((StageSpec(), FrameSpec(floor_mm=-60.0), SPEC.prototype), made, space, PARTS)
 
     def test_three_leds_are_refused_by_the_spec(self) -> None:
         with pytest.raises(ValidationError, match="4 to 12 places"):
-            Stage.model_validate({"leds_mm": Stage().leds_mm[:3]})
+            StageSpec.model_validate({"leds_mm": StageSpec().leds_mm[:3]})
 
     def test_no_led_is_hidden_in_a_march_along_its_rays(self, made: Prototype, space: Room) -> None:
         numbers = staged(made, space)
@@ -205,7 +205,7 @@ class TestRoom:
         assert exact[outside] == pytest.approx(found[outside], abs=0.8)
 
     def test_swept_holds_carrier_and_balls_at_all_angles(
-        self, made: Prototype, carrier: Base, space: Room
+        self, made: Prototype, carrier: BaseLayout, space: Room
     ) -> None:
         seat = carrier.seats
         for angle in np.linspace(made.stops.angle[0], made.stops.angle[-1], 7).tolist():
@@ -219,7 +219,7 @@ class TestRoom:
                 points = turned(line, turn) @ carrier.frame
                 assert space.swept(points).max() < 1e-6
 
-    def test_swept_is_a_distance_off_the_sector(self, carrier: Base, space: Room) -> None:
+    def test_swept_is_a_distance_off_the_sector(self, carrier: BaseLayout, space: Room) -> None:
         """Beyond the outermost azimuth, to the edge's half-plane."""
         high = max(one.high for one in space.sections if one.high < np.pi)
         at = carrier.middle[len(carrier.middle) // 2]
@@ -230,7 +230,7 @@ class TestRoom:
             assert space.swept(point)[0] <= away + 1e-9
             assert space.swept(point)[0] > 0.5 * away
 
-    def test_approach_widens_what_is_swept(self, made: Prototype, carrier: Base) -> None:
+    def test_approach_widens_what_is_swept(self, made: Prototype, carrier: BaseLayout) -> None:
         near = room(made, carrier, CAPTURE, 0.0).sections[0]
         far = room(made, carrier, CAPTURE, 0.1).sections[0]
         assert far.low == pytest.approx(near.low - 0.1)

@@ -15,19 +15,19 @@ from tbcad.prototype.balls.layout import Prototype, prototype
 from tbcad.prototype.base.layout import base
 from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import Room, room
-from tbcad.prototype.printing.placing import Part
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
-from tbcad.prototype.stage.layout import StageNumbers, stage
+from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.prototype.stage.stage_solids import parts
 from tbcad.shell.solid import Solid
-from tbcad.spec.base_keys import Base as Keys
+from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import Frame, Stage
+from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 LISTS = load_parts()
 CAPTURE = 30.0
-KEYS = Keys()
+KEYS = BaseSpec()
 
 
 @pytest.fixture(scope="module")
@@ -41,28 +41,28 @@ def space(made: Prototype) -> Room:
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype, space: Room) -> StageNumbers:
+def numbers(made: Prototype, space: Room) -> StageLayout:
     own = load_spec(None).prototype
-    return stage((Stage(), Frame(), own), made, space, LISTS)
+    return stage((StageSpec(), FrameSpec(), own), made, space, LISTS)
 
 
 @pytest.fixture(scope="module")
-def solids(numbers: StageNumbers) -> dict[str, Part]:
+def solids(numbers: StageLayout) -> dict[str, PlacedSolid]:
     return {part.name: part for part in parts(numbers, KEYS)}
 
 
 @pytest.fixture(scope="module")
-def crown(solids: dict[str, Part]) -> trimesh.Trimesh:
+def crown(solids: dict[str, PlacedSolid]) -> trimesh.Trimesh:
     return as_trimesh(solids["stage_crown"])
 
 
-def as_trimesh(part: Part, tolerance: float = 0.01) -> trimesh.Trimesh:
+def as_trimesh(part: PlacedSolid, tolerance: float = 0.01) -> trimesh.Trimesh:
     found = meshed(part.shape, tolerance)
     return trimesh.Trimesh(found.vertices, found.triangles, process=False)
 
 
 class TestSolids:
-    def test_each_is_watertight(self, solids: dict[str, Part]) -> None:
+    def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
         assert list(solids) == ["stage_disc", "stage_crown", "stage_post"]
         for part in solids.values():
             mesh = as_trimesh(part)
@@ -71,20 +71,20 @@ class TestSolids:
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
 
-    def test_volume_of_the_disc(self, solids: dict[str, Part], numbers: StageNumbers) -> None:
+    def test_volume_of_the_disc(self, solids: dict[str, PlacedSolid], numbers: StageLayout) -> None:
         stud = min(STUD_MM, numbers.disc / 5) + STUD_PLAY_MM
         area = np.pi * (numbers.disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
 
-    def test_volume_of_the_post(self, solids: dict[str, Part], numbers: StageNumbers) -> None:
-        wall = Stage().wall_mm
+    def test_volume_of_the_post(self, solids: dict[str, PlacedSolid], numbers: StageLayout) -> None:
+        wall = StageSpec().wall_mm
         tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (numbers.joint - numbers.foot)
         # The set screw's hole is nearly as long as the wall is thick.
         hole = np.pi * 1.4**2 * wall
         assert solids["stage_post"].volume == pytest.approx(tube - hole, abs=0.1 * hole)
 
     def test_led_places_are_recovered_from_the_pockets(
-        self, numbers: StageNumbers, crown: trimesh.Trimesh
+        self, numbers: StageLayout, crown: trimesh.Trimesh
     ) -> None:
         led = numbers.led
         radius = led["flange_mm"] / 2 + 0.1
@@ -104,7 +104,7 @@ class TestSolids:
             assert norm(middle - place[:2]) < 1e-6
 
     def test_wires_come_from_every_pocket_to_the_bores_end(
-        self, numbers: StageNumbers, crown: trimesh.Trimesh
+        self, numbers: StageLayout, crown: trimesh.Trimesh
     ) -> None:
         """A way of points in the open: down from the pocket, along the groove, down the bore."""
         groove = numbers.plate - 0.8
@@ -124,7 +124,7 @@ class TestSolids:
             assert crown.contains(way[39:41] - [0, 0, 1.5]).all()  # the plate below the groove
 
     def test_all_inside_the_sphere_is_inside_or_in_the_dark(
-        self, solids: dict[str, Part], space: Room
+        self, solids: dict[str, PlacedSolid], space: Room
     ) -> None:
         for part in solids.values():
             mesh = as_trimesh(part)
@@ -134,12 +134,12 @@ class TestSolids:
                 assert space.light(outside).min() > -0.15
                 assert space.swept(outside).min() > 3
 
-    def test_a_bed_too_small_is_refused(self, numbers: StageNumbers) -> None:
+    def test_a_bed_too_small_is_refused(self, numbers: StageLayout) -> None:
         with pytest.raises(SpecError, match="stage_post does not fit"):
-            parts(numbers, Keys(bed_mm=(120.0, 120.0, 120.0)))
+            parts(numbers, BaseSpec(bed_mm=(120.0, 120.0, 120.0)))
 
 
-def test_the_same_bytes_twice(numbers: StageNumbers, tmp_path: Path) -> None:
+def test_the_same_bytes_twice(numbers: StageLayout, tmp_path: Path) -> None:
     for name in ("one", "two"):
         crown = parts(numbers, KEYS)[1]
         write_step(tmp_path / name, Solid(crown.name, crown.shape, ()))

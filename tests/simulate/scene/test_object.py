@@ -9,7 +9,7 @@ from PIL import Image
 
 from tbcad.errors import InputError
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.object import Subject, built_in, load, pattern
+from tbcad.simulate.scene.object import SceneObject, built_in, load, pattern
 from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT, Seen, look, scene_of
 
 CAPTURE_MM = 60.0
@@ -19,7 +19,7 @@ def box(size: float = 20.0) -> trimesh.Trimesh:
     return trimesh.creation.box((size, size, size))
 
 
-def from_above(subject: Subject, x: float, y: float) -> Seen:
+def from_above(subject: SceneObject, x: float, y: float) -> Seen:
     """What a ray sees that falls on the object along -z."""
     scene = scene_of(subject)
     return look(scene, np.array([[x, y, 100.0]]), np.array([[0.0, 0.0, -1.0]]))

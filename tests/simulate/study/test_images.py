@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Half, design
+from tbcad.mirrors.array import MirrorArray, design
 from tbcad.simulate.study.images import behind, images
 from tbcad.spec.design import load_spec
 from tbcad.types import Floats
@@ -11,7 +11,7 @@ from tbcad.types import Floats
 FAN = 1e-5  # distance of a fan's neighbouring ray from the apex, mm
 
 
-def half_of(*settings: str) -> Half:
+def half_of(*settings: str) -> MirrorArray:
     return design(load_spec(None, settings)).halves[0]
 
 
@@ -75,7 +75,7 @@ def test_depth_is_what_the_camera_measures_along_its_axis() -> None:
     assert (at.depth < at.distance).all()
 
 
-def test_incidence_is_that_of_the_paper_design(paper_half: Half) -> None:
+def test_incidence_is_that_of_the_paper_design(paper_half: MirrorArray) -> None:
     """16 ... 35 degrees at the apices, measured before (DESIGN.md section 3)."""
     incidence = np.degrees(images(paper_half, 30.0).incidence)
     assert (round(incidence.min()), round(incidence.max())) == (16, 35)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design, Half, design
+from tbcad.mirrors.array import Design, MirrorArray, design
 from tbcad.simulate.scene.reflector import Reflector, pixels_of, reflectors
 from tbcad.simulate.study.pixels import Sensor, _traced, counts, sensor_of, virtual_cameras
 from tbcad.simulate.study.resolution import Ratio, balance, ratio_of
@@ -94,7 +94,7 @@ def test_number_of_virtual_cameras(n: int) -> None:
     assert virtual_cameras(half) == 5 * n**2 + 2 * n + 1
 
 
-def test_table_1(paper_half: Half) -> None:
+def test_table_1(paper_half: MirrorArray) -> None:
     assert virtual_cameras(paper_half) == 1657
 
 

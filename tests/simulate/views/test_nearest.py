@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.viewpoint import directions, viewpoint
 from tbcad.simulate.views.nearest import nearest
@@ -32,7 +32,7 @@ def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return origin, direction, colour
 
 
-def wanted_by(view: View) -> tuple[Slab, Rays]:
+def wanted_by(view: Camera) -> tuple[Slab, Rays]:
     slab = slab_along(view.forward, view.right, CAPTURE_MM)
     way = directions(view).reshape(-1, 3)
     meets = np.linalg.norm(np.cross(view.pinhole, way), axis=1) < CAPTURE_MM / 2

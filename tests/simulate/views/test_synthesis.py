@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.quality import likeness
 from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture, whole
@@ -22,7 +22,7 @@ def tiles(light_field: LightField) -> Tiles:
     return Tiles(light_field)
 
 
-def view_from(azimuth: float, elevation: float, distance: float = 640.0) -> View:
+def view_from(azimuth: float, elevation: float, distance: float = 640.0) -> Camera:
     return viewpoint(np.radians(azimuth), np.radians(elevation), distance, 60.0, SIZE)
 
 

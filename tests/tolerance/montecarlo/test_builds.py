@@ -7,8 +7,8 @@ import pytest
 
 from tbcad.tolerance.montecarlo.builds import (
     BATCH,
+    MonteCarloCase,
     Result,
-    Task,
     Work,
     joined,
     simulate,
@@ -16,21 +16,21 @@ from tbcad.tolerance.montecarlo.builds import (
     yielded,
 )
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import Nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel
 
-Halves = tuple[Nominal, Nominal]
+Halves = tuple[EdgeModel, EdgeModel]
 SOME = Errors(sphere_centre=Error(0.02), camera_shift=Error(0.1), scale_axis=Error(0.001))
 MACHINES = 2 * BATCH + 3
 ARRAYS = ("coverage", "pixels", "angle", "offset")
 
 
 @pytest.fixture(scope="module")
-def task(halves: Halves) -> Task:
-    return Task(halves, SOME, 11)
+def task(halves: Halves) -> MonteCarloCase:
+    return MonteCarloCase(halves, SOME, 11)
 
 
 @pytest.fixture(scope="module")
-def result(task: Task) -> Result:
+def result(task: MonteCarloCase) -> Result:
     return simulate(task, MACHINES)
 
 
@@ -54,24 +54,24 @@ def pickled(work: Work, batches: Sequence[range]) -> list[Result]:
 
 
 @pytest.mark.parametrize("each", [alone, backward, pickled])
-def test_same_figures_whoever_works(task: Task, result: Result, each: object) -> None:
+def test_same_figures_whoever_works(task: MonteCarloCase, result: Result, each: object) -> None:
     assert same(simulate(task, MACHINES, each), result)  # type: ignore[arg-type]
 
 
 def test_same_figures_in_whatever_batches(
-    task: Task, result: Result, monkeypatch: pytest.MonkeyPatch
+    task: MonteCarloCase, result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tbcad.tolerance.montecarlo.builds.BATCH", 4)
     assert same(simulate(task, MACHINES), result)
 
 
-def test_later_machines_continue_earlier_ones(task: Task, result: Result) -> None:
+def test_later_machines_continue_earlier_ones(task: MonteCarloCase, result: Result) -> None:
     parts = [simulate(task, 5), simulate(task, MACHINES - 5, first=5)]
     assert same(joined(parts), result)
 
 
 def test_another_seed_makes_other_machines(halves: Halves, result: Result) -> None:
-    other = simulate(Task(halves, SOME, 12), MACHINES)
+    other = simulate(MonteCarloCase(halves, SOME, 12), MACHINES)
     assert not np.any(other.worst == result.worst)
 
 
@@ -89,7 +89,7 @@ def test_worst_and_quantiles(result: Result) -> None:
 
 
 def test_machines_without_errors_all_do(halves: Halves) -> None:
-    result = simulate(Task(halves, Errors(), 1), 2)
+    result = simulate(MonteCarloCase(halves, Errors(), 1), 2)
     assert result.offset.max() < 1e-9
     assert result.angle.max() < 1e-9
     assert yielded(result.worst, 60.0).share == 1

@@ -13,10 +13,10 @@ from tbcad.simulate.scene.reflector import pixels_of, reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, seen, virtual
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import Nominal, nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
 from tests.tolerance.exact_builds import surrounded
 
-Halves = tuple[Nominal, Nominal]
+Halves = tuple[EdgeModel, EdgeModel]
 
 
 def none(halves: Halves, machines: int = 1) -> tuple[Draws, Draws]:

@@ -6,20 +6,20 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tbcad.tolerance.montecarlo.builds import Task, reached, simulate, yielded
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, coverage_at_yield, simulate, yielded
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import Nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel
 from tbcad.tolerance.montecarlo.sensitivity import (
     EXACT,
     MOST_TIMES,
-    alone,
     kinds,
     loosest,
+    one_at_a_time,
     only,
     scaled,
 )
 
-Halves = tuple[Nominal, Nominal]
+Halves = tuple[EdgeModel, EdgeModel]
 MIXED = Errors(
     sphere_centre=Error(0.02),
     coating=Error(0.01, 0.03, "uniform"),
@@ -36,7 +36,7 @@ def synthetic(loss: Callable[[float], float]) -> Callable[[Errors], np.ndarray]:
 
 
 def real(halves: Halves, machines: int) -> Callable[[Errors], np.ndarray]:
-    return lambda errors: simulate(Task(halves, errors, 3), machines).worst
+    return lambda errors: simulate(MonteCarloCase(halves, errors, 3), machines).worst
 
 
 def test_kinds_are_those_of_which_there_are_any() -> None:
@@ -91,7 +91,7 @@ def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
     for wanted in np.arange(1, 2 * count) / (2 * count):
         for target in worst:
             good = yielded(worst, target).share >= wanted
-            assert (reached(worst, wanted) >= target) == good
+            assert (coverage_at_yield(worst, wanted) >= target) == good
 
 
 def test_what_costs_nothing_may_be_anything() -> None:
@@ -118,7 +118,7 @@ def test_quantile_of_the_machines_decides_not_their_mean() -> None:
 
     found = loosest(Errors(facets=Error(0, 0.4)), 0.75, TARGET, worst)
     assert found == pytest.approx(ROOM / (0.4 * 0.75), rel=EXACT)
-    one = alone(MIXED, "facets", 0.75, TARGET, worst)
+    one = one_at_a_time(MIXED, "facets", 0.75, TARGET, worst)
     assert one.kind == "facets"
     assert one.loss == pytest.approx(0.36 / 2)
     assert one.tail == pytest.approx(0.36 * 0.75)
@@ -132,7 +132,7 @@ def test_alone_asks_for_no_other_kind() -> None:
         asked.append(errors)
         return np.full(3, TARGET + ROOM - errors.coating.mean)
 
-    alone(MIXED, "coating", 0.9, TARGET, worst)
+    one_at_a_time(MIXED, "coating", 0.9, TARGET, worst)
     assert len(asked) > 3
     for errors in asked:
         assert replace(errors, coating=Error()) == Errors()
@@ -143,7 +143,7 @@ def test_facets_of_a_machine_are_linear(halves: Halves) -> None:
     worst = real(halves, 10)
     spare = float(worst(Errors())[0]) - TARGET
     assert spare > 0.5
-    one = alone(MIXED, "facets", 0.99, TARGET, worst)
+    one = one_at_a_time(MIXED, "facets", 0.99, TARGET, worst)
     assert one.loss == pytest.approx(0.36, abs=1e-9)
     assert one.tail == pytest.approx(0.36, abs=1e-9)
     assert one.times == pytest.approx(spare / 0.36, rel=EXACT)
@@ -167,6 +167,8 @@ def test_machines_with_the_factor_just_do(halves: Halves, kind: str, error: Erro
 
 def test_camera_that_turns_about_its_pinhole_is_harmless(halves: Halves) -> None:
     """Coverage hangs on places of pinhole and mirrors alone."""
-    one = alone(Errors(camera_tilt=Error(0.003)), "camera_tilt", 0.9, TARGET, real(halves, 10))
+    one = one_at_a_time(
+        Errors(camera_tilt=Error(0.003)), "camera_tilt", 0.9, TARGET, real(halves, 10)
+    )
     assert one.loss == pytest.approx(0, abs=1e-9)
     assert one.times == np.inf

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tbcad.mirrors.array import Design, design
-from tbcad.optics.camera import View
+from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.object import built_in
 from tbcad.simulate.scene.rays import exact, reflected
 from tbcad.simulate.scene.reflector import Reflector, reflectors
@@ -54,7 +54,7 @@ def scene() -> Scene:
 @pytest.fixture(scope="module")
 def wanted(scene: Scene) -> Wanted:
     places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
-    views: list[View] = [viewpoint(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places]
+    views: list[Camera] = [viewpoint(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places]
     return Wanted(CAPTURE_MM, views, truths(scene, views, lambda _: None))
 
 
@@ -155,7 +155,7 @@ class TestActual:
             assert missed.min() > 0.01
 
 
-def _axes(view: View) -> np.ndarray:
+def _axes(view: Camera) -> np.ndarray:
     return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from unittest import mock
 
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.record.files import Blob
+from tbcad_verify.record.files import FileBytes
 from tbcad_verify.run import stages
 from tbcad_verify.step import checks
 
@@ -40,7 +40,7 @@ class _Once:
             return self._found[key]
 
 
-def _bytes(blob: Blob) -> str:
+def _bytes(blob: FileBytes) -> str:
     return blob.sha256
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
-from tbcad_verify.run.verify import Wishes, verify
+from tbcad_verify.run.verify import Options, verify
 
 from tests.verify.corpus.copies import copy, sign
 from tests.verify.corpus.mutation import Mutation
@@ -33,7 +33,7 @@ class Outcome:
     seconds: float
 
 
-def attempt(mutation: Mutation, export: Path, room: Path, wishes: Wishes) -> Outcome:
+def attempt(mutation: Mutation, export: Path, room: Path, wishes: Options) -> Outcome:
     """Break a copy in an empty folder of its own, and prove it."""
     folder = copy(export, room / "export")
     words = list(mutation.words)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from tbcad_verify.mesh.mesh import Topology, distinct, examine, joined, merge
 from tbcad_verify.mesh.stl import Facets, parse
-from tbcad_verify.record.files import Blob
+from tbcad_verify.record.files import FileBytes
 
 from tests.verify.synthetic_export import stl
 
@@ -16,7 +16,7 @@ BOX = trimesh.creation.box((2, 3, 5))
 
 def facets(triangles: np.ndarray) -> Facets:
     data = np.frombuffer(stl(np.asarray(triangles, np.float32)), np.uint8)
-    return parse(Blob("x.stl", data, ""))
+    return parse(FileBytes("x.stl", data, ""))
 
 
 def found(triangles: np.ndarray) -> Topology:

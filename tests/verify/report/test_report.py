@@ -15,9 +15,9 @@ import tbcad_verify
 from tbcad_verify import main, verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.record.poses import geodesic
-from tbcad_verify.report.checks import Check, at_least, at_most, offenders, told
+from tbcad_verify.report.checks import Check, at_least, at_most, informative, offenders
 from tbcad_verify.report.report import Report
-from tbcad_verify.run.verify import Wishes
+from tbcad_verify.run.verify import Options
 from tbcad_verify.shell import pixels
 
 from tests.verify.benches import HERE
@@ -83,7 +83,7 @@ def test_same_export_same_bytes(good: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_nothing_is_written_when_asked(good: Path) -> None:
-    assert verify(good, wishes=Wishes(write=False, apart=False)).passed
+    assert verify(good, wishes=Options(write=False, apart=False)).passed
     assert not (good / "verify.json").exists()
 
 
@@ -350,7 +350,7 @@ def test_checks_hold_their_limits() -> None:
     assert at_most(name, np.inf, 1).measured is None
     assert at_least(name, 1, 1).passed is True
     assert at_least(name, np.nan, 1).passed is False
-    assert told(name, 3).limit is None
+    assert informative(name, 3).limit is None
     assert offenders(["a", "b", "c"], np.array([1.0, 2, 3]), "mm", np.array([2, 0])) == (
         "c 3.00 mm, a 1.00 mm"
     )

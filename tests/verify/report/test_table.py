@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from tbcad_verify import main
 from tbcad_verify.programs.answers import skipped
-from tbcad_verify.report.checks import Check, at_most, told, unknown
+from tbcad_verify.report.checks import Check, at_most, informative, unknown
 from tbcad_verify.report.table import table
 
 
@@ -30,7 +30,7 @@ def test_files_that_agree_share_a_row() -> None:
 def test_states_are_told_apart() -> None:
     name = ("x", "f", "mm")
     assert shown(unknown(name, "why")) == ["x f unknown mm why"]
-    assert shown(told(name, 1)) == ["x f info 1 mm"]
+    assert shown(informative(name, 1)) == ["x f info 1 mm"]
     assert shown(skipped(name, "not installed: y")) == ["x f skipped mm skipped: not installed: y"]
 
 

@@ -10,8 +10,8 @@ import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
-from tbcad_verify.run.results import Lines, Results, replay
-from tbcad_verify.run.verify import Wishes, verify
+from tbcad_verify.run.results import JsonLinesSink, Results, replay
+from tbcad_verify.run.verify import Options, verify
 from tbcad_verify.run.watch import watched
 
 STAGES = ("one", "two", "three")
@@ -73,7 +73,7 @@ def test_lines_are_what_was_sent(tmp_path: Path) -> None:
     checks = [Check("a", "f", None, None, None, "mm", "why"), Check("b", "", False, 1.5, 1.0, "mm")]
     column = np.array([1.0, np.nan, 0.1 + 0.2])
     with (tmp_path / "lines").open("w") as stream:
-        lines = Lines(stream)
+        lines = JsonLinesSink(stream)
         lines.stage("s")
         lines.checks(checks)
         lines.mirrors({"pixels": column})
@@ -91,13 +91,13 @@ def test_the_same_proof_apart_and_here(good: Path) -> None:
     assert verify(good, said.append).passed
     apart = (good / NAME).read_bytes()
     here: list[str] = []
-    assert verify(good, here.append, Wishes(apart=False)).passed
+    assert verify(good, here.append, Options(apart=False)).passed
     assert (good / NAME).read_bytes() == apart
     assert said == here
 
 
 def test_too_little_time_is_no_pass(good: Path) -> None:
-    report = verify(good, wishes=Wishes(seconds=0.01))
+    report = verify(good, wishes=Options(seconds=0.01))
     assert not report.passed
     assert {check.passed for check in report.checks} == {None}
     assert "unknown: reading" in report.verdict
@@ -113,7 +113,7 @@ def test_a_file_replaced_while_it_is_read(good: Path) -> None:
             copy.replace(good / "shell_a.stl")
 
     with pytest.raises(BadExport, match=r"shell_a\.stl: changed while it was read"):
-        verify(good, replace, Wishes(apart=False))
+        verify(good, replace, Options(apart=False))
     assert not (good / NAME).exists()
 
 
@@ -123,4 +123,4 @@ def test_a_file_removed_while_it_is_read(good: Path) -> None:
             (good / "mirrors.csv").unlink()
 
     with pytest.raises(BadExport, match=r"mirrors\.csv: changed"):
-        verify(good, remove, Wishes(apart=False))
+        verify(good, remove, Options(apart=False))

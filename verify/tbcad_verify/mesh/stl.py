@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.record.files import AGAIN, HEAD, Blob, read
+from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 
 FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -29,7 +29,7 @@ class Facets:
     corners: NDArray[np.float32]
 
 
-def read_facets(folder: Path, name: str) -> tuple[Facets, Blob]:
+def read_facets(folder: Path, name: str) -> tuple[Facets, FileBytes]:
     """Facets of a binary STL, and the bytes they came from.
 
     Args:
@@ -46,7 +46,7 @@ def read_facets(folder: Path, name: str) -> tuple[Facets, Blob]:
     return parse(blob), blob
 
 
-def parse(blob: Blob) -> Facets:
+def parse(blob: FileBytes) -> Facets:
     """Facets of a binary STL.
 
     Raises:

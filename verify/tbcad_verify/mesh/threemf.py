@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.record.files import AGAIN, MAX_BYTES, Blob, read
+from tbcad_verify.record.files import AGAIN, MAX_BYTES, FileBytes, read
 from tbcad_verify.report.checks import Check, Name, at_most
 
 ROUNDED_MM = 1e-6  # the text has six decimals
 LARGEST_RATIO = 200.0  # of unpacked to packed bytes; meshes as text reach 10
 
 
-def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], Blob]:
+def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
     """(F, 3, 3) corners of the one mesh of a 3MF, mm, and the bytes they came from.
 
     Raises:
@@ -46,7 +46,7 @@ def same_check(name: Name, corners: NDArray[np.float32], facets: Facets) -> Chec
     return at_most(name, float(apart[worst]), limit, f"facet {worst} is elsewhere in the STL")
 
 
-def _check_zip(blob: Blob) -> None:
+def _check_zip(blob: FileBytes) -> None:
     """The members' sizes first; then each member's own head and check sum against the directory."""
     try:
         with zipfile.ZipFile(io.BytesIO(blob.data.tobytes())) as archive:
@@ -61,7 +61,7 @@ def _check_zip(blob: Blob) -> None:
         raise BadExport(f"{blob.name}: the zip's member {broken} is damaged; {AGAIN}")
 
 
-def _corners(blob: Blob) -> NDArray[np.float32]:
+def _corners(blob: FileBytes) -> NDArray[np.float32]:
     with tempfile.TemporaryDirectory(prefix="tbcad-3mf-") as place:
         copy = Path(place) / "part.3mf"  # the library takes bytes one by one, and files at once
         blob.data.tofile(copy)

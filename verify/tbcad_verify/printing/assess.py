@@ -13,7 +13,7 @@ from tbcad_verify.printing.placing import SLACK_MM, Placing, place, words
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.walls import thin_area
-from tbcad_verify.report.checks import Check, Name, at_most, finite, told
+from tbcad_verify.report.checks import Check, Name, at_most, finite, informative
 from tbcad_verify.types import Floats
 
 UNIT = "problems"
@@ -169,7 +169,7 @@ def _check(one: Print, wanted: bool) -> Check:
     detail = "; ".join(one.problems)
     if wanted:
         return at_most(name, count, 0, detail)
-    return told(name, count, detail or _fitting(one))
+    return informative(name, count, detail or _fitting(one))
 
 
 def _fitting(one: Print) -> str:

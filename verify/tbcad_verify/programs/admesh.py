@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
 from tbcad_verify.report.checks import Check, Unknown, at_most
 
 PARTS, VOLUME = "parts", "mm^3 off"
@@ -22,7 +22,7 @@ FLAWS = (
 LEAST_FACETS = 4
 
 
-def ask(room: Room, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
     """Nothing to repair, one part, the mesh's volume.
 
     Raises:
@@ -53,7 +53,7 @@ def _figures(text: str) -> dict[str, float]:
     return said
 
 
-STL = Errand(
+STL = ProgramQuery(
     program="admesh",
     kind="stl",
     install="apt install admesh",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tbcad_verify.report.checks import Check, Name, Unknown, at_most, finite, told, unknown
+from tbcad_verify.report.checks import Check, Name, Unknown, at_most, finite, informative, unknown
 from tbcad_verify.run.child import Outcome
 
 SKIPPED = "skipped: "
@@ -19,7 +19,7 @@ SHOWN = 160  # characters of a program's own words
 
 def skipped(check: Name, reason: str) -> Check:
     """Nobody looked, and nobody was asked to: no failure, and no figure either."""
-    return told(check, math.nan, SKIPPED + reason)
+    return informative(check, math.nan, SKIPPED + reason)
 
 
 def is_skipped(check: Check) -> bool:

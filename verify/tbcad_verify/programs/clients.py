@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tbcad_verify.programs import admesh, freecad, gmsh, prusa
 from tbcad_verify.programs.answers import skipped
-from tbcad_verify.programs.program_query import Command, Errand, Wanted, room
+from tbcad_verify.programs.program_query import Command, ProgramQuery, Wanted, room
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
@@ -24,7 +24,7 @@ def client_checks(
     wanted: Sequence[Wanted],
     seconds: float = 300.0,
     progress: Progress = lambda _: None,
-    errands: Sequence[Errand] = ERRANDS,
+    errands: Sequence[ProgramQuery] = ERRANDS,
 ) -> list[Check]:
     """Ask the programs about every file that they open.
 
@@ -66,7 +66,7 @@ def _two_at_a_time(jobs: Sequence[Callable[[], list[Check]]], limits: Limits) ->
 
 
 def _settle(
-    folder: Path, part: Wanted, errand: Errand, limits: Limits, progress: Progress
+    folder: Path, part: Wanted, errand: ProgramQuery, limits: Limits, progress: Progress
 ) -> list[Check]:
     file = part.files.get(errand.kind, "")
     if not file:
@@ -81,7 +81,7 @@ def _settle(
 
 
 def _ask(
-    folder: Path, part: Wanted, errand: Errand, command: Command, limits: Limits
+    folder: Path, part: Wanted, errand: ProgramQuery, command: Command, limits: Limits
 ) -> Sequence[Check]:
     with room(command, folder, part.files[errand.kind], errand.kind, limits) as given:
         return errand.ask(given, part)

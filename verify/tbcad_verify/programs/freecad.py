@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tbcad_verify.programs.answers import figures
-from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
 from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
 from tbcad_verify.report.checks import Check, at_most
 
@@ -41,7 +41,7 @@ sys.exit(3 if "error" in answer else 0)
 """
 
 
-def ask(room: Room, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
     """One valid, closed solid with the mirrors' faces and the mesh's volume.
 
     Raises:
@@ -67,7 +67,7 @@ def _valid(file: str, seen: dict[str, float]) -> Check:
     return at_most(("freecad valid", file, "flaws"), flaws + (seen["solids"] < 1), 0, detail)
 
 
-STEP = Errand(
+STEP = ProgramQuery(
     program="freecad",
     kind="step",
     install="apt install freecad",

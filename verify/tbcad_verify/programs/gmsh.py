@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from tbcad_verify.programs.answers import figures, skipped, text_of
-from tbcad_verify.programs.program_query import Command, Errand, Room, Wanted, on_path
+from tbcad_verify.programs.program_query import Command, ProgramQuery, Sandbox, Wanted, on_path
 from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
 from tbcad_verify.report.checks import Check, Unknown
 
@@ -65,7 +65,7 @@ def find() -> Command:
     return on_path("gmsh")
 
 
-def ask(room: Room, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
     """One solid with the mirrors' faces and the mesh's volume.
 
     Raises:
@@ -80,11 +80,11 @@ def ask(room: Room, wanted: Wanted) -> list[Check]:
     ]
 
 
-def _package(room: Room) -> dict[str, float]:
+def _package(room: Sandbox) -> dict[str, float]:
     return figures(room.run(), room.place / "answer.json", KEYS)
 
 
-def _program(room: Room) -> dict[str, float]:
+def _program(room: Sandbox) -> dict[str, float]:
     script = room.place / "look.geo"
     script.write_text(GEO, encoding="utf-8")
     text = text_of(room.run(script, "-parse_and_exit"))
@@ -98,7 +98,7 @@ def _no_spheres(file: str) -> Check:
     return skipped(("gmsh spheres", file, SPHERES), f"only its package tells: {INSTALL}")
 
 
-STEP = Errand(
+STEP = ProgramQuery(
     program="gmsh",
     kind="step",
     install=INSTALL,

@@ -36,7 +36,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Room:
+class Sandbox:
     """A private folder with a copy of one file, for one run of one program.
 
     Attributes:
@@ -59,7 +59,7 @@ class Room:
 
 
 @dataclass(frozen=True)
-class Errand:
+class ProgramQuery:
     """One program and one kind of file.
 
     Attributes:
@@ -76,7 +76,7 @@ class Errand:
     install: str
     questions: Mapping[str, str]
     find: Callable[[], Command]
-    ask: Callable[[Room, Wanted], Sequence[Check]]
+    ask: Callable[[Sandbox, Wanted], Sequence[Check]]
 
     def names(self, wanted: Wanted) -> list[Name]:
         """Name, file and unit of every check; a part without such a file goes by its own name."""
@@ -91,7 +91,7 @@ def on_path(*names: str) -> Command:
 
 
 @contextmanager
-def room(command: Command, folder: Path, file: str, kind: str, limits: Limits) -> Iterator[Room]:
+def room(command: Command, folder: Path, file: str, kind: str, limits: Limits) -> Iterator[Sandbox]:
     """A room that is gone afterwards.
 
     Args:
@@ -109,4 +109,4 @@ def room(command: Command, folder: Path, file: str, kind: str, limits: Limits) -
         place = Path(name).resolve()
         given = place / f"given.{kind}"
         shutil.copyfile(original, given)
-        yield Room(command, place, given, file, limits)
+        yield Sandbox(command, place, given, file, limits)

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.program_query import Errand, Room, Wanted, on_path
-from tbcad_verify.report.checks import Check, Unknown, at_most, told, unknown
+from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
+from tbcad_verify.report.checks import Check, Unknown, at_most, informative, unknown
 
 INSTALL = "apt install prusa-slicer"
 PARTS, VOLUME = "parts", "mm^3 off"
@@ -34,7 +34,7 @@ PROFILE = (
 )
 
 
-def ask_info(room: Room, wanted: Wanted) -> list[Check]:
+def ask_info(room: Sandbox, wanted: Wanted) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
     Raises:
@@ -55,7 +55,7 @@ def ask_info(room: Room, wanted: Wanted) -> list[Check]:
     ]
 
 
-def ask_slices(room: Room, wanted: Wanted) -> list[Check]:
+def ask_slices(room: Sandbox, wanted: Wanted) -> list[Check]:
     """The print's volume is the mesh's; how much filament and time it takes is told.
 
     Raises:
@@ -67,8 +67,10 @@ def ask_slices(room: Room, wanted: Wanted) -> list[Check]:
     length, hours = _print(_tail(code))
     return [
         _slices(("prusa slices", room.file, "%"), length, wanted.volume),
-        told(("prusa filament", room.file, "m"), length / 1e3),
-        told(("prusa time", room.file, "h"), round(hours, 1)),  # seconds differ from run to run
+        informative(("prusa filament", room.file, "m"), length / 1e3),
+        informative(
+            ("prusa time", room.file, "h"), round(hours, 1)
+        ),  # seconds differ from run to run
     ]
 
 
@@ -128,9 +130,9 @@ def _print(code: str) -> tuple[float, float]:
     return float(length[1]), sum(int(count) * HOURS[unit] for count, unit in spans)
 
 
-def _info(kind: str) -> Errand:
+def _info(kind: str) -> ProgramQuery:
     questions = {"prusa manifold": "flaws", "prusa parts": PARTS, "prusa volume": VOLUME}
-    return Errand("prusa", kind, INSTALL, questions, _find, ask_info)
+    return ProgramQuery("prusa", kind, INSTALL, questions, _find, ask_info)
 
 
 def _find() -> tuple[str, ...]:
@@ -139,7 +141,7 @@ def _find() -> tuple[str, ...]:
 
 STL = _info("stl")
 THREEMF = _info("3mf")
-SLICES = Errand(
+SLICES = ProgramQuery(
     program="prusa",
     kind="stl",
     install=INSTALL,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from tbcad_verify.programs.answers import exactly, near
 from tbcad_verify.programs.program_query import Wanted
-from tbcad_verify.report.checks import Check, told
+from tbcad_verify.report.checks import Check, informative
 
 SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
 
@@ -20,7 +20,7 @@ def spheres(program: str, file: str, seen: Mapping[str, float], wanted: Wanted) 
     """Every mirror is a face on an exact sphere, and nothing else is."""
     name = (f"{program} spheres", file, SPHERES)
     if wanted.spheres is None:
-        return told(name, seen["spheres"], "no mirrors: any number will do")
+        return informative(name, seen["spheres"], "no mirrors: any number will do")
     return exactly(name, seen["spheres"], wanted.spheres, "spherical faces, unlike the mirrors")
 
 

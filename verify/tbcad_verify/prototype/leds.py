@@ -8,7 +8,7 @@ from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
 from tbcad_verify.prototype.nearest import distances
 from tbcad_verify.prototype.swing import solid_of
 from tbcad_verify.prototype.view import View
-from tbcad_verify.report.checks import Check, at_most, listed, told
+from tbcad_verify.report.checks import Check, at_most, informative, listed
 from tbcad_verify.types import Floats
 
 POINT_MM = 0.02  # edge of the cube that stands for a light
@@ -32,7 +32,7 @@ def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
     made = [at_most(inside, len(odd), 0, f"the camera may not see {listed(odd)}")]
     stage = of_roles(bodies, "stage")
     if not leds or not stage:
-        return [*made, told(free, 0), told(held, 0, "no light, or no stage")]
+        return [*made, informative(free, 0), informative(held, 0, "no light, or no stage")]
     mesh, _ = joined_bodies(stage)
     a, b, c = (mesh.points[mesh.faces[:, k]].T for k in range(3))
     away = np.array([float(distances(point, (a, b, c)).min()) for point in position])
@@ -41,7 +41,7 @@ def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
     return [
         *made,
         at_most(free, len(sunk), 0, f"in the material of the stage: {listed(sunk)}"),
-        told(held, float(away[worst]), f"{leds[worst].name} is farthest from the stage"),
+        informative(held, float(away[worst]), f"{leds[worst].name} is farthest from the stage"),
     ]
 
 

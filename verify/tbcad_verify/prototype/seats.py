@@ -11,7 +11,15 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.nearest import Corners, distances, to_segments
 from tbcad_verify.prototype.view import View
-from tbcad_verify.report.checks import Check, Unknown, at_least, at_most, guarded, offenders, told
+from tbcad_verify.report.checks import (
+    Check,
+    Unknown,
+    at_least,
+    at_most,
+    guarded,
+    informative,
+    offenders,
+)
 from tbcad_verify.types import Floats, Ints
 
 # A facet may be a pad's if it faces the ball to within this, near where the record has the pad.
@@ -76,7 +84,7 @@ def checks(view: View, held: Held, files: str) -> list[Check]:
         at_least(
             clear, float(held.clear.min()), -SUNK_MM, _worst(view, -held.clear, held.clear < 0)
         ),
-        told(room, float(held.clear.min())),
+        informative(room, float(held.clear.min())),
     ]
 
 

@@ -26,12 +26,12 @@ from tbcad_verify.report.checks import (
     attempt,
     finite,
     guarded,
+    informative,
     listed,
     needed,
     offenders,
-    told,
 )
-from tbcad_verify.run.results import Taker
+from tbcad_verify.run.results import ResultSink
 from tbcad_verify.types import Floats
 
 PRINTING = "printability of the prototype"
@@ -54,7 +54,9 @@ LIGHT = {
 DIGITS = 9
 
 
-def prove(export: Export, made: Prototype, facets: Sequence[Facets], taker: Taker) -> list[Body]:
+def prove(
+    export: Export, made: Prototype, facets: Sequence[Facets], taker: ResultSink
+) -> list[Body]:
     """Make all stages but printability, and hand over what each finds.
 
     Args:
@@ -91,7 +93,7 @@ def prove(export: Export, made: Prototype, facets: Sequence[Facets], taker: Take
     return bodies
 
 
-def _seats(view: View, bodies: list[Body], taker: Taker) -> tuple[Held | None, list[caps.Cap]]:
+def _seats(view: View, bodies: list[Body], taker: ResultSink) -> tuple[Held | None, list[caps.Cap]]:
     files = _files(bodies, "base")
     base, reason = attempt(lambda: joined_bodies(of_roles(bodies, "base"))[0])
     held, why = attempt(lambda: seats.hold(view, needed(base, reason)))
@@ -107,7 +109,9 @@ def _seats(view: View, bodies: list[Body], taker: Taker) -> tuple[Held | None, l
     return held, found or []
 
 
-def _swing(view: View, ready: Rig | None, reason: str, bodies: list[Body], taker: Taker) -> None:
+def _swing(
+    view: View, ready: Rig | None, reason: str, bodies: list[Body], taker: ResultSink
+) -> None:
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
     found, odd = attempt(lambda: assembly.shapes(view))
@@ -146,15 +150,15 @@ def _light(view: View, found: Shown, names: list[Name]) -> list[Check]:
             view.export.target_mm,
             "shows too little: " + offenders(ids, found.coverage, "mm", short),
         ),
-        told(off, float(away[furthest]), f"ball {furthest + 1} shows {least[furthest]:.3f}"),
+        informative(off, float(away[furthest]), f"ball {furthest + 1} shows {least[furthest]:.3f}"),
         at_most(
             path,
             blocked.sum(),
             0,
             f"{_some(ids, blocked)}; blocked by {listed(found.blockers)}",
         ),
-        told(rays, float(found.rays.sum()), "looked at, each on both of its ways"),
-        told(
+        informative(rays, float(found.rays.sum()), "looked at, each on both of its ways"),
+        informative(
             kept,
             100 * float(found.pixels.sum() / max(found.pixels_shell.sum(), 1)),
             f"{found.pixels.sum():.0f} of {found.pixels_shell.sum():.0f} px, from a sample",

@@ -13,7 +13,7 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.rig import Rig
-from tbcad_verify.report.checks import Check, at_least, at_most, listed, told
+from tbcad_verify.report.checks import Check, at_least, at_most, informative, listed
 from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # clearances beyond this are not told apart
@@ -97,8 +97,8 @@ def checks(made: Rig, bodies: list[Body], bought: list[tuple[str, Any]], files: 
     ]
     return [
         at_most(swing, volume, TOUCH_MM3, listed(hits)),
-        told(clearance, least.gap if least else SEARCH_MM, _nearest(least)),
-        told(looks, sum(one.looks for one in found), _how(found)),
+        informative(clearance, least.gap if least else SEARCH_MM, _nearest(least)),
+        informative(looks, sum(one.looks for one in found), _how(found)),
         _apart(apart, [turning, standing]),
         _room(balls, made),
     ]

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.record.files import AGAIN, Blob
+from tbcad_verify.record.files import AGAIN, FileBytes
 
 NAME = re.compile(r"[A-Za-z0-9_]{1,64}")
 Record = Mapping[str, Any]
 DESIGN = "design.json"
 
 
-def parse(blob: Blob) -> dict[str, Any]:
+def parse(blob: FileBytes) -> dict[str, Any]:
     """The JSON object in a file.
 
     Raises:

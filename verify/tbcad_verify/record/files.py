@@ -22,7 +22,7 @@ AGAIN = "write the export again with `tbcad build`"
 
 
 @dataclass(frozen=True)
-class Blob:
+class FileBytes:
     """One file as it was when it was read: what is hashed is what is parsed.
 
     Attributes:
@@ -98,7 +98,7 @@ def read(
     name: str,
     limit: int = MAX_BYTES,
     expect: Callable[[str, int, bytes], None] = lambda _name, _size, _head: None,
-) -> Blob:
+) -> FileBytes:
     """Read a whole file once, and hash what was read.
 
     Args:
@@ -124,7 +124,7 @@ def read(
         raise BadExport(f"{name}: cannot be read ({error.strerror}); {AGAIN}") from error
     if data.size != size or rest:
         raise BadExport(f"{name}: changed while it was read; let the build finish, then verify")
-    return Blob(name, data, hashlib.sha256(data.data).hexdigest())
+    return FileBytes(name, data, hashlib.sha256(data.data).hexdigest())
 
 
 def digest(folder: Path, name: str) -> tuple[int, str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import limited
-from tbcad_verify.record.files import AGAIN, Blob
+from tbcad_verify.record.files import AGAIN, FileBytes
 from tbcad_verify.types import Floats
 
 # fmt: off
@@ -74,7 +74,7 @@ def from_json(items: Sequence[dict[str, Any]]) -> Mirrors:
     return _mirrors("design.json", [(str(m.get("id")), str(m.get("camera"))) for m in items], rows)
 
 
-def from_csv(blob: Blob) -> Mirrors:
+def from_csv(blob: FileBytes) -> Mirrors:
     """Mirrors from mirrors.csv; columns after the known ones are left alone.
 
     Raises:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.fields import NAME, limited
-from tbcad_verify.record.files import AGAIN, Blob
+from tbcad_verify.record.files import AGAIN, FileBytes
 from tbcad_verify.types import Floats, Ints
 
 PLAN_COLUMNS = (
@@ -74,7 +74,7 @@ class Stops:
         return len(self.stop)
 
 
-def cells(blob: Blob, columns: Sequence[str]) -> list[list[str]]:
+def cells(blob: FileBytes, columns: Sequence[str]) -> list[list[str]]:
     """The fields of a CSV file below its head.
 
     Raises:
@@ -97,7 +97,7 @@ def cells(blob: Blob, columns: Sequence[str]) -> list[list[str]]:
     return lines[1:]
 
 
-def read_plan(blob: Blob) -> Plan:
+def read_plan(blob: FileBytes) -> Plan:
     """The plan of rotation.
 
     Raises:
@@ -118,7 +118,7 @@ def read_plan(blob: Blob) -> Plan:
     )
 
 
-def read_stops(blob: Blob) -> Stops:
+def read_stops(blob: FileBytes) -> Stops:
     """The stops of the base.
 
     Raises:
@@ -137,7 +137,7 @@ def read_stops(blob: Blob) -> Stops:
     )
 
 
-def _columns(blob: Blob, columns: Sequence[str]) -> dict[str, list[str]]:
+def _columns(blob: FileBytes, columns: Sequence[str]) -> dict[str, list[str]]:
     rows = cells(blob, columns)
     return {key: [row[k] for row in rows] for k, key in enumerate(columns)}
 

@@ -57,7 +57,7 @@ def at_least(check: Name, measured: float, limit: float, detail: str = "") -> Ch
     return _held(check, measured, limit, measured >= limit, detail)
 
 
-def told(check: Name, measured: float, detail: str = "") -> Check:
+def informative(check: Name, measured: float, detail: str = "") -> Check:
     """A figure without a limit: it informs, and passes."""
     return Check(check[0], check[1], True, finite(measured), None, check[2], detail)
 

@@ -24,7 +24,7 @@ PER_MIRROR = (
 )
 
 
-class Taker(Protocol):
+class ResultSink(Protocol):
     """Takes what the stages find, as they find it."""
 
     def stage(self, title: str) -> None:
@@ -84,7 +84,7 @@ class Results:
         self.machine = found
 
 
-class Lines:
+class JsonLinesSink:
     """Writes everything as one JSON object a line, for `replay` in another process."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -121,7 +121,7 @@ class Lines:
         self._stream.flush()
 
 
-def replay(line: str, taker: Taker) -> bool:
+def replay(line: str, taker: ResultSink) -> bool:
     """Hand one line on; whether it was the last.
 
     Raises:

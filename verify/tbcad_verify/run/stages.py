@@ -21,7 +21,7 @@ from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export, Part, read_export
 from tbcad_verify.report.checks import Check, Name, attempt, guarded, needed
-from tbcad_verify.run.results import Taker
+from tbcad_verify.run.results import ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import fold_check, manifest_checks, mesh_checks, record_checks
 from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
@@ -58,7 +58,7 @@ def stages(export: Export) -> tuple[str, ...]:
     return (*STAGES, *(machine.STAGES if export.prototype else ()))
 
 
-def prove(folder: Path, taker: Taker, printers: Sequence[str] = ()) -> None:
+def prove(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) -> None:
     """Make all stages, and hand over what each finds.
 
     Args:
@@ -106,7 +106,11 @@ def prove(folder: Path, taker: Taker, printers: Sequence[str] = ()) -> None:
 
 
 def _printing(
-    part: Part | Printed, solid: Solid | Body, profiles: list[Profile], wanted: bool, taker: Taker
+    part: Part | Printed,
+    solid: Solid | Body,
+    profiles: list[Profile],
+    wanted: bool,
+    taker: ResultSink,
 ) -> None:
     def work() -> list[Check]:
         topology = needed(solid.topology, solid.reason)
@@ -130,7 +134,9 @@ def _read_parts(
     return facets, digests
 
 
-def _threemf(export: Export, part: Part | Printed, facets: Facets, taker: Taker) -> tuple[int, str]:
+def _threemf(
+    export: Export, part: Part | Printed, facets: Facets, taker: ResultSink
+) -> tuple[int, str]:
     corners, blob = read_3mf(export.folder, part.threemf)
     name = ("3MF", part.threemf, "mm")
     taker.checks(guarded([name], lambda: [same_check(name, corners, facets)]))
@@ -155,7 +161,7 @@ def _solid(export: Export, part: Part, facets: Facets) -> Solid:
     return Solid(mesh, topology, lump, recovery, checks + folds, reason or why or odd or off)
 
 
-def _optics(export: Export, solids: list[Solid], taker: Taker) -> None:
+def _optics(export: Export, solids: list[Solid], taker: ResultSink) -> None:
     files = ", ".join(part.stl for part in export.parts)
     taker.stage("optical bench")
     bench, reason = attempt(lambda: _bench(export, solids))

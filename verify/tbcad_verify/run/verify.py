@@ -28,7 +28,7 @@ Stamps = dict[str, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
-class Wishes:
+class Options:
     """What a user may ask of a proof.
 
     Attributes:
@@ -48,7 +48,7 @@ class Wishes:
 
 
 def verify(
-    folder: Path, progress: Callable[[str], None] = lambda _: None, wishes: Wishes = Wishes()
+    folder: Path, progress: Callable[[str], None] = lambda _: None, wishes: Options = Options()
 ) -> Report:
     """Prove an export, and write verify.json into it.
 

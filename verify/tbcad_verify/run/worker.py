@@ -12,13 +12,13 @@ import sys
 from pathlib import Path
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.run.results import Lines
+from tbcad_verify.run.results import JsonLinesSink
 from tbcad_verify.run.stages import prove
 
 
 def main(folder: Path, printers: list[str]) -> None:
     """Prove one folder; what libraries chatter goes to stderr."""
-    lines = Lines(os.fdopen(os.dup(1), "w", encoding="utf-8"))
+    lines = JsonLinesSink(os.fdopen(os.dup(1), "w", encoding="utf-8"))
     os.dup2(2, 1)
     try:
         prove(folder, lines, printers)

@@ -12,7 +12,15 @@ from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads
 from tbcad_verify.mesh.surfaces import Lines
 from tbcad_verify.mesh.vectors import slices
 from tbcad_verify.record.record import Camera
-from tbcad_verify.report.checks import Check, Name, at_least, at_most, listed, offenders, told
+from tbcad_verify.report.checks import (
+    Check,
+    Name,
+    at_least,
+    at_most,
+    informative,
+    listed,
+    offenders,
+)
 from tbcad_verify.shell import seam
 from tbcad_verify.shell.optics import Bench
 from tbcad_verify.shell.outline import (
@@ -85,8 +93,8 @@ def checks(bench: Bench, found: Coverage, files: str) -> list[Check]:
         _covers(bench, facets, found.facet),
         _covers(bench, spheres, found.fitted),
         at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {listed(found.blockers)}"),
-        told(gap, float(found.gap.max()), f"widest at {widest}"),
-        told(off, _off_the_record(bench, found)),
+        informative(gap, float(found.gap.max()), f"widest at {widest}"),
+        informative(off, _off_the_record(bench, found)),
     ]
 
 

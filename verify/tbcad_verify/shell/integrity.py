@@ -28,9 +28,9 @@ from tbcad_verify.report.checks import (
     at_least,
     at_most,
     guarded,
+    informative,
     listed,
     offenders,
-    told,
 )
 from tbcad_verify.report.report import NAME
 
@@ -62,7 +62,7 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
             "missing, unlisted, not as written, or of no part: "
             + listed(wrong + unlisted + unread),
         ),
-        told(("other files", "", "files"), len(others), listed(others)),
+        informative(("other files", "", "files"), len(others), listed(others)),
     ]
 
 

@@ -10,9 +10,9 @@ from tbcad_verify.report.checks import (
     Name,
     at_least,
     at_most,
+    informative,
     listed,
     offenders,
-    told,
     unknown,
 )
 from tbcad_verify.shell import image_rim, light
@@ -54,12 +54,12 @@ def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, lis
         _path(bench, path, tally),
         _clear(bench, clear, tally, rings),
         at_least(least, float(each.min()), 1, f"no pixel sees the object in {listed(none)}"),
-        told(median, float(np.median(each))),
-        told(most, float(each.max())),
+        informative(median, float(np.median(each))),
+        informative(most, float(each.max())),
         _framed(bench, framed, rings),
-        told(second, 100 * tally.twice / max(tally.on_mirrors, 1)),
-        told(half, float(spread[0])),
-        told(nearly_all, float(spread[1])),
+        informative(second, 100 * tally.twice / max(tally.on_mirrors, 1)),
+        informative(half, float(spread[0])),
+        informative(nearly_all, float(spread[1])),
     ]
 
 

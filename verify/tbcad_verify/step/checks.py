@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import Bulk
 from tbcad_verify.mesh.rays import in_threads
-from tbcad_verify.record.files import Blob
+from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.record import Export, Part
 from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
 from tbcad_verify.step import part_checks
@@ -99,7 +99,7 @@ def _recorded(export: Export) -> Check:
 
 
 def _part(
-    export: Export, part: Part, blob: Blob, bulks: dict[str, Bulk], seconds: float
+    export: Export, part: Part, blob: FileBytes, bulks: dict[str, Bulk], seconds: float
 ) -> list[Check]:
     names = [(name, part.step, unit) for name, unit in UNITS.items()]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import Bulk
-from tbcad_verify.record.files import AGAIN, Blob, read
+from tbcad_verify.record.files import AGAIN, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
 from tbcad_verify.types import Floats
@@ -80,7 +80,7 @@ class StepFile:
     faces: Faces
 
 
-def load(folder: Path, name: str) -> Blob:
+def load(folder: Path, name: str) -> FileBytes:
     """The bytes of a STEP file.
 
     Raises:
@@ -92,7 +92,7 @@ def load(folder: Path, name: str) -> Blob:
     return blob
 
 
-def examine(blob: Blob, seconds: float) -> StepFile:
+def examine(blob: FileBytes, seconds: float) -> StepFile:
     """Read the bytes as text and by the kernel, from a private copy.
 
     Raises:
@@ -104,7 +104,7 @@ def examine(blob: Blob, seconds: float) -> StepFile:
     return found
 
 
-def examine_all(blobs: Sequence[Blob], seconds: float) -> list[StepFile | Unknown]:
+def examine_all(blobs: Sequence[FileBytes], seconds: float) -> list[StepFile | Unknown]:
     """Several files in one process, which takes long to start.
 
     Whatever that process did not come to is read once more, each file in a process of its own, so
