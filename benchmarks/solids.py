@@ -12,11 +12,12 @@ from OCP.gp import gp_Pnt
 from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, told
 
+from tbcad.cad.brep import Solid
 from tbcad.mirrors.array import Design, MirrorArray, design, directions
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded
-from tbcad.shell.envelope import body
-from tbcad.shell.solid import Solid, shell
+from tbcad.shell.envelope import envelope
+from tbcad.shell.solid import shell
 from tbcad.spec.design import load_spec
 
 SEGMENTS = 64
@@ -67,7 +68,7 @@ def shells(made: Design) -> list[Solid]:
     every, faces = directions(made.spec.optics.n)
     triangles, boundary = bounded(faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0))
     cells = cells_of(half.body.surfaces, boundary, triangles)
-    closing = body(made.spec.shell, cells, half.ellipsoid)
+    closing = envelope(made.spec.shell, cells, half.ellipsoid)
     return [
         shell(f"shell_{one.camera}", one.ids, cells, closing, mirrored=one.camera == "b")
         for one in made.halves

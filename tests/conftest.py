@@ -3,7 +3,7 @@
 import pytest
 
 from tbcad.mirrors.array import Design, MirrorArray, design
-from tbcad.shell.envelope import Body, body
+from tbcad.shell.envelope import Envelope, envelope
 from tbcad.spec.design import load_spec
 
 
@@ -30,6 +30,6 @@ def small_half(small_design: Design) -> MirrorArray:
 
 
 @pytest.fixture(scope="session")
-def small_body(small_design: Design) -> Body:
+def small_body(small_design: Design) -> Envelope:
     half = small_design.halves[0]
-    return body(small_design.spec.shell, half.body, half.ellipsoid)
+    return envelope(small_design.spec.shell, half.body, half.ellipsoid)

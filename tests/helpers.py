@@ -17,11 +17,13 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
+from tbcad.cad.brep import Solid
+from tbcad.cad.mesh import Mesh
 from tbcad.mirrors.array import Design, MirrorArray
-from tbcad.shell.envelope import Body, body
+from tbcad.shell.envelope import Envelope, envelope
 from tbcad.shell.files import distances
-from tbcad.shell.mesh import Mesh, mesh
-from tbcad.shell.solid import Solid, shell
+from tbcad.shell.mesh import mesh
+from tbcad.shell.solid import shell
 
 
 @dataclass(frozen=True)
@@ -98,9 +100,9 @@ def solid_of(made: Design, which: int) -> Solid:
     return shell(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
 
 
-def body_of(made: Design) -> Body:
+def body_of(made: Design) -> Envelope:
     half = made.halves[0]
-    return body(made.spec.shell, half.body, half.ellipsoid)
+    return envelope(made.spec.shell, half.body, half.ellipsoid)
 
 
 def mesh_of(made: Design) -> Mesh:

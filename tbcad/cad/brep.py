@@ -45,6 +45,25 @@ Ring = Sequence[Side]
 TOLERANCE = 1e-6
 
 
+@dataclass(frozen=True)
+class Solid:
+    """A solid and the names of its faces.
+
+    Attributes:
+        name: of the part.
+        shape: the closed solid.
+        faces: name and face, mirrors first in the order of their ids.
+    """
+
+    name: str
+    shape: TopoDS_Solid
+    faces: tuple[tuple[str, TopoDS_Face], ...]
+
+
+class InvalidSolidError(RuntimeError):
+    """The kernel's check refuses a solid: a fault of tbcad, not of the input."""
+
+
 @dataclass
 class Maker:
     """Makes kernel shapes from arrays, mirrored in x = 0 for camera b."""

@@ -3,10 +3,10 @@
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
+from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, one_solid, plane_faces, volume
 from tbcad.geometry.vectors import norm
-from tbcad.shell.mesh import Mesh
-from tbcad.shell.solid import InvalidSolidError
 from tbcad.types import Floats
 
 NEAR_MM = 1e-4

@@ -35,8 +35,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from OCP.TopTools import TopTools_ListOfShape
 
-from tbcad.shell.mesh import Mesh
-from tbcad.shell.solid import InvalidSolidError
+from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.mesh import Mesh
 from tbcad.types import Floats, Ints
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)

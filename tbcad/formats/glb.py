@@ -9,8 +9,8 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from tbcad.cad.assembly import ColouredSolid, SolidGroup
 from tbcad.cad.solids import meshed
-from tbcad.prototype.assembly import Body, Group
 
 # Only to look at: parts are meshed finely in their own files.
 COARSE_MM, COARSE_ANGLE = 0.1, 0.25
@@ -19,7 +19,7 @@ UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0
 METAL, ROUGH = 0.1, 0.6
 
 
-def write_glb(path: Path, name: str, groups: Sequence[Group]) -> None:
+def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     """Write groups of bodies as a binary glTF 2.0 file, a node for each group and each body."""
     scene = trimesh.Scene(base_frame="world")
     scene.graph.update(name, "world", matrix=UPRIGHT)
@@ -35,7 +35,7 @@ def write_glb(path: Path, name: str, groups: Sequence[Group]) -> None:
     path.write_bytes(export_glb(scene, include_normals=True))
 
 
-def _drawn(body: Body) -> trimesh.Trimesh:
+def _drawn(body: ColouredSolid) -> trimesh.Trimesh:
     mesh = meshed(body.shape, COARSE_MM, COARSE_ANGLE)
     drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     # Corners of flat faces are not smoothed over.

@@ -16,7 +16,7 @@ from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 
-from tbcad.shell.solid import Solid
+from tbcad.cad.brep import Solid
 
 # A fixed time stamp: the file's bytes then depend on the design alone.
 TIME_STAMP = "2022-11-01T00:00:00"

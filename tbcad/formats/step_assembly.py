@@ -14,13 +14,13 @@ from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.XSControl import XSControl_WorkSession
 
+from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.formats.step import StepError, quiet, write_head
-from tbcad.prototype.assembly import Body, Colour, Group
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 
 
-def write_assembly(path: Path, name: str, groups: Sequence[Group]) -> None:
+def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     """Write groups of bodies as one AP214 assembly in millimetres, everything where it stands.
 
     The kernel's own order of colours is that of addresses in memory, so they are written here.
@@ -48,7 +48,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[Group]) -> None:
     path.write_text(text + colours + found + rest, encoding="ascii")
 
 
-def _tree(name: str, groups: Sequence[Group]) -> cadquery.Assembly:
+def _tree(name: str, groups: Sequence[SolidGroup]) -> cadquery.Assembly:
     tree = cadquery.Assembly(name=name)
     for group in groups:
         branch = cadquery.Assembly(name=group.name)
@@ -69,7 +69,7 @@ def _count_anew(writer: STEPControl_Writer) -> None:
             entity.SetName(entity.RelatedProductDefinition().Formation().OfProduct().Name())
 
 
-def _colours(writer: STEPControl_Writer, bodies: Sequence[Body]) -> str:
+def _colours(writer: STEPControl_Writer, bodies: Sequence[ColouredSolid]) -> str:
     """Text of the styled items of all bodies.
 
     Source: CAx-IF, Recommended Practices for Model Styling and Organization, section 4.

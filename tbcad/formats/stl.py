@@ -5,7 +5,7 @@ from pathlib import Path
 import trimesh
 from trimesh.exchange.stl import export_stl
 
-from tbcad.shell.mesh import Mesh
+from tbcad.cad.mesh import Mesh
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:

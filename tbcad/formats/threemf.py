@@ -6,7 +6,7 @@ from uuid import NAMESPACE_URL, uuid5
 import lib3mf
 import numpy as np
 
-from tbcad.shell.mesh import Mesh
+from tbcad.cad.mesh import Mesh
 
 DECIMALS = 6
 

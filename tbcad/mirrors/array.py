@@ -8,7 +8,7 @@ from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import MIRROR
 from tbcad.mirrors.radii import RadiusProblem, solve
 from tbcad.optics import flat
-from tbcad.optics.camera import Camera, turned_to
+from tbcad.optics.camera import Camera, fitted_camera
 from tbcad.optics.cells import Cells, areas, cells_of
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.power_diagram import bounded
@@ -150,7 +150,7 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     camera = spec.camera
     return MirrorArray(
         camera="a",
-        view=turned_to(
+        view=fitted_camera(
             ellipsoid.pinhole,
             cells.corners,
             camera.width_px,

@@ -62,7 +62,7 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
     return float(np.max(np.abs(across) / depth[:, None] / half_sizes))
 
 
-def turned_to(
+def fitted_camera(
     pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
 ) -> Camera:
     """The camera turned so that points (k, 3) fill the least share of its frame.

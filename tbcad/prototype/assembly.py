@@ -1,18 +1,13 @@
 """The rig as it stands: groups of named, coloured solids in the frame of the shell."""
 
-from dataclasses import dataclass
-from typing import TypeAlias
-
 import numpy as np
-from OCP.TopoDS import TopoDS_Solid
 
+from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.cad.primitives import pyramid, sphere
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.frame import frame_solids as frames
 from tbcad.prototype.machine import Machine
 from tbcad.prototype.printing.parts import Role
-
-Colour: TypeAlias = tuple[float, float, float, float]
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)
 STEEL: Colour = (0.78, 0.80, 0.83, 1.0)
@@ -26,30 +21,7 @@ COLOURS: dict[Role, Colour] = {
 }
 
 
-@dataclass(frozen=True)
-class Body:
-    """One solid.
-
-    Attributes:
-        name: unique in the rig.
-        shape: with the base at angle zero.
-        colour: red, green, blue (sRGB) and opacity, from 0 to 1.
-    """
-
-    name: str
-    shape: TopoDS_Solid
-    colour: Colour
-
-
-@dataclass(frozen=True)
-class Group:
-    """Bodies that belong together."""
-
-    name: str
-    bodies: tuple[Body, ...]
-
-
-def rig(built: Machine) -> tuple[Group, ...]:
+def rig(built: Machine) -> tuple[SolidGroup, ...]:
     """All bodies of the prototype where they stand with the base at angle zero.
 
     Coupons are tools, and not in it. What light passes through is there to be looked at, and
@@ -65,35 +37,35 @@ def rig(built: Machine) -> tuple[Group, ...]:
     )
 
 
-def _printed(name: str, built: Machine, roles: tuple[str, ...]) -> Group:
-    return Group(
+def _printed(name: str, built: Machine, roles: tuple[str, ...]) -> SolidGroup:
+    return SolidGroup(
         name,
         tuple(
-            Body(piece.name, piece.part.shape, COLOURS[piece.role])
+            ColouredSolid(piece.name, piece.part.shape, COLOURS[piece.role])
             for piece in built.pieces
             if piece.role in roles
         ),
     )
 
 
-def _bought(built: Machine) -> Group:
-    bodies = (Body(name, shape, METAL) for name, shape in frames.bought(built.frame))
-    return Group("bought", tuple(bodies))
+def _bought(built: Machine) -> SolidGroup:
+    bodies = (ColouredSolid(name, shape, METAL) for name, shape in frames.bought(built.frame))
+    return SolidGroup("bought", tuple(bodies))
 
 
-def _balls(built: Machine) -> Group:
+def _balls(built: Machine) -> SolidGroup:
     balls, centre = built.made.balls, built.made.body_centres()
     bought = (~balls.cap).nonzero()[0].tolist()
-    return Group(
+    return SolidGroup(
         "balls",
         tuple(
-            Body(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
+            ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
             for k in bought
         ),
     )
 
 
-def _views(built: Machine) -> Group:
+def _views(built: Machine) -> SolidGroup:
     """The capture sphere, and what the camera sees as far as beyond it."""
     view, radius = built.made.half.view, built.target / 2
     length = float(norm(view.pinhole)) + radius
@@ -102,10 +74,10 @@ def _views(built: Machine) -> Group:
     middle, up = view.pinhole + length * view.forward, np.cross(view.right, view.forward)
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     corners = middle + signs @ np.stack([wide * view.right, high * up])
-    return Group(
+    return SolidGroup(
         "views",
         (
-            Body("capture_sphere", sphere(np.zeros(3), radius), SEEN),
-            Body("camera_view", pyramid(view.pinhole, corners), LIGHT),
+            ColouredSolid("capture_sphere", sphere(np.zeros(3), radius), SEEN),
+            ColouredSolid("camera_view", pyramid(view.pinhole, corners), LIGHT),
         ),
     )

@@ -18,7 +18,7 @@ from tbcad.cad.brep import Maker, Ring, Side
 from tbcad.geometry.conics import EllipseArc
 from tbcad.shell.bores import bores
 from tbcad.shell.boundary import boundary_chain, chain_ends
-from tbcad.shell.envelope import Body
+from tbcad.shell.envelope import Envelope
 from tbcad.shell.front import Front
 from tbcad.types import Floats
 
@@ -58,7 +58,7 @@ class Edges:
     wall: Pair
 
 
-def casing(front: Front, body: Body) -> list[tuple[str, TopoDS_Face]]:
+def casing(front: Front, body: Envelope) -> list[tuple[str, TopoDS_Face]]:
     """Names and faces of everything but the mirrors."""
     maker, e = front.maker, _edges(front, body)
     seam_holes = bores(maker, body.seam_holes, Y, Z)
@@ -98,7 +98,7 @@ def turned(ring: Ring) -> list[Side]:
     return [back_way(side) for side in reversed(ring)]
 
 
-def _edges(front: Front, body: Body) -> Edges:
+def _edges(front: Front, body: Envelope) -> Edges:
     maker, cells = front.maker, front.cells
     seam_back = body.seam_rim.moved(body.seam_thickness)
     foot_top = body.foot_rim.moved(body.foot_thickness)
@@ -139,7 +139,7 @@ def _ends(arc: EllipseArc) -> list[Floats]:
     return list(arc.at(np.array([0.0, 1.0])))
 
 
-def _back(maker: Maker, body: Body, e: Edges) -> TopoDS_Face:
+def _back(maker: Maker, body: Envelope, e: Edges) -> TopoDS_Face:
     ring = [e.foot_back, back_way(e.seam_back)]
     face = maker.face(maker.spheroid(body.back), [ring], natural=False)
     maker.add_pcurves(face, ring)

@@ -38,7 +38,7 @@ class Holes:
 
 
 @dataclass(frozen=True)
-class Body:
+class Envelope:
     """What closes camera a's cells to a solid; all arcs run from lower to higher y.
 
     The joining faces are x = 0 (seam) and z = foot; the seam flange stands on the foot flange.
@@ -74,7 +74,7 @@ class Body:
         return self.foot_holes.direction
 
 
-def body(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Body:
+def envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
     """Back, flanges and holes round camera a's cells.
 
     Raises:
@@ -100,11 +100,11 @@ def _valleys(cells: Cells) -> Floats:
     return arcs.at(arc, share).reshape(-1, 3)
 
 
-def _flanged(shell: ShellSpec, back: Spheroid, foot: float, x: float, z: float) -> Body:
+def _flanged(shell: ShellSpec, back: Spheroid, foot: float, x: float, z: float) -> Envelope:
     seam, base = shell.seam_flange, shell.foot_flange
     rim = _wider(back, seam.width_mm)
     outer = _wider(back, _foot_width(base, back, rim, foot, x, z))
-    return Body(
+    return Envelope(
         back=back,
         foot=foot,
         seam_back=_over(back, x, z),

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tbcad.cad.mesh import Mesh
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.mirrors.record import part
-from tbcad.shell.envelope import Body, body
-from tbcad.shell.mesh import Mesh, mesh
+from tbcad.shell.envelope import Envelope, envelope
+from tbcad.shell.mesh import mesh
 from tbcad.shell.solid import shell
 from tbcad.types import Progress
 
@@ -30,14 +31,14 @@ def export_shells(design: Design, folder: Path, progress: Progress = lambda _: N
         _export(design, half, around, facets, folder, progress)
 
 
-def closing(design: Design) -> Body:
+def closing(design: Design) -> Envelope:
     """What closes camera a's half: back, flanges, holes.
 
     Raises:
         SpecError: when flanges or holes do not fit.
     """
     first = design.halves[0]
-    return body(design.spec.shell, first.body, first.ellipsoid)
+    return envelope(design.spec.shell, first.body, first.ellipsoid)
 
 
 def distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -46,7 +47,12 @@ def distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]
 
 
 def _export(
-    design: Design, half: MirrorArray, closing: Body, facets: Mesh, folder: Path, progress: Progress
+    design: Design,
+    half: MirrorArray,
+    closing: Envelope,
+    facets: Mesh,
+    folder: Path,
+    progress: Progress,
 ) -> None:
     """Write one half; closing and facets are camera a's."""
     files, mirrored = part(half), half.camera == "b"

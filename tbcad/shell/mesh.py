@@ -1,16 +1,16 @@
 """Triangles of a whole half: mirrors' facets and the body's, on shared vertices."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
 
+from tbcad.cad.mesh import Mesh
 from tbcad.geometry.conics import EllipseArc, Spheroid
-from tbcad.geometry.vectors import MIRROR, dot, norm
+from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import boundary_chain
-from tbcad.shell.envelope import Body, Holes
+from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
@@ -18,38 +18,7 @@ from tbcad.types import Floats, Ints
 LEAST_AROUND_HOLE = 24
 
 
-@dataclass(frozen=True)
-class Mesh:
-    """A closed triangle mesh.
-
-    Attributes:
-        vertices: mm, (v, 3).
-        triangles: counter-clockwise seen from outside the solid, (t, 3).
-    """
-
-    vertices: Floats
-    triangles: Ints
-
-    @property
-    def volume(self) -> float:
-        """Signed volume, mm^3."""
-        corner = self.vertices[self.triangles]
-        return float(dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6
-
-    @property
-    def areas(self) -> Floats:
-        """Areas of the triangles, mm^2, (t,)."""
-        corner = self.vertices[self.triangles]
-        across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        result: Floats = norm(across) / 2
-        return result
-
-    def mirrored(self) -> "Mesh":
-        """Mirror image in the plane x = 0."""
-        return Mesh(self.vertices * MIRROR, self.triangles[:, ::-1])
-
-
-def mesh(spec: Spec, cells: Cells, body: Body, distance: Floats) -> Mesh:
+def mesh(spec: Spec, cells: Cells, body: Envelope, distance: Floats) -> Mesh:
     """Mesh of camera a's half.
 
     Args:
@@ -68,7 +37,7 @@ def mesh(spec: Spec, cells: Cells, body: Body, distance: Floats) -> Mesh:
 class _Skin:
     """Vertices and triangles of the body, collected face by face."""
 
-    def __init__(self, error: float, cells: Cells, front: Facets, body: Body) -> None:
+    def __init__(self, error: float, cells: Cells, front: Facets, body: Envelope) -> None:
         self.error, self.points, self.triangles = error, [front.vertices[:0]], [front.triangles[:0]]
         self.front, self.count = front, len(front.vertices)
         seam, foot = body.seam_thickness, body.foot_thickness

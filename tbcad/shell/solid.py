@@ -1,37 +1,15 @@
 """One camera's half as a closed solid, built face by face without boolean operations."""
 
-from dataclasses import dataclass
-
 from OCP.BRepCheck import BRepCheck_Analyzer
-from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 
-from tbcad.cad.brep import Maker
+from tbcad.cad.brep import InvalidSolidError, Maker, Solid
 from tbcad.optics.cells import Cells
 from tbcad.shell.casing import casing
-from tbcad.shell.envelope import Body
+from tbcad.shell.envelope import Envelope
 from tbcad.shell.front import front
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A solid and the names of its faces.
-
-    Attributes:
-        name: of the part.
-        shape: the closed solid.
-        faces: name and face, mirrors first in the order of their ids.
-    """
-
-    name: str
-    shape: TopoDS_Solid
-    faces: tuple[tuple[str, TopoDS_Face], ...]
-
-
-class InvalidSolidError(RuntimeError):
-    """The kernel's check refuses a solid: a fault of tbcad, not of the input."""
-
-
-def shell(name: str, ids: list[str], cells: Cells, body: Body, mirrored: bool) -> Solid:
+def shell(name: str, ids: list[str], cells: Cells, body: Envelope, mirrored: bool) -> Solid:
     """Solid of one half.
 
     Args:

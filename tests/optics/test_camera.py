@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.camera import turned_to
+from tbcad.optics.camera import fitted_camera
 
 
 def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: MirrorArray) -> None:
@@ -37,5 +37,5 @@ def test_mirrored_camera_sees_the_mirrored_array_alike(paper_half: MirrorArray) 
 
 
 def test_a_point_behind_the_camera_is_told() -> None:
-    view = turned_to(np.array([0.0, 0, -9]), np.array([[0.1, 0, 0], [0, 0.1, 0]]), 100, 80, 1.0)
+    view = fitted_camera(np.array([0.0, 0, -9]), np.array([[0.1, 0, 0], [0, 0.1, 0]]), 100, 80, 1.0)
     assert view.fill(np.array([[0.0, 0.0, -20.0]])) == np.inf

@@ -3,12 +3,12 @@ import pytest
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.shell.envelope import Body, body
+from tbcad.shell.envelope import Envelope, envelope
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
 
-def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Body) -> None:
+def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Envelope) -> None:
     """Least distance from any corner or arc to the back is the wall, within the samples."""
     arcs = small_half.body.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, 9))
@@ -23,7 +23,7 @@ def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Bod
     assert 3.0 - 1e-6 < least < 3.3
 
 
-def test_ends_meet(small_body: Body) -> None:
+def test_ends_meet(small_body: Envelope) -> None:
     ends = np.array([0.0, 1.0])
     assert small_body.seam_back.at(ends) == pytest.approx(small_body.foot_back.at(ends))
     seam, foot = small_body.seam_rim.at(ends), small_body.foot_rim.at(ends)
@@ -35,7 +35,7 @@ def test_ends_meet(small_body: Body) -> None:
 
 
 @pytest.mark.parametrize("which", ["seam", "foot"])
-def test_holes_stay_inside_their_flange(small_body: Body, which: str) -> None:
+def test_holes_stay_inside_their_flange(small_body: Envelope, which: str) -> None:
     holes = getattr(small_body, f"{which}_holes")
     inner = getattr(small_body, f"{which}_back").at(np.linspace(0, 1, 4001))
     outer = getattr(small_body, f"{which}_rim").at(np.linspace(0, 1, 4001))
@@ -45,7 +45,7 @@ def test_holes_stay_inside_their_flange(small_body: Body, which: str) -> None:
             assert norm(line[:, plane] - centre[plane]).min() > radius + 1.0
 
 
-def test_holes_by_kind(small_body: Body) -> None:
+def test_holes_by_kind(small_body: Envelope) -> None:
     assert sorted(small_body.seam_holes.radius) == [2.0] * 2 + [2.15] * 6
     assert sorted(small_body.foot_holes.radius) == [2.0] * 2 + [2.15] * 5
 
@@ -53,7 +53,7 @@ def test_holes_by_kind(small_body: Body) -> None:
 def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     spec = load_spec(None, ["shell.seam_flange.bolts=60"])
     with pytest.raises(SpecError, match="holes") as caught:
-        body(spec.shell, small_half.body, small_half.ellipsoid)
+        envelope(spec.shell, small_half.body, small_half.ellipsoid)
     assert "lower bolts" in str(caught.value)
 
 
@@ -61,4 +61,4 @@ def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
 def test_every_n_gets_a_body(n: int) -> None:
     made = design(load_spec(None, [f"n={n}"]))
     half = made.halves[0]
-    assert body(made.spec.shell, half.body, half.ellipsoid).back.offset > 0
+    assert envelope(made.spec.shell, half.body, half.ellipsoid).back.offset > 0

@@ -17,13 +17,14 @@ from tbcad_verify.shell.optics import Bench, set_up
 from tbcad_verify.shell.outline import least_miss, reflect_on_fits, trace_outline
 from tbcad_verify.shell.recover import recover
 
+from tbcad.cad.mesh import Mesh
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import closing, distances
-from tbcad.shell.mesh import Mesh, mesh
+from tbcad.shell.mesh import mesh
 from tbcad.tolerance.montecarlo.draws import Draws
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm

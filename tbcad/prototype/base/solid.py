@@ -6,6 +6,7 @@ Built about z with azimuth zero along x, then moved into the frame of the shell.
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
+from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting, relief
 from tbcad.cad.solids import cut, fused, polygon, prism, ring, volume_by_meshes
@@ -17,7 +18,6 @@ from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import Split, downs, split
 from tbcad.prototype.base.split_solids import flanges, numbers, pieces, windows
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.shell.solid import InvalidSolidError
 from tbcad.types import Floats
 
 SUNK_MM = 0.4

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Any
 
+from tbcad.cad.brep import Solid
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.prototype.printing.parts import PrintedPart, printed
-from tbcad.shell.solid import Solid
 
 KINDS = ("step", "stl", "3mf")
 

@@ -3,6 +3,7 @@
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
+from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.solids import (
     cut,
     cylinder,
@@ -17,7 +18,6 @@ from tbcad.cad.solids import (
 from tbcad.geometry.primitives import Body, Component, Rod, Turned
 from tbcad.geometry.primitives import Prism as Straight
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.shell.solid import InvalidSolidError
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.types import Floats
 

@@ -8,9 +8,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, without_lost
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.shell.mesh import Mesh
 
 # base and cap turn with the base, stage and frame stand still; a tool is not in the rig.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]

@@ -7,10 +7,10 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, moved, one_solid, volume
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
-from tbcad.shell.mesh import Mesh
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats

@@ -8,7 +8,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.camera import turned_to
+from tbcad.optics.camera import fitted_camera
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import Reflector
@@ -102,7 +102,9 @@ def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
 def _counted(half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius: float) -> Counts:
     """Counts of the rays themselves, through the middles of so many columns and rows."""
     corners = half.cells.corners
-    full = turned_to(half.view.pinhole, corners, sensor.width_px, sensor.height_px, half.view.hfov)
+    full = fitted_camera(
+        half.view.pinhole, corners, sensor.width_px, sensor.height_px, half.view.hfov
+    )
     view = replace(full, width_px=sampled[0], height_px=sampled[1])
     on, seen = _traced(Reflector(half.camera, view, half.u, half.cells), radius)
     return Counts(on, seen, full.fill(corners), sampled[0] * sampled[1])

@@ -12,6 +12,7 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.Geom import Geom_SphericalSurface
 from OCP.TopoDS import TopoDS_Shape
 
+from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting, loops, relief
 from tbcad.cad.solids import (
@@ -41,7 +42,6 @@ from tbcad.prototype.base.layout import BaseLayout, base
 from tbcad.prototype.base.solid import bodies, carrier, tools
 from tbcad.prototype.base.split import downs
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.shell.solid import InvalidSolidError, Solid
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError

@@ -10,8 +10,10 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.Geom import Geom_CylindricalSurface
 
+from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_mesh
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
@@ -25,8 +27,6 @@ from tbcad.prototype.base.solid import bodies, carrier, tools, whole
 from tbcad.prototype.base.split import Split, split
 from tbcad.prototype.base.split_solids import holes
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.shell.mesh import Mesh
-from tbcad.shell.solid import InvalidSolidError, Solid
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 

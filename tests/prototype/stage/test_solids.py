@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from tbcad.cad.brep import Solid
 from tbcad.cad.solids import meshed
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
@@ -19,7 +20,6 @@ from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.prototype.stage.stage_solids import parts
-from tbcad.shell.solid import Solid
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError

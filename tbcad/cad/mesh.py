@@ -1,0 +1,39 @@
+"""A closed triangle mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.geometry.vectors import MIRROR, dot, norm
+from tbcad.types import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed triangle mesh.
+
+    Attributes:
+        vertices: mm, (v, 3).
+        triangles: counter-clockwise seen from outside the solid, (t, 3).
+    """
+
+    vertices: Floats
+    triangles: Ints
+
+    @property
+    def volume(self) -> float:
+        """Signed volume, mm^3."""
+        corner = self.vertices[self.triangles]
+        return float(dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6
+
+    @property
+    def areas(self) -> Floats:
+        """Areas of the triangles, mm^2, (t,)."""
+        corner = self.vertices[self.triangles]
+        across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        result: Floats = norm(across) / 2
+        return result
+
+    def mirrored(self) -> "Mesh":
+        """Mirror image in the plane x = 0."""
+        return Mesh(self.vertices * MIRROR, self.triangles[:, ::-1])
