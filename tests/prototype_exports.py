@@ -7,13 +7,13 @@ import numpy as np
 
 from tbcad.mirrors.array import Design
 from tbcad.mirrors.record import write_record
-from tbcad.prototype.balls.layout import Prototype, pictures
+from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
 from tbcad.prototype.files.balls_csv import rows as ball_rows
 from tbcad.prototype.files.plan_csv import rows, write_plan
 from tbcad.simulate.prototype.plan import Plan
 
 
-def plan_of(made: Prototype) -> Plan:
+def plan_of(made: PrototypeLayout) -> Plan:
     """The plan without the way through files."""
     ball, stop = made.fit.ball, made.stops.stop
     back = np.argsort(made.twin)
@@ -31,10 +31,10 @@ def plan_of(made: Prototype) -> Plan:
     )
 
 
-def write_export(folder: Path, little: Design, made: Prototype) -> Path:
+def write_export(folder: Path, little: Design, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
-    write_plan(folder / "rotation_plan.csv", rows(pictures(made)))
+    write_plan(folder / "rotation_plan.csv", rows(planned_pictures(made)))
     axis, zero, third = made.half.ellipsoid.frame().tolist()
     document = {
         "schema": "tbcad-prototype/1",

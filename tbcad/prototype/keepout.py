@@ -15,7 +15,7 @@ from tbcad.geometry.primitives import Body, triangles
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import light
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.types import Floats
 
@@ -93,7 +93,7 @@ class Room:
         return result
 
 
-def room(made: Prototype, base: BaseLayout, capture: float, approach: float) -> Room:
+def room(made: PrototypeLayout, base: BaseLayout, capture: float, approach: float) -> Room:
     """The room that a prototype leaves.
 
     Args:
@@ -152,7 +152,7 @@ def _split(corners: Floats) -> Floats:
     return np.concatenate([tips, half])
 
 
-def _extreme(of: Callable[..., Floats], made: Prototype, angle: Floats) -> Floats:
+def _extreme(of: Callable[..., Floats], made: PrototypeLayout, angle: Floats) -> Floats:
     return np.array([of(angle[made.fit.ball == k]) for k in range(len(made))])
 
 

@@ -8,15 +8,15 @@ import numpy as np
 
 from tbcad.cad.solids import centroid
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.cap_solids import caps, magnets
-from tbcad.prototype.base.coupon import coupon
-from tbcad.prototype.base.layout import BaseLayout, base
-from tbcad.prototype.base.purchased import bought as bought_for_base
-from tbcad.prototype.base.solid import carrier
-from tbcad.prototype.base.split import Split, split
-from tbcad.prototype.drive.balance import Balance, Load, balance, ball_load
-from tbcad.prototype.drive.drive import Drive, Parts, chosen, load_drives, load_parts
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.purchased import base_purchased_parts as bought_for_base
+from tbcad.prototype.base.solid import carrier_parts
+from tbcad.prototype.base.split import BaseSplit, split_base
+from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
+from tbcad.prototype.drive.drive import Drive, Parts, choose_drive, load_drives, load_parts
 from tbcad.prototype.frame import frame_solids as frames
 from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import room
@@ -45,13 +45,13 @@ class Machine:
         target: diameter of the capture sphere, mm.
     """
 
-    made: Prototype
+    made: PrototypeLayout
     base: BaseLayout
-    plan: Split
+    plan: BaseSplit
     stage: StageLayout
     frame: FrameLayout
     pieces: tuple[PrintedPart, ...]
-    balance: Balance
+    balance: BaseBalance
     drive: Drive
     parts: Parts
     target: float
@@ -65,7 +65,7 @@ class Machine:
     def bought(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls, drive and LEDs."""
         for_base = Counter(bought_for_base(self.base, self.plan))
-        in_caps = Counter(magnets(self.base, self.made, self.parts))
+        in_caps = Counter(cap_magnets(self.base, self.made, self.parts))
         around = Counter(bought_parts(self.frame, self.stage))
         return dict(sorted((for_base + in_caps + around).items()))
 
@@ -80,13 +80,13 @@ def machine(design: Design, progress: Progress = lambda _: None) -> Machine:
     keys, parts = design.spec.prototype, load_parts()
     target = design.spec.optics.capture_diameter_mm
     progress("prototype: balls, their places, stops")
-    made = prototype(design.spec, design)
-    numbers = base(keys.base, made)
+    made = prototype_layout(design.spec, design)
+    numbers = base_layout(keys.base, made)
     progress("prototype: base")
-    plan = split(numbers)
-    turning = carrier(numbers, plan)
+    plan = split_base(numbers)
+    turning = carrier_parts(numbers, plan)
     density = keys.base.density_g_cm3
-    summed = balance(numbers.frame, ball_load(made, density), _load(turning, density))
+    summed = sum_masses(numbers.frame, ball_masses(made, density), _load(turning, density))
     drive = _drive(made, summed, keys, parts)
     progress("prototype: stage and frame")
     left = room(made, numbers, target / 2, float(np.radians(keys.motion.approach_deg)))
@@ -98,19 +98,19 @@ def machine(design: Design, progress: Progress = lambda _: None) -> Machine:
     return Machine(made, numbers, plan, held, round_it, pieces, summed, drive, parts, target)
 
 
-def _swing(made: Prototype) -> tuple[float, float]:
+def _swing(made: PrototypeLayout) -> tuple[float, float]:
     return float(made.stops.angle.min()), float(made.stops.angle.max())
 
 
-def _drive(made: Prototype, summed: Balance, keys: PrototypeSpec, parts: Parts) -> Drive:
+def _drive(made: PrototypeLayout, summed: BaseBalance, keys: PrototypeSpec, parts: Parts) -> Drive:
     acceleration = float(np.radians(keys.motion.acceleration_deg_s2))
     needed = summed.needed(*_swing(made), acceleration, keys.motion.safety)
-    return chosen(keys.base.drive, needed, load_drives(parts))
+    return choose_drive(keys.base.drive, needed, load_drives(parts))
 
 
-def _load(parts: list[PlacedSolid], density: float) -> Load:
+def _load(parts: list[PlacedSolid], density: float) -> PointMasses:
     mass = [part.mass_g(density) for part in parts]
-    return Load(np.array(mass), np.array([centroid(part.shape) for part in parts]))
+    return PointMasses(np.array(mass), np.array([centroid(part.shape) for part in parts]))
 
 
 def _bases(parts: list[PlacedSolid]) -> Iterator[PrintedPart]:
@@ -118,9 +118,9 @@ def _bases(parts: list[PlacedSolid]) -> Iterator[PrintedPart]:
         yield PrintedPart(part, "base", "carrier of the balls, turns about the axis")
 
 
-def _caps(numbers: BaseLayout, made: Prototype) -> Iterator[PrintedPart]:
+def _caps(numbers: BaseLayout, made: PrototypeLayout) -> Iterator[PrintedPart]:
     own = np.flatnonzero(made.balls.cap).tolist()
-    for k, part in zip(own, caps(numbers, made), strict=True):
+    for k, part in zip(own, cap_parts(numbers, made), strict=True):
         yield PrintedPart(part, "cap", f"stands in for ball {k + 1}, which is too large to buy", k)
 
 
@@ -135,7 +135,7 @@ def _frames(round_it: FrameLayout, keys: PrototypeSpec) -> Iterator[PrintedPart]
 
 
 def _tools(numbers: BaseLayout) -> Iterator[PrintedPart]:
-    for part in coupon(numbers):
+    for part in coupon_plates(numbers):
         yield PrintedPart(
             part, "tool", "seats to try the fit of the balls before the base is printed"
         )

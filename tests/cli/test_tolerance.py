@@ -12,7 +12,7 @@ import pytest
 from tbcad.cli import run
 from tbcad.mirrors.array import Design, design
 from tbcad.mirrors.record import write_record
-from tbcad.prototype.balls.layout import prototype
+from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.spec.design import load_spec
 from tests.prototype_exports import write_export
 
@@ -52,7 +52,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record with its prototype."""
     folder = tmp_path_factory.mktemp("export")
     little = exported(folder, "n=6", "prototype.k=5")
-    made = prototype(little.spec, little)
+    made = prototype_layout(little.spec, little)
     return write_export(folder, little, made)
 
 

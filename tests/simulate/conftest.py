@@ -6,7 +6,7 @@ import pytest
 
 from tbcad.mirrors.array import Design, design
 from tbcad.mirrors.record import write_record
-from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.capture.light_field import LightField, in_memory
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.exported import Exported, read_export
@@ -57,10 +57,12 @@ def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField
 
 
 @pytest.fixture(scope="session")
-def made(little: Design) -> Prototype:
-    return prototype(little.spec, little)
+def made(little: Design) -> PrototypeLayout:
+    return prototype_layout(little.spec, little)
 
 
 @pytest.fixture(scope="session")
-def written(made: Prototype, little: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(
+    made: PrototypeLayout, little: Design, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     return write_export(tmp_path_factory.mktemp("export"), little, made)

@@ -4,8 +4,15 @@ from dataclasses import dataclass
 
 from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.catalogue import Catalogue
-from tbcad.prototype.balls.groups import Clusters
-from tbcad.prototype.balls.selection import SAME_MM, BallCandidates, Balls, choose, fit, stand
+from tbcad.prototype.balls.groups import MirrorGroups
+from tbcad.prototype.balls.selection import (
+    SAME_MM,
+    BallCandidates,
+    Balls,
+    ball_candidates,
+    ball_fit,
+    choose_balls,
+)
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import PrototypeSpec
 
@@ -33,7 +40,7 @@ class BallAlternative:
     made: int
 
 
-WAYS = {
+SELECTION_RULES = {
     "cover, with caps": {"snap": "cover", "caps": True},
     "cover, balls only": {"snap": "cover", "caps": False},
     "nearest, with caps": {"snap": "nearest", "caps": True},
@@ -41,17 +48,17 @@ WAYS = {
 }
 
 
-def choices(
-    spec: Spec, half: MirrorArray, groups: Clusters, catalogue: Catalogue
+def ball_alternatives(
+    spec: Spec, half: MirrorArray, groups: MirrorGroups, catalogue: Catalogue
 ) -> list[BallAlternative]:
     """What each way to choose the balls costs, for groups of camera a's mirrors."""
-    here = stand(half, groups, spec.optics.capture_diameter_mm)
-    keys = [(name, spec.prototype.model_copy(update=way)) for name, way in WAYS.items()]
-    return [_choice(name, here, choose(here, way, catalogue), way) for name, way in keys]
+    here = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    keys = [(name, spec.prototype.model_copy(update=way)) for name, way in SELECTION_RULES.items()]
+    return [_choice(name, here, choose_balls(here, way, catalogue), way) for name, way in keys]
 
 
 def _choice(name: str, here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallAlternative:
-    found = fit(here, balls, keys)
+    found = ball_fit(here, balls, keys)
     short = found.coverage < here.target - SAME_MM
     return BallAlternative(
         name,

@@ -18,7 +18,7 @@ from tbcad.types import Floats
 
 # Kept on top of every least angle, radians: far more than the solver's rounding and far less than
 # matters, so that no two balls come closer than they may.
-BETWEEN = 1e-4
+SOLVER_MARGIN = 1e-4
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Obstacle:
     azimuth: float
 
 
-def apart(
+def min_separations(
     balls: Balls, keys: PrototypeSpec, pinhole: float, capture: float
 ) -> tuple[Floats, Floats]:
     """Least differences of azimuth so that no balls touch, and so that light passes, (k, k) each.
@@ -57,7 +57,7 @@ def apart(
 
 
 def _between(angle: Floats) -> Floats:
-    result = np.where(angle > 0, angle + BETWEEN, 0.0)
+    result = np.where(angle > 0, angle + SOLVER_MARGIN, 0.0)
     np.fill_diagonal(result, 0.0)
     return result
 
@@ -87,7 +87,9 @@ def _obstacle(start: Floats, end: Floats, radius: float) -> Obstacle:
     return Obstacle(RoundCones(first, second, size, size), azimuth)
 
 
-def free(balls: Balls, keys: PrototypeSpec, things: Iterable[Obstacle]) -> tuple[Floats, Floats]:
+def allowed_azimuths(
+    balls: Balls, keys: PrototypeSpec, things: Iterable[Obstacle]
+) -> tuple[Floats, Floats]:
     """Least and largest azimuth (k,) of each ball such that it meets nothing in between.
 
     Raises:
@@ -108,7 +110,7 @@ def free(balls: Balls, keys: PrototypeSpec, things: Iterable[Obstacle]) -> tuple
     return floor, ceiling
 
 
-def edges(balls: Balls, wall: float) -> Floats:
+def seat_half_angles(balls: Balls, wall: float) -> Floats:
     """Angle at the axis between a ball's centre and the edge of its seat, radians, (k,)."""
     share = (balls.body_radius + wall) / np.maximum(balls.body_centre[:, 1], 1e-9)
     angle: Floats = np.arcsin(np.minimum(share, 1))

@@ -14,7 +14,7 @@ SAME_DEG = 1e-6
 
 
 @dataclass(frozen=True)
-class Clusters:
+class MirrorGroups:
     """Groups of m mirrors by rising polar angle, over k groups.
 
     Attributes:
@@ -43,7 +43,7 @@ class Clusters:
         return result
 
 
-def clusters(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) -> Clusters:
+def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) -> MirrorGroups:
     """Group mirrors by k-means (the paper, section 5.1).
 
     The start is spread evenly over polar angle instead of drawn at random: the same every time,
@@ -67,17 +67,17 @@ def clusters(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) ->
     return ordered(np.asarray(of, dtype=np.int64), polar, radius, k)
 
 
-def ordered(of: Ints, polar: Floats, radius: Floats, k: int) -> Clusters:
+def ordered(of: Ints, polar: Floats, radius: Floats, k: int) -> MirrorGroups:
     """Groups (m,) renumbered by rising mean polar angle."""
-    loose = Clusters(of, np.zeros(k), np.zeros(k))
+    loose = MirrorGroups(of, np.zeros(k), np.zeros(k))
     order = np.argsort(loose.mean(polar), kind="stable")
     rank = np.empty(k, dtype=np.int64)
     rank[order] = np.arange(k)
-    named = Clusters(rank[of], np.zeros(k), np.zeros(k))
-    return Clusters(named.of, named.mean(polar), named.mean(radius))
+    named = MirrorGroups(rank[of], np.zeros(k), np.zeros(k))
+    return MirrorGroups(named.of, named.mean(polar), named.mean(radius))
 
 
-def most_groups(polar: Floats, radius: Floats, radius_weight_deg: float) -> int:
+def max_groups(polar: Floats, radius: Floats, radius_weight_deg: float) -> int:
     """Number of mirrors that differ, beyond which no grouping goes; arguments as of clusters."""
     return len(_different(_places(polar, radius, radius_weight_deg)))
 

@@ -9,11 +9,27 @@ from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls import selection as ball
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
-from tbcad.prototype.balls.clearance import apart, edges, free, obstacles
-from tbcad.prototype.balls.groups import Clusters, clusters, most_groups
-from tbcad.prototype.balls.placement import Placement, PlacementProblem, greedy, place
-from tbcad.prototype.balls.selection import BallCandidates, Balls, Fit
-from tbcad.prototype.balls.stops import Requests, Stops, plan, requests, settled
+from tbcad.prototype.balls.clearance import (
+    allowed_azimuths,
+    min_separations,
+    obstacles,
+    seat_half_angles,
+)
+from tbcad.prototype.balls.groups import MirrorGroups, group_mirrors, max_groups
+from tbcad.prototype.balls.placement import (
+    Placement,
+    PlacementProblem,
+    greedy_placement,
+    min_swing_placement,
+)
+from tbcad.prototype.balls.selection import BallCandidates, BallFit, Balls
+from tbcad.prototype.balls.stops import (
+    StopPlan,
+    StopRequests,
+    azimuths_for_fewer_stops,
+    plan_stops,
+    stop_requests,
+)
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MOST_BALLS, PrototypeSpec
@@ -24,7 +40,7 @@ POST_LENGTHS = 3
 
 
 @dataclass(frozen=True)
-class Prototype:
+class PrototypeLayout:
     """Balls on a base that turns about the ellipsoid's axis, over k balls and m mirrors.
 
     At base angle b ball j stands at azimuth placement.azimuth[j] + b; positions are in the frame
@@ -46,13 +62,13 @@ class Prototype:
 
     half: MirrorArray
     grade: Grade
-    groups: Clusters
+    groups: MirrorGroups
     balls: Balls
-    fit: Fit
+    fit: BallFit
     task: PlacementProblem
     placement: Placement
     greedy: Placement
-    stops: Stops
+    stops: StopPlan
     twin: Ints
 
     def __len__(self) -> int:
@@ -91,7 +107,7 @@ class Prototype:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PlannedPicture:
     """One photograph for one mirror.
 
     Attributes:
@@ -115,7 +131,7 @@ class Picture:
     error: float
 
 
-def prototype(spec: Spec, design: Design) -> Prototype:
+def prototype_layout(spec: Spec, design: Design) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
     Raises:
@@ -124,25 +140,25 @@ def prototype(spec: Spec, design: Design) -> Prototype:
     keys, half = spec.prototype, _curved(design.halves[0])
     _check_half_turn(spec)
     here, balls = _stand(spec, half)
-    wanted = requests(here.groups, half.azimuth, float(np.radians(keys.stop_error_deg)))
+    wanted = stop_requests(here.groups, half.azimuth, float(np.radians(keys.stop_error_deg)))
     task = _task(spec, half, balls, wanted)
-    placed = place(task)
-    azimuth = settled(task, wanted, placed.azimuth)
-    return Prototype(
+    placed = min_swing_placement(task)
+    azimuth = azimuths_for_fewer_stops(task, wanted, placed.azimuth)
+    return PrototypeLayout(
         half=half,
         grade=load_grades()[keys.grade],
         groups=here.groups,
         balls=balls,
-        fit=ball.fit(here, balls, keys),
+        fit=ball.ball_fit(here, balls, keys),
         task=task,
         placement=replace(placed, azimuth=azimuth, outermost=task.outermost(azimuth)),
-        greedy=greedy(task),
-        stops=plan(here.groups, half.polar, wanted, azimuth),
+        greedy=greedy_placement(task),
+        stops=plan_stops(here.groups, half.polar, wanted, azimuth),
         twin=_twins(half),
     )
 
 
-def pictures(made: Prototype) -> list[Picture]:
+def planned_pictures(made: PrototypeLayout) -> list[PlannedPicture]:
     """All photographs in order: camera a's mirrors, then camera b's with the object turned.
 
     The base goes through its stops twice, both times upward, so that play in the drive has no
@@ -152,7 +168,7 @@ def pictures(made: Prototype) -> list[Picture]:
     order = np.lexsort((np.arange(len(made.half)), stops.stop)).tolist()
     names = made.half.ids, [f"b{i + 1:04d}" for i in made.twin.tolist()]
     return [
-        Picture(
+        PlannedPicture(
             turn,
             int(stops.stop[i]),
             float(stops.angle[stops.stop[i]]),
@@ -192,11 +208,11 @@ def _stand(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
     if keys.k != "auto":
         return _grouped(spec, half, keys.k, catalogue)
     radius, weight = half.mirrors.radius, keys.radius_weight_deg
-    most = min(most_groups(half.polar, radius, weight), MOST_BALLS)
+    most = min(max_groups(half.polar, radius, weight), MOST_BALLS)
     for k in range(1, most + 1):
         if _near(keys, half, k):
             here, balls = _grouped(spec, half, k, catalogue)
-            if 100 * (1 - ball.fit(here, balls, keys).kept) <= keys.auto_lost_percent:
+            if 100 * (1 - ball.ball_fit(here, balls, keys).kept) <= keys.auto_lost_percent:
                 return here, balls
     raise SpecError(
         f"no number of balls up to {most} keeps prototype.auto_direction_max_deg, "
@@ -206,7 +222,7 @@ def _stand(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
 
 def _near(keys: PrototypeSpec, half: MirrorArray, k: int) -> bool:
     """Whether the errors of direction of k groups are within the limits, before all else."""
-    groups = clusters(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
+    groups = group_mirrors(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
     error = np.degrees(np.abs(groups.polar[groups.of] - half.polar))
     return bool(
         error.max() <= keys.auto_direction_max_deg
@@ -218,23 +234,25 @@ def _grouped(
     spec: Spec, half: MirrorArray, k: int, catalogue: Catalogue
 ) -> tuple[BallCandidates, Balls]:
     keys = spec.prototype
-    groups = clusters(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
-    here = ball.stand(half, groups, spec.optics.capture_diameter_mm)
-    return here, ball.choose(here, keys, catalogue)
+    groups = group_mirrors(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
+    here = ball.ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    return here, ball.choose_balls(here, keys, catalogue)
 
 
-def _task(spec: Spec, half: MirrorArray, balls: Balls, wanted: Requests) -> PlacementProblem:
+def _task(spec: Spec, half: MirrorArray, balls: Balls, wanted: StopRequests) -> PlacementProblem:
     keys, ellipsoid = spec.prototype, half.ellipsoid
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, spec.optics.capture_diameter_mm / 2
     length = POST_LENGTHS * ellipsoid.semi_major
-    floor, ceiling = free(balls, keys, obstacles(keys, ellipsoid.frame(), half.view, length))
+    floor, ceiling = allowed_azimuths(
+        balls, keys, obstacles(keys, ellipsoid.frame(), half.view, length)
+    )
     return PlacementProblem(
-        apart=np.maximum(*apart(balls, keys, pinhole, capture)),
+        apart=np.maximum(*min_separations(balls, keys, pinhole, capture)),
         low=wanted.low(len(balls)),
         high=wanted.high(len(balls)),
         floor=floor,
         ceiling=ceiling,
-        edge=edges(balls, keys.ball_wall_mm),
+        edge=seat_half_angles(balls, keys.ball_wall_mm),
         most=float(np.radians(keys.max_swing_deg)),
     )
 

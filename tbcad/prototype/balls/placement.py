@@ -83,7 +83,7 @@ class Placement:
     outermost: float
 
 
-def greedy(task: PlacementProblem) -> Placement:
+def greedy_placement(task: PlacementProblem) -> Placement:
     """Balls one after the other, the widest group first, each as near to azimuth 0 as it can.
 
     Where post or camera rule that out: those with least room first, for a swing that grows until
@@ -127,7 +127,7 @@ def _filled(task: PlacementProblem, low: Floats, high: Floats, rank: Floats) -> 
     return azimuth
 
 
-def place(task: PlacementProblem) -> Placement:
+def min_swing_placement(task: PlacementProblem) -> Placement:
     """Azimuths with the least swing, and of those with that swing the least outermost azimuth.
 
     The search stops at NODES nodes with the best found.
@@ -135,7 +135,7 @@ def place(task: PlacementProblem) -> Placement:
     Raises:
         SpecError: when there are none.
     """
-    first = greedy(task)
+    first = greedy_placement(task)
     found = _least_swing(task, first)
     if found is None:
         raise SpecError(_not_placed(task))

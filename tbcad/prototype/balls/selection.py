@@ -10,7 +10,7 @@ from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import Poses, facing, outlines, pixels, poses, turned
 from tbcad.optics.windows import Pieces, Windows, windows
 from tbcad.prototype.balls.catalogue import Catalogue
-from tbcad.prototype.balls.groups import Clusters
+from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
 
@@ -18,7 +18,7 @@ HALVINGS = 40
 # Of rounding only: far below what the least stock step changes.
 SAME_MM = 1e-6
 CAP_STEP_MM = 0.1
-MADE = -1
+CAP = -1
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Balls:
     @property
     def cap(self) -> Bools:
         """Which are made, not bought, (k,)."""
-        made: Bools = self.stock == MADE
+        made: Bools = self.stock == CAP
         return made
 
     @property
@@ -87,7 +87,7 @@ class Balls:
 
 
 @dataclass(frozen=True)
-class Fit:
+class BallFit:
     """How well balls stand in for mirrors, over m mirrors.
 
     Attributes:
@@ -128,7 +128,7 @@ class BallCandidates:
     """
 
     half: MirrorArray
-    groups: Clusters
+    groups: MirrorGroups
     windows: Windows
     target: float
 
@@ -163,21 +163,21 @@ class BallCandidates:
         return replace(self, windows=self.windows.only(mirrors))
 
 
-def stand(half: MirrorArray, groups: Clusters, target: float) -> BallCandidates:
+def ball_candidates(half: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
     """Groups of mirrors ready to try balls in their places; target is a coverage in mm."""
     return BallCandidates(half, groups, windows(half.cells, half.view.pinhole), target)
 
 
-def choose(here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue) -> Balls:
+def choose_balls(here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue) -> Balls:
     """The ball of each group, by the spec's rule; groups beyond stock get caps if it says so."""
     if keys.snap == "nearest":
         radius, stock = _nearest(here.groups.radius, catalogue, keys.caps)
     else:
         radius, stock = _covering(here, keys, catalogue)
-    return balls_of(here, radius, stock, catalogue, keys.cap_rim_mm)
+    return balls_with_radii(here, radius, stock, catalogue, keys.cap_rim_mm)
 
 
-def balls_of(
+def balls_with_radii(
     here: BallCandidates, radius: Floats, stock: Ints, catalogue: Catalogue, rim: float
 ) -> Balls:
     """Balls with reflecting radii (k,) in the places of the groups, caps with a rim (mm)."""
@@ -205,7 +205,7 @@ def _bodies(radius: Floats, edge: Floats) -> tuple[Floats, Floats]:
     return np.sqrt(2) * edge, drop + edge
 
 
-def possible(here: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:
+def coverable(here: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:
     """Whether the smallest ball shows the target in each mirror's cell, (m,).
 
     Where it does not, the mirror is too far from its group for any ball.
@@ -214,7 +214,7 @@ def possible(here: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:
     return here.coverage(smallest, moved) >= here.target - SAME_MM
 
 
-def fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> Fit:
+def ball_fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallFit:
     """What the balls show in place of the mirrors."""
     half, groups = here.half, here.groups
     moved = keys.picture == "moved"
@@ -224,12 +224,12 @@ def fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> Fit:
         2 * half.ellipsoid.linear_eccentricity,
         here.target / 2,
     )
-    return Fit(
+    return BallFit(
         ball=groups.of,
         polar_error=groups.polar[groups.of] - half.polar,
         coverage=here.coverage(balls.radius, moved=True),
         coverage_fixed=here.coverage(balls.radius, moved=False),
-        possible=possible(here, balls.catalogue, moved),
+        possible=coverable(here, balls.catalogue, moved),
         pixels_shell=_counted(half, shell),
         pixels=_counted(half, balls.outline[groups.of]),
     )
@@ -245,7 +245,7 @@ def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, 
     stock = np.argmin(np.abs(catalogue.diameter / 2 - radius[:, None]), axis=1)
     beyond = caps & (radius > catalogue.diameter[-1] / 2)
     made = np.round(radius / CAP_STEP_MM) * CAP_STEP_MM
-    return np.where(beyond, made, catalogue.diameter[stock] / 2), np.where(beyond, MADE, stock)
+    return np.where(beyond, made, catalogue.diameter[stock] / 2), np.where(beyond, CAP, stock)
 
 
 def _covering(
@@ -253,7 +253,7 @@ def _covering(
 ) -> tuple[Floats, Ints]:
     """Largest stock ball, or cap, that shows the target for every mirror of its group."""
     groups, moved = here.groups, keys.picture == "moved"
-    hopeless = ~possible(here, catalogue, moved)
+    hopeless = ~coverable(here, catalogue, moved)
 
     def covers(radius: Floats) -> Bools:
         covered = np.where(hopeless, np.inf, here.coverage(radius, moved))
@@ -271,7 +271,7 @@ def _covering(
     made = _largest_radius(here.only(beyond[groups.of]), radius, hopeless, moved)
     made = np.floor(made / CAP_STEP_MM + SAME_MM) * CAP_STEP_MM
     beyond &= made > radius
-    return np.where(beyond, made, radius), np.where(beyond, MADE, stock)
+    return np.where(beyond, made, radius), np.where(beyond, CAP, stock)
 
 
 def _largest(holds: Callable[[Ints], Bools], count: int, last: int) -> Ints:

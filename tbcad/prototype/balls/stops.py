@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.prototype.balls.groups import Clusters
+from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.placement import PlacementProblem
 from tbcad.types import Floats, Ints
 
@@ -20,7 +20,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Requests:
+class StopRequests:
     """Base angles at which each of m mirrors may be served, apart from its ball's azimuth.
 
     Attributes:
@@ -47,7 +47,7 @@ class Requests:
 
 
 @dataclass(frozen=True)
-class Stops:
+class StopPlan:
     """Stops of the base in ascending order, over s stops and m mirrors.
 
     Attributes:
@@ -73,7 +73,7 @@ class Stops:
         return np.flatnonzero(self.stop == stop)
 
 
-def requests(groups: Clusters, azimuth: Floats, error: float) -> Requests:
+def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRequests:
     """What the mirrors ask for.
 
     Args:
@@ -83,7 +83,7 @@ def requests(groups: Clusters, azimuth: Floats, error: float) -> Requests:
     """
     share = np.sin(error / 2) / np.maximum(np.sin(groups.polar), 1e-12)
     tolerance = 2 * np.arcsin(np.minimum(share, 1))
-    return Requests(groups.of, azimuth, tolerance[groups.of])
+    return StopRequests(groups.of, azimuth, tolerance[groups.of])
 
 
 def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
@@ -106,7 +106,9 @@ def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     return np.array(points), which
 
 
-def settled(task: PlacementProblem, wanted: Requests, azimuth: Floats) -> Floats:
+def azimuths_for_fewer_stops(
+    task: PlacementProblem, wanted: StopRequests, azimuth: Floats
+) -> Floats:
     """Azimuths (k,) moved where they are free to, so that fewer stops do; the swing stays.
 
     Ball after ball, each is tried at small steps over all that the others, the swing and the
@@ -144,19 +146,21 @@ def _tried(
     return result
 
 
-def _count(wanted: Requests, azimuth: Floats, ball: int, place: float) -> int:
+def _count(wanted: StopRequests, azimuth: Floats, ball: int, place: float) -> int:
     moved = azimuth.copy()
     moved[ball] = place
     return len(min_stabbing_points(*_intervals(wanted, moved))[0])
 
 
-def _intervals(wanted: Requests, azimuth: Floats) -> tuple[Floats, Floats]:
+def _intervals(wanted: StopRequests, azimuth: Floats) -> tuple[Floats, Floats]:
     """Base angles (m,) between which each mirror may be served."""
     angle = wanted.azimuth - azimuth[wanted.ball]
     return angle - wanted.tolerance, angle + wanted.tolerance
 
 
-def plan(groups: Clusters, polar: Floats, wanted: Requests, azimuth: Floats) -> Stops:
+def plan_stops(
+    groups: MirrorGroups, polar: Floats, wanted: StopRequests, azimuth: Floats
+) -> StopPlan:
     """The stops for balls at azimuths (k,), each mirror at the one that suits it best.
 
     Args:
@@ -169,7 +173,9 @@ def plan(groups: Clusters, polar: Floats, wanted: Requests, azimuth: Floats) -> 
     angle = _middles(exact, *_intervals(wanted, azimuth))
     stop = np.abs(angle - exact[:, None]).argmin(axis=1)
     across, along = angle[stop] - exact, groups.polar[groups.of] - polar
-    return Stops(angle, stop, across, along, between(polar, groups.polar[groups.of], across))
+    return StopPlan(
+        angle, stop, across, along, angle_between(polar, groups.polar[groups.of], across)
+    )
 
 
 def _middles(exact: Floats, low: Floats, high: Floats) -> Floats:
@@ -194,7 +200,7 @@ def _each(extreme: np.ufunc, values: Floats, which: Ints) -> Floats:
     return result
 
 
-def between(polar: Floats, other: Floats, azimuth: Floats) -> Floats:
+def angle_between(polar: Floats, other: Floats, azimuth: Floats) -> Floats:
     """Angles (m,) between directions at two polar angles and a difference of azimuth, radians."""
     half = np.sin((polar - other) / 2) ** 2
     half += np.sin(polar) * np.sin(other) * np.sin(azimuth / 2) ** 2

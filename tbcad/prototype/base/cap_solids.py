@@ -15,7 +15,7 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
 from tbcad.cad.solids import moved, one_solid, revolved
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.purchased import magnet_name
 from tbcad.prototype.drive.drive import Parts
@@ -25,7 +25,7 @@ WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # least material before the pocket
 
 
-def caps(base: BaseLayout, made: Prototype) -> list[PlacedSolid]:
+def cap_parts(base: BaseLayout, made: PrototypeLayout) -> list[PlacedSolid]:
     """A cap for each ball that is not bought, in its seat, its front up when it is printed.
 
     Raises:
@@ -34,24 +34,26 @@ def caps(base: BaseLayout, made: Prototype) -> list[PlacedSolid]:
     return [_cap(base, made, k) for k in np.flatnonzero(made.balls.cap).tolist()]
 
 
-def _cap(base: BaseLayout, made: Prototype, k: int) -> PlacedSolid:
+def _cap(base: BaseLayout, made: PrototypeLayout, k: int) -> PlacedSolid:
     seats, name = base.seats, f"cap_{k + 1}"
     line = _section(base, float(made.balls.radius[k]), float(made.balls.body_depth[k]), k)
     axes = seats.axes[k]
     shape = one_solid(name, moved(revolved(line), axes, seats.centre[k]))
     # Turned over, so that the front is up and the flat lies on the bed.
     over = axes.T @ np.diag([1.0, -1.0, -1.0])
-    return PlacedSolid(name, shape, over, np.array([0, 0, flat(base, k)]) - seats.centre[k] @ over)
+    return PlacedSolid(
+        name, shape, over, np.array([0, 0, flat_depth(base, k)]) - seats.centre[k] @ over
+    )
 
 
-def flat(base: BaseLayout, k: int) -> float:
+def flat_depth(base: BaseLayout, k: int) -> float:
     """Distance of the flat behind the centre of the body, clear of the pads, mm."""
     seats = base.seats
     angle = seats.tilt - np.arcsin((seats.pad[k] + WEB_MM) / seats.radius[k])
     return float(seats.radius[k] * np.cos(angle))
 
 
-def pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
+def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
     """Radius and depth of the pocket for the cap's own magnet, mm; zeros where there is none.
 
     Args:
@@ -59,7 +61,7 @@ def pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
         k: number of the seat.
         depth: of the body's centre behind the apex, mm.
     """
-    keys, behind = base.keys, flat(base, k)
+    keys, behind = base.keys, flat_depth(base, k)
     wide = float(np.sqrt(base.seats.radius[k] ** 2 - behind**2)) - WEB_MM
     sizes = [(size + keys.magnet_play_mm) / 2 for size in keys.magnets_mm]
     fitting = [size for size in sizes if size <= wide]
@@ -68,21 +70,23 @@ def pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
     return max(fitting), keys.magnet_height_mm
 
 
-def magnets(base: BaseLayout, made: Prototype, parts: Parts) -> dict[str, int]:
+def cap_magnets(base: BaseLayout, made: PrototypeLayout, parts: Parts) -> dict[str, int]:
     """Magnets in the caps' own pockets, by name.
 
     Raises:
         SpecError: when one is in no list.
     """
     depth, play = made.balls.body_depth, base.keys.magnet_play_mm
-    radii = [pocket(base, k, float(depth[k]))[0] for k in np.flatnonzero(made.balls.cap).tolist()]
+    radii = [
+        cap_pocket(base, k, float(depth[k]))[0] for k in np.flatnonzero(made.balls.cap).tolist()
+    ]
     return dict(Counter(magnet_name(base, 2 * r - play, parts) for r in radii if r))
 
 
 def _section(base: BaseLayout, front: float, depth: float, k: int) -> TopoDS_Face:
     """Half section (x out, z along) in y = 0: front, body, flat, pocket."""
-    body, behind = float(base.seats.radius[k]), flat(base, k)
-    wide, deep = pocket(base, k, depth)
+    body, behind = float(base.seats.radius[k]), flat_depth(base, k)
+    wide, deep = cap_pocket(base, k, depth)
     edge = body / np.sqrt(2)
     wire = BRepBuilderAPI_MakeWire()
     apex, rim = (0.0, -depth), (float(np.sqrt(body**2 - behind**2)), behind)

@@ -34,7 +34,7 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Row:
+class CouponRow:
     """Seats of one size side by side on a bar, the size left of all, each offset left of its seat.
 
     Attributes:
@@ -52,10 +52,10 @@ class Row:
     size: tuple[float, float]
 
 
-Place = tuple[Row, Floats]
+Place = tuple[CouponRow, Floats]
 
 
-def coupon(base: BaseLayout) -> list[PlacedSolid]:
+def coupon_plates(base: BaseLayout) -> list[PlacedSolid]:
     """Plates with a seat for each size and each offset of the pads, as few as the bed allows.
 
     Raises:
@@ -63,27 +63,27 @@ def coupon(base: BaseLayout) -> list[PlacedSolid]:
         InvalidSolidError: when the kernel fails.
     """
     seats = replace(base.seats, back=base.seats.bottom + base.keys.floor_mm)
-    plates = _plates(rows_of(seats, base.keys), base.keys)
+    plates = _plates(coupon_rows(seats, base.keys), base.keys)
     return [
         PlacedSolid(name, _plate(name, seats, base.keys, rows), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
     ]
 
 
-def rows_of(seats: Seats, keys: BaseSpec) -> list[Row]:
+def coupon_rows(seats: Seats, keys: BaseSpec) -> list[CouponRow]:
     """A row for each size, the largest first."""
     sizes, first = np.unique(np.round(seats.radius, 6), return_index=True)
     return [_row(seats, keys, int(k)) for k in first[np.argsort(-sizes)]]
 
 
-def _row(seats: Seats, keys: BaseSpec, k: int) -> Row:
+def _row(seats: Seats, keys: BaseSpec, k: int) -> CouponRow:
     name = f"{2 * seats.radius[k]:.2f}".rstrip("0").rstrip(".")
     wide = 2 * float(seats.boss[k])
     signs = max(width(_sign(offset)) for offset in keys.coupon_offsets_mm)
     cell = signs * keys.digit_mm / ROWS + 2 * GAP_MM + wide
     first = width(name) * keys.digit_mm / ROWS + 2 * GAP_MM
     across = first + cell * len(keys.coupon_offsets_mm)
-    return Row(k, name, first, cell, (across, max(wide, _bar(keys)) + GAP_MM))
+    return CouponRow(k, name, first, cell, (across, max(wide, _bar(keys)) + GAP_MM))
 
 
 def _bar(keys: BaseSpec) -> float:
@@ -96,7 +96,7 @@ def _sign(offset: float) -> str:
     return "0" if text in ("+0", "-0") else text
 
 
-def _plates(rows: Iterable[Row], keys: BaseSpec) -> Iterator[list[list[Place]]]:
+def _plates(rows: Iterable[CouponRow], keys: BaseSpec) -> Iterator[list[list[Place]]]:
     """Rows on shelves, shelves on plates, each with its left end on the shelf's middle line."""
     wide, deep = room(keys)[:2]
     shelves: list[list[Place]] = []
@@ -116,7 +116,7 @@ def _plates(rows: Iterable[Row], keys: BaseSpec) -> Iterator[list[list[Place]]]:
     yield shelves
 
 
-def _check(row: Row, keys: BaseSpec) -> None:
+def _check(row: CouponRow, keys: BaseSpec) -> None:
     across, depth = row.size
     if (np.array(row.size) > room(keys)[:2]).any():
         raise SpecError(
@@ -160,7 +160,7 @@ def _slab(low: tuple[float, float], high: tuple[float, float], keys: BaseSpec) -
     return prism(polygon(corners), np.array([0, 0, OF_FLOOR * keys.floor_mm]))
 
 
-def _middle(row: Row, left: Floats, n: int, seats: Seats) -> Floats:
+def _middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
     """Where the axis of a row's n-th seat stands, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
     middle: Floats = left + np.array([right - float(seats.boss[row.seat]), 0.0])
@@ -169,7 +169,7 @@ def _middle(row: Row, left: Floats, n: int, seats: Seats) -> Floats:
 
 def _seat(seats: Seats, keys: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
     """A seat in its own frame."""
-    return cut(ring(_wall(seats, keys, k), 0.0, 2 * np.pi), [seat.hollow(seats, k, offset)])
+    return cut(ring(_wall(seats, keys, k), 0.0, 2 * np.pi), [seat.seat_hollow(seats, k, offset)])
 
 
 def _wall(seats: Seats, keys: BaseSpec, k: int) -> Floats:
@@ -183,7 +183,7 @@ def _wall(seats: Seats, keys: BaseSpec, k: int) -> Floats:
     return np.array([[front, 0.0], [front, boss], *slope, *end, [back, 0.0]])
 
 
-def _texts(row: Row, keys: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
+def _texts(row: CouponRow, keys: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
     at = left + np.array([row.first / 2, 0.0])
     found = _text(row.name, keys, at)

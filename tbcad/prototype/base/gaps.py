@@ -18,7 +18,7 @@ SHORTEST_MM = 8.0  # of what is left between gaps
 BEYOND_MM = 5.0  # by which a gap's section stands out of the rib
 
 
-def arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[tuple[float, float]]:
+def ring_arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[tuple[float, float]]:
     """Azimuths between which a ring (4, 2) of (z, r) is there, within two azimuths, radians."""
     reach = float(ring[:, 1].max())
     azimuth = np.linspace(low, high, int(np.ceil((high - low) * reach / STEP_MM)) + 1)
@@ -34,7 +34,7 @@ def arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[tuple[
     return _runs(azimuth, _free(base.own_seats, points), SHORTEST_MM / reach)
 
 
-def gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
+def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
     """Polygons (n, 2) of (z, r) over which a rib at an azimuth is left out.
 
     Args:

@@ -16,7 +16,7 @@ BOSS_MM = 20.0
 
 
 @dataclass(frozen=True)
-class Pattern:
+class HolePattern:
     """Holes of a purchased part, on a circle about the axis.
 
     Attributes:
@@ -34,13 +34,15 @@ class Pattern:
     source: str
 
 
-PATTERNS: dict[Drive, Pattern] = {
+PATTERNS: dict[Drive, HolePattern] = {
     # There is no standard for bolted GT2 wheels: the wheel is made to this circle.
-    "nema17-belt": Pattern(28.0, 0.0, (0.0, 0.0), True, "own: a GT2 wheel made to fit"),
+    "nema17-belt": HolePattern(28.0, 0.0, (0.0, 0.0), True, "own: a GT2 wheel made to fit"),
     # Sold as "5 mm flange coupling": flange 22 mm, four M3 holes on 16 mm, collar 10 mm.
-    "nema17-direct": Pattern(16.0, 0.0, (0.0, 0.0), True, "flange couplings on sale, 22 x 16 mm"),
+    "nema17-direct": HolePattern(
+        16.0, 0.0, (0.0, 0.0), True, "flange couplings on sale, 22 x 16 mm"
+    ),
     # Stage tops with tapped M6 holes on the 25 mm grid of optical tables, one of them central.
-    "stage-60": Pattern(
+    "stage-60": HolePattern(
         50.0, 6.6, (11.0, 6.5), False, "25 mm grid of optical tables, M6 (ISO 273)"
     ),
 }
@@ -81,7 +83,7 @@ class Hub:
     source: str
 
 
-def hub(keys: BaseSpec, front: float) -> Hub:
+def hub_layout(keys: BaseSpec, front: float) -> Hub:
     """The hub whose disc begins at z = front.
 
     Raises:
@@ -113,7 +115,7 @@ def hub(keys: BaseSpec, front: float) -> Hub:
     )
 
 
-def _check(keys: BaseSpec, pattern: Pattern, hole: float) -> None:
+def _check(keys: BaseSpec, pattern: HolePattern, hole: float) -> None:
     least = 1.5
     most = pattern.circle - max(hole, pattern.head[0]) - 2 * least
     if keys.shaft_mm > most:

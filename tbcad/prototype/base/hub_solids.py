@@ -14,7 +14,7 @@ THROUGH = 1.0  # tools stick out this far, so that no faces coincide
 SCREWS = np.radians([135.0, 225.0])
 
 
-def body(hub: Hub) -> list[TopoDS_Shape]:
+def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:
     """Disc and boss."""
     disc = cylinder(hub.back * UP, UP, hub.disc, hub.front - hub.back)
     if not hub.boss:
@@ -22,7 +22,7 @@ def body(hub: Hub) -> list[TopoDS_Shape]:
     return [disc, cylinder(hub.face * UP, UP, hub.boss, hub.back - hub.face + THROUGH)]
 
 
-def holes(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
+def hub_holes(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
     """Bore, the drive's holes, and those of the lock."""
     start, length = hub.face - THROUGH, hub.front - hub.face + 2 * THROUGH
     found = [cylinder(start * UP, UP, hub.bore, length)]

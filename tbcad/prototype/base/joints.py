@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.profile import offset, outside
-from tbcad.prototype.base.screws import access, sizes
+from tbcad.prototype.base.profile import distance_outside, offset
+from tbcad.prototype.base.screws import access_radius, joint_hardware
 from tbcad.types import Bools, Floats
 
 GRID_MM = 2.0
@@ -28,7 +28,7 @@ OFF_HUB_MM = 1.0
 
 
 @dataclass(frozen=True)
-class Plane:
+class CutPlane:
     """A plane: all points whose product with the unit normal (3,) is the level, mm."""
 
     normal: Floats
@@ -53,7 +53,7 @@ class Joint:
         labels: places on the plane of the numbers below and above, mm, (2, 3).
     """
 
-    plane: Plane
+    plane: CutPlane
     within: Floats
     dowels: Floats
     screws: Floats
@@ -61,7 +61,7 @@ class Joint:
     labels: Floats
 
 
-def profile(base: BaseLayout) -> Floats:
+def flange_profile(base: BaseLayout) -> Floats:
     """Cross-section of the flanges, from within the wall, (z, r), mm, (n, 2).
 
     It begins off the hub and ends before the wall does.
@@ -76,8 +76,8 @@ def _top(base: BaseLayout) -> Floats:
     return offset(base.inner, base.keys.thickness_mm + base.keys.joint_height_mm)
 
 
-def holes(
-    base: BaseLayout, plane: Plane, within: Floats, others: Sequence[tuple[Plane, Floats]]
+def plan_joint(
+    base: BaseLayout, plane: CutPlane, within: Floats, others: Sequence[tuple[CutPlane, Floats]]
 ) -> Joint | None:
     """Dowels, screws and numbers of a joint, or None where they have no room.
 
@@ -87,8 +87,8 @@ def holes(
         within: rows (h, 4) of normal and level below which the joint lies.
         others: planes of all other joints, each with what it lies within.
     """
-    size, room = sizes(base.keys), _Room(base, plane, within, others)
-    pin, bolt, free = base.keys.dowel_mm / 2, base.keys.insert_hole_mm / 2, access(size)
+    size, room = joint_hardware(base.keys), _Room(base, plane, within, others)
+    pin, bolt, free = base.keys.dowel_mm / 2, base.keys.insert_hole_mm / 2, access_radius(size)
     places = room.places(max(pin, bolt))
     sides = [room.reached(places, side, free, ACCESS_MM) for side in (-1, 1)]
     dowels = _farthest_two(places)
@@ -127,9 +127,9 @@ def _label(room: "_Room", side: int, taken: Floats, free: float) -> Floats:
 @dataclass(frozen=True)
 class _Room:
     base: BaseLayout
-    plane: Plane
+    plane: CutPlane
     within: Floats
-    others: Sequence[tuple[Plane, Floats]]
+    others: Sequence[tuple[CutPlane, Floats]]
 
     def places(self, radius: float) -> Floats:
         """Points of the plane round which both flanges have room for a hole, (n, 3)."""
@@ -148,7 +148,7 @@ class _Room:
         axis = self._along(points, side * np.linspace(thick, thick + length, 10))
         good = self._off_bosses(axis, radius + HEAD_PLAY_MM, self.base.keys.relief_mm)
         good &= self._off_others(axis, thick + radius)
-        good &= outside(self.base.outer, _section(axis)) >= radius
+        good &= distance_outside(self.base.outer, _section(axis)) >= radius
         result: Bools = np.asarray(good.all(axis=1))
         return result
 
@@ -161,7 +161,7 @@ class _Room:
         away = at[..., 1, None] * np.abs(np.sin(azimuth[..., None] - base.ribs))
         good = np.asarray((away >= base.keys.rib_mm + LABEL_MM).all(axis=(1, 2)))
         for ring in base.rings:
-            good &= (outside(np.vstack([ring, ring[:1]]), at) >= LABEL_MM).all(axis=1)
+            good &= (distance_outside(np.vstack([ring, ring[:1]]), at) >= LABEL_MM).all(axis=1)
         return good
 
     def _grid(self) -> Floats:
@@ -188,8 +188,8 @@ class _Room:
         azimuth = np.arctan2(points[..., 1], points[..., 0])
         edge = at[..., 1] * np.sin(np.clip(np.minimum(azimuth - low, high - azimuth), -1, 1))
         good: Bools = (
-            (outside(base.inner, at) >= margin)
-            & (outside(_top(base), at) <= -margin)
+            (distance_outside(base.inner, at) >= margin)
+            & (distance_outside(_top(base), at) <= -margin)
             & ((at - base.inner[-1]) @ end <= -margin - 1)
             & (at[..., 1] >= base.hub.disc + margin)
             & (edge >= margin + base.keys.rib_mm)

@@ -11,19 +11,19 @@ import numpy as np
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.ball_light import light
-from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.base.hub import Hub, hub
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.hub import Hub, hub_layout
 from tbcad.prototype.base.profile import (
-    Light,
+    LightSpheroid,
+    distance_outside,
     hull,
     offset,
-    outside,
     outward,
     shortened,
     thinned,
     trimmed,
 )
-from tbcad.prototype.base.seats import Seats, seats
+from tbcad.prototype.base.seats import Seats, seat_layout
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
@@ -62,7 +62,7 @@ class BaseLayout:
 
     keys: BaseSpec
     frame: Floats
-    light: Light
+    light: LightSpheroid
     inner: Floats
     sector: tuple[float, float]
     ribs: Floats
@@ -106,17 +106,17 @@ class BaseLayout:
         return float(np.abs(self.sector).max() + swing / 2)
 
 
-def base(keys: BaseSpec, made: Prototype) -> BaseLayout:
+def base_layout(keys: BaseSpec, made: PrototypeLayout) -> BaseLayout:
     """The base for a prototype's balls.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
     """
-    frame, seat = made.half.ellipsoid.frame(), seats(keys, made)
+    frame, seat = made.half.ellipsoid.frame(), seat_layout(keys, made)
     behind = _light(keys, made)
     _check_front(seat, behind, frame)
     nose = float(behind.pinhole / 2 - behind.level / 2)
-    held = hub(keys, nose - keys.light_clearance_mm)
+    held = hub_layout(keys, nose - keys.light_clearance_mm)
     inner, sector = _inner(keys, seat, frame, behind, held), _sector(keys, seat, made)
     return BaseLayout(
         keys=keys,
@@ -132,19 +132,19 @@ def base(keys: BaseSpec, made: Prototype) -> BaseLayout:
     )
 
 
-def _light(keys: BaseSpec, made: Prototype) -> Light:
+def _light(keys: BaseSpec, made: PrototypeLayout) -> LightSpheroid:
     """The level of all light with its margins.
 
     On a sphere about a point the sum of distances is at most that at the point plus the diameter.
     The capture sphere lies inside the mirrors' ellipsoid and so far below the level of any ball.
     """
     pinhole = 2 * made.half.ellipsoid.linear_eccentricity
-    free, cones = Light(pinhole, 0.0), light(made.balls.outline, pinhole, 0.0)[0]
+    free, cones = LightSpheroid(pinhole, 0.0), light(made.balls.outline, pinhole, 0.0)[0]
     level = (free.beyond(cones.end) + 2 * cones.end_radius).max()
-    return Light(pinhole, float(level) + 2 * keys.light_clearance_mm)
+    return LightSpheroid(pinhole, float(level) + 2 * keys.light_clearance_mm)
 
 
-def _check_front(seat: Seats, behind: Light, frame: Floats) -> None:
+def _check_front(seat: Seats, behind: LightSpheroid, frame: Floats) -> None:
     """Refuse seats that reach into the light.
 
     Raises:
@@ -173,7 +173,7 @@ def _plane(points: Floats) -> Floats:
     return np.stack([points[..., 0], norm(points[..., 1:])], axis=-1)
 
 
-def _inner(keys: BaseSpec, seat: Seats, frame: Floats, behind: Light, held: Hub) -> Floats:
+def _inner(keys: BaseSpec, seat: Seats, frame: Floats, behind: LightSpheroid, held: Hub) -> Floats:
     """The wall's inner line: round the light, from the hub's rim to beyond the last boss.
 
     It lies behind the fronts of all bosses, and so deep at each that the ribs end where it does.
@@ -201,7 +201,7 @@ def _end(seat: Seats, frame: Floats) -> float:
     return float((np.maximum(tops, fronts) + wide).max() + EDGE_MM)
 
 
-def _sector(keys: BaseSpec, seat: Seats, made: Prototype) -> tuple[float, float]:
+def _sector(keys: BaseSpec, seat: Seats, made: PrototypeLayout) -> tuple[float, float]:
     """Azimuths between which the wall carries all bosses and has room for the edges' ribs."""
     azimuth = made.placement.azimuth
     out = _plane((seat.centre + seat.front[:, None] * seat.axis) @ made.half.ellipsoid.frame().T)
@@ -221,7 +221,9 @@ def _sector(keys: BaseSpec, seat: Seats, made: Prototype) -> tuple[float, float]
     return low, high
 
 
-def _ribs(keys: BaseSpec, seat: Seats, made: Prototype, sector: tuple[float, float]) -> Floats:
+def _ribs(
+    keys: BaseSpec, seat: Seats, made: PrototypeLayout, sector: tuple[float, float]
+) -> Floats:
     """Azimuths of the ribs: both edges, and between them where they meet bosses least."""
     even = np.linspace(*sector, keys.ribs)
     step = even[1] - even[0]
@@ -275,7 +277,11 @@ def _standing_out(keys: BaseSpec, seat: Seats, frame: Floats, outer: Floats) -> 
     back = seat.back.copy()
     for _ in range(60):
         end = seat.centre @ frame.T + back[:, None] * (seat.axis @ frame.T)
-        lack = OUT_MM + keys.relief_mm - outside(outer, _plane(end[:, None] + side)).min(axis=1)
+        lack = (
+            OUT_MM
+            + keys.relief_mm
+            - distance_outside(outer, _plane(end[:, None] + side)).min(axis=1)
+        )
         if lack.max() <= 1e-9:
             break
         back += np.maximum(lack, 0)

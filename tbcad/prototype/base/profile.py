@@ -16,7 +16,7 @@ CORNERS = 24
 
 
 @dataclass(frozen=True)
-class Light:
+class LightSpheroid:
     """All light of all balls: |X| + |X - pinhole| is at most a level.
 
     The sum of distances to two points is convex. So if it is at most the level on the spheres that
@@ -135,7 +135,7 @@ def _meeting(four: Floats) -> Floats:
     return result
 
 
-def outside(line: Floats, points: Floats) -> Floats:
+def distance_outside(line: Floats, points: Floats) -> Floats:
     """Least distance, never too large, of points (..., 2) beyond a convex line; < 0 inside."""
     normal = outward(line)
     away = points[..., None, :] - line[:-1]

@@ -3,8 +3,8 @@
 from collections import Counter
 
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import sizes
-from tbcad.prototype.base.split import Split, split
+from tbcad.prototype.base.screws import joint_hardware
+from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.drive import PurchasedPart, load_parts
 from tbcad.spec.errors import SpecError
 
@@ -13,7 +13,7 @@ LOCKS = {"set-screws": 2, "clamp": 1}
 PLAY_MM = 1e-6
 
 
-def bought(base: BaseLayout, plan: Split | None = None) -> dict[str, int]:
+def base_purchased_parts(base: BaseLayout, plan: BaseSplit | None = None) -> dict[str, int]:
     """Purchased parts of the base, without balls and without what bolts the drive to it.
 
     Args:
@@ -26,7 +26,7 @@ def bought(base: BaseLayout, plan: Split | None = None) -> dict[str, int]:
     Raises:
         SpecError: when a part is in no list, or the base cannot be cut to fit the bed.
     """
-    found = Counter(magnets(base)) + Counter(fasteners(base, plan or split(base)))
+    found = Counter(magnets(base)) + Counter(fasteners(base, plan or split_base(base)))
     return dict(sorted(found.items()))
 
 
@@ -40,7 +40,7 @@ def magnets(base: BaseLayout) -> dict[str, int]:
     return dict(Counter(magnet_name(base, size, parts) for size in sizes_mm if size > 0))
 
 
-def fasteners(base: BaseLayout, plan: Split) -> dict[str, int]:
+def fasteners(base: BaseLayout, plan: BaseSplit) -> dict[str, int]:
     """Screws, inserts and dowels of hub and joints, by name.
 
     Raises:
@@ -49,7 +49,7 @@ def fasteners(base: BaseLayout, plan: Split) -> dict[str, int]:
     parts = load_parts()
     found, insert = Counter(_hub(base, parts)), _insert(base, parts)
     for joint in plan.joints:
-        size = sizes(base.keys)
+        size = joint_hardware(base.keys)
         found.update({size.dowel: len(joint.dowels), size.screw: len(joint.screws)})
         found[insert] += len(joint.screws)
     return {name: count for name, count in found.items() if count}

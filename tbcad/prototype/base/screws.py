@@ -13,7 +13,7 @@ KEY_MM = 0.55  # round a screw's head
 
 
 @dataclass(frozen=True)
-class Sizes:
+class JointHardware:
     """Purchased parts of joints: names, and what their holes need, mm."""
 
     dowel: str
@@ -22,7 +22,7 @@ class Sizes:
     head: float
 
 
-def sizes(keys: BaseSpec) -> Sizes:
+def joint_hardware(keys: BaseSpec) -> JointHardware:
     """The longest dowel and the shortest M3 screw for the flanges' thickness.
 
     Raises:
@@ -47,7 +47,7 @@ def sizes(keys: BaseSpec) -> Sizes:
             "of the lengths on sale less 4"
         )
     pin, screw = max(pins, key=lambda p: p.sizes[1]), min(screws, key=lambda p: p.sizes[1])
-    return Sizes(pin.name, pin.sizes[1] / 2 + BEYOND_MM, screw.name, screw.sizes[2])
+    return JointHardware(pin.name, pin.sizes[1] / 2 + BEYOND_MM, screw.name, screw.sizes[2])
 
 
 def _is(part: PurchasedPart, size: float) -> bool:
@@ -62,6 +62,6 @@ def _check_insert(keys: BaseSpec) -> None:
         )
 
 
-def access(size: Sizes) -> float:
+def access_radius(size: JointHardware) -> float:
     """Radius of what is kept clear over a screw's head, mm."""
     return size.head / 2 + KEY_MM

@@ -26,13 +26,13 @@ INTO_MM = 0.3
 ALONG = np.array([0.0, 0.0, 1.0])
 
 
-def boss(seats: Seats, k: int) -> TopoDS_Shape:
+def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
     """Solid boss in its own frame."""
     length = float(seats.back[k] - seats.front[k])
     return cylinder(seats.front[k] * ALONG, ALONG, float(seats.boss[k]), length)
 
 
-def hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
+def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
     """What a ball and its magnet need, without the posts of the pads, in the seat's own frame.
 
     Args:
@@ -52,7 +52,7 @@ def hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
     return cut(room, posts)
 
 
-def way(seats: Seats, k: int) -> TopoDS_Shape:
+def insertion_path(seats: Seats, k: int) -> TopoDS_Shape:
     """What a ball needs to be put in, in its own frame."""
     out = seats.way[k] @ seats.axes[k].T
     length = float(np.linalg.norm(out))
@@ -60,13 +60,13 @@ def way(seats: Seats, k: int) -> TopoDS_Shape:
     return cylinder(np.zeros(3), out / length, float(radius), length)
 
 
-def column(seats: Seats, k: int, length: float) -> TopoDS_Shape:
+def column_behind_boss(seats: Seats, k: int, length: float) -> TopoDS_Shape:
     """Cylinder behind a boss, in its own frame; no face of it lies on one of the boss."""
     start = (seats.back[k] - INTO_MM) * ALONG
     return cylinder(start, ALONG, float(seats.boss[k]) - INTO_MM, length)
 
 
-def placed(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
+def moved_to_seat(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
     """A shape of the seat's own frame moved to its place."""
     return moved(shape, seats.axes[k], seats.centre[k])
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
@@ -88,7 +88,7 @@ class Seats:
         return self.centre[:, None] - self.radius[:, None, None] * self.pad_normals
 
 
-def seats(keys: BaseSpec, made: Prototype) -> Seats:
+def seat_layout(keys: BaseSpec, made: PrototypeLayout) -> Seats:
     """One seat for each body of the prototype.
 
     Raises:
@@ -120,13 +120,13 @@ def seats(keys: BaseSpec, made: Prototype) -> Seats:
     return _turned(_slanted(found))
 
 
-def resized(seat: Seats, offsets: Floats) -> Floats:
+def shifted_contacts(seat: Seats, offsets: Floats) -> Floats:
     """Contacts (k, o, 3, 3) along the rows of axes with pads moved by offsets (o,) off the ball."""
     away = seat.radius[:, None] + offsets
     return -away[..., None, None] * seat.local_normals[:, None]
 
 
-def _axes(made: Prototype) -> Floats:
+def _axes(made: PrototypeLayout) -> Floats:
     frame, azimuth = made.half.ellipsoid.frame(), made.placement.azimuth
     against = np.stack([0 * azimuth, np.sin(azimuth), -np.cos(azimuth)], axis=1) @ frame
     back = -made.normals()
@@ -191,7 +191,7 @@ def _turned(seat: Seats) -> Seats:
         SpecError: when a pad stands in the way of another ball however it is turned.
     """
     tries = [replace(seat, turn=np.full(len(seat), turn)) for turn in TURNS.tolist()]
-    room = np.stack([free_of_ways(one).min(axis=1) for one in tries])
+    room = np.stack([insertion_clearance(one).min(axis=1) for one in tries])
     if (blocked := room.max(axis=0) < APART_MM).any():
         raise SpecError(
             f"a pad of ball {_first(blocked)} stands where another ball is put in: make "
@@ -207,7 +207,7 @@ def _first_with(room: Floats, enough: float) -> NDArray[np.int64]:
     return first
 
 
-def free_of_ways(seat: Seats) -> Floats:
+def insertion_clearance(seat: Seats) -> Floats:
     """Room between each pad and the ways on which the other balls are put in, mm, (k, 3)."""
     result: Floats = _free(seat).min(axis=2)
     return result

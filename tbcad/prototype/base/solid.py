@@ -12,11 +12,16 @@ from tbcad.cad.glyphs import fitting, relief
 from tbcad.cad.solids import cut, fused, polygon, prism, ring, volume_by_meshes
 from tbcad.prototype.base import hub_solids as hubs
 from tbcad.prototype.base import seat_solids as seat
-from tbcad.prototype.base.gaps import arcs, gaps
+from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.base.split import Split, downs, split
-from tbcad.prototype.base.split_solids import flanges, numbers, pieces, windows
+from tbcad.prototype.base.split import BaseSplit, downward_directions, split_base
+from tbcad.prototype.base.split_solids import (
+    carrier_pieces,
+    flange_solids,
+    label_windows,
+    number_solids,
+)
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 
@@ -29,7 +34,7 @@ ROOT = 0.6
 LABEL_ROOM = 0.85  # of a boss's end
 
 
-def carrier(base: BaseLayout, plan: Split | None = None) -> list[PlacedSolid]:
+def carrier_parts(base: BaseLayout, plan: BaseSplit | None = None) -> list[PlacedSolid]:
     """The carrier laid on the bed: in one piece where it fits, else in as few as can be.
 
     Args:
@@ -40,21 +45,25 @@ def carrier(base: BaseLayout, plan: Split | None = None) -> list[PlacedSolid]:
         SpecError: when it cannot be cut to fit; it says how large the bed must be.
         InvalidSolidError: when the kernel fails.
     """
-    plan = plan or split(base)
-    solid = whole(base, plan)
+    plan = plan or split_base(base)
+    solid = carrier_solid(base, plan)
     if plan.joints:
-        return pieces(base, plan, solid)
-    return [placed_on_bed("carrier", solid, downs(base, plan.pieces[0]), base.axes, base.keys)]
+        return carrier_pieces(base, plan, solid)
+    return [
+        placed_on_bed(
+            "carrier", solid, downward_directions(base, plan.pieces[0]), base.axes, base.keys
+        )
+    ]
 
 
-def whole(base: BaseLayout, plan: Split | None = None) -> TopoDS_Solid:
+def carrier_solid(base: BaseLayout, plan: BaseSplit | None = None) -> TopoDS_Solid:
     """The carrier before it is cut up, about z, with the flanges of its joints.
 
     Raises:
         InvalidSolidError: when the kernel fails, whatever it takes for the same point.
     """
     seats = base.own_seats
-    added, removed = bodies(base, seats, plan), tools(base, seats)
+    added, removed = added_solids(base, seats, plan), removed_solids(base, seats)
     expected = volume_by_meshes(added, removed, COARSE_MM)
     contacts, pads = seats.contacts.reshape(-1, 3), np.repeat(seats.pad, 3)
     faults = []
@@ -67,21 +76,23 @@ def whole(base: BaseLayout, plan: Split | None = None) -> TopoDS_Solid:
     raise faults[0]
 
 
-def bodies(base: BaseLayout, seats: Seats, plan: Split | None = None) -> list[TopoDS_Shape]:
+def added_solids(
+    base: BaseLayout, seats: Seats, plan: BaseSplit | None = None
+) -> list[TopoDS_Shape]:
     """What the carrier is the union of."""
-    plan = plan or Split((np.zeros((0, 4)),), ())
-    labels = numbers(base, plan)
+    plan = plan or BaseSplit((np.zeros((0, 4)),), ())
+    labels = number_solids(base, plan)
     labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
-    bosses = [seat.placed(seat.boss(seats, k), seats, k) for k in range(len(seats))]
-    return [_wall(base), *_struts(base, plan), *hubs.body(base.hub), *bosses, *labels]
+    bosses = [seat.moved_to_seat(seat.boss_solid(seats, k), seats, k) for k in range(len(seats))]
+    return [_wall(base), *_struts(base, plan), *hubs.hub_bodies(base.hub), *bosses, *labels]
 
 
-def tools(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
+def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: cups with their pockets, ways of the balls, holes."""
-    own = [(seat.hollow(seats, k), k) for k in range(len(seats))]
-    own += [(seat.way(seats, k), k) for k in range(len(seats))]
-    placed = [seat.placed(shape, seats, k) for shape, k in own]
-    return [*placed, *hubs.holes(base.hub, base.keys)]
+    own = [(seat.seat_hollow(seats, k), k) for k in range(len(seats))]
+    own += [(seat.insertion_path(seats, k), k) for k in range(len(seats))]
+    placed = [seat.moved_to_seat(shape, seats, k) for shape, k in own]
+    return [*placed, *hubs.hub_holes(base.hub, base.keys)]
 
 
 def _wall(base: BaseLayout) -> TopoDS_Shape:
@@ -89,7 +100,7 @@ def _wall(base: BaseLayout) -> TopoDS_Shape:
     return ring(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
 
 
-def _struts(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
+def _struts(base: BaseLayout, plan: BaseSplit) -> list[TopoDS_Shape]:
     """Ribs, rings and flanges, left out where numbers are read."""
     low, high = base.sector
     # Their ends lie within the ribs at the edges, not in a plane with other faces.
@@ -97,17 +108,20 @@ def _struts(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     rings = [
         ring(one, start, end - start)
         for one in base.rings
-        for start, end in arcs(base, one, low + inside, high - inside)
+        for start, end in ring_arcs(base, one, low + inside, high - inside)
     ]
-    struts, joints = [*_ribs(base), *rings], flanges(base, plan)
+    struts, joints = [*_ribs(base), *rings], flange_solids(base, plan)
     if not joints:
         return struts
-    return [cut(fused([*struts, *joints]), [*_ends(base), *windows(base, plan)])]
+    return [cut(fused([*struts, *joints]), [*_ends(base), *label_windows(base, plan)])]
 
 
 def _ends(base: BaseLayout) -> list[TopoDS_Shape]:
     seats = base.own_seats
-    return [seat.placed(seat.column(seats, k, COLUMN_MM), seats, k) for k in range(len(seats))]
+    return [
+        seat.moved_to_seat(seat.column_behind_boss(seats, k, COLUMN_MM), seats, k)
+        for k in range(len(seats))
+    ]
 
 
 def _ribs(base: BaseLayout) -> list[TopoDS_Shape]:
@@ -121,7 +135,7 @@ def _ribs(base: BaseLayout) -> list[TopoDS_Shape]:
             _plate(section, azimuth, thick, side),
             [
                 _plate(gap, azimuth, 2 * thick, (side - 0.5) / 2)
-                for gap in gaps(base, azimuth, side)
+                for gap in rib_gaps(base, azimuth, side)
             ],
         )
         for azimuth, side in ribs

@@ -15,10 +15,10 @@ from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.base.joints import Joint, Plane, holes
+from tbcad.prototype.base.joints import CutPlane, Joint, plan_joint
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import offset
-from tbcad.prototype.base.screws import sizes
+from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.printing.bed import as_text, needed, shortfall
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
@@ -34,7 +34,7 @@ ROUND = 24
 
 
 @dataclass(frozen=True)
-class Split:
+class BaseSplit:
     """Pieces and joints of the base.
 
     Attributes:
@@ -52,7 +52,7 @@ class Split:
         return low.index(True)
 
 
-def split(base: BaseLayout) -> Split:
+def split_base(base: BaseLayout) -> BaseSplit:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
     Raises:
@@ -60,8 +60,8 @@ def split(base: BaseLayout) -> Split:
     """
     search = _Search(base)
     if search.lack(np.zeros((0, 4))) <= 0:
-        return Split((np.zeros((0, 4)),), ())
-    sizes(base.keys)
+        return BaseSplit((np.zeros((0, 4)),), ())
+    joint_hardware(base.keys)
     for count in range(2, MOST + 1):
         for found in search.splits(count):
             return found
@@ -71,7 +71,7 @@ def split(base: BaseLayout) -> Split:
     )
 
 
-def downs(base: BaseLayout, planes: Floats) -> list[Floats]:
+def downward_directions(base: BaseLayout, planes: Floats) -> list[Floats]:
     """Directions of the carrier's own frame that may point down when a piece is printed.
 
     Args:
@@ -103,35 +103,35 @@ class _Bodies:
         return ends.min(axis=0) - across, ends.max(axis=0) + across
 
 
-Cut = tuple[Plane, Floats]  # a plane, and what bounds the piece that it cuts
+Cut = tuple[CutPlane, Floats]  # a plane, and what bounds the piece that it cuts
 Tree = tuple[tuple[Floats, ...], tuple[Cut, ...]]
 
 
 @dataclass
 class _Search:
     base: BaseLayout
-    cuts: dict[bytes, list[tuple[float, Plane]]] = field(default_factory=dict)
+    cuts: dict[bytes, list[tuple[float, CutPlane]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.bodies = _bodies(self.base)
         self.middle, self.cloud, self.tops = _clouds(self.base)
         self.normals = _half_sphere(NORMALS)
 
-    def splits(self, count: int) -> Iterator[Split]:
+    def splits(self, count: int) -> Iterator[BaseSplit]:
         """Splits into a number of pieces that fit the bed and whose joints have room."""
         for pieces, cuts in self._trees(np.zeros((0, 4)), count):
             if (found := self._split(pieces, cuts)) is not None:
                 yield found
 
-    def _split(self, pieces: tuple[Floats, ...], cuts: tuple[Cut, ...]) -> Split | None:
+    def _split(self, pieces: tuple[Floats, ...], cuts: tuple[Cut, ...]) -> BaseSplit | None:
         joints = []
         for k, (plane, within) in enumerate(cuts):
-            joint = holes(self.base, plane, within, cuts[:k] + cuts[k + 1 :])
+            joint = plan_joint(self.base, plane, within, cuts[:k] + cuts[k + 1 :])
             if joint is None:
                 return None
             joints.append(joint)
         order = sorted(pieces, key=self._has_hub, reverse=True)
-        return Split(tuple(order), tuple(joints))
+        return BaseSplit(tuple(order), tuple(joints))
 
     def _has_hub(self, piece: Floats) -> bool:
         return bool((piece[:, :3] @ self.bodies.start[-1] <= piece[:, 3]).all())
@@ -153,7 +153,9 @@ class _Search:
 
     def lack(self, piece: Floats) -> float:
         """By how much the bed is too small for a piece, mm; 0 or less: it fits."""
-        return shortfall(self._corners(piece), downs(self.base, piece), self.base.keys)
+        return shortfall(
+            self._corners(piece), downward_directions(self.base, piece), self.base.keys
+        )
 
     def least_bed(self) -> Floats:
         """The bed that the best cut into two needs, or the base as a whole, mm, (3,)."""
@@ -166,9 +168,9 @@ class _Search:
         return self._needed(none)
 
     def _needed(self, piece: Floats) -> Floats:
-        return needed(self._corners(piece), downs(self.base, piece), self.base.keys)
+        return needed(self._corners(piece), downward_directions(self.base, piece), self.base.keys)
 
-    def _cuts_of(self, piece: Floats) -> list[tuple[float, Plane]]:
+    def _cuts_of(self, piece: Floats) -> list[tuple[float, CutPlane]]:
         """Planes that part a piece, those that leave the least too large first."""
         key = piece.tobytes()
         if key not in self.cuts:
@@ -180,7 +182,7 @@ class _Search:
             self.cuts[key] = sorted(found, key=lambda one: round(one[0], 3))
         return self.cuts[key]
 
-    def _planes(self, piece: Floats) -> Iterator[Plane]:
+    def _planes(self, piece: Floats) -> Iterator[CutPlane]:
         """Planes half way between bodies of a piece, a few for each way to part them."""
         inside = (self.bodies.start @ piece[:, :3].T <= piece[:, 3]).all(axis=1)
         which = np.flatnonzero(inside)
@@ -195,7 +197,7 @@ class _Search:
         normal = np.broadcast_to(np.arange(len(gap))[:, None], gap.shape)[wide]
         for rows in _groups(below[wide], gap[wide]):
             for row in rows:
-                yield Plane(self.normals[normal[row]], float(level[wide][row]))
+                yield CutPlane(self.normals[normal[row]], float(level[wide][row]))
 
     def _corners(self, piece: Floats) -> Floats:
         """Points round a piece and its flanges, at most a step outside of it, (c, 3)."""
@@ -213,7 +215,7 @@ class _Search:
         return bool(inside.sum() > inside.size / 50) and label(inside)[1] == 1
 
 
-def _sides(piece: Floats, plane: Plane) -> tuple[Floats, Floats]:
+def _sides(piece: Floats, plane: CutPlane) -> tuple[Floats, Floats]:
     row = np.array([*plane.normal, plane.level])
     return np.vstack([piece, row]), np.vstack([piece, -row])
 

@@ -11,10 +11,10 @@ from tbcad.cad.glyphs import fitting, relief
 from tbcad.cad.solids import common, cut, cylinder, polygon, prism, ring, volume_by_cut_mesh
 from tbcad.geometry.vectors import unit
 from tbcad.prototype.base.hub import SCREW_MM
-from tbcad.prototype.base.joints import ACCESS_MM, LABEL_MM, Joint, profile
+from tbcad.prototype.base.joints import ACCESS_MM, LABEL_MM, Joint, flange_profile
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import access, sizes
-from tbcad.prototype.base.split import Split, downs
+from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 
@@ -26,7 +26,7 @@ SUNK_MM = 0.4
 LABEL_ROOM = 0.95
 
 
-def flanges(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
+def flange_solids(base: BaseLayout, plan: BaseSplit) -> list[TopoDS_Shape]:
     """Both flanges of each joint in one."""
     return [_flange(base, joint) for joint in plan.joints]
 
@@ -35,7 +35,7 @@ def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
     low, high = base.sector
     # Its ends lie within the ribs at the edges.
     inside = 0.7 * base.keys.rib_mm / float(base.inner[:, 1].max())
-    band = ring(profile(base), low + inside, high - low - 2 * inside)
+    band = ring(flange_profile(base), low + inside, high - low - 2 * inside)
     thick, normal = base.keys.joint_mm, joint.plane.normal
     slab = prism(_square(normal, joint.plane.level - thick), 2 * thick * normal)
     return cut(common(band, slab), [_beyond(row) for row in joint.within])
@@ -54,7 +54,7 @@ def _beyond(row: Floats) -> TopoDS_Shape:
     return prism(_square(row[:3], float(row[3])), FAR_MM * row[:3])
 
 
-def numbers(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
+def number_solids(base: BaseLayout, plan: BaseSplit) -> list[TopoDS_Shape]:
     """The number of the piece, from 1, on the outer face of each of its flanges."""
     return [
         solid
@@ -64,7 +64,7 @@ def numbers(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     ]
 
 
-def windows(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
+def label_windows(base: BaseLayout, plan: BaseSplit) -> list[TopoDS_Shape]:
     """What ribs and rings leave free over these numbers."""
     return [
         cylinder(place + (base.keys.joint_mm - SPOT_MM) * out, out, LABEL_MM, ACCESS_MM)
@@ -73,7 +73,7 @@ def windows(base: BaseLayout, plan: Split) -> list[TopoDS_Shape]:
     ]
 
 
-def _number(base: BaseLayout, plan: Split, out: Floats, place: Floats) -> list[TopoDS_Shape]:
+def _number(base: BaseLayout, plan: BaseSplit, out: Floats, place: Floats) -> list[TopoDS_Shape]:
     """A number whose top points away from the axis."""
     at = place + base.keys.joint_mm * out
     away = at * [1.0, 1.0, 0.0]
@@ -84,7 +84,7 @@ def _number(base: BaseLayout, plan: Split, out: Floats, place: Floats) -> list[T
     return relief(text, height, base.keys.relief_mm, SUNK_MM, axes, at)
 
 
-def pieces(base: BaseLayout, plan: Split, whole: TopoDS_Solid) -> list[PlacedSolid]:
+def carrier_pieces(base: BaseLayout, plan: BaseSplit, whole: TopoDS_Solid) -> list[PlacedSolid]:
     """The pieces laid on the bed.
 
     Args:
@@ -100,7 +100,7 @@ def pieces(base: BaseLayout, plan: Split, whole: TopoDS_Solid) -> list[PlacedSol
         placed_on_bed(
             f"carrier_{n + 1}",
             _piece(base, plan, n, whole),
-            downs(base, planes),
+            downward_directions(base, planes),
             base.axes,
             base.keys,
         )
@@ -108,8 +108,8 @@ def pieces(base: BaseLayout, plan: Split, whole: TopoDS_Solid) -> list[PlacedSol
     ]
 
 
-def _piece(base: BaseLayout, plan: Split, n: int, whole: TopoDS_Solid) -> TopoDS_Solid:
-    planes, tools = plan.pieces[n], holes(base, plan, n)
+def _piece(base: BaseLayout, plan: BaseSplit, n: int, whole: TopoDS_Solid) -> TopoDS_Solid:
+    planes, tools = plan.pieces[n], piece_holes(base, plan, n)
     expected = volume_by_cut_mesh(whole, planes, tools, FINE_MM)
     shape = cut(whole, [*(_beyond(row) for row in planes), *tools])
     seats = base.own_seats
@@ -119,7 +119,7 @@ def _piece(base: BaseLayout, plan: Split, n: int, whole: TopoDS_Solid) -> TopoDS
     return checked(f"carrier_{n + 1}", shape, expected, contacts, pads)
 
 
-def holes(base: BaseLayout, plan: Split, n: int) -> list[TopoDS_Shape]:
+def piece_holes(base: BaseLayout, plan: BaseSplit, n: int) -> list[TopoDS_Shape]:
     """What is cut out of a piece at its joints, from beyond the plane."""
     found = []
     for joint in plan.joints:
@@ -132,14 +132,14 @@ def holes(base: BaseLayout, plan: Split, n: int) -> list[TopoDS_Shape]:
 
 def _side(base: BaseLayout, joint: Joint, side: int) -> list[TopoDS_Shape]:
     """Holes of a joint above (1) or below its plane (-1): dowels, inserts, screws, their heads."""
-    keys, size, out = base.keys, sizes(base.keys), side * joint.plane.normal
+    keys, size, out = base.keys, joint_hardware(base.keys), side * joint.plane.normal
     pin = keys.dowel_mm + (keys.dowel_slip_mm if side > 0 else keys.dowel_press_mm)
     found = [_hole(at, out, pin, size.dowel_depth) for at in joint.dowels]
     for at, head in zip(joint.screws, joint.heads.tolist(), strict=True):
         if head == side:
             start = at + (keys.joint_mm - SPOT_MM) * out
             found.append(_hole(at, out, SCREW_MM, keys.joint_mm + THROUGH_MM))
-            found.append(cylinder(start, out, access(size), ACCESS_MM))
+            found.append(cylinder(start, out, access_radius(size), ACCESS_MM))
         else:
             found.append(_hole(at, out, keys.insert_hole_mm, keys.insert_depth_mm))
     return found

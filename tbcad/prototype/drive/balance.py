@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.balls.selection import Balls
 from tbcad.types import Floats
 
@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-9  # of a mass's moment: rounding
 
 
 @dataclass(frozen=True)
-class Load:
+class PointMasses:
     """Masses on the base, over n of them.
 
     Attributes:
@@ -50,7 +50,7 @@ class Counterweight:
 
 
 @dataclass(frozen=True)
-class Balance:
+class BaseBalance:
     """Sums over all masses on the base.
 
     Attributes:
@@ -130,7 +130,7 @@ class Balance:
         return Counterweight(self.moment / radius, radius, self.azimuth + np.pi)
 
 
-def balance(frame: Floats, *loads: Load) -> Balance:
+def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:
     """Sum up the masses on a base whose axis is the first row of a frame (3, 3)."""
     mass = np.concatenate([load.mass_g for load in loads])
     place = np.concatenate([load.centre for load in loads]) @ frame.T
@@ -138,10 +138,10 @@ def balance(frame: Floats, *loads: Load) -> Balance:
     # A balanced base has no direction: without this, rounding would give it one.
     first[1:][np.abs(first[1:]) < NEGLIGIBLE * (mass @ np.abs(place[:, 1:]))] = 0.0
     inertia = float(mass @ (place[:, 1] ** 2 + place[:, 2] ** 2))
-    return Balance(frame, float(mass.sum()), first, inertia)
+    return BaseBalance(frame, float(mass.sum()), first, inertia)
 
 
-def ball_load(made: Prototype, cap_density: float) -> Load:
+def ball_masses(made: PrototypeLayout, cap_density: float) -> PointMasses:
     """All balls in their places, and the caps.
 
     Args:
@@ -152,14 +152,14 @@ def ball_load(made: Prototype, cap_density: float) -> Load:
     millimetres off.
     """
     volume = cap_volume(made.balls)
-    return Load(made.balls.mass_g + volume * cap_density * 1e-3, made.body_centres())
+    return PointMasses(made.balls.mass_g + volume * cap_density * 1e-3, made.body_centres())
 
 
-def weight_load(weight: Counterweight, along: float, frame: Floats) -> Load:
+def counterweight_masses(weight: Counterweight, along: float, frame: Floats) -> PointMasses:
     """A counterweight at a place along the axis (mm from the origin)."""
     cosine, sine = np.cos(weight.azimuth), np.sin(weight.azimuth)
     place = np.array([[along, weight.radius * cosine, weight.radius * sine]])
-    return Load(np.array([weight.mass_g]), place @ frame)
+    return PointMasses(np.array([weight.mass_g]), place @ frame)
 
 
 def cap_volume(balls: Balls) -> Floats:

@@ -231,7 +231,7 @@ def _named(where: str, row: Row, column: str, parts: Parts) -> PurchasedPart | N
     return part
 
 
-def chosen(name: str, needed: float, drives: Sequence[Drive]) -> Drive:
+def choose_drive(name: str, needed: float, drives: Sequence[Drive]) -> Drive:
     """The first drive of a name that holds a torque on the base (N mm).
 
     Raises:

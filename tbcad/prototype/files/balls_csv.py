@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.types import Floats
 
 Value = str | int | float | None
@@ -19,7 +19,7 @@ COLUMNS = (
 )
 
 
-def rows(made: Prototype) -> list[Row]:
+def rows(made: PrototypeLayout) -> list[Row]:
     """One record for each ball, in the order of COLUMNS, numbered from 1.
 
     p is the apex, n the inward normal there, c the centre of the reflecting sphere and b that of
@@ -49,7 +49,7 @@ def write_table(path: Path, columns: tuple[str, ...], records: list[Row]) -> Non
         writer.writerows(records)
 
 
-def _names(made: Prototype, j: int) -> list[Value]:
+def _names(made: PrototypeLayout, j: int) -> list[Value]:
     balls = made.balls
     diameter, size = 2 * float(balls.body_radius[j]), balls.size[j]
     if balls.cap[j]:
@@ -58,7 +58,7 @@ def _names(made: Prototype, j: int) -> list[Value]:
     return [j + 1, "ball", size, diameter, made.grade.grade, standard, float(balls.mass_g[j])]
 
 
-def _pose(made: Prototype) -> Floats:
+def _pose(made: PrototypeLayout) -> Floats:
     """Radii, angles, apex, normal and both centres, (k, 16)."""
     balls = made.balls
     table: Floats = np.column_stack(
@@ -76,7 +76,7 @@ def _pose(made: Prototype) -> Floats:
     return table + 0.0  # no negative zeros
 
 
-def _shown(made: Prototype) -> Floats:
+def _shown(made: PrototypeLayout) -> Floats:
     """Pixels kept and the shell's, least coverages, largest error of direction, (k, 5)."""
     fit, k = made.fit, len(made)
     error = np.zeros(k)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.prototype.balls.layout import Prototype
-from tbcad.prototype.drive.balance import Balance, cap_volume
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.balance import BaseBalance, cap_volume
 from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.files.balls_csv import Row, Value, write_table
 from tbcad.spec.errors import SpecError, shown
@@ -63,7 +63,7 @@ class PartsNeeded:
     led: str = "LED-3"
 
 
-def rows(made: Prototype, drive: Drive, needed: PartsNeeded, parts: Parts) -> list[Row]:
+def rows(made: PrototypeLayout, drive: Drive, needed: PartsNeeded, parts: Parts) -> list[Row]:
     """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
 
     Balls and caps come first, by size, then what is bought for them and for the drive, then what
@@ -90,7 +90,7 @@ def write_bom(path: Path, records: list[Row]) -> None:
 
 
 def drive_record(
-    summed: Balance, drive: Drive, motion: MotionSpec, swing: tuple[float, float], radius: float
+    summed: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float], radius: float
 ) -> dict[str, Value | list[float]]:
     """What the drive must bear and does, for design.json.
 
@@ -134,7 +134,7 @@ def _bought(part: PurchasedPart, quantity: int) -> list[Value]:
     return [*what, None, BOUGHT]
 
 
-def _balls(made: Prototype) -> list[list[Value]]:
+def _balls(made: PrototypeLayout) -> list[list[Value]]:
     """Bought balls by rising diameter."""
     balls, grade = made.balls, made.grade.grade
     catalogue = balls.catalogue
@@ -154,7 +154,7 @@ def _balls(made: Prototype) -> list[list[Value]]:
     ]
 
 
-def _caps(made: Prototype, needed: PartsNeeded) -> list[list[Value]]:
+def _caps(made: PrototypeLayout, needed: PartsNeeded) -> list[list[Value]]:
     """Caps by number of their ball: no two are alike."""
     balls, volume = made.balls, cap_volume(made.balls)
     own, density = needed.cap_material, needed.cap_density

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.spec.errors import SpecError
 from tbcad.spec.motion_keys import MotionSpec
@@ -42,7 +42,7 @@ class Run:
     mirrors: NDArray[np.int64]
 
 
-def run(made: Prototype, motion: MotionSpec) -> Run:
+def run(made: PrototypeLayout, motion: MotionSpec) -> Run:
     """The stops, and where to begin so that play in the drive is taken up before the first.
 
     Raises:
@@ -60,14 +60,14 @@ def run(made: Prototype, motion: MotionSpec) -> Run:
     return Run(start, angle, np.bincount(made.stops.stop, minlength=len(angle)))
 
 
-def free(made: Prototype) -> tuple[float, float]:
+def free(made: PrototypeLayout) -> tuple[float, float]:
     """Base angles between which post, camera and the largest swing leave the balls, radians."""
     task, azimuth = made.task, made.placement.azimuth
     low = max(float((task.floor - azimuth).max()), -task.most / 2)
     return low, min(float((task.ceiling - azimuth).min()), task.most / 2)
 
 
-def program(made: Prototype, drive: Drive, motion: MotionSpec) -> list[str]:
+def program(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str]:
     """Lines of the program, each shorter than 80 characters.
 
     Raises:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.prototype.balls.layout import Picture, Prototype
+from tbcad.prototype.balls.layout import PlannedPicture, PrototypeLayout
 from tbcad.prototype.files.balls_csv import Row, write_table
 
 COLUMNS = (
@@ -14,7 +14,7 @@ COLUMNS = (
 STOP_COLUMNS = ("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg")
 
 
-def rows(photographs: list[Picture]) -> list[Row]:
+def rows(photographs: list[PlannedPicture]) -> list[Row]:
     """One record for each mirror's picture, in order; stops and balls are numbered from 1.
 
     One photograph shows all mirrors of a stop with the object as it is turned. Errors of azimuth
@@ -23,7 +23,7 @@ def rows(photographs: list[Picture]) -> list[Row]:
     return [_row(order, one) for order, one in enumerate(photographs, 1)]
 
 
-def stop_rows(made: Prototype) -> list[Row]:
+def stop_rows(made: PrototypeLayout) -> list[Row]:
     """One record for each stop: how many mirrors, which balls, and the worst errors, all >= 0.
 
     They hold for both turns of the object.
@@ -41,7 +41,7 @@ def write_stops(path: Path, records: list[Row]) -> None:
     write_table(path, STOP_COLUMNS, records)
 
 
-def _row(order: int, one: Picture) -> Row:
+def _row(order: int, one: PlannedPicture) -> Row:
     values = (
         *(order, round(float(np.degrees(one.turn))), one.stop + 1, _degrees(one.angle)),
         *(one.ball + 1, one.mirror),
@@ -50,7 +50,7 @@ def _row(order: int, one: Picture) -> Row:
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def _stop(made: Prototype, stop: int) -> Row:
+def _stop(made: PrototypeLayout, stop: int) -> Row:
     stops, mirrors = made.stops, made.stops.mirrors(stop)
     balls = " ".join(str(ball + 1) for ball in np.unique(made.fit.ball[mirrors]).tolist())
     worst = [float(np.abs(error[mirrors]).max()) for error in (stops.azimuth_error, stops.error)]

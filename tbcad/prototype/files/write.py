@@ -8,8 +8,8 @@ from tbcad.formats.glb import write_glb
 from tbcad.formats.step_assembly import write_assembly
 from tbcad.mirrors.array import Design
 from tbcad.prototype.assembly import rig
-from tbcad.prototype.balls.alternatives import choices
-from tbcad.prototype.balls.layout import Prototype, pictures
+from tbcad.prototype.balls.alternatives import ball_alternatives
+from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
 from tbcad.prototype.files import balls_csv, bom_csv, drilling, gcode, plan_csv
 from tbcad.prototype.files.part_files import record, write_piece
 from tbcad.prototype.machine import Machine, machine
@@ -79,9 +79,9 @@ def document(built: Machine, design: Design) -> dict[str, Any]:
     }
 
 
-def _choices(made: Prototype, spec: Spec) -> list[dict[str, Any]]:
+def _choices(made: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
     """What each way to choose the balls from the stock would cost, the one taken among them."""
-    found = choices(spec, made.half, made.groups, made.balls.catalogue)
+    found = ball_alternatives(spec, made.half, made.groups, made.balls.catalogue)
     return [
         {
             "way": one.name,
@@ -121,7 +121,7 @@ def _seats(built: Machine) -> list[dict[str, Any]]:
 def _write_tables(built: Machine, design: Design, folder: Path) -> None:
     made, motion = built.made, design.spec.prototype.motion
     balls_csv.write_balls(folder / "balls.csv", balls_csv.rows(made))
-    plan_csv.write_plan(folder / "rotation_plan.csv", plan_csv.rows(pictures(made)))
+    plan_csv.write_plan(folder / "rotation_plan.csv", plan_csv.rows(planned_pictures(made)))
     plan_csv.write_stops(folder / "stops.csv", plan_csv.stop_rows(made))
     drilling.write_drilling(folder / "plate_holes.csv", drilling.rows(built.frame))
     gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Rod, box
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.frame.brackets import (
@@ -77,7 +77,7 @@ class FrameLayout:
 
 def frame(
     spec: tuple[FrameKeys, PrototypeSpec],
-    made: Prototype,
+    made: PrototypeLayout,
     base: BaseLayout,
     stage: StageLayout,
     drive: Drive,
@@ -137,7 +137,7 @@ def bought_parts(numbers: FrameLayout, stage: StageLayout) -> dict[str, int]:
 def _brackets(
     keys: FrameKeys,
     own: PrototypeSpec,
-    made: Prototype,
+    made: PrototypeLayout,
     axes: Floats,
     stage: StageLayout,
     top: Head,
@@ -196,7 +196,7 @@ def _plate(
     return part, item, middle - half
 
 
-def _camera(own: PrototypeSpec, made: Prototype) -> list[Component]:
+def _camera(own: PrototypeSpec, made: PrototypeLayout) -> list[Component]:
     if own.camera_diameter_mm == 0:
         return []
     view, radius = made.half.view, own.camera_diameter_mm / 2

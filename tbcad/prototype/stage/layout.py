@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.geometry.primitives import Component
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import turned
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Parts, PurchasedPart
 from tbcad.prototype.keepout import Room, least
 from tbcad.prototype.stage.crown import (
@@ -78,7 +78,10 @@ class StageLayout:
 
 
 def stage(
-    spec: tuple[StageKeys, FrameKeys, PrototypeSpec], made: Prototype, space: Room, parts: Parts
+    spec: tuple[StageKeys, FrameKeys, PrototypeSpec],
+    made: PrototypeLayout,
+    space: Room,
+    parts: Parts,
 ) -> StageLayout:
     """The stage that fits into the room that balls, base and light leave.
 
@@ -131,7 +134,7 @@ def leds(numbers: StageLayout) -> list[tuple[str, Floats, Floats]]:
     return [(f"led_{i}", place, np.array(UP)) for i, place in enumerate(numbers.leds, 1)]
 
 
-def _grazed(made: Prototype, capture: float) -> float:
+def _grazed(made: PrototypeLayout, capture: float) -> float:
     """Least distance from z at which light touches the sphere's bottom, mm.
 
     From a point at distance L and height z light that grazes the sphere comes down by at least

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.keepout import Room
 from tbcad.spec.errors import SpecError
@@ -15,7 +15,12 @@ FLAT_MM = 1.0  # least that the LEDs stand out of any plane, square root of the 
 
 
 def check_leds(
-    keys: StageSpec, made: Prototype, space: Room, led: PurchasedPart, pockets: Floats, plate: float
+    keys: StageSpec,
+    made: PrototypeLayout,
+    space: Room,
+    led: PurchasedPart,
+    pockets: Floats,
+    plate: float,
 ) -> None:
     """Refuse LEDs that are outside the sphere, collide, are in one plane or hidden.
 
@@ -56,7 +61,7 @@ def check_leds(
     _check_seen(places, made, pillar, tip)
 
 
-def _check_seen(places: Floats, made: Prototype, pillar: float, tip: float) -> None:
+def _check_seen(places: Floats, made: PrototypeLayout, pillar: float, tip: float) -> None:
     """Refuse an LED that another pillar hides from a virtual camera.
 
     A pillar is taken to reach as high as its LED.

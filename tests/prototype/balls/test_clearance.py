@@ -6,9 +6,15 @@ from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import turned
 from tbcad.optics.trace import reflected
 from tbcad.prototype.balls.catalogue import load_catalogue
-from tbcad.prototype.balls.clearance import BETWEEN, apart, edges, free, obstacles
-from tbcad.prototype.balls.groups import clusters
-from tbcad.prototype.balls.selection import Balls, balls_of, stand
+from tbcad.prototype.balls.clearance import (
+    SOLVER_MARGIN,
+    allowed_azimuths,
+    min_separations,
+    obstacles,
+    seat_half_angles,
+)
+from tbcad.prototype.balls.groups import group_mirrors
+from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
 from tbcad.spec.design import load_spec
 
 KEYS = load_spec(None).prototype
@@ -18,11 +24,11 @@ K = 12
 @pytest.fixture(scope="module")
 def balls(paper_half: MirrorArray) -> Balls:
     """As large as stock has them, so that they stand in each other's light too."""
-    groups = clusters(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
-    here = stand(paper_half, groups, 60.0)
+    groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
+    here = ball_candidates(paper_half, groups, 60.0)
     catalogue = load_catalogue(["metric"])
     stock = np.full(K, len(catalogue) - 1)
-    return balls_of(here, np.full(K, 30.0), stock, catalogue, 2.0)
+    return balls_with_radii(here, np.full(K, 30.0), stock, catalogue, 2.0)
 
 
 def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
@@ -50,7 +56,7 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
 ) -> None:
     """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
     pinhole = norm(paper_half.view.pinhole)
-    _, dark = apart(balls, KEYS, pinhole, 30.0)
+    _, dark = min_separations(balls, KEYS, pinhole, 30.0)
     turn = np.radians(np.arange(0, 60, 0.5))
     nearest = np.full((K, K), np.inf)
     for j in range(K):
@@ -68,10 +74,10 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
 
 
 def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> None:
-    touch, _ = apart(balls, KEYS, norm(paper_half.view.pinhole), 30.0)
+    touch, _ = min_separations(balls, KEYS, norm(paper_half.view.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
-        other = turned(balls.body_centre[i], np.array(touch[i, j] - BETWEEN))
+        other = turned(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
         assert norm(other - balls.body_centre[j]) == pytest.approx(60 + KEYS.ball_wall_mm)
 
 
@@ -82,7 +88,7 @@ def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None
     assert post.azimuth == pytest.approx(np.pi)
     assert post.cone.end[0] == pytest.approx(400 * np.array([1, 1]) / np.sqrt(2))
     assert camera.cone.start[0] == pytest.approx([np.sqrt(2) * 100, 0])
-    floor, ceiling = free(balls, KEYS, [post])
+    floor, ceiling = allowed_azimuths(balls, KEYS, [post])
     assert floor == pytest.approx(-ceiling)
     near = ceiling < np.pi
     assert near[0]
@@ -94,4 +100,4 @@ def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None
 
 def test_edges_are_tangents_from_the_axis(balls: Balls) -> None:
     expected = np.arcsin((balls.body_radius + 3) / balls.body_centre[:, 1])
-    assert edges(balls, 3.0) == pytest.approx(expected)
+    assert seat_half_angles(balls, 3.0) == pytest.approx(expected)

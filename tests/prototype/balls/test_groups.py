@@ -4,18 +4,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tbcad.mirrors.array import MirrorArray
-from tbcad.prototype.balls.groups import clusters
+from tbcad.prototype.balls.groups import group_mirrors
 from tbcad.spec.errors import SpecError
 
 
 def test_one_group_is_the_mean(paper_half: MirrorArray) -> None:
-    groups = clusters(paper_half.polar, paper_half.mirrors.radius, 1, 0.25)
+    groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, 1, 0.25)
     assert groups.polar == pytest.approx([paper_half.polar.mean()])
     assert groups.radius == pytest.approx([paper_half.mirrors.radius.mean()])
 
 
 def test_by_polar_angle_alone_groups_are_bands(paper_half: MirrorArray) -> None:
-    groups = clusters(paper_half.polar, paper_half.mirrors.radius, 16, 0.0)
+    groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, 16, 0.0)
     order = np.argsort(paper_half.polar, kind="stable")
     assert (np.diff(groups.of[order]) >= 0).all()
     assert (np.diff(groups.polar) > 0).all()
@@ -24,7 +24,7 @@ def test_by_polar_angle_alone_groups_are_bands(paper_half: MirrorArray) -> None:
 def test_every_mirror_is_in_the_nearest_group(paper_half: MirrorArray) -> None:
     """What k-means promises, whatever its start."""
     polar, radius = np.degrees(paper_half.polar), paper_half.mirrors.radius
-    groups = clusters(paper_half.polar, radius, 16, 0.25)
+    groups = group_mirrors(paper_half.polar, radius, 16, 0.25)
     away = (polar[:, None] - np.degrees(groups.polar)) ** 2
     away += (0.25 * (radius[:, None] - groups.radius)) ** 2
     assert (away.argmin(axis=1) == groups.of).all()
@@ -32,7 +32,7 @@ def test_every_mirror_is_in_the_nearest_group(paper_half: MirrorArray) -> None:
 
 def test_worst_direction_is_nearly_the_least_possible(paper_half: MirrorArray) -> None:
     """16 even bands over 90 degrees would be off by 2.81 at most."""
-    groups = clusters(paper_half.polar, paper_half.mirrors.radius, 16, 0.25)
+    groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, 16, 0.25)
     error = np.degrees(np.abs(groups.polar[groups.of] - paper_half.polar))
     assert error.max() < 3.2
 
@@ -40,7 +40,7 @@ def test_worst_direction_is_nearly_the_least_possible(paper_half: MirrorArray) -
 @pytest.mark.parametrize("k", [848, 847, 5000])
 def test_more_groups_than_mirrors(paper_half: MirrorArray, k: int) -> None:
     with pytest.raises(SpecError, match=rf"prototype.k is {k}, but camera a has 847 mirrors"):
-        clusters(paper_half.polar, paper_half.mirrors.radius, k, 0.25)
+        group_mirrors(paper_half.polar, paper_half.mirrors.radius, k, 0.25)
 
 
 @settings(max_examples=60, deadline=None)
@@ -51,7 +51,7 @@ def test_no_group_is_empty_or_it_is_said(data: st.DataObject) -> None:
     polar, radius = np.array(data.draw(places)), np.array(data.draw(places))
     k = data.draw(st.integers(1, count + 1))
     try:
-        groups = clusters(polar, radius, k, 1.0)
+        groups = group_mirrors(polar, radius, k, 1.0)
     except SpecError as error:
         assert "prototype.k" in str(error)  # noqa: PT017
         return

@@ -8,10 +8,16 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import Design, design
 from tbcad.optics.trace import reflected
-from tbcad.prototype.balls.alternatives import choices
-from tbcad.prototype.balls.layout import Prototype, pictures, prototype
-from tbcad.prototype.balls.selection import SAME_MM, BallCandidates, choose, fit, stand
-from tbcad.prototype.balls.stops import min_stabbing_points, plan, requests
+from tbcad.prototype.balls.alternatives import ball_alternatives
+from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
+from tbcad.prototype.balls.selection import (
+    SAME_MM,
+    BallCandidates,
+    ball_candidates,
+    ball_fit,
+    choose_balls,
+)
+from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError
 
@@ -21,25 +27,27 @@ DEGREE = np.radians(1)
 
 
 @pytest.fixture(scope="module")
-def made(paper_design: Design) -> Prototype:
-    return prototype(SPEC, paper_design)
+def made(paper_design: Design) -> PrototypeLayout:
+    return prototype_layout(SPEC, paper_design)
 
 
 @pytest.fixture(scope="module")
-def here(made: Prototype) -> BallCandidates:
-    return stand(made.half, made.groups, 60.0)
+def here(made: PrototypeLayout) -> BallCandidates:
+    return ball_candidates(made.half, made.groups, 60.0)
 
 
-def small(made: Design, *options: str) -> Prototype:
-    return prototype(load_spec(None, ["n=6", *options]), made)
+def small(made: Design, *options: str) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", *options]), made)
 
 
 class TestBalls:
-    def test_all_mirrors_show_the_whole_target(self, made: Prototype) -> None:
+    def test_all_mirrors_show_the_whole_target(self, made: PrototypeLayout) -> None:
         assert made.fit.coverage.min() > 60
         assert made.fit.possible.all()
 
-    def test_the_next_larger_ball_would_not(self, made: Prototype, here: BallCandidates) -> None:
+    def test_the_next_larger_ball_would_not(
+        self, made: PrototypeLayout, here: BallCandidates
+    ) -> None:
         catalogue, stock = made.balls.catalogue, made.balls.stock
         larger = np.where(
             made.balls.cap,
@@ -48,51 +56,55 @@ class TestBalls:
         )
         assert (made.groups.least(here.coverage(larger, moved=True)) < 60).all()
 
-    def test_groups_beyond_stock_get_caps(self, made: Prototype) -> None:
+    def test_groups_beyond_stock_get_caps(self, made: PrototypeLayout) -> None:
         beyond = made.balls.radius > 30
         assert (made.balls.cap == beyond).all()
         assert 0 < beyond.sum() < 5
         assert (made.balls.mass_g[beyond] == 0).all()
         assert made.balls.size[0].startswith("cap R 4")
 
-    def test_a_caps_edge_lies_on_its_front_and_on_its_ball(self, made: Prototype) -> None:
+    def test_a_caps_edge_lies_on_its_front_and_on_its_ball(self, made: PrototypeLayout) -> None:
         balls, cap = made.balls, made.balls.cap
         edge = balls.in_use[cap] + KEYS.cap_rim_mm
         drop = balls.radius[cap] - np.sqrt(balls.radius[cap] ** 2 - edge**2)
         on_ball = np.hypot(edge, balls.body_depth[cap] - drop)
         assert on_ball == pytest.approx(balls.body_radius[cap])
 
-    def test_a_balls_body_is_itself(self, made: Prototype) -> None:
+    def test_a_balls_body_is_itself(self, made: PrototypeLayout) -> None:
         bought = ~made.balls.cap
         assert (made.balls.body_centre[bought] == made.balls.centre[bought]).all()
 
-    def test_without_caps_the_largest_ball(self, made: Prototype, here: BallCandidates) -> None:
-        balls = choose(here, KEYS.model_copy(update={"caps": False}), made.balls.catalogue)
+    def test_without_caps_the_largest_ball(
+        self, made: PrototypeLayout, here: BallCandidates
+    ) -> None:
+        balls = choose_balls(here, KEYS.model_copy(update={"caps": False}), made.balls.catalogue)
         assert balls.radius.max() == 30
         assert not balls.cap.any()
 
-    def test_nearest(self, made: Prototype, here: BallCandidates) -> None:
+    def test_nearest(self, made: PrototypeLayout, here: BallCandidates) -> None:
         keys = KEYS.model_copy(update={"snap": "nearest"})
-        balls = choose(here, keys, made.balls.catalogue)
+        balls = choose_balls(here, keys, made.balls.catalogue)
         every = made.balls.catalogue.diameter / 2
         away = np.abs(every - made.groups.radius[:, None]).min(axis=1)
         bought = ~balls.cap
         assert np.abs(balls.radius - made.groups.radius)[bought] == pytest.approx(away[bought])
-        assert fit(here, balls, keys).coverage.min() < 60
+        assert ball_fit(here, balls, keys).coverage.min() < 60
 
     def test_pictures_left_in_place_need_tiny_balls(
-        self, made: Prototype, here: BallCandidates
+        self, made: PrototypeLayout, here: BallCandidates
     ) -> None:
         keys = KEYS.model_copy(update={"picture": "fixed"})
-        balls = choose(here, keys, made.balls.catalogue)
-        found = fit(here, balls, keys)
+        balls = choose_balls(here, keys, made.balls.catalogue)
+        found = ball_fit(here, balls, keys)
         assert not found.possible.all()
         assert (found.coverage_fixed[found.possible] >= 60 - SAME_MM).all()
         assert found.kept < 0.05
 
     def test_cost_of_each_choice(self, small_design: Design) -> None:
         spec, made = small_design.spec, small(small_design)
-        found = {c.name: c for c in choices(spec, made.half, made.groups, made.balls.catalogue)}
+        found = {
+            c.name: c for c in ball_alternatives(spec, made.half, made.groups, made.balls.catalogue)
+        }
         assert found["cover, with caps"].kept == pytest.approx(made.fit.kept)
         assert found["cover, with caps"].short == 0
         assert found["cover, balls only"].kept < found["cover, with caps"].kept
@@ -100,7 +112,7 @@ class TestBalls:
 
 
 class TestPlaces:
-    def test_apices_stay_on_the_ellipsoid(self, made: Prototype) -> None:
+    def test_apices_stay_on_the_ellipsoid(self, made: PrototypeLayout) -> None:
         apex = made.apices(0.3)
         pinhole = made.half.view.pinhole
         assert norm(apex) + norm(apex - pinhole) == pytest.approx(
@@ -110,14 +122,14 @@ class TestPlaces:
             apex - made.balls.radius[:, None] * made.normals(0.3)
         )
 
-    def test_no_two_balls_come_closer_than_the_wall(self, made: Prototype) -> None:
+    def test_no_two_balls_come_closer_than_the_wall(self, made: PrototypeLayout) -> None:
         centre, radius = made.body_centres(), made.balls.body_radius
         gap = norm(centre[:, None] - centre) - radius[:, None] - radius
         np.fill_diagonal(gap, np.inf)
         assert gap.min() > KEYS.ball_wall_mm
         assert gap.min() < KEYS.ball_wall_mm + 0.05  # and are no farther than they must
 
-    def test_no_ball_stands_in_anothers_light(self, made: Prototype) -> None:
+    def test_no_ball_stands_in_anothers_light(self, made: PrototypeLayout) -> None:
         """Rays off every ball by brute force against every other ball."""
         outline, balls = made.balls.outline, made.balls
         camera, frame = made.half.view.pinhole, made.half.ellipsoid.frame()
@@ -144,7 +156,7 @@ class TestPlaces:
                     gap = clear(x, target, made.body_centres()[others])
                     assert (gap - balls.body_radius[others]).min() > KEYS.light_margin_mm
 
-    def test_post_and_camera_stay_clear_over_the_swing(self, made: Prototype) -> None:
+    def test_post_and_camera_stay_clear_over_the_swing(self, made: PrototypeLayout) -> None:
         view = made.half.view
         back = view.pinhole - KEYS.camera_length_mm * view.forward
         for angle in np.linspace(-1, 1, 41) * made.placement.swing / 2:
@@ -154,12 +166,12 @@ class TestPlaces:
             assert (post - made.balls.body_radius - 10).min() > KEYS.ball_wall_mm - 1e-3
             assert (body - made.balls.body_radius - 30).min() > KEYS.ball_wall_mm - 1e-3
 
-    def test_swing_is_proved_least_and_less_than_greedy(self, made: Prototype) -> None:
+    def test_swing_is_proved_least_and_less_than_greedy(self, made: PrototypeLayout) -> None:
         assert made.placement.bound == pytest.approx(made.placement.swing, abs=1e-3)
         assert made.placement.swing < made.greedy.swing - DEGREE
         assert made.placement.swing / DEGREE < 205
 
-    def test_outermost_is_that_of_the_edges(self, made: Prototype) -> None:
+    def test_outermost_is_that_of_the_edges(self, made: PrototypeLayout) -> None:
         """By the seats' edges themselves, at both ends of the swing."""
         frame = made.half.ellipsoid.frame()
         far = 0.0
@@ -179,7 +191,7 @@ def clear(start: np.ndarray, end: np.ndarray, centre: np.ndarray) -> np.ndarray:
 
 
 class TestStops:
-    def test_every_mirror_is_served_within_the_limit(self, made: Prototype) -> None:
+    def test_every_mirror_is_served_within_the_limit(self, made: PrototypeLayout) -> None:
         stops = made.stops
         across = 2 * np.arcsin(
             np.sin(np.abs(stops.azimuth_error) / 2) * np.sin(made.groups.polar[made.fit.ball])
@@ -188,29 +200,31 @@ class TestStops:
         assert sum(len(stops.mirrors(i)) for i in range(len(stops))) == len(made.half)
         assert min(len(stops.mirrors(i)) for i in range(len(stops))) > 0
 
-    def test_errors_are_those_of_the_balls_themselves(self, made: Prototype) -> None:
+    def test_errors_are_those_of_the_balls_themselves(self, made: PrototypeLayout) -> None:
         for i in range(0, len(made.half), 50):
             apex = made.apices(made.stops.angle[made.stops.stop[i]])[made.fit.ball[i]]
             angle = np.arccos(np.clip(unit(apex) @ made.half.u[i], -1, 1))
             assert made.stops.error[i] == pytest.approx(angle, abs=1e-7)
 
-    def test_stops_rise_within_the_swing(self, made: Prototype) -> None:
+    def test_stops_rise_within_the_swing(self, made: PrototypeLayout) -> None:
         assert (np.diff(made.stops.angle) > 0).all()
         assert np.abs(made.stops.angle).max() <= made.placement.swing / 2 + 1e-9
 
-    def test_are_the_fewest_and_fewer_than_greedys(self, made: Prototype) -> None:
-        wanted = requests(made.groups, made.half.azimuth, np.radians(KEYS.stop_error_deg))
+    def test_are_the_fewest_and_fewer_than_greedys(self, made: PrototypeLayout) -> None:
+        wanted = stop_requests(made.groups, made.half.azimuth, np.radians(KEYS.stop_error_deg))
         angle = wanted.azimuth - made.placement.azimuth[wanted.ball]
         points, _ = min_stabbing_points(angle - wanted.tolerance, angle + wanted.tolerance)
         assert len(points) == len(made.stops)
-        other = plan(made.groups, made.half.polar, wanted, made.greedy.azimuth)
+        other = plan_stops(made.groups, made.half.polar, wanted, made.greedy.azimuth)
         assert len(made.stops) <= len(other)
 
-    def test_other_half_with_the_object_turned(self, made: Prototype, paper_design: Design) -> None:
+    def test_other_half_with_the_object_turned(
+        self, made: PrototypeLayout, paper_design: Design
+    ) -> None:
         """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
         b = paper_design.halves[1]
         assert b.u[made.twin] == pytest.approx(made.half.u * [-1, -1, 1], abs=1e-9)
-        shots = pictures(made)
+        shots = planned_pictures(made)
         assert len(shots) == 2 * 847
         assert {shot.mirror for shot in shots} == {*made.half.ids, *b.ids}
         assert [shot.turn for shot in shots] == [0.0] * 847 + [np.pi] * 847
@@ -219,8 +233,8 @@ class TestStops:
 
 
 class TestAsked:
-    def test_same_numbers_every_time(self, made: Prototype, paper_design: Design) -> None:
-        again = prototype(SPEC, paper_design)
+    def test_same_numbers_every_time(self, made: PrototypeLayout, paper_design: Design) -> None:
+        again = prototype_layout(SPEC, paper_design)
         assert again.placement.azimuth.tobytes() == made.placement.azimuth.tobytes()
         assert again.stops.angle.tobytes() == made.stops.angle.tobytes()
         assert again.balls.size == made.balls.size
@@ -288,7 +302,7 @@ class TestRefused:
     def test_planar_mirrors(self) -> None:
         spec = load_spec(None, ["n=4", "radius_rule=flat"])
         with pytest.raises(SpecError, match=r"needs curved mirrors.*traced or paper"):
-            prototype(spec, design(spec))
+            prototype_layout(spec, design(spec))
 
     def test_an_empty_catalogue(self, small_design: Design, tmp_path: Path) -> None:
         path = tmp_path / "none.csv"
@@ -296,4 +310,4 @@ class TestRefused:
         keys = small_design.spec.prototype.model_copy(update={"catalogues": (str(path),)})
         spec: Spec = small_design.spec.model_copy(update={"prototype": keys})
         with pytest.raises(SpecError, match=r"none\.csv: an empty catalogue"):
-            prototype(spec, small_design)
+            prototype_layout(spec, small_design)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.prototype.balls.stops import between, min_stabbing_points
+from tbcad.prototype.balls.stops import angle_between, min_stabbing_points
 
 
 def exhaustive(low: np.ndarray, high: np.ndarray) -> int:
@@ -41,5 +41,5 @@ def test_angle_between_directions(polar: float, other: float, azimuth: float) ->
     a = np.array([np.cos(polar), np.sin(polar), 0])
     b = np.array([np.cos(other), *np.sin(other) * np.array([np.cos(azimuth), np.sin(azimuth)])])
     expected = 2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b))
-    found = between(np.array([polar]), np.array([other]), np.array([azimuth]))[0]
+    found = angle_between(np.array([polar]), np.array([other]), np.array([azimuth]))[0]
     assert found == pytest.approx(expected, abs=1e-7)

@@ -8,12 +8,19 @@ import pytest
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import light
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.hub import hub
-from tbcad.prototype.base.layout import BaseLayout, base
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.hub import hub_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.layout import _sector as sector
-from tbcad.prototype.base.profile import Light, hull, offset, outside, thinned, trimmed
-from tbcad.prototype.base.seats import APART_MM, free_of_ways, resized, seats
+from tbcad.prototype.base.profile import (
+    LightSpheroid,
+    distance_outside,
+    hull,
+    offset,
+    thinned,
+    trimmed,
+)
+from tbcad.prototype.base.seats import APART_MM, insertion_clearance, seat_layout, shifted_contacts
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
@@ -26,29 +33,31 @@ def keys(**changed: object) -> BaseSpec:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: Design) -> Prototype:
-    return prototype(load_spec(None), paper_design)
+def paper(paper_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None), paper_design)
 
 
 @pytest.fixture(scope="module")
-def whole(paper: Prototype) -> BaseLayout:
-    return base(KEYS, paper)
+def whole(paper: PrototypeLayout) -> BaseLayout:
+    return base_layout(KEYS, paper)
 
 
 class TestSeats:
-    def test_pads_are_tangent_to_the_bodies(self, whole: BaseLayout, paper: Prototype) -> None:
+    def test_pads_are_tangent_to_the_bodies(
+        self, whole: BaseLayout, paper: PrototypeLayout
+    ) -> None:
         seat = whole.seats
         away = dot(seat.contacts - paper.body_centres()[:, None], seat.pad_normals)
         assert np.abs(away + paper.balls.body_radius[:, None]).max() < 1e-9
         assert np.abs(norm(seat.pad_normals) - 1).max() < 1e-12
 
     def test_pads_stand_at_the_angle_of_the_spec_a_third_of_a_turn_apart(
-        self, whole: BaseLayout, paper: Prototype
+        self, whole: BaseLayout, paper: PrototypeLayout
     ) -> None:
         normal = whole.seats.pad_normals
         tilt = dot(normal, paper.normals()[:, None])
@@ -71,32 +80,32 @@ class TestSeats:
         pads = seat.radius * np.sin(seat.tilt) - seat.pad * np.cos(seat.tilt)
         assert (seat.pocket < pads).all()
 
-    def test_glue_needs_no_magnet(self, made: Prototype) -> None:
-        seat = seats(keys(hold="glue"), made)
+    def test_glue_needs_no_magnet(self, made: PrototypeLayout) -> None:
+        seat = seat_layout(keys(hold="glue"), made)
         assert (seat.magnet == 0).all()
         assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
 
     def test_balls_go_in_past_the_pads_of_others(self, whole: BaseLayout) -> None:
-        assert free_of_ways(whole.seats).min() > APART_MM
+        assert insertion_clearance(whole.seats).min() > APART_MM
 
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
         self, paper_design: Design
     ) -> None:
-        made = prototype(load_spec(None, ["prototype.k=10"]), paper_design)
-        seat = seats(KEYS, made)
+        made = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
+        seat = seat_layout(KEYS, made)
         slant = np.degrees(np.arccos(np.clip(-dot(seat.way, seat.axis) / norm(seat.way), -1, 1)))
         assert 5 < slant.max() < 21
         # On its way out it leaves its own pads.
         assert dot(seat.way[:, None], seat.pad_normals).min() > 0
-        assert free_of_ways(seat).min() > APART_MM
+        assert insertion_clearance(seat).min() > APART_MM
 
     def test_moved_pads(self, whole: BaseLayout) -> None:
-        moved = resized(whole.seats, np.array([0.0, 0.2]))
+        moved = shifted_contacts(whole.seats, np.array([0.0, 0.2]))
         assert norm(moved[:, 1]) - norm(moved[:, 0]) == pytest.approx(np.full((16, 3), 0.2))
 
 
 class TestLight:
-    def test_all_light_is_within_the_level(self, whole: BaseLayout, paper: Prototype) -> None:
+    def test_all_light_is_within_the_level(self, whole: BaseLayout, paper: PrototypeLayout) -> None:
         random = np.random.default_rng(1)
         for cone in light(paper.balls.outline, whole.light.pinhole, 30.0):
             share = random.random((len(cone), 500, 1))
@@ -112,15 +121,15 @@ class TestLight:
         assert whole.light.least_beyond(parts).min() >= 0
 
     def test_the_bound_of_a_facet_is_below_all_of_it(self) -> None:
-        random, region = np.random.default_rng(2), Light(140.0, 250.0)
+        random, region = np.random.default_rng(2), LightSpheroid(140.0, 250.0)
         facets = random.normal(size=(200, 3, 3)) * 100
         weights = random.dirichlet([1, 1, 1], size=(200, 40))
         inside = region.beyond(weights @ facets).min(axis=1)
         assert (region.least_beyond(facets) <= inside + 1e-9).all()
 
-    def test_a_boss_in_the_light_is_refused(self, made: Prototype) -> None:
+    def test_a_boss_in_the_light_is_refused(self, made: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
-            base(keys(light_clearance_mm=12.0), made)
+            base_layout(keys(light_clearance_mm=12.0), made)
 
 
 class TestProfile:
@@ -129,14 +138,14 @@ class TestProfile:
         assert hull(points).tolist() == [[0, 0], [1, 2], [2, 2.5], [3, 0]]
 
     def test_offset_lines_keep_their_distance(self, whole: BaseLayout) -> None:
-        away = outside(whole.inner, offset(whole.inner, 5.0))
+        away = distance_outside(whole.inner, offset(whole.inner, 5.0))
         assert away == pytest.approx(np.full(len(away), 5.0))
 
     def test_thinned_lines_go_round(self) -> None:
         line = np.array([[0, 0], [2, 4], [2.5, 4.6], [6, 7], [12, 7]], dtype=float)
         short = thinned(line, 2.0)
         assert len(short) == 4
-        assert outside(short, line).max() <= 1e-12
+        assert distance_outside(short, line).max() <= 1e-12
         assert short[[0, -1]].tolist() == line[[0, -1]].tolist()
 
     def test_trimmed_and_prolonged(self) -> None:
@@ -152,9 +161,9 @@ class TestProfile:
                 point = (point + side * seat.boss[:, None] * seat.axes[:, 0]) @ frame.T
                 at = np.stack([point[:, 0], norm(point[:, 1:])], axis=1)
                 line = whole.inner if sign < 0 else whole.outer
-                assert (sign * outside(line, at)).min() > -1e-9
+                assert (sign * distance_outside(line, at)).min() > -1e-9
 
-    def test_the_sector_holds_all_bosses(self, whole: BaseLayout, paper: Prototype) -> None:
+    def test_the_sector_holds_all_bosses(self, whole: BaseLayout, paper: PrototypeLayout) -> None:
         low, high = whole.sector
         azimuth = paper.placement.azimuth
         assert low < azimuth.min() < azimuth.max() < high
@@ -175,7 +184,7 @@ class TestHub:
         [("nema17-belt", 28.0, 4.0), ("nema17-direct", 16.0, 4.0), ("stage-60", 50.0, 6.6)],
     )
     def test_patterns(self, drive: str, circle: float, hole: float) -> None:
-        held = hub(keys(drive=drive), -60.0)
+        held = hub_layout(keys(drive=drive), -60.0)
         assert norm(held.holes) == pytest.approx(np.full(4, circle / 2))
         assert held.hole == hole
         assert held.disc > circle / 2 + hole / 2 + 2
@@ -183,7 +192,7 @@ class TestHub:
 
     def test_a_shaft_too_thick(self) -> None:
         with pytest.raises(SpecError, match=r"prototype.base.shaft_mm 9 or less"):
-            hub(keys(drive="nema17-direct", shaft_mm=12.0), -60.0)
+            hub_layout(keys(drive="nema17-direct", shaft_mm=12.0), -60.0)
 
 
 class TestRefused:
@@ -195,25 +204,25 @@ class TestRefused:
             ({"magnets_mm": [40.0]}, "no magnet fits between the pads of ball 1: add one of"),
         ],
     )
-    def test_seats(self, made: Prototype, changed: dict[str, object], text: str) -> None:
+    def test_seats(self, made: PrototypeLayout, changed: dict[str, object], text: str) -> None:
         with pytest.raises(SpecError, match=text):
-            base(keys(**changed), made)
+            base_layout(keys(**changed), made)
 
-    def test_pads_in_the_way_of_other_balls(self, made: Prototype) -> None:
+    def test_pads_in_the_way_of_other_balls(self, made: PrototypeLayout) -> None:
         close = replace(made.placement, azimuth=made.placement.azimuth * 0)
         small = replace(made.balls.at, apex=made.balls.at.apex * 0 + made.balls.at.apex[:1])
         crowded = replace(made, placement=close, balls=replace(made.balls, at=small))
         with pytest.raises(SpecError, match="stands where another ball is put in"):
-            seats(KEYS, crowded)
+            seat_layout(KEYS, crowded)
 
-    def test_a_ball_next_to_the_axis(self, made: Prototype) -> None:
-        seat = seats(KEYS, made)
+    def test_a_ball_next_to_the_axis(self, made: PrototypeLayout) -> None:
+        seat = seat_layout(KEYS, made)
         frame = made.half.ellipsoid.frame()
         near = replace(seat, centre=seat.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
         with pytest.raises(SpecError, match="stands too near to the axis for its seat"):
             sector(KEYS, near, made)
 
-    def test_balls_all_round_the_axis(self, made: Prototype) -> None:
+    def test_balls_all_round_the_axis(self, made: PrototypeLayout) -> None:
         spread = replace(made.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0]))
         with pytest.raises(SpecError, match=r"would go 3\d\d degrees round its axis"):
-            base(KEYS, replace(made, placement=spread))
+            base_layout(KEYS, replace(made, placement=spread))

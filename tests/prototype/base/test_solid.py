@@ -31,16 +31,16 @@ from tbcad.cad.solids import (
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import hub_solids as hubs
 from tbcad.prototype.base import seat_solids as seat
-from tbcad.prototype.base.cap_solids import caps, flat, pocket
+from tbcad.prototype.base.cap_solids import cap_parts, cap_pocket, flat_depth
 from tbcad.prototype.base.coupon import _wall as seat_section
-from tbcad.prototype.base.coupon import coupon, rows_of
-from tbcad.prototype.base.hub import hub
-from tbcad.prototype.base.layout import BaseLayout, base
-from tbcad.prototype.base.solid import bodies, carrier, tools
-from tbcad.prototype.base.split import downs
+from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
+from tbcad.prototype.base.hub import hub_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
+from tbcad.prototype.base.split import downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
@@ -51,19 +51,19 @@ KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
+def made(small_design: Design) -> PrototypeLayout:
     options = ["n=6", "prototype.k=4", "prototype.snap=nearest", "prototype.largest_ball_mm=50"]
-    return prototype(load_spec(None, options), small_design)
+    return prototype_layout(load_spec(None, options), small_design)
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype) -> BaseLayout:
-    return base(KEYS, made)
+def numbers(made: PrototypeLayout) -> BaseLayout:
+    return base_layout(KEYS, made)
 
 
 @pytest.fixture(scope="module")
 def part(numbers: BaseLayout) -> PlacedSolid:
-    (only,) = carrier(numbers)
+    (only,) = carrier_parts(numbers)
     return only
 
 
@@ -99,7 +99,7 @@ class TestCarrier:
         assert part.mass_g(1.27) == pytest.approx(part.volume * 1.27e-3)
 
     def test_ball_centres_are_recovered_from_the_pads(
-        self, numbers: BaseLayout, made: Prototype, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, made: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
         centre, radius = made.body_centres(), made.balls.body_radius
         for k, (contacts, normals) in enumerate(
@@ -128,7 +128,7 @@ class TestCarrier:
                 assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_balls_touch_nothing_but_their_pads(
-        self, numbers: BaseLayout, made: Prototype, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, made: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=1)
         points = np.vstack([points, mesh.vertices])
@@ -159,7 +159,7 @@ class TestCarrier:
     ) -> None:
         """The kernel's booleans can lose a piece and pass for valid; other booleans tell."""
         seats = numbers.own_seats
-        added, removed = bodies(numbers, seats), tools(numbers, seats)
+        added, removed = added_solids(numbers, seats), removed_solids(numbers, seats)
         assert part.volume == pytest.approx(volume_by_meshes(added, removed, 0.01), rel=2e-4)
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
             check_volume("carrier", part.shape, part.volume * 1.01)
@@ -217,20 +217,26 @@ class TestCarrier:
         with pytest.raises(
             SpecError, match=r"make prototype\.base\.bed_mm at least \d+ x \d+"
         ) as said:
-            placed_on_bed("carrier", part.shape, downs(numbers, np.zeros((0, 4))), np.eye(3), small)
+            placed_on_bed(
+                "carrier",
+                part.shape,
+                downward_directions(numbers, np.zeros((0, 4))),
+                np.eye(3),
+                small,
+            )
         bed = [
             float(size) for size in re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))[0]
         ]
         assert placed_on_bed(
             "carrier",
             part.shape,
-            downs(numbers, np.zeros((0, 4))),
+            downward_directions(numbers, np.zeros((0, 4))),
             np.eye(3),
             BaseSpec(bed_mm=tuple(bed)),
         )
 
     def test_the_same_bytes(self, numbers: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
-        for name, again in (("one", part), ("two", carrier(numbers)[0])):
+        for name, again in (("one", part), ("two", carrier_parts(numbers)[0])):
             write_step(tmp_path / name, Solid(again.name, again.shape, ()))
         assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
@@ -242,9 +248,11 @@ def test_booleans_in_parallel_give_the_same_bytes(
     found = numbers.own_seats
 
     def made(name: str) -> bytes:
-        bosses = [seat.placed(seat.boss(found, k), found, k) for k in range(len(found))]
+        bosses = [
+            seat.moved_to_seat(seat.boss_solid(found, k), found, k) for k in range(len(found))
+        ]
         rod = cylinder(np.array([0.0, 0.0, -300.0]), UP, 200.0, 600.0)
-        solid = one_solid("block", cut(fused([rod, *bosses]), tools(numbers, found)))
+        solid = one_solid("block", cut(fused([rod, *bosses]), removed_solids(numbers, found)))
         write_step(tmp_path / name, Solid("block", solid, ()))
         return (tmp_path / name).read_bytes()
 
@@ -280,7 +288,7 @@ class TestSeat:
             well = np.pi * pocket_radius**2 * (bottom - low)
             post = 2 * np.pi / 3 * (cup**3 - (cup**2 - pad**2) ** 1.5) - np.pi * pad**2 * radius
             whole = np.pi * float(found.boss[k]) ** 2 * (back - front)
-            solid = one_solid("seat", cut(seat.boss(found, k), [seat.hollow(found, k)]))
+            solid = one_solid("seat", cut(seat.boss_solid(found, k), [seat.seat_hollow(found, k)]))
             assert volume(solid) == pytest.approx(whole - zone - well + 3 * post, rel=1e-6)
 
 
@@ -289,15 +297,15 @@ class TestHub:
     @pytest.mark.parametrize("drive", ["nema17-belt", "nema17-direct", "stage-60"])
     def test_every_drive(self, drive: str, lock: str) -> None:
         keys = BaseSpec.model_validate({"drive": drive, "lock": lock})
-        held = hub(keys, -60.0)
-        solid = one_solid("hub", cut(fused(hubs.body(held)), hubs.holes(held, keys)))
+        held = hub_layout(keys, -60.0)
+        solid = one_solid("hub", cut(fused(hubs.hub_bodies(held)), hubs.hub_holes(held, keys)))
         assert as_trimesh(solid).is_watertight
         assert bounds(solid)[:, 2] == pytest.approx([held.face, held.front])
 
     def test_volume_of_a_stages_hub(self) -> None:
         keys = BaseSpec(drive="stage-60")
-        held = hub(keys, -60.0)
-        solid = cut(fused(hubs.body(held)), hubs.holes(held, keys))
+        held = hub_layout(keys, -60.0)
+        solid = cut(fused(hubs.hub_bodies(held)), hubs.hub_holes(held, keys))
         thick = held.front - held.face
         hole = 3.3**2 * (thick - 6.5) + 5.5**2 * 6.5
         expected = np.pi * (held.disc**2 * thick - 4.0**2 * thick - 4 * hole)
@@ -306,9 +314,9 @@ class TestHub:
 
 class TestCaps:
     def test_fronts_and_bodies_are_exact_spheres(
-        self, numbers: BaseLayout, made: Prototype
+        self, numbers: BaseLayout, made: PrototypeLayout
     ) -> None:
-        parts = caps(numbers, made)
+        parts = cap_parts(numbers, made)
         assert len(parts) == made.balls.cap.sum() > 0
         for k, found in zip(np.flatnonzero(made.balls.cap), parts, strict=True):
             spheres = {}
@@ -324,44 +332,44 @@ class TestCaps:
             assert first == pytest.approx(made.body_centres()[k], abs=1e-9)
             assert second == pytest.approx(made.centres()[k], abs=1e-9)
 
-    def test_volume_against_a_closed_form(self, numbers: BaseLayout, made: Prototype) -> None:
-        for k, found in zip(np.flatnonzero(made.balls.cap), caps(numbers, made), strict=True):
+    def test_volume_against_a_closed_form(self, numbers: BaseLayout, made: PrototypeLayout) -> None:
+        for k, found in zip(np.flatnonzero(made.balls.cap), cap_parts(numbers, made), strict=True):
             body, front = float(made.balls.body_radius[k]), float(made.balls.radius[k])
-            edge, behind = body / np.sqrt(2), flat(numbers, k)
+            edge, behind = body / np.sqrt(2), flat_depth(numbers, k)
             drop = front - np.sqrt(front**2 - edge**2)
             lens = np.pi * drop**2 * (3 * front - drop) / 3
             zone = np.pi * (body**2 * (behind + edge) - (behind**3 + edge**3) / 3)
-            wide, deep = pocket(numbers, k, float(made.balls.body_depth[k]))
+            wide, deep = cap_pocket(numbers, k, float(made.balls.body_depth[k]))
             assert found.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
 
     def test_they_are_watertight_and_printed_front_up(
-        self, numbers: BaseLayout, made: Prototype
+        self, numbers: BaseLayout, made: PrototypeLayout
     ) -> None:
-        for k, found in zip(np.flatnonzero(made.balls.cap), caps(numbers, made), strict=True):
+        for k, found in zip(np.flatnonzero(made.balls.cap), cap_parts(numbers, made), strict=True):
             whole = as_trimesh(found.shape)
             assert whole.is_watertight
             assert (norm(whole.vertices - made.apices()[k])).min() < 1e-6
             low, high = bounds(found.on_bed)
             assert low[2] == pytest.approx(0, abs=1e-6)
-            assert high[2] == pytest.approx(flat(numbers, k) + made.balls.body_depth[k])
+            assert high[2] == pytest.approx(flat_depth(numbers, k) + made.balls.body_depth[k])
 
-    def test_they_rest_on_the_pads(self, numbers: BaseLayout, made: Prototype) -> None:
+    def test_they_rest_on_the_pads(self, numbers: BaseLayout, made: PrototypeLayout) -> None:
         for k in np.flatnonzero(made.balls.cap).tolist():
             along = dot(numbers.seats.contacts[k] - numbers.seats.centre[k], numbers.seats.axis[k])
             steep = np.cos(numbers.seats.tilt)
             assert along == pytest.approx(np.full(3, steep * numbers.seats.radius[k]))
             edge = along + numbers.seats.pad[k] * np.sin(numbers.seats.tilt)
-            assert edge.max() < flat(numbers, k)
+            assert edge.max() < flat_depth(numbers, k)
 
-    def test_glued_caps_have_no_pocket(self, made: Prototype) -> None:
-        glued = base(BaseSpec(hold="glue"), made)
-        assert pocket(glued, 0, 5.0) == (0.0, 0.0)
-        assert as_trimesh(caps(glued, made)[0].shape).is_watertight
+    def test_glued_caps_have_no_pocket(self, made: PrototypeLayout) -> None:
+        glued = base_layout(BaseSpec(hold="glue"), made)
+        assert cap_pocket(glued, 0, 5.0) == (0.0, 0.0)
+        assert as_trimesh(cap_parts(glued, made)[0].shape).is_watertight
 
 
 @pytest.fixture(scope="module")
 def plates(numbers: BaseLayout) -> list[PlacedSolid]:
-    return coupon(numbers)
+    return coupon_plates(numbers)
 
 
 class TestCoupon:
@@ -375,7 +383,7 @@ class TestCoupon:
     ) -> None:
         """A seat's pads are sqrt(3) sin(tilt) times the radius of the sphere in it apart."""
         found = numbers.seats
-        rows = rows_of(found, KEYS)
+        rows = coupon_rows(found, KEYS)
         assert len(rows) == len(np.unique(np.round(found.radius, 6)))
         planes = [plane_faces(plate.shape) for plate in plates]
         middle = np.concatenate([one + 1e4 * n for n, (one, _) in enumerate(planes)])
@@ -410,7 +418,9 @@ class TestCoupon:
 
     def test_offsets_move_the_pads(self, numbers: BaseLayout) -> None:
         found = numbers.seats
-        shapes = [cut(seat.boss(found, 0), [seat.hollow(found, 0, by)]) for by in (0.0, 0.2)]
+        shapes = [
+            cut(seat.boss_solid(found, 0), [seat.seat_hollow(found, 0, by)]) for by in (0.0, 0.2)
+        ]
         pad, normal = found.pad[0], found.local_normals[0, 0]
         for shape, by in zip(shapes, (0.0, 0.2), strict=True):
             plane = -(found.radius[0] + by) * normal
@@ -418,10 +428,12 @@ class TestCoupon:
             area = solid.area_faces[in_plane(solid, plane, normal)].sum()
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
-    def test_a_row_larger_than_the_bed(self, made: Prototype) -> None:
-        crowded = base(BaseSpec(coupon_offsets_mm=(0.1,) * 9, bed_mm=(100.0, 100.0, 100.0)), made)
+    def test_a_row_larger_than_the_bed(self, made: PrototypeLayout) -> None:
+        crowded = base_layout(
+            BaseSpec(coupon_offsets_mm=(0.1,) * 9, bed_mm=(100.0, 100.0, 100.0)), made
+        )
         with pytest.raises(SpecError, match=r"make prototype.base.bed_mm larger or"):
-            coupon(crowded)
+            coupon_plates(crowded)
 
 
 class TestRelief:
@@ -444,7 +456,7 @@ def test_several_solids_are_refused() -> None:
 
 def test_a_lost_pad_is_noticed(numbers: BaseLayout) -> None:
     found = numbers.seats
-    whole = cut(seat.boss(found, 0), [seat.hollow(found, 0)])
+    whole = cut(seat.boss_solid(found, 0), [seat.seat_hollow(found, 0)])
     contacts = -found.radius[0] * found.local_normals[0]
     pads = np.full(3, found.pad[0])
     check_pads("seat", whole, contacts, pads)

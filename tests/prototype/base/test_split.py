@@ -8,13 +8,13 @@ import pytest
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.joints import profile
-from tbcad.prototype.base.layout import BaseLayout, base
-from tbcad.prototype.base.profile import outside
-from tbcad.prototype.base.purchased import bought, fasteners, magnets
-from tbcad.prototype.base.screws import access, sizes
-from tbcad.prototype.base.split import Split, split
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.joints import flange_profile
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.profile import distance_outside
+from tbcad.prototype.base.purchased import base_purchased_parts, fasteners, magnets
+from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.printing.bed import needed, room, shortfall
 from tbcad.spec.base_keys import BaseSpec
@@ -34,23 +34,23 @@ def cube(size: float) -> BaseSpec:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: Design) -> Prototype:
-    return prototype(load_spec(None), paper_design)
+def paper(paper_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None), paper_design)
 
 
 @pytest.fixture(scope="module", params=["small", "paper in two", "paper in three"])
 def cut(
-    request: pytest.FixtureRequest, made: Prototype, paper: Prototype
-) -> tuple[BaseLayout, Split]:
+    request: pytest.FixtureRequest, made: PrototypeLayout, paper: PrototypeLayout
+) -> tuple[BaseLayout, BaseSplit]:
     at = {"small": (made, 150.0), "paper in two": (paper, 180.0), "paper in three": (paper, 160.0)}
     chosen, bed = at[request.param]
-    numbers = base(cube(bed), chosen)
-    plan = split(numbers)
+    numbers = base_layout(cube(bed), chosen)
+    plan = split_base(numbers)
     assert len(plan.pieces) == (3 if "three" in request.param else 2)
     return numbers, plan
 
@@ -65,13 +65,15 @@ def rims(numbers: BaseLayout) -> np.ndarray:
 
 
 class TestPlanes:
-    def test_a_base_that_fits_stays_whole(self, made: Prototype, paper: Prototype) -> None:
+    def test_a_base_that_fits_stays_whole(
+        self, made: PrototypeLayout, paper: PrototypeLayout
+    ) -> None:
         for one in (made, paper):
-            plan = split(base(KEYS, one))
+            plan = split_base(base_layout(KEYS, one))
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
 
-    def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, plan = cut
         corners = rims(numbers).reshape(len(numbers.seats), -1, 3)
         for joint in plan.joints:
@@ -81,35 +83,35 @@ class TestPlanes:
             assert (away.min(axis=1) > 0).any()
             assert (away.max(axis=1) < 0).any()
 
-    def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, plan = cut
         held, turn = numbers.hub, np.linspace(0, 2 * np.pi, 60)
         for z in (held.face, held.front):
             rim = np.stack([held.disc * np.cos(turn), held.disc * np.sin(turn), 0 * turn + z], 1)
             assert {plan.piece_of(point) for point in rim} == {0}
 
-    def test_pieces_fill_space_once(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_pieces_fill_space_once(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         points = np.random.default_rng(1).normal(size=(3000, 3)) * 150
         inside = [(points @ one[:, :3].T < one[:, 3]).all(axis=1) for one in cut[1].pieces]
         assert (np.sum(inside, axis=0) == 1).all()
         assert all(one.any() for one in inside)
 
-    def test_the_same_again(self, made: Prototype) -> None:
-        one, two = (split(base(cube(150.0), made)) for _ in range(2))
+    def test_the_same_again(self, made: PrototypeLayout) -> None:
+        one, two = (split_base(base_layout(cube(150.0), made)) for _ in range(2))
         for first, second in zip(one.joints, two.joints, strict=True):
             assert (first.screws == second.screws).all()
             assert (first.plane.normal == second.plane.normal).all()
 
-    def test_a_bed_too_small_names_one_that_does(self, made: Prototype) -> None:
+    def test_a_bed_too_small_names_one_that_does(self, made: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"make prototype\.base\.bed_mm at least") as said:
-            split(base(keys(bed_mm=[135.0, 135.0, 60.0]), made))
+            split_base(base_layout(keys(bed_mm=[135.0, 135.0, 60.0]), made))
         (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))
         large = np.array([float(size) for size in bed])
-        assert len(split(base(keys(bed_mm=large.tolist()), made)).pieces) == 2
+        assert len(split_base(base_layout(keys(bed_mm=large.tolist()), made)).pieces) == 2
 
 
 class TestJoints:
-    def test_two_dowels_and_two_screws_or_more(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_two_dowels_and_two_screws_or_more(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         for joint in cut[1].joints:
             assert len(joint.dowels) == 2
             assert len(joint.screws) >= 2
@@ -120,7 +122,7 @@ class TestJoints:
             assert norm(joint.dowels[1] - joint.dowels[0]) > 40
 
     def test_holes_are_in_the_flanges_and_off_all_seats(
-        self, cut: tuple[BaseLayout, Split]
+        self, cut: tuple[BaseLayout, BaseSplit]
     ) -> None:
         numbers, plan = cut
         seat, used = numbers.own_seats, numbers.keys
@@ -128,7 +130,7 @@ class TestJoints:
             along = np.linspace(-used.joint_mm, used.joint_mm, 40)[:, None, None]
             axes = np.vstack([joint.dowels, joint.screws]) + along * joint.plane.normal
             at = np.stack([axes[..., 2], norm(axes[..., :2])], axis=-1)
-            assert outside(numbers.inner, at).min() > used.insert_hole_mm / 2 + 1
+            assert distance_outside(numbers.inner, at).min() > used.insert_hole_mm / 2 + 1
             balls = norm(axes[..., None, :] - seat.centre) - seat.cup
             assert balls.min() > used.insert_hole_mm / 2 + 1
             # And beside the magnets.
@@ -137,31 +139,31 @@ class TestJoints:
             beside = norm(away - deep[..., None] * seat.axis) - seat.pocket
             assert (beside[(deep > 0) & (deep < seat.back)] > used.insert_hole_mm / 2 + 1).all()
 
-    def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, plan = cut
-        free = access(sizes(numbers.keys))
+        free = access_radius(joint_hardware(numbers.keys))
         assert free > 5.5 / 2
         for joint in plan.joints:
             for place, side in zip(joint.screws, joint.heads, strict=True):
                 steps = numbers.keys.joint_mm + np.linspace(0, 25, 60)
                 axis = place + side * steps[:, None] * joint.plane.normal
                 at = np.stack([axis[:, 2], norm(axis[:, :2])], axis=-1)
-                assert outside(numbers.outer, at).min() > 5.5 / 2
+                assert distance_outside(numbers.outer, at).min() > 5.5 / 2
                 for rim, up in zip(rims(numbers), numbers.own_seats.axis, strict=True):
                     ends = rim.mean(axis=1)
                     deep = np.clip((axis - ends[0]) @ up, 0, (ends[1] - ends[0]) @ up)
                     away = norm(axis - ends[0] - deep[:, None] * up)
                     assert away.min() > norm(rim[0, 0] - ends[0]) + 5.5 / 2 - 0.1
 
-    def test_flanges_are_behind_the_light(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_flanges_are_behind_the_light(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, _ = cut
-        line = profile(numbers)
+        line = flange_profile(numbers)
         parts = np.stack([line, np.roll(line, -1, axis=0)], axis=1)
         assert numbers.light.least_beyond(parts).min() > 0
         assert line[:, 1].min() > numbers.hub.disc
 
     def test_sizes_are_in_the_lists(self) -> None:
-        found, parts = sizes(KEYS), load_parts()
+        found, parts = joint_hardware(KEYS), load_parts()
         assert parts[found.dowel].sizes == (3.0, 12.0)
         assert found.dowel_depth + 1 <= KEYS.joint_mm
         length = parts[found.screw].sizes[1]
@@ -176,9 +178,9 @@ class TestJoints:
             ({"joint_mm": 27.0}, r"no M3 screw is 31 to 33\.2 mm long"),
         ],
     )
-    def test_refused(self, made: Prototype, changed: dict[str, object], text: str) -> None:
+    def test_refused(self, made: PrototypeLayout, changed: dict[str, object], text: str) -> None:
         with pytest.raises(SpecError, match=text):
-            split(base(keys(bed_mm=[150.0] * 3, **changed), made))
+            split_base(base_layout(keys(bed_mm=[150.0] * 3, **changed), made))
 
 
 class TestBed:
@@ -196,8 +198,8 @@ class TestBed:
 
 
 class TestBought:
-    def test_a_whole_base(self, paper: Prototype) -> None:
-        found = bought(base(KEYS, paper))
+    def test_a_whole_base(self, paper: PrototypeLayout) -> None:
+        found = base_purchased_parts(base_layout(KEYS, paper))
         magnet = {name: count for name, count in found.items() if name.startswith("MAGNET")}
         assert sum(magnet.values()) == len(paper.balls.body_radius)
         # Four of the drive, two of the set screws.
@@ -209,26 +211,26 @@ class TestBought:
         assert set(found) <= set(load_parts())
         assert not any(name.startswith(("DOWEL", "M3x")) for name in found)
 
-    def test_joints_need_more(self, cut: tuple[BaseLayout, Split]) -> None:
+    def test_joints_need_more(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, plan = cut
         found, screws = fasteners(numbers, plan), sum(len(j.screws) for j in plan.joints)
         assert found["DOWEL-3x12"] == 2 * len(plan.joints)
         assert found["M3x12"] == screws
         assert found["INSERT-M3"] == 6 + screws
 
-    def test_other_hubs(self, made: Prototype) -> None:
-        clamp = bought(base(keys(lock="clamp"), made))
+    def test_other_hubs(self, made: PrototypeLayout) -> None:
+        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), made))
         assert clamp["INSERT-M3"] == 5
         assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
-        stage = bought(base(keys(drive="stage-60", hold="glue"), made))
+        stage = base_purchased_parts(base_layout(keys(drive="stage-60", hold="glue"), made))
         assert stage == {}
 
-    def test_not_in_a_list(self, made: Prototype) -> None:
+    def test_not_in_a_list(self, made: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
-            magnets(base(keys(magnet_height_mm=4.0), made))
-        numbers = base(keys(insert_hole_mm=4.4), made)
+            magnets(base_layout(keys(magnet_height_mm=4.0), made))
+        numbers = base_layout(keys(insert_hole_mm=4.4), made)
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
-            fasteners(numbers, split(numbers))
+            fasteners(numbers, split_base(numbers))
         short = replace(numbers, hub=replace(numbers.hub, boss=6.0), keys=KEYS)
         with pytest.raises(SpecError, match=r"no M3 screw of at most 2\.0 mm is in setscrews\.csv"):
-            fasteners(short, split(numbers))
+            fasteners(short, split_base(numbers))

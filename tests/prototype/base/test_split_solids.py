@@ -18,26 +18,26 @@ from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume,
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import prototype
+from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
-from tbcad.prototype.base.layout import BaseLayout, base
-from tbcad.prototype.base.screws import access, sizes
-from tbcad.prototype.base.solid import bodies, carrier, tools, whole
-from tbcad.prototype.base.split import Split, split
-from tbcad.prototype.base.split_solids import holes
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
+from tbcad.prototype.base.split import BaseSplit, split_base
+from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 
 KEYS = BaseSpec(bed_mm=(160.0, 160.0, 160.0))
 Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
-Cut = tuple[BaseLayout, Split, list[PlacedSolid], list[trimesh.Trimesh]]
+Cut = tuple[BaseLayout, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
 def cut_up(numbers: BaseLayout) -> Cut:
-    plan = split(numbers)
-    parts = carrier(numbers, plan)
+    plan = split_base(numbers)
+    parts = carrier_parts(numbers, plan)
     return numbers, plan, parts, [as_trimesh(part) for part in parts]
 
 
@@ -48,14 +48,14 @@ def as_trimesh(part: PlacedSolid) -> trimesh.Trimesh:
 
 @pytest.fixture(scope="module")
 def small(small_design: Design) -> Cut:
-    made = prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
-    return cut_up(base(KEYS, made))
+    made = prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+    return cut_up(base_layout(KEYS, made))
 
 
 @pytest.fixture(scope="module")
 def paper(paper_design: Design) -> Cut:
-    made = prototype(load_spec(None), paper_design)
-    return cut_up(base(BaseSpec(bed_mm=(180.0, 180.0, 180.0)), made))
+    made = prototype_layout(load_spec(None), paper_design)
+    return cut_up(base_layout(BaseSpec(bed_mm=(180.0, 180.0, 180.0)), made))
 
 
 def check_pieces(cut: Cut) -> None:
@@ -100,10 +100,10 @@ class TestSmall:
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
         numbers, plan, parts, _ = small
         seats = numbers.own_seats
-        added, removed = bodies(numbers, seats, plan), tools(numbers, seats)
+        added, removed = added_solids(numbers, seats, plan), removed_solids(numbers, seats)
         with_flanges = volume_by_meshes(added, removed, 0.01)
-        assert with_flanges > volume_by_meshes(bodies(numbers, seats), removed, 0.01) + 10_000
-        assert volume(whole(numbers, plan)) == pytest.approx(with_flanges, rel=2e-4)
+        assert with_flanges > volume_by_meshes(added_solids(numbers, seats), removed, 0.01) + 10_000
+        assert volume(carrier_solid(numbers, plan)) == pytest.approx(with_flanges, rel=2e-4)
         # Holes of both sides begin beyond the plane, so each piece has its own taken out.
         assert len(plan.pieces) == 2
         (joint,) = plan.joints
@@ -114,7 +114,7 @@ class TestSmall:
     def test_holes_of_both_sides_are_coaxial(self, small: Cut) -> None:
         numbers, plan, parts, _ = small
         (joint,) = plan.joints
-        used, size = numbers.keys, sizes(numbers.keys)
+        used, size = numbers.keys, joint_hardware(numbers.keys)
         turn = numbers.axes
         press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
         sides = {
@@ -129,13 +129,13 @@ class TestSmall:
             assert on_axis(sides[-head], place, normal) == pytest.approx([used.insert_hole_mm / 2])
             found = on_axis(sides[head], place, normal)
             assert found[0] == pytest.approx(SCREW_MM / 2)
-            assert found[-1] <= access(size) + 1e-9
+            assert found[-1] <= access_radius(size) + 1e-9
 
     def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
         """Straight from the plane into the material, until the mesh is met."""
         numbers, plan, _, meshes = small
         (joint,) = plan.joints
-        used, depth = numbers.keys, sizes(numbers.keys).dowel_depth
+        used, depth = numbers.keys, joint_hardware(numbers.keys).dowel_depth
         for side in (-1, 1):
             mesh = meshes[piece_at(plan, joint, side)]
             out = side * joint.plane.normal @ numbers.axes
@@ -179,7 +179,7 @@ class TestSmall:
 
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
         numbers, plan, parts, _ = small
-        for name, again in (("one", parts), ("two", carrier(numbers, plan))):
+        for name, again in (("one", parts), ("two", carrier_parts(numbers, plan))):
             for part in again:
                 write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))
         for part in parts:
@@ -195,13 +195,13 @@ class TestPaper:
         check_pads(paper)
 
 
-def piece_at(plan: Split, joint: Joint, side: int) -> int:
+def piece_at(plan: BaseSplit, joint: Joint, side: int) -> int:
     return plan.piece_of(joint.dowels[0] + side * joint.plane.normal)
 
 
 def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
     """Of dowels' and screws' holes and of inserts, without what is taken off for the heads."""
-    used, depth = numbers.keys, sizes(numbers.keys).dowel_depth
+    used, depth = numbers.keys, joint_hardware(numbers.keys).dowel_depth
     pins = [used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm]
     dowels = len(joint.dowels) * sum(np.pi / 4 * pin**2 * depth for pin in pins)
     insert = np.pi / 4 * used.insert_hole_mm**2 * used.insert_depth_mm
@@ -211,7 +211,9 @@ def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
 
 def heads_volume(numbers: BaseLayout, joint: Joint) -> float:
     """At most all of what is kept clear for the heads."""
-    return float(len(joint.screws) * np.pi * access(sizes(numbers.keys)) ** 2 * 25.2)
+    return float(
+        len(joint.screws) * np.pi * access_radius(joint_hardware(numbers.keys)) ** 2 * 25.2
+    )
 
 
 def cylinders(part: PlacedSolid) -> list[Cylinder]:
@@ -246,8 +248,8 @@ def first_hit(mesh: trimesh.Trimesh, at: np.ndarray, out: np.ndarray) -> float:
 
 def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
     numbers, _, _, _ = small
-    plan = Split((np.zeros((0, 4)),), ())
-    assert holes(numbers, plan, 0) == []
+    plan = BaseSplit((np.zeros((0, 4)),), ())
+    assert piece_holes(numbers, plan, 0) == []
 
 
 def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:

@@ -5,15 +5,15 @@ from hypothesis import strategies as st
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
-    Balance,
-    Load,
-    balance,
-    ball_load,
+    BaseBalance,
+    PointMasses,
+    ball_masses,
     cap_volume,
-    weight_load,
+    counterweight_masses,
+    sum_masses,
 )
 from tbcad.spec.design import load_spec
 
@@ -22,30 +22,30 @@ FRAME = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0).frame()
 TURN = np.pi / 2
 
 
-def at(along: float, radius: float, azimuth: float, mass: float = 100.0) -> Load:
+def at(along: float, radius: float, azimuth: float, mass: float = 100.0) -> PointMasses:
     place = np.array([[along, radius * np.cos(azimuth), radius * np.sin(azimuth)]])
-    return Load(np.array([mass]), place @ FRAME)
+    return PointMasses(np.array([mass]), place @ FRAME)
 
 
-def turned(load: Load, angle: float) -> Load:
+def turned(load: PointMasses, angle: float) -> PointMasses:
     """Rodrigues' rotation about the axis, apart from the frame's own."""
     w, r = FRAME[0], load.centre
     across = np.cross(w, r)
     along = (r @ w)[:, None] * w
-    return Load(
+    return PointMasses(
         load.mass_g, r * np.cos(angle) + across * np.sin(angle) + along * (1 - np.cos(angle))
     )
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=6"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=6"]), small_design)
 
 
 class TestTorque:
     def test_one_ball(self) -> None:
         """A ball 100 mm off the axis, beside it: its weight times 100 mm times cos 45 degrees."""
-        one = balance(FRAME, at(20, 100, 0))
+        one = sum_masses(FRAME, at(20, 100, 0))
         full = 0.1 * GRAVITY * 100 / np.sqrt(2)
         assert one.torque(np.array([0, TURN, -TURN, 2 * TURN])) == pytest.approx(
             [0, full, -full, 0]
@@ -55,7 +55,7 @@ class TestTorque:
     def test_it_is_that_of_its_weight(self) -> None:
         """Against w . (r x F) of the turned masses, from their places alone."""
         loads = [at(20, 100, 0.3), at(-40, 30, 2.0, 700.0), at(5, 80, -1.0, 30.0)]
-        summed = balance(FRAME, *loads)
+        summed = sum_masses(FRAME, *loads)
         for angle in np.linspace(-3, 3, 7):
             force = np.array([0, 0, -GRAVITY])
             expected = sum(
@@ -65,17 +65,17 @@ class TestTorque:
             assert summed.torque(np.array([angle])) == pytest.approx(expected)
 
     def test_symmetric_balls_have_none(self) -> None:
-        both = balance(FRAME, at(20, 100, 0.4), at(-20, 100, 0.4 + np.pi))
+        both = sum_masses(FRAME, at(20, 100, 0.4), at(-20, 100, 0.4 + np.pi))
         assert both.moment == 0
         assert both.worst(-np.pi, np.pi) == 0
 
     def test_an_upright_axis_has_none(self) -> None:
         upright = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-        load = Load(np.array([100.0]), np.array([[50.0, 20, 10]]))
-        assert balance(upright, load).greatest == 0
+        load = PointMasses(np.array([100.0]), np.array([[50.0, 20, 10]]))
+        assert sum_masses(upright, load).greatest == 0
 
     def test_worst_at_an_end_or_beside_the_axis(self) -> None:
-        one = balance(FRAME, at(0, 100, 0))
+        one = sum_masses(FRAME, at(0, 100, 0))
         assert one.worst(-1, 0.5) == pytest.approx(one.greatest * np.sin(1))
         assert one.worst(-0.5, 2) == one.greatest
         assert one.worst(-2, 0.5) == one.greatest
@@ -90,20 +90,20 @@ class TestTorque:
     def test_worst_is_that_of_all_angles(
         self, azimuth: float, low: float, width: float, mass: float
     ) -> None:
-        summed = balance(FRAME, at(0, 100, azimuth, mass), at(0, 30, 1.0))
+        summed = sum_masses(FRAME, at(0, 100, azimuth, mass), at(0, 30, 1.0))
         tried = np.abs(summed.torque(np.linspace(low, low + width, 2001))).max()
         assert tried <= summed.worst(low, low + width) * (1 + 1e-12)
         assert summed.worst(low, low + width) == pytest.approx(tried, rel=1e-5)
 
     def test_holding_torque_wanted(self) -> None:
-        one = balance(FRAME, at(0, 100, 0))
+        one = sum_masses(FRAME, at(0, 100, 0))
         inertia = 0.1 * 0.1**2  # kg m^2
         assert one.needed(-2, 2, 3.0, 2.0) == pytest.approx(2 * (one.greatest + 1e3 * inertia * 3))
 
 
 class TestCentre:
     def test_of_two(self) -> None:
-        both = balance(FRAME, at(0, 100, 0, 100.0), at(30, 100, 0, 300.0))
+        both = sum_masses(FRAME, at(0, 100, 0, 100.0), at(30, 100, 0, 300.0))
         assert both.mass_g == 400
         assert FRAME @ both.centre == pytest.approx([22.5, 100, 0])
 
@@ -114,44 +114,46 @@ class TestCentre:
             lever = turned(load, angle).centre[0] - along * FRAME[0]
             moment = np.cross(lever, [0, 0, -GRAVITY * 0.1])
             moments.append(np.linalg.norm(moment - (moment @ FRAME[0]) * FRAME[0]))
-        assert balance(FRAME, load).tilting(along) == pytest.approx(max(moments), rel=1e-4)
+        assert sum_masses(FRAME, load).tilting(along) == pytest.approx(max(moments), rel=1e-4)
 
 
 class TestCounterweight:
     @given(azimuth=st.floats(-3, 3), radius=st.floats(10, 300), mass=st.floats(1, 5000))
     def test_nothing_is_left(self, azimuth: float, radius: float, mass: float) -> None:
         load = at(30, 90, azimuth, mass)
-        weight = balance(FRAME, load).counterweight(radius)
+        weight = sum_masses(FRAME, load).counterweight(radius)
         assert weight.mass_g == pytest.approx(mass * 90 / radius)
-        left = balance(FRAME, load, weight_load(weight, -80, FRAME))
+        left = sum_masses(FRAME, load, counterweight_masses(weight, -80, FRAME))
         assert left.worst(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
         assert left.mass_g == pytest.approx(mass + weight.mass_g)
 
-    def test_of_a_prototype(self, made: Prototype) -> None:
-        load = ball_load(made, 1.27)
-        before = balance(made.half.ellipsoid.frame(), load)
+    def test_of_a_prototype(self, made: PrototypeLayout) -> None:
+        load = ball_masses(made, 1.27)
+        before = sum_masses(made.half.ellipsoid.frame(), load)
         weight = before.counterweight(100)
-        after = balance(before.frame, load, weight_load(weight, -70, before.frame))
+        after = sum_masses(before.frame, load, counterweight_masses(weight, -70, before.frame))
         assert before.greatest > 100
         assert after.greatest < 1e-9 * before.greatest
 
 
 class TestBalls:
-    def test_balls_weigh_where_they_sit(self, made: Prototype) -> None:
-        load = ball_load(made, 1.27)
+    def test_balls_weigh_where_they_sit(self, made: PrototypeLayout) -> None:
+        load = ball_masses(made, 1.27)
         bought = ~made.balls.cap
         assert len(load) == len(made)
         assert load.mass_g[bought].sum() == pytest.approx(made.mass_g)
         assert (load.centre == made.body_centres()).all()
 
-    def test_turning_the_base_turns_the_balls(self, made: Prototype) -> None:
+    def test_turning_the_base_turns_the_balls(self, made: PrototypeLayout) -> None:
         frame = made.half.ellipsoid.frame()
-        still = balance(frame, ball_load(made, 1.27))
-        moved = balance(frame, Load(ball_load(made, 1.27).mass_g, made.body_centres(0.4)))
+        still = sum_masses(frame, ball_masses(made, 1.27))
+        moved = sum_masses(
+            frame, PointMasses(ball_masses(made, 1.27).mass_g, made.body_centres(0.4))
+        )
         assert still.torque(np.array([0.4])) == pytest.approx(moved.torque(np.array([0.0])))
         assert still.inertia == pytest.approx(moved.inertia)
 
-    def test_caps_by_slices(self, made: Prototype) -> None:
+    def test_caps_by_slices(self, made: PrototypeLayout) -> None:
         """Their volume as the sum of thin discs: within both spheres."""
         balls = made.balls
         assert balls.cap.any()
@@ -165,12 +167,12 @@ class TestBalls:
             area = np.pi * np.where(x < drop, front, np.maximum(back, 0))
             assert cap_volume(balls)[j] == pytest.approx(np.trapezoid(area, x), rel=1e-5)
 
-    def test_balls_have_no_cap(self, made: Prototype) -> None:
+    def test_balls_have_no_cap(self, made: PrototypeLayout) -> None:
         assert (cap_volume(made.balls)[~made.balls.cap] == 0).all()
 
 
 def test_one_mass_is_its_own_sum() -> None:
-    one: Balance = balance(FRAME, at(10, 50, 0.2, 80.0))
+    one: BaseBalance = sum_masses(FRAME, at(10, 50, 0.2, 80.0))
     assert FRAME @ one.centre == pytest.approx([10, 50 * np.cos(0.2), 50 * np.sin(0.2)])
     assert one.moment == pytest.approx(4000)
     assert one.azimuth == pytest.approx(0.2)

@@ -15,7 +15,7 @@ from tbcad.prototype.drive.drive import (
     Drive,
     belt_length,
     centre_distance,
-    chosen,
+    choose_drive,
     load_drives,
     load_parts,
     pitch_diameter,
@@ -162,18 +162,18 @@ class TestDrives:
             _ = drive.centre_mm
 
     def test_the_first_that_does(self) -> None:
-        assert chosen("nema17-belt", 1000, DRIVES) == belt()
-        assert chosen("nema17-belt", 3000, DRIVES).motor.name == "NEMA17-48"
+        assert choose_drive("nema17-belt", 1000, DRIVES) == belt()
+        assert choose_drive("nema17-belt", 3000, DRIVES).motor.name == "NEMA17-48"
 
     def test_none_does(self) -> None:
         with pytest.raises(SpecError, match=r"no drive nema17-direct holds 2000 N mm .* 650: bal"):
-            chosen("nema17-direct", 2000, DRIVES)
+            choose_drive("nema17-direct", 2000, DRIVES)
         with pytest.raises(SpecError, match="use one of nema17-belt, nema17-direct, stage-60"):
-            chosen("servo", 1, DRIVES)
+            choose_drive("servo", 1, DRIVES)
 
     @given(needed=st.floats(1, 4600))
     def test_what_is_chosen_holds(self, needed: float) -> None:
-        drive = chosen("nema17-belt", needed, DRIVES)
+        drive = choose_drive("nema17-belt", needed, DRIVES)
         assert drive.holds_nmm >= needed
         before = DRIVES[: DRIVES.index(drive)]
         assert all(d.holds_nmm < needed for d in before)

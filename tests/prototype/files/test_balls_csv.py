@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.files.balls_csv import COLUMNS, rows, write_balls
 from tbcad.spec.design import load_spec
 
@@ -14,15 +14,15 @@ Read = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
+def made(small_design: Design) -> PrototypeLayout:
     """Balls and caps, both."""
-    return prototype(
+    return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
     )
 
 
 @pytest.fixture(scope="module")
-def read(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def read(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("balls") / "balls.csv"
     write_balls(path, rows(made))
     with path.open(newline="") as file:
@@ -33,13 +33,13 @@ def column(read: Read, *names: str) -> NDArray[np.float64]:
     return np.array([[float(row[name]) for name in names] for row in read]).squeeze()
 
 
-def test_one_row_a_ball(made: Prototype, read: Read) -> None:
+def test_one_row_a_ball(made: PrototypeLayout, read: Read) -> None:
     assert tuple(read[0]) == COLUMNS
     assert [int(row["number"]) for row in read] == list(range(1, len(made) + 1))
     assert [row["size"] for row in read] == list(made.balls.size)
 
 
-def test_places_are_exact(made: Prototype, read: Read) -> None:
+def test_places_are_exact(made: PrototypeLayout, read: Read) -> None:
     for names, expected in {
         ("px", "py", "pz"): made.apices(),
         ("nx", "ny", "nz"): made.normals(),
@@ -63,7 +63,7 @@ def test_the_table_alone_gives_the_spheres(read: Read) -> None:
     assert away == pytest.approx(np.full(len(read), away[0]))
 
 
-def test_balls_have_grade_and_mass_caps_have_none(made: Prototype, read: Read) -> None:
+def test_balls_have_grade_and_mass_caps_have_none(made: PrototypeLayout, read: Read) -> None:
     kinds = [row["kind"] for row in read]
     assert set(kinds) == {"ball", "cap"}
     for row, cap, mass in zip(read, made.balls.cap, made.balls.mass_g, strict=True):
@@ -76,7 +76,7 @@ def test_balls_have_grade_and_mass_caps_have_none(made: Prototype, read: Read) -
             assert float(row["diameter_mm"]) == 2 * float(row["radius_mm"])
 
 
-def test_what_they_show(made: Prototype, read: Read) -> None:
+def test_what_they_show(made: PrototypeLayout, read: Read) -> None:
     fit = made.fit
     assert sum(int(row["mirrors"]) for row in read) == len(made.half)
     assert column(read, "pixels").sum() == pytest.approx(fit.pixels.sum())
@@ -89,7 +89,7 @@ def test_what_they_show(made: Prototype, read: Read) -> None:
         assert float(row["error_deg"]) == np.degrees(made.stops.error[own]).max()
 
 
-def test_same_bytes(made: Prototype, tmp_path: Path) -> None:
+def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path in paths:
         write_balls(path, rows(made))

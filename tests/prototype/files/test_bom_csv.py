@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.drive.balance import balance, ball_load, cap_volume
-from tbcad.prototype.drive.drive import Drive, chosen, load_drives, load_parts
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives, load_parts
 from tbcad.prototype.files.bom_csv import (
     COLUMNS,
     PartsNeeded,
@@ -35,20 +35,20 @@ Read = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
+def made(small_design: Design) -> PrototypeLayout:
     """Balls and caps, both."""
-    return prototype(
+    return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
     )
 
 
 @pytest.fixture(scope="module")
 def drive() -> Drive:
-    return chosen("nema17-belt", 1000, DRIVES)
+    return choose_drive("nema17-belt", 1000, DRIVES)
 
 
 @pytest.fixture(scope="module")
-def read(made: Prototype, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def read(made: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
     write_bom(path, rows(made, drive, NEEDED, PARTS))
     with path.open(newline="") as file:
@@ -71,7 +71,7 @@ def test_rows(read: Read) -> None:
         assert (row["print_volume_mm3"] != "") == (row["from"] == "printed")
 
 
-def test_totals_are_the_sum_of_the_parts(made: Prototype, drive: Drive, read: Read) -> None:
+def test_totals_are_the_sum_of_the_parts(made: PrototypeLayout, drive: Drive, read: Read) -> None:
     balls = made.mass_g + 1.27e-3 * cap_volume(made.balls).sum()
     bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.bought.items())
     electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
@@ -81,7 +81,7 @@ def test_totals_are_the_sum_of_the_parts(made: Prototype, drive: Drive, read: Re
     assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)
 
 
-def test_balls_by_size(made: Prototype, read: Read) -> None:
+def test_balls_by_size(made: PrototypeLayout, read: Read) -> None:
     balls = [row for row in read if row["part"].startswith("ball ")]
     assert sum(int(row["quantity"]) for row in balls) == (~made.balls.cap).sum()
     for row in balls:
@@ -92,7 +92,7 @@ def test_balls_by_size(made: Prototype, read: Read) -> None:
     assert len(caps) == made.balls.cap.sum() > 0
 
 
-def test_equal_balls_share_a_row(made: Prototype, drive: Drive) -> None:
+def test_equal_balls_share_a_row(made: PrototypeLayout, drive: Drive) -> None:
     stock = made.balls.stock.copy()
     stock[:] = 10
     alike = replace(made, balls=replace(made.balls, stock=stock))
@@ -123,7 +123,7 @@ def test_drive_is_in_it(drive: Drive, read: Read) -> None:
         assert of(read, part.name)["quantity"] == "1"
 
 
-def test_turned_caps(made: Prototype, drive: Drive) -> None:
+def test_turned_caps(made: PrototypeLayout, drive: Drive) -> None:
     needed = PartsNeeded(cap_material="steel")
     caps = [row for row in rows(made, drive, needed, PARTS) if row["from"] == "turned"]
     weights = 7.81e-3 * cap_volume(made.balls)[made.balls.cap]
@@ -131,23 +131,23 @@ def test_turned_caps(made: Prototype, drive: Drive) -> None:
     assert {row["material"] for row in caps} == {"steel"}
 
 
-def test_unknown_part(made: Prototype, drive: Drive) -> None:
+def test_unknown_part(made: PrototypeLayout, drive: Drive) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
         rows(made, drive, PartsNeeded(bought={"M3x11": 1}), PARTS)
 
 
-def test_same_bytes(made: Prototype, drive: Drive, tmp_path: Path) -> None:
+def test_same_bytes(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     for name in ("a", "b"):
         write_bom(tmp_path / name, rows(made, drive, NEEDED, load_parts()))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_record_of_the_drive(made: Prototype) -> None:
-    summed = balance(made.half.ellipsoid.frame(), ball_load(made, 1.27))
+def test_record_of_the_drive(made: PrototypeLayout) -> None:
+    summed = sum_masses(made.half.ellipsoid.frame(), ball_masses(made, 1.27))
     low, high = (float(made.stops.angle[i]) for i in (0, -1))
     motion = MotionSpec()
     needed = summed.needed(low, high, np.radians(motion.acceleration_deg_s2), motion.safety)
-    drive = chosen("nema17-belt", needed, DRIVES)
+    drive = choose_drive("nema17-belt", needed, DRIVES)
     record = json.loads(json.dumps(drive_record(summed, drive, motion, (low, high), 120.0)))
     assert record["needed_nmm"] <= record["holds_nmm"]
     assert record["needed_nmm"] >= 2 * record["worst_torque_nmm"]

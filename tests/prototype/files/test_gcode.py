@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.drive.drive import Drive, chosen, load_drives, load_parts
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives, load_parts
 from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
@@ -102,16 +102,16 @@ def sent(lines: list[str], axis: str = "X") -> Grbl:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
 @pytest.fixture(scope="module")
 def drive() -> Drive:
-    return chosen("nema17-belt", 1000, load_drives(load_parts()))
+    return choose_drive("nema17-belt", 1000, load_drives(load_parts()))
 
 
-def test_every_stop_twice_in_order_within_a_step(made: Prototype, drive: Drive) -> None:
+def test_every_stop_twice_in_order_within_a_step(made: PrototypeLayout, drive: Drive) -> None:
     machine = sent(program(made, drive, MOTION))
     angle = np.degrees(made.stops.angle)
     step = 1 / drive.steps_per_deg(MOTION.microsteps)
@@ -119,7 +119,7 @@ def test_every_stop_twice_in_order_within_a_step(made: Prototype, drive: Drive) 
     assert off.max() < 10**-DECIMALS < step / 10
 
 
-def test_it_stays_in_the_swing_but_for_the_approach(made: Prototype, drive: Drive) -> None:
+def test_it_stays_in_the_swing_but_for_the_approach(made: PrototypeLayout, drive: Drive) -> None:
     machine = sent(program(made, drive, MOTION))
     ends = np.degrees(made.stops.angle[[0, -1]])
     half = np.degrees(made.placement.swing) / 2
@@ -132,7 +132,7 @@ def test_it_stays_in_the_swing_but_for_the_approach(made: Prototype, drive: Driv
     assert min(within) >= ends[0]
 
 
-def test_every_stop_is_reached_from_below(made: Prototype, drive: Drive) -> None:
+def test_every_stop_is_reached_from_below(made: PrototypeLayout, drive: Drive) -> None:
     machine = sent(program(made, drive, MOTION))
     steps = list(zip(machine.moves, machine.moves[1:], strict=False))
     for shot in set(machine.shots):
@@ -141,7 +141,7 @@ def test_every_stop_is_reached_from_below(made: Prototype, drive: Drive) -> None
         assert max(came) < shot
 
 
-def test_pauses_for_people(made: Prototype, drive: Drive) -> None:
+def test_pauses_for_people(made: PrototypeLayout, drive: Drive) -> None:
     machine = sent(program(made, drive, MOTION))
     (before, first), (between, second) = machine.pauses
     assert before is None
@@ -150,19 +150,19 @@ def test_pauses_for_people(made: Prototype, drive: Drive) -> None:
     assert between == pytest.approx(run(made, MOTION).start, abs=1e-3)
 
 
-def test_it_ends_where_it_began(made: Prototype, drive: Drive) -> None:
+def test_it_ends_where_it_began(made: PrototypeLayout, drive: Drive) -> None:
     motion = MotionSpec(home_deg=-12.5)
     assert sent(program(made, drive, motion)).at == -12.5
 
 
-def test_other_axis(made: Prototype, drive: Drive) -> None:
+def test_other_axis(made: PrototypeLayout, drive: Drive) -> None:
     plain, other = (program(made, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
     assert sent(other, "A").shots == sent(plain).shots
     assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
     assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
 
 
-def test_a_person_as_trigger(made: Prototype, drive: Drive) -> None:
+def test_a_person_as_trigger(made: PrototypeLayout, drive: Drive) -> None:
     lines = program(made, drive, MotionSpec(trigger="pause"))
     machine = sent(lines)
     assert not machine.shots
@@ -170,14 +170,14 @@ def test_a_person_as_trigger(made: Prototype, drive: Drive) -> None:
     assert not {"M8", "M9"} & set(lines)
 
 
-def test_comments_count_the_mirrors(made: Prototype, drive: Drive) -> None:
+def test_comments_count_the_mirrors(made: PrototypeLayout, drive: Drive) -> None:
     lines = program(made, drive, MOTION)
     counts = [int(c) for line in lines for c in re.findall(r"of \d+: (\d+) mirrors", line)]
     assert sum(counts) == 2 * len(made.half)
     assert f"(stop 1 of {len(made.stops)}: {len(made.stops.mirrors(0))} mirrors)" in lines
 
 
-def test_time(made: Prototype, drive: Drive) -> None:
+def test_time(made: PrototypeLayout, drive: Drive) -> None:
     machine = sent(program(made, drive, MOTION))
     todo = run(made, MOTION)
     way = 2 * 2 * (todo.angle[-1] - todo.start)
@@ -192,7 +192,7 @@ def test_time(made: Prototype, drive: Drive) -> None:
         MotionSpec(approach_deg=30),
     ],
 )
-def test_other_motions(made: Prototype, drive: Drive, motion: MotionSpec) -> None:
+def test_other_motions(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
     machine = sent(program(made, drive, motion))
     low, high = np.degrees(free(made))
     assert low <= min(machine.moves)
@@ -202,18 +202,18 @@ def test_other_motions(made: Prototype, drive: Drive, motion: MotionSpec) -> Non
 
 def test_the_approach_ends_where_something_stands(small_design: Design) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
-    tight = prototype(spec, small_design)
+    tight = prototype_layout(spec, small_design)
     start = run(tight, MotionSpec(approach_deg=20)).start
     assert start == pytest.approx(np.degrees(free(tight)[0]))
     assert start == pytest.approx(-90)
 
 
-def test_a_start_out_of_reach(made: Prototype) -> None:
+def test_a_start_out_of_reach(made: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
         run(made, MotionSpec(home_deg=170))
 
 
-def test_written(made: Prototype, drive: Drive, tmp_path: Path) -> None:
+def test_written(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     lines = program(made, drive, MOTION)
     for name in ("a.nc", "b.nc"):
         write_program(tmp_path / name, lines)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, pictures, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
 from tbcad.prototype.files.balls_csv import Row
 from tbcad.prototype.files.plan_csv import (
     COLUMNS,
@@ -26,25 +26,25 @@ def read_back(path: Path) -> Read:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def plan(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def plan(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("plan") / "rotation_plan.csv"
-    write_plan(path, rows(pictures(made)))
+    write_plan(path, rows(planned_pictures(made)))
     return read_back(path)
 
 
 @pytest.fixture(scope="module")
-def stops(made: Prototype, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def stops(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("stops") / "stops.csv"
     write_stops(path, stop_rows(made))
     return read_back(path)
 
 
-def test_every_mirror_of_both_cameras_once(made: Prototype, plan: Read) -> None:
+def test_every_mirror_of_both_cameras_once(made: PrototypeLayout, plan: Read) -> None:
     assert tuple(plan[0]) == COLUMNS
     assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(made.half) + 1))
     for turn, camera in (("0", "a"), ("180", "b")):
@@ -52,8 +52,8 @@ def test_every_mirror_of_both_cameras_once(made: Prototype, plan: Read) -> None:
         assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(made.half))]
 
 
-def test_round_trip(made: Prototype, plan: Read) -> None:
-    for row, one in zip(plan, pictures(made), strict=True):
+def test_round_trip(made: PrototypeLayout, plan: Read) -> None:
+    for row, one in zip(plan, planned_pictures(made), strict=True):
         assert int(row["stop"]) == one.stop + 1
         assert int(row["ball"]) == one.ball + 1
         for name, angle in {
@@ -71,7 +71,7 @@ def test_each_run_goes_upward(plan: Read) -> None:
         assert angle == sorted(angle)
 
 
-def test_the_table_alone_gives_the_directions(made: Prototype, plan: Read) -> None:
+def test_the_table_alone_gives_the_directions(made: PrototypeLayout, plan: Read) -> None:
     """Ball's azimuth on the base and the base's angle, less the error: the mirror's azimuth."""
     half, azimuth = made.half, np.degrees(made.placement.azimuth)
     for row in (row for row in plan if row["object_turn_deg"] == "0"):
@@ -94,9 +94,9 @@ def test_stops_sum_up_the_plan(plan: Read, stops: Read) -> None:
             assert worst == float(stop["azimuth_error_deg"])
 
 
-def test_same_bytes(made: Prototype, tmp_path: Path) -> None:
+def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
     def written(name: str, records: list[Row]) -> bytes:
         write_plan(tmp_path / name, records)
         return (tmp_path / name).read_bytes()
 
-    assert written("a", rows(pictures(made))) == written("b", rows(pictures(made)))
+    assert written("a", rows(planned_pictures(made))) == written("b", rows(planned_pictures(made)))

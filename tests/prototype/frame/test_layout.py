@@ -10,8 +10,8 @@ import pytest
 from tbcad.geometry.primitives import Rod
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import prototype
-from tbcad.prototype.base.layout import BaseLayout, base
+from tbcad.prototype.balls.layout import prototype_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import Drive, load_drives, load_parts
 from tbcad.prototype.frame.brackets import fitting, rig_axes
 from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
@@ -38,9 +38,9 @@ class Rig:
 
     def __init__(self, spec: Spec, design: Design, name: str = "nema17-belt") -> None:
         self.own = spec.prototype
-        self.made = prototype(spec, design)
+        self.made = prototype_layout(spec, design)
         keys = spec.prototype.base.model_copy(update={"drive": name})
-        self.base: BaseLayout = base(keys, self.made)
+        self.base: BaseLayout = base_layout(keys, self.made)
         self.space: Room = room(self.made, self.base, CAPTURE, 0.0)
         self.stage: StageLayout = self.staged(KEYS)
 

@@ -15,8 +15,8 @@ from tbcad.cad.solids import faces, meshed, volume
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.layout import BaseLayout, base
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_drives, load_parts
 from tbcad.prototype.frame.frame_solids import bought, parts
 from tbcad.prototype.frame.layout import FrameLayout, frame
@@ -37,27 +37,29 @@ PRINTER = BaseSpec()
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(SPEC, small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(SPEC, small_design)
 
 
 @pytest.fixture(scope="module")
-def carrier(made: Prototype) -> BaseLayout:
-    return base(PRINTER, made)
+def carrier(made: PrototypeLayout) -> BaseLayout:
+    return base_layout(PRINTER, made)
 
 
 @pytest.fixture(scope="module")
-def space(made: Prototype, carrier: BaseLayout) -> Room:
+def space(made: PrototypeLayout, carrier: BaseLayout) -> Room:
     return room(made, carrier, 30.0, 0.0)
 
 
 @pytest.fixture(scope="module")
-def stand(made: Prototype, space: Room) -> StageLayout:
+def stand(made: PrototypeLayout, space: Room) -> StageLayout:
     return stage((StageSpec(), KEYS, SPEC.prototype), made, space, LISTS)
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype, carrier: BaseLayout, space: Room, stand: StageLayout) -> FrameLayout:
+def numbers(
+    made: PrototypeLayout, carrier: BaseLayout, space: Room, stand: StageLayout
+) -> FrameLayout:
     return frame((KEYS, SPEC.prototype), made, carrier, stand, DRIVE, space, LISTS)
 
 
@@ -134,7 +136,7 @@ class TestSolids:
         assert np.array(along) - numbers.head.motor == pytest.approx(np.array(ends), abs=1e-5)
 
     def test_the_bracket_puts_the_pinhole_where_the_record_has_it(
-        self, made: Prototype, solids: dict[str, PlacedSolid]
+        self, made: PrototypeLayout, solids: dict[str, PlacedSolid]
     ) -> None:
         """From the bracket alone: its face and slot, and the camera's radius and thread."""
         view, own = made.half.view, SPEC.prototype
@@ -201,7 +203,7 @@ class TestSolids:
 class TestClearance:
     def test_nothing_meets_the_base(
         self,
-        made: Prototype,
+        made: PrototypeLayout,
         carrier: BaseLayout,
         solids: dict[str, PlacedSolid],
         things: dict[str, TopoDS_Shape],
@@ -228,7 +230,7 @@ class TestClearance:
 
     def test_no_ray_hits_the_frame(
         self,
-        made: Prototype,
+        made: PrototypeLayout,
         solids: dict[str, PlacedSolid],
         things: dict[str, TopoDS_Shape],
         stand: StageLayout,
@@ -253,7 +255,12 @@ class TestClearance:
 
     @pytest.mark.parametrize("teeth", [60, 120])
     def test_printed_and_bought_do_not_overlap(
-        self, made: Prototype, carrier: BaseLayout, space: Room, stand: StageLayout, teeth: int
+        self,
+        made: PrototypeLayout,
+        carrier: BaseLayout,
+        space: Room,
+        stand: StageLayout,
+        teeth: int,
     ) -> None:
         drive = next(d for d in load_drives(LISTS) if d.wheel and d.wheel["teeth"] == teeth)
         keys = FrameSpec(clearance_mm=0.5)

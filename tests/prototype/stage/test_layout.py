@@ -11,8 +11,8 @@ from tbcad.geometry.primitives import SIDES, Prism, Rod, Turned, box, rod, slot,
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.layout import BaseLayout, base
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, leds, stage
@@ -27,27 +27,27 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(SPEC, small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(SPEC, small_design)
 
 
 @pytest.fixture(scope="module")
-def carrier(made: Prototype) -> BaseLayout:
-    return base(SPEC.prototype.base, made)
+def carrier(made: PrototypeLayout) -> BaseLayout:
+    return base_layout(SPEC.prototype.base, made)
 
 
 @pytest.fixture(scope="module")
-def space(made: Prototype, carrier: BaseLayout) -> Room:
+def space(made: PrototypeLayout, carrier: BaseLayout) -> Room:
     return room(made, carrier, CAPTURE, 0.0)
 
 
-def staged(made: Prototype, space: Room, **changed: object) -> StageLayout:
+def staged(made: PrototypeLayout, space: Room, **changed: object) -> StageLayout:
     post = changed.pop("post", 20.0)
     own = SPEC.prototype.model_copy(update={"post_diameter_mm": post})
     return stage((StageSpec.model_validate(changed), FrameSpec(), own), made, space, PARTS)
 
 
-def refusal(made: Prototype, space: Room, **changed: object) -> str:
+def refusal(made: PrototypeLayout, space: Room, **changed: object) -> str:
     with pytest.raises(SpecError) as caught:
         staged(made, space, **changed)
     return str(caught.value)
@@ -55,7 +55,7 @@ def refusal(made: Prototype, space: Room, **changed: object) -> str:
 
 class TestStage:
     def test_leds_stand_where_the_spec_has_them_and_look_up(
-        self, made: Prototype, space: Room
+        self, made: PrototypeLayout, space: Room
     ) -> None:
         found = leds(staged(made, space))
         assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
@@ -72,18 +72,22 @@ class TestStage:
         area = max(float(norm(np.cross(sides[i], sides[j]))) for i, j in ((0, 1), (0, 2), (1, 2)))
         assert abs(np.linalg.det(sides)) / area > 2.0
 
-    def test_room_below_the_object_is_what_was_found(self, made: Prototype, space: Room) -> None:
+    def test_room_below_the_object_is_what_was_found(
+        self, made: PrototypeLayout, space: Room
+    ) -> None:
         numbers = staged(made, space)
         assert numbers.light > -GRAZING_MM
         assert numbers.swept > FrameSpec().clearance_mm
         assert numbers.post == 10.0
 
-    def test_a_stage_without_leds(self, made: Prototype, space: Room) -> None:
+    def test_a_stage_without_leds(self, made: PrototypeLayout, space: Room) -> None:
         numbers = staged(made, space, leds_mm=[])
         assert leds(numbers) == []
         assert [item.name for item in numbers.items] == ["stage_disc", "stage_crown", "stage_post"]
 
-    def test_the_studs_take_the_disc_two_ways_round(self, made: Prototype, space: Room) -> None:
+    def test_the_studs_take_the_disc_two_ways_round(
+        self, made: PrototypeLayout, space: Room
+    ) -> None:
         disc, crown, _ = staged(made, space).items
         holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Rod)])
         studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Rod)])
@@ -103,12 +107,12 @@ class TestStage:
         ],
     )
     def test_what_does_not_fit_is_refused(
-        self, made: Prototype, space: Room, changed: dict[str, object], words: str
+        self, made: PrototypeLayout, space: Room, changed: dict[str, object], words: str
     ) -> None:
         assert words in refusal(made, space, **changed)
 
     def test_a_post_in_the_light_or_in_the_base_is_refused(
-        self, made: Prototype, space: Room
+        self, made: PrototypeLayout, space: Room
     ) -> None:
         below = replace(space, used=space.used + np.pi)
         assert "mm in the light of the balls" in refusal(made, below)
@@ -129,7 +133,7 @@ class TestStage:
     )
     def test_leds_that_do_not_do_are_refused(
         self,
-        made: Prototype,
+        made: PrototypeLayout,
         space: Room,
         number: int,
         place: tuple[float, float, float],
@@ -139,11 +143,11 @@ class TestStage:
         places[number - 1] = place
         assert words in refusal(made, space, leds_mm=places)
 
-    def test_leds_in_one_plane_are_refused(self, made: Prototype, space: Room) -> None:
+    def test_leds_in_one_plane_are_refused(self, made: PrototypeLayout, space: Room) -> None:
         places = [(x, y, -15.0) for x, y, _ in StageSpec().leds_mm]
         assert "nearly in one plane" in refusal(made, space, leds_mm=places)
 
-    def test_a_floor_too_high_is_refused(self, made: Prototype, space: Room) -> None:
+    def test_a_floor_too_high_is_refused(self, made: PrototypeLayout, space: Room) -> None:
         with pytest.raises(SpecError, match=r"make prototype\.frame\.floor_mm"):
             stage((StageSpec(), FrameSpec(floor_mm=-60.0), SPEC.prototype), made, space, PARTS)
 
@@ -151,7 +155,9 @@ class TestStage:
         with pytest.raises(ValidationError, match="4 to 12 places"):
             StageSpec.model_validate({"leds_mm": StageSpec().leds_mm[:3]})
 
-    def test_no_led_is_hidden_in_a_march_along_its_rays(self, made: Prototype, space: Room) -> None:
+    def test_no_led_is_hidden_in_a_march_along_its_rays(
+        self, made: PrototypeLayout, space: Room
+    ) -> None:
         numbers = staged(made, space)
         crown = numbers.items[1]
         pillars = [body for body in crown.added[3:] if isinstance(body, Rod)]
@@ -167,7 +173,7 @@ class TestStage:
 
 
 class TestRoom:
-    def test_light_is_where_rays_are(self, made: Prototype, space: Room) -> None:
+    def test_light_is_where_rays_are(self, made: PrototypeLayout, space: Room) -> None:
         """Rays from points of the capture sphere to points of the part in use, at its stops."""
         rng = np.random.default_rng(5)
         outline, stops = made.balls.outline, made.stops
@@ -205,7 +211,7 @@ class TestRoom:
         assert exact[outside] == pytest.approx(found[outside], abs=0.8)
 
     def test_swept_holds_carrier_and_balls_at_all_angles(
-        self, made: Prototype, carrier: BaseLayout, space: Room
+        self, made: PrototypeLayout, carrier: BaseLayout, space: Room
     ) -> None:
         seat = carrier.seats
         for angle in np.linspace(made.stops.angle[0], made.stops.angle[-1], 7).tolist():
@@ -230,7 +236,9 @@ class TestRoom:
             assert space.swept(point)[0] <= away + 1e-9
             assert space.swept(point)[0] > 0.5 * away
 
-    def test_approach_widens_what_is_swept(self, made: Prototype, carrier: BaseLayout) -> None:
+    def test_approach_widens_what_is_swept(
+        self, made: PrototypeLayout, carrier: BaseLayout
+    ) -> None:
         near = room(made, carrier, CAPTURE, 0.0).sections[0]
         far = room(made, carrier, CAPTURE, 0.1).sections[0]
         assert far.low == pytest.approx(near.low - 0.1)
@@ -289,6 +297,6 @@ class TestBodies:
         assert [end.start[0] for end in ends if isinstance(end, Rod)] == [-3, 3]
 
 
-def test_the_same_stage_twice(made: Prototype, space: Room) -> None:
+def test_the_same_stage_twice(made: PrototypeLayout, space: Room) -> None:
     first, second = (replace(staged(made, space), led=PARTS["LED-3"]) for _ in range(2))
     assert repr(first) == repr(second)

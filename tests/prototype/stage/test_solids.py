@@ -12,8 +12,8 @@ from tbcad.cad.solids import meshed
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
-from tbcad.prototype.balls.layout import Prototype, prototype
-from tbcad.prototype.base.layout import base
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import Room, room
 from tbcad.prototype.printing.placing import PlacedSolid
@@ -31,17 +31,17 @@ KEYS = BaseSpec()
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> Prototype:
-    return prototype(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+def made(small_design: Design) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def space(made: Prototype) -> Room:
-    return room(made, base(KEYS, made), CAPTURE, 0.0)
+def space(made: PrototypeLayout) -> Room:
+    return room(made, base_layout(KEYS, made), CAPTURE, 0.0)
 
 
 @pytest.fixture(scope="module")
-def numbers(made: Prototype, space: Room) -> StageLayout:
+def numbers(made: PrototypeLayout, space: Room) -> StageLayout:
     own = load_spec(None).prototype
     return stage((StageSpec(), FrameSpec(), own), made, space, LISTS)
 

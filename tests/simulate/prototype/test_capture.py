@@ -14,7 +14,7 @@ import tbcad.simulate.compiled
 import tbcad.simulate.prototype.merge
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm, unit
-from tbcad.prototype.balls.layout import Prototype
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.capture.light_field import LightField, write, writing
 from tbcad.simulate.capture.photograph import CENTRE, Band
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
@@ -38,7 +38,7 @@ Rows = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def both(made: Prototype, cameras: tuple[Reflector, Reflector]) -> Both:
+def both(made: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Both:
     return runs(cameras, plan_of(made))
 
 
@@ -52,7 +52,7 @@ def merged(both: Both, scene: Scene) -> LightField:
     return light_field(both, scene, CAPTURE_MM)
 
 
-def ideal(made: Prototype, angle: float) -> Plan:
+def ideal(made: PrototypeLayout, angle: float) -> Plan:
     """A ball for every mirror, its like, on a base that brings them there at one angle."""
     half, m = made.half, np.arange(len(made.half))
     back = Rotation.from_rotvec(-angle * half.ellipsoid.axis)
@@ -89,7 +89,9 @@ class TestGeometry:
             assert np.abs(seen.origin - run.stands.apex).max() < 1e-9
             assert np.abs(seen.direction + unit(run.stands.apex)).max() < 1e-9
 
-    def test_balls_stand_as_far_off_as_the_plan_says(self, both: Both, made: Prototype) -> None:
+    def test_balls_stand_as_far_off_as_the_plan_says(
+        self, both: Both, made: PrototypeLayout
+    ) -> None:
         a, b = (2 * np.arcsin(norm(unit(run.stands.apex) - run.at.u) / 2) for run in both)
         assert a == pytest.approx(made.stops.error, abs=1e-9)
         assert b[made.twin] == pytest.approx(made.stops.error, abs=1e-9)
@@ -102,7 +104,7 @@ class TestGeometry:
             assert np.linalg.det(run.turn) == pytest.approx(1)
 
     def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
-        self, both: Both, made: Prototype
+        self, both: Both, made: PrototypeLayout
     ) -> None:
         """The record is computed at the mirror's own azimuth, these rays at the stop."""
         for run, order in zip(both, (np.arange(len(made.half)), made.twin), strict=True):
@@ -123,7 +125,9 @@ class TestGeometry:
                 np.minimum.at(least, mirror, misses(run, mirror, way))
             assert 2 * least[order] == pytest.approx(made.fit.coverage, abs=2e-3)
 
-    def test_left_where_they_are(self, made: Prototype, cameras: tuple[Reflector, ...]) -> None:
+    def test_left_where_they_are(
+        self, made: PrototypeLayout, cameras: tuple[Reflector, ...]
+    ) -> None:
         still = runs(cameras, replace(plan_of(made), moved=False))
         assert (still[0].turn == np.eye(3)).all()
 
@@ -187,7 +191,7 @@ class TestMerged:
     @pytest.mark.parametrize("resample", ["exact", "photograph"])
     def test_balls_like_the_mirrors_give_the_shells_picture(
         self,
-        made: Prototype,
+        made: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
         resample: str,
         size_mm: float,
@@ -233,7 +237,7 @@ class TestMerged:
             assert np.abs(unit(both_ways) - unit(origin - centre)).max() < 1e-4
 
     def test_pixels_kept(
-        self, merged: LightField, made: Prototype, cameras: tuple[Reflector, Reflector]
+        self, merged: LightField, made: PrototypeLayout, cameras: tuple[Reflector, Reflector]
     ) -> None:
         """As many rays into the capture sphere as the design's areas promise, within rounding."""
         kept = sum(capture_rays(frame.planes).sum() for frame in merged.frames.values())
@@ -325,7 +329,7 @@ def capture_rays(planes: dict[str, np.ndarray]) -> np.ndarray:
 
 
 class TestReading:
-    def test_what_was_written(self, written: Path, made: Prototype) -> None:
+    def test_what_was_written(self, written: Path, made: PrototypeLayout) -> None:
         found, wanted = read_plan(read_export(written)), plan_of(made)
         for name in ("frame", "apex", "normal", "radius", "body_centre", "body_radius", "angle"):
             assert getattr(found, name) == pytest.approx(getattr(wanted, name), abs=1e-12)

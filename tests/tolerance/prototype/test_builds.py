@@ -10,7 +10,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import Design, design
 from tbcad.optics.ball_light import miss_off_balls
 from tbcad.optics.windows import windows
-from tbcad.prototype.balls.layout import Prototype, prototype
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import Run, runs
 from tbcad.simulate.scene.reflector import reflectors
@@ -47,12 +47,12 @@ def little() -> Design:
 
 
 @pytest.fixture(scope="module")
-def made(little: Design) -> Prototype:
-    return prototype(little.spec, little)
+def made(little: Design) -> PrototypeLayout:
+    return prototype_layout(little.spec, little)
 
 
 @pytest.fixture(scope="module")
-def plan(made: Prototype) -> Plan:
+def plan(made: PrototypeLayout) -> Plan:
     return plan_of(made)
 
 
@@ -122,13 +122,13 @@ def balls(
 
 
 class TestCoverage:
-    def test_without_errors_it_is_the_record(self, at: Designed, made: Prototype) -> None:
+    def test_without_errors_it_is_the_record(self, at: Designed, made: PrototypeLayout) -> None:
         diameter, offset = seen(at, machines(at, 1))
         m = len(made.half)
         assert diameter[0, :m] == pytest.approx(made.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
 
-    def test_both_runs_are_alike(self, at: Designed, made: Prototype) -> None:
+    def test_both_runs_are_alike(self, at: Designed, made: PrototypeLayout) -> None:
         """Mirror i of camera a and its twin of camera b are shown by the same ball."""
         diameter = seen(at, machines(at, 1))[0][0]
         a, b = diameter[at.virtual].reshape(2, -1)
