@@ -13,11 +13,11 @@ from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, told
 
 from tbcad.cad.brep import Solid
-from tbcad.mirrors.array import Design, MirrorArray, design, directions
+from tbcad.mirrors.array import Design, MirrorArray, design, numbered_directions
 from tbcad.optics.cells import cells_of
-from tbcad.optics.power_diagram import bounded
+from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.shell.envelope import envelope
-from tbcad.shell.solid import shell
+from tbcad.shell.solid import shell_solid
 from tbcad.spec.design import load_spec
 
 SEGMENTS = 64
@@ -65,12 +65,14 @@ def shells(made: Design) -> list[Solid]:
     The cells start from the polyhedron, not from those that the radii were solved with.
     """
     half = made.halves[0]
-    every, faces = directions(made.spec.optics.n)
-    triangles, boundary = bounded(faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0))
+    every, faces = numbered_directions(made.spec.optics.n)
+    triangles, boundary = bounded_triangulation(
+        faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0)
+    )
     cells = cells_of(half.body.surfaces, boundary, triangles)
     closing = envelope(made.spec.shell, cells, half.ellipsoid)
     return [
-        shell(f"shell_{one.camera}", one.ids, cells, closing, mirrored=one.camera == "b")
+        shell_solid(f"shell_{one.camera}", one.ids, cells, closing, mirrored=one.camera == "b")
         for one in made.halves
     ]
 

@@ -23,8 +23,8 @@ from tbcad.mirrors.record import write_record
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
 from tbcad.output.manifest import write_manifest
-from tbcad.shell.files import closing, distances
-from tbcad.shell.mesh import mesh
+from tbcad.shell.files import object_distances, shell_envelope
+from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
@@ -89,11 +89,11 @@ def _meshes(
 
 def _write(made: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
     """Mesh both shells of a machine, as the exporter does."""
-    first, body = made.halves[0], closing(made)
+    first, body = made.halves[0], shell_envelope(made)
     for half, drawn in zip(made.halves, draws, strict=True):
         cells = _cells(half, drawn, k)
         cells = cells if half is first else cells.mirrored()
-        facets = mesh(made.spec, cells, body, distances(first))
+        facets = shell_mesh(made.spec, cells, body, object_distances(first))
         facets = facets if half is first else facets.mirrored()
         write_stl(folder / f"shell_{half.camera}.stl", facets)
 

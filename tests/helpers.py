@@ -21,9 +21,9 @@ from tbcad.cad.brep import Solid
 from tbcad.cad.mesh import Mesh
 from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.shell.envelope import Envelope, envelope
-from tbcad.shell.files import distances
-from tbcad.shell.mesh import mesh
-from tbcad.shell.solid import shell
+from tbcad.shell.files import object_distances
+from tbcad.shell.mesh import shell_mesh
+from tbcad.shell.solid import shell_solid
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def solid_of(made: Design, which: int) -> Solid:
     half = made.halves[which]
     name = f"shell_{half.camera}"
-    return shell(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
+    return shell_solid(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
 
 
 def body_of(made: Design) -> Envelope:
@@ -107,4 +107,4 @@ def body_of(made: Design) -> Envelope:
 
 def mesh_of(made: Design) -> Mesh:
     half: MirrorArray = made.halves[0]
-    return mesh(made.spec, half.body, body_of(made), distances(half))
+    return shell_mesh(made.spec, half.body, body_of(made), object_distances(half))

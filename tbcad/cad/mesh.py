@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import MIRROR, dot, norm
+from tbcad.geometry.vectors import FLIP_X, dot, norm
 from tbcad.types import Floats, Ints
 
 
@@ -36,4 +36,4 @@ class Mesh:
 
     def mirrored(self) -> "Mesh":
         """Mirror image in the plane x = 0."""
-        return Mesh(self.vertices * MIRROR, self.triangles[:, ::-1])
+        return Mesh(self.vertices * FLIP_X, self.triangles[:, ::-1])

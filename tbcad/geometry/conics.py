@@ -150,7 +150,7 @@ class Spheroid:
         return np.column_stack([np.full(2, x), y, np.full(2, z)])
 
 
-def offset_to_hold(ellipsoid: Ellipsoid, points: Floats) -> float:
+def enclosing_offset(ellipsoid: Ellipsoid, points: Floats) -> float:
     """Least offset of a spheroid that holds all points (k, 3), mm."""
     away = points - ellipsoid.pinhole / 2
     along = away @ ellipsoid.axis
@@ -167,7 +167,7 @@ def offset_to_hold(ellipsoid: Ellipsoid, points: Floats) -> float:
     return float(offset.max())
 
 
-def offset_beyond(ellipsoid: Ellipsoid, inner: float, wall: float) -> float:
+def wall_offset(ellipsoid: Ellipsoid, inner: float, wall: float) -> float:
     """Least offset of a spheroid that keeps a wall (mm) everywhere from the spheroid at inner.
 
     Both are convex: their least distance is the least difference of their support functions.

@@ -16,7 +16,7 @@ SIDES = 32
 
 
 @dataclass(frozen=True)
-class Rod:
+class Cylinder:
     """A cylinder: start (3,), unit axis (3,), radius and length, mm."""
 
     start: Floats
@@ -34,13 +34,13 @@ class Prism:
 
 
 @dataclass(frozen=True)
-class Turned:
+class Revolved:
     """A polygon (n, 2) of (z, r) turned about the z axis of the shell's frame, mm."""
 
     profile: Floats
 
 
-Body: TypeAlias = Rod | Prism | Turned
+Primitive: TypeAlias = Cylinder | Prism | Revolved
 
 
 @dataclass(frozen=True)
@@ -59,23 +59,23 @@ class Component:
 
     name: str
     what: str
-    added: tuple[Body, ...]
-    removed: tuple[Body, ...] = ()
+    added: tuple[Primitive, ...]
+    removed: tuple[Primitive, ...] = ()
     downs: tuple[tuple[float, float, float], ...] = ()
     part: str | None = None
     turns: bool = False
 
 
-def across(axis: Floats) -> Floats:
+def perpendicular_axes(axis: Floats) -> Floats:
     """Two unit vectors across a unit axis and each other, (2, 3); right-handed with it."""
     first = unit(np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis))
     return np.stack([first, np.cross(axis, first)])
 
 
-def rod(start: Floats, end: Floats, radius: float) -> Rod:
+def cylinder_between(start: Floats, end: Floats, radius: float) -> Cylinder:
     """The cylinder from a point to another."""
     along = end - start
-    return Rod(start, unit(along), radius, float(np.linalg.norm(along)))
+    return Cylinder(start, unit(along), radius, float(np.linalg.norm(along)))
 
 
 def box(low: Floats, high: Floats, axes: Floats) -> Prism:
@@ -87,7 +87,7 @@ def box(low: Floats, high: Floats, axes: Floats) -> Prism:
 
 def slot(
     middle: Floats, along: Floats, travel: float, radius: float, depth: Floats
-) -> tuple[Body, ...]:
+) -> tuple[Primitive, ...]:
     """A hole that lets its screw move: two cylinders and what is between them.
 
     Args:
@@ -98,19 +98,19 @@ def slot(
         depth: vector from the one end to the other, (3,).
     """
     if travel <= 0:
-        return (rod(middle, middle + depth, radius),)
+        return (cylinder_between(middle, middle + depth, radius),)
     step, side = travel / 2 * along, radius * unit(np.cross(along, depth))
     corners = middle + np.stack([-step - side, step - side, step + side, -step + side])
-    ends = [rod(middle + way, middle + way + depth, radius) for way in (-step, step)]
+    ends = [cylinder_between(middle + way, middle + way + depth, radius) for way in (-step, step)]
     return (Prism(corners, depth), *ends)
 
 
-def triangles(body: Body) -> Floats:
+def enclosing_triangles(body: Primitive) -> Floats:
     """Triangles (t, 3, 3) that enclose a body, mm."""
-    if isinstance(body, Rod):
+    if isinstance(body, Cylinder):
         turn, wide = 2 * np.pi * np.arange(SIDES) / SIDES, 1 / np.cos(np.pi / SIDES)
         circle = body.radius * wide * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        corners = body.start + circle @ across(body.axis)
+        corners = body.start + circle @ perpendicular_axes(body.axis)
         return _prism(corners, body.length * body.axis)
     if isinstance(body, Prism):
         return _prism(body.corners, body.along)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tbcad.types import Floats
 
-MIRROR = np.array([-1.0, 1.0, 1.0])
+FLIP_X = np.array([-1.0, 1.0, 1.0])
 """Factors that mirror points and vectors in the plane x = 0."""
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.geometry.vectors import MIRROR
-from tbcad.mirrors.radii import RadiusProblem, solve
+from tbcad.geometry.vectors import FLIP_X
+from tbcad.mirrors.radii import RadiusProblem, solve_radii
 from tbcad.optics import flat
 from tbcad.optics.camera import Camera, fitted_camera
-from tbcad.optics.cells import Cells, areas, cells_of
+from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic
-from tbcad.optics.power_diagram import bounded
+from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
@@ -78,8 +78,8 @@ class MirrorArray:
             self,
             camera="b",
             view=self.view.mirrored(),
-            ellipsoid=Ellipsoid(self.ellipsoid.pinhole * MIRROR, self.ellipsoid.semi_minor),
-            u=self.u * MIRROR,
+            ellipsoid=Ellipsoid(self.ellipsoid.pinhole * FLIP_X, self.ellipsoid.semi_minor),
+            u=self.u * FLIP_X,
             azimuth=-self.azimuth,
             cells=self.cells.mirrored(),
             body=self.body.mirrored(),
@@ -104,18 +104,18 @@ def design(spec: Spec, progress: Progress = lambda _: None) -> Design:
     return Design(spec, (half, half.mirrored()))
 
 
-def ordered(u: Floats) -> Ints:
+def numbering_order(u: Floats) -> Ints:
     """Order of the mirrors' numbers: from the zenith down, then by azimuth about z."""
     height = np.round(u[:, 2], 9)
     turn = np.round(np.arctan2(u[:, 1], u[:, 0]), 9)
     return np.lexsort((turn, -height))
 
 
-def directions(n: int) -> tuple[Floats, Ints]:
+def numbered_directions(n: int) -> tuple[Floats, Ints]:
     """All geodesic directions, camera a's first in the order of their ids, and all faces."""
     u, faces = geodesic(n)
     mine = (u[:, 0] >= 0) & (u[:, 2] >= 0)
-    first = np.flatnonzero(mine)[ordered(u[mine])]
+    first = np.flatnonzero(mine)[numbering_order(u[mine])]
     order = np.concatenate([first, np.flatnonzero(~mine)])
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
@@ -125,15 +125,15 @@ def directions(n: int) -> tuple[Floats, Ints]:
 def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
-    every, faces = directions(optics.n)
+    every, faces = numbered_directions(optics.n)
     kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
     u = every[kept]
     theta0 = flat.half_angles(ellipsoid, u, every)
     size = flat.half_widths(ellipsoid, u, theta0)
-    theta1 = flat.wanted_angles(ellipsoid, u, size, optics.capture_diameter_mm / 2)
+    theta1 = flat.required_angles(ellipsoid, u, size, optics.capture_diameter_mm / 2)
     # The equatorial mirrors stay whole: the foot plane lies the greatest half width below them.
     foot = -float(size[u[:, 2] == 0].max())
-    triangles, boundary = bounded(faces, every, kept)
+    triangles, boundary = bounded_triangulation(faces, every, kept)
     task = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u), ellipsoid.normals(u), flat.paper_curvatures(theta0, theta1, size)
@@ -145,7 +145,7 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
         least=1 / (spec.mirrors.max_radius_widths * size),
         target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
     )
-    cells, covered = solve(spec.mirrors.radius_rule, task, progress)
+    cells, covered = solve_radii(spec.mirrors.radius_rule, task, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
     camera = spec.camera
     return MirrorArray(
@@ -166,7 +166,7 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
         azimuth=azimuth,
         cells=cells,
         body=_under_coat(cells, spec.mirrors.coating_um / 1000),
-        area=areas(cells),
+        area=cell_areas(cells),
         coverage=covered,
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.power_diagram import Boundary, NotRegularError
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.trace import coverage
+from tbcad.optics.trace import coverage_diameters
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints, Progress
 
@@ -47,19 +47,19 @@ class RadiusProblem:
         return cells_of(surfaces, self.boundary, start)
 
 
-def flat(task: RadiusProblem) -> tuple[Cells, Floats]:
+def flat_radii(task: RadiusProblem) -> tuple[Cells, Floats]:
     """Planar mirrors (Mukaigawa et al.): cells and their coverage (m,), mm."""
     cells = task.cells(np.zeros(len(task.mirrors)))
-    return cells, coverage(cells, task.pinhole)
+    return cells, coverage_diameters(cells, task.pinhole)
 
 
-def paper(task: RadiusProblem) -> tuple[Cells, Floats]:
+def paper_radii(task: RadiusProblem) -> tuple[Cells, Floats]:
     """Radii by eqs. 1 and 2; nearly flat where those want no curvature or hardly any."""
     cells = task.cells(np.maximum(task.mirrors.curvature, task.least))
-    return cells, coverage(cells, task.pinhole)
+    return cells, coverage_diameters(cells, task.pinhole)
 
 
-def traced(task: RadiusProblem, progress: Progress = lambda _: None) -> tuple[Cells, Floats]:
+def traced_radii(task: RadiusProblem, progress: Progress = lambda _: None) -> tuple[Cells, Floats]:
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
@@ -82,7 +82,11 @@ def traced(task: RadiusProblem, progress: Progress = lambda _: None) -> tuple[Ce
             curvature = (curvature + closed) / 2
             least = np.minimum(least, curvature)
             continue
-        closed, triangles, covered = curvature, cells.triangles, coverage(cells, task.pinhole)
+        closed, triangles, covered = (
+            curvature,
+            cells.triangles,
+            coverage_diameters(cells, task.pinhole),
+        )
         error = np.where(curvature > least, np.abs(covered - task.target), 0.0)
         error = np.maximum(error, task.target - covered)
         if error.max() < CONVERGED_MM:
@@ -93,10 +97,10 @@ def traced(task: RadiusProblem, progress: Progress = lambda _: None) -> tuple[Ce
     raise SpecError(_not_made(worst, covered, task.target))
 
 
-RULES = {"flat": flat, "paper": paper, "traced": traced}
+RULES = {"flat": flat_radii, "paper": paper_radii, "traced": traced_radii}
 
 
-def solve(
+def solve_radii(
     rule: str, task: RadiusProblem, progress: Progress = lambda _: None
 ) -> tuple[Cells, Floats]:
     """Cells and coverage (m,) by a rule: "traced", "paper" or "flat".
@@ -105,7 +109,7 @@ def solve(
         SpecError: when the mirrors do not close to an array, or none has the coverage wanted.
     """
     try:
-        return traced(task, progress) if rule == "traced" else RULES[rule](task)
+        return traced_radii(task, progress) if rule == "traced" else RULES[rule](task)
     except NotRegularError as error:
         raise SpecError(
             f"mirrors with radius rule {rule} do not close to one array ({error}): "

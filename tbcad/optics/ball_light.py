@@ -17,14 +17,14 @@ from tbcad.optics.trace import reflected
 from tbcad.types import Floats
 
 # Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
-POINTS = 24
+OUTLINE_POINTS = 24
 # A ray is turned by twice the tilt of the mirror, less across the plane of incidence.
 STEEPEST = np.radians(70)
 HALVINGS = 50
 
 
 @dataclass(frozen=True)
-class Poses:
+class BallPoses:
     """Balls in the half-plane of azimuth zero, over k of them.
 
     Attributes:
@@ -38,11 +38,11 @@ class Poses:
     normal: Floats
 
 
-def poses(ellipsoid: Ellipsoid, polar: Floats) -> Poses:
+def ball_poses(ellipsoid: Ellipsoid, polar: Floats) -> BallPoses:
     """Apices and normals at polar angles (k,) in the half-plane of azimuth zero."""
     frame = ellipsoid.frame()
     u = np.cos(polar)[:, None] * frame[0] + np.sin(polar)[:, None] * frame[1]
-    return Poses(polar, ellipsoid.apices(u) @ frame.T, ellipsoid.normals(u) @ frame.T)
+    return BallPoses(polar, ellipsoid.apices(u) @ frame.T, ellipsoid.normals(u) @ frame.T)
 
 
 def turned(points: Floats, azimuth: Floats) -> Floats:
@@ -52,7 +52,7 @@ def turned(points: Floats, azimuth: Floats) -> Floats:
     return np.stack([along, cosine * out - sine * across, sine * out + cosine * across], axis=-1)
 
 
-def outlines(at: Poses, radius: Floats, pinhole: float, capture: float) -> Floats:
+def used_outlines(at: BallPoses, radius: Floats, pinhole: float, capture: float) -> Floats:
     """Outline on each ball of the part that shows the capture sphere, mm, (k, POINTS, 3).
 
     Args:
@@ -65,7 +65,10 @@ def outlines(at: Poses, radius: Floats, pinhole: float, capture: float) -> Float
     which they touch it is found by halving, in POINTS directions about the apex.
     """
     camera = np.array([pinhole, 0.0, 0.0])
-    low, high = np.zeros((len(radius), POINTS)), np.full((len(radius), POINTS), STEEPEST)
+    low, high = (
+        np.zeros((len(radius), OUTLINE_POINTS)),
+        np.full((len(radius), OUTLINE_POINTS), STEEPEST),
+    )
     for _ in range(HALVINGS):
         tilt = (low + high) / 2
         meets = _meets(*_surface(at, radius, tilt), camera, capture)
@@ -74,9 +77,9 @@ def outlines(at: Poses, radius: Floats, pinhole: float, capture: float) -> Float
     return point
 
 
-def _surface(at: Poses, radius: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+def _surface(at: BallPoses, radius: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     """Points and normals (k, POINTS, 3) of the balls tilted (k, POINTS) from their apices."""
-    turn = 2 * np.pi * np.arange(POINTS) / POINTS
+    turn = 2 * np.pi * np.arange(OUTLINE_POINTS) / OUTLINE_POINTS
     across = np.array([0.0, 0.0, 1.0])
     in_plane = np.cross(across, at.normal)[:, None]
     away = np.cos(turn)[:, None] * in_plane + np.sin(turn)[:, None] * across
@@ -92,7 +95,7 @@ def _meets(point: Floats, normal: Floats, camera: Floats, capture: float) -> NDA
     return meets
 
 
-def light(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
+def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
     """Hulls that hold all light of each ball: capture sphere to ball, ball to pinhole, (k,).
 
     Args:
@@ -113,7 +116,7 @@ def light(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, 
     )
 
 
-def pixels(view: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
+def pixel_counts(view: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
     """Number of pixels inside outlines (m, s, 3) turned by azimuths (m,), exact, (m,).
 
     Args:
@@ -126,10 +129,10 @@ def pixels(view: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Flo
     axes = np.stack([view.right, np.cross(view.forward, view.right)])
     width = view.half_sizes[0] * 2 / view.width_px
     image = (ray @ axes.T) / (ray @ view.forward)[..., None] / width
-    return enclosed(image)
+    return enclosed_areas(image)
 
 
-def enclosed(outline: Floats) -> Floats:
+def enclosed_areas(outline: Floats) -> Floats:
     """Areas (m,) within smooth closed curves sampled evenly at points (m, s, 2).
 
     With the Fourier series sum c_n e^(i n t) of the curve the area is pi sum n |c_n|^2.
@@ -141,7 +144,7 @@ def enclosed(outline: Floats) -> Floats:
     return area
 
 
-def miss_off_balls(camera: Floats, ray: Floats, centre: Floats, radius: Floats) -> Floats:
+def ball_miss_distances(camera: Floats, ray: Floats, centre: Floats, radius: Floats) -> Floats:
     """Distance from the origin of rays after balls, mm, (...); infinite where they miss the ball.
 
     Args:
@@ -160,8 +163,8 @@ def miss_off_balls(camera: Floats, ray: Floats, centre: Floats, radius: Floats) 
     return miss
 
 
-def facing(ellipsoid: Ellipsoid, polar: Floats) -> Floats:
+def field_angles(ellipsoid: Ellipsoid, polar: Floats) -> Floats:
     """Angle at the pinhole between the axis (to the origin) and each apex, radians, (k,)."""
-    way = unit(poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
+    way = unit(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
     angle: Floats = np.arctan2(way[:, 1], -way[:, 0])
     return angle

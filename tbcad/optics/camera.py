@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from tbcad.geometry.vectors import MIRROR, unit
+from tbcad.geometry.vectors import FLIP_X, unit
 from tbcad.types import Floats
 
 
@@ -45,9 +45,9 @@ class Camera:
     def mirrored(self) -> "Camera":
         """The other camera: mirror image in the plane x = 0, its rows running the other way."""
         return Camera(
-            self.pinhole * MIRROR,
-            self.forward * MIRROR,
-            -self.right * MIRROR,
+            self.pinhole * FLIP_X,
+            self.forward * FLIP_X,
+            -self.right * FLIP_X,
             self.width_px,
             self.height_px,
             self.hfov,

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tbcad.geometry.vectors import MIRROR, dot, norm, unit
+from tbcad.geometry.vectors import FLIP_X, dot, norm, unit
 from tbcad.optics.power_diagram import Boundary, flip_until_regular, half_edges, radical_planes
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
@@ -43,7 +43,7 @@ class Cells:
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
         return Cells(
-            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * MIRROR
+            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * FLIP_X
         )
 
     @cached_property
@@ -181,7 +181,7 @@ def cells_of(surfaces: Surfaces, boundary: Boundary, triangles: Ints) -> Cells:
     return Cells(surfaces, boundary, settled, corners)
 
 
-def areas(cells: Cells) -> Floats:
+def cell_areas(cells: Cells) -> Floats:
     """Areas of the cells in closed form, mm^2, (m,).
 
     A spherical polygon of small-circle arcs by Gauss and Bonnet: the area over r^2 is 2 pi less

@@ -42,7 +42,7 @@ def half_widths(ellipsoid: Ellipsoid, u: Floats, theta0: Floats) -> Floats:
     return (ellipsoid.camera_distance - ellipsoid.radial_distance(u)) * np.tan(theta0)
 
 
-def wanted_angles(ellipsoid: Ellipsoid, u: Floats, width: Floats, sphere_radius: float) -> Floats:
+def required_angles(ellipsoid: Ellipsoid, u: Floats, width: Floats, sphere_radius: float) -> Floats:
     """theta_1 = atan((R - l) / rho) of eq. 1, radians, (m,)."""
     return np.arctan2(sphere_radius - width, ellipsoid.radial_distance(u))
 

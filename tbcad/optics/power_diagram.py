@@ -37,7 +37,7 @@ class Boundary:
     foot: int
 
 
-def bounded(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints, Boundary]:
+def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints, Boundary]:
     """Part of a triangulation on the kept directions, closed by a seam and a foot vertex.
 
     Args:
@@ -171,13 +171,13 @@ def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
             break
         changed = _flip(triangles, edge, twin)
         points[changed] = corners(surfaces, triangles[changed], mirrors)
-    deepest = covered(surfaces, points)
+    deepest = lowest_value(surfaces, points)
     if not deepest > -TOUCHING:
         raise NotRegularError(f"a corner lies {-deepest:.3g} mm inside another mirror")
     return points
 
 
-def covered(surfaces: Surfaces, points: Floats) -> float:
+def lowest_value(surfaces: Surfaces, points: Floats) -> float:
     """Least value of any f_j at points (t, 3): below zero some surface covers a point, mm.
 
     It looks at all pairs, so it is the proof of what the flips found by looking at neighbours.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import MIRROR, dot
+from tbcad.geometry.vectors import FLIP_X, dot
 from tbcad.types import Floats, Ints
 
 
@@ -81,7 +81,7 @@ class Surfaces:
 
     def mirrored(self) -> "Surfaces":
         """The surfaces of the other camera: mirror image in the plane x = 0."""
-        return Surfaces(self.apex * MIRROR, self.normal * MIRROR, self.curvature)
+        return Surfaces(self.apex * FLIP_X, self.normal * FLIP_X, self.curvature)
 
     def joined(self, other: "Surfaces") -> "Surfaces":
         """These surfaces followed by the other ones."""

@@ -25,7 +25,7 @@ def miss_distances(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
     return result
 
 
-def counted_sides(cells: Cells) -> tuple[Ints, Ints]:
+def limiting_sides(cells: Cells) -> tuple[Ints, Ints]:
     """Mirror and arc of each side that limits what a mirror sees.
 
     The seam halves a mirror whose apex lies on it; its other half belongs to the other camera
@@ -39,13 +39,13 @@ def counted_sides(cells: Cells) -> tuple[Ints, Ints]:
     return mirror[counted], arc[counted]
 
 
-def coverage(cells: Cells, pinhole: Floats) -> Floats:
+def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
     """Coverage diameter of each mirror, mm, (m,).
 
     Twice the least distance from the origin of all rays camera -> edge of the cell -> reflected
     (DESIGN.md section 2), by samples along each arc, refined about the least.
     """
-    mirror, arc = counted_sides(cells)
+    mirror, arc = limiting_sides(cells)
     low, high = np.zeros(len(arc)), np.ones(len(arc))
     row = np.arange(len(arc))
     for _ in range(ROUNDS):

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.vectors import dot, unit
-from tbcad.optics.ball_light import miss_off_balls
+from tbcad.optics.ball_light import ball_miss_distances
 from tbcad.optics.cells import Cells
-from tbcad.optics.trace import counted_sides
+from tbcad.optics.trace import limiting_sides
 from tbcad.types import Bools, Floats, Ints
 
 # Samples of each side, first over all of it, then about the least: after four rounds they are a
@@ -17,7 +17,7 @@ ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Pieces:
+class SubstituteBalls:
     """A ball for each of m mirrors, and the turn of the mirror's window about the pinhole.
 
     Attributes:
@@ -63,7 +63,7 @@ class Windows:
         ray = unit(point - self.pinhole)
         return rotated(ray, axis[self.mirror][:, None], turn[self.mirror][:, None])
 
-    def coverage(self, pieces: Pieces) -> Floats:
+    def coverage(self, pieces: SubstituteBalls) -> Floats:
         """Coverage diameter (m,), mm: twice the least miss of the rays through the windows' edge.
 
         Whether the ball shows the origin inside the window is asked of `surround`. Infinite for
@@ -74,7 +74,7 @@ class Windows:
         row = np.arange(len(self.arc))
         for _ in range(ROUNDS):
             t = np.linspace(low, high, SAMPLES, axis=1)
-            miss = miss_off_balls(
+            miss = ball_miss_distances(
                 self.pinhole, self.rays(t, pieces.axis, pieces.turn), centre, radius
             )
             best = np.argmin(miss, axis=1)
@@ -103,9 +103,9 @@ class Windows:
         return inside
 
 
-def windows(cells: Cells, pinhole: Floats) -> Windows:
+def cell_windows(cells: Cells, pinhole: Floats) -> Windows:
     """The windows of all mirrors."""
-    return Windows(cells, pinhole, *counted_sides(cells))
+    return Windows(cells, pinhole, *limiting_sides(cells))
 
 
 def rotated(vector: Floats, axis: Floats, turn: Floats) -> Floats:

@@ -10,7 +10,7 @@ from tbcad.output.background import beside
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.files.write import export_prototype
-from tbcad.shell.files import closing, export_shells
+from tbcad.shell.files import shell_envelope, write_shells
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
@@ -35,12 +35,12 @@ def export(
     """
     write_record(folder, design, SHELL in parts)
     if PROTOTYPE not in parts:
-        export_shells(design, folder, progress)
+        write_shells(design, folder, progress)
     elif SHELL not in parts:
         export_prototype(design, folder, progress)
     else:
-        closing(design)  # flanges that do not fit are told at once
-        with beside(export_shells, design, folder):
+        shell_envelope(design)  # flanges that do not fit are told at once
+        with beside(write_shells, design, folder):
             with _or_left_out():
                 export_prototype(design, folder, progress)
             progress("shells")

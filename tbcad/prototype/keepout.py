@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from tbcad.geometry.primitives import Body, triangles
+from tbcad.geometry.primitives import Primitive, enclosing_triangles
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm
-from tbcad.optics.ball_light import light
+from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.types import Floats
@@ -106,7 +106,7 @@ def room(made: PrototypeLayout, base: BaseLayout, capture: float, approach: floa
     angle = stops.angle[stops.stop]
     used = np.stack([_extreme(np.min, made, angle), _extreme(np.max, made, angle)], axis=1)
     used += azimuth[:, None]
-    to_object, to_camera = light(made.balls.outline, base.light.pinhole, capture)
+    to_object, to_camera = light_hulls(made.balls.outline, base.light.pinhole, capture)
     swing = np.array([min(float(angle.min()), 0.0) - approach, max(float(angle.max()), 0.0)])
     return Room(
         frame=base.frame,
@@ -121,7 +121,7 @@ def room(made: PrototypeLayout, base: BaseLayout, capture: float, approach: floa
 
 
 def least(
-    distance: Callable[[Floats], Floats], bodies: Iterable[Body], enough: float = 0.0
+    distance: Callable[[Floats], Floats], bodies: Iterable[Primitive], enough: float = 0.0
 ) -> float:
     """Least distance of the surfaces of bodies by a function of points (n, 3), mm.
 
@@ -130,7 +130,7 @@ def least(
     split. Some distance below `enough` ends the search: a body that meets something is wrong
     anyway.
     """
-    open_ = np.concatenate([triangles(body) for body in bodies])
+    open_ = np.concatenate([enclosing_triangles(body) for body in bodies])
     best = np.inf
     for _ in range(ROUNDS):
         middle = open_.mean(axis=1)

@@ -58,14 +58,14 @@ class Edges:
     wall: Pair
 
 
-def casing(front: Front, body: Envelope) -> list[tuple[str, TopoDS_Face]]:
+def casing_faces(front: Front, body: Envelope) -> list[tuple[str, TopoDS_Face]]:
     """Names and faces of everything but the mirrors."""
     maker, e = front.maker, _edges(front, body)
     seam_holes = bores(maker, body.seam_holes, Y, Z)
     foot_holes = bores(maker, body.foot_holes, X, Y)
     seam, foot, base = body.seam_thickness, body.foot_thickness, body.foot * Z
-    seam_face = [turned(_seam_outline(front, e)), *seam_holes.near]
-    foot_face = [turned(_foot_outline(front, e)), *foot_holes.near]
+    seam_face = [reversed_ring(_seam_outline(front, e)), *seam_holes.near]
+    foot_face = [reversed_ring(_foot_outline(front, e)), *foot_holes.near]
     return [
         ("back", _back(maker, body, e)),
         ("seam", maker.face(maker.plane(0 * X, -X), seam_face, natural=True)),
@@ -88,14 +88,14 @@ def casing(front: Front, body: Envelope) -> list[tuple[str, TopoDS_Face]]:
     ]
 
 
-def back_way(side: Side) -> Side:
+def reversed_side(side: Side) -> Side:
     """The same edge followed the other way."""
     return side[0], not side[1]
 
 
-def turned(ring: Ring) -> list[Side]:
+def reversed_ring(ring: Ring) -> list[Side]:
     """The same ring the other way round."""
-    return [back_way(side) for side in reversed(ring)]
+    return [reversed_side(side) for side in reversed(ring)]
 
 
 def _edges(front: Front, body: Envelope) -> Edges:
@@ -140,7 +140,7 @@ def _ends(arc: EllipseArc) -> list[Floats]:
 
 
 def _back(maker: Maker, body: Envelope, e: Edges) -> TopoDS_Face:
-    ring = [e.foot_back, back_way(e.seam_back)]
+    ring = [e.foot_back, reversed_side(e.seam_back)]
     face = maker.face(maker.spheroid(body.back), [ring], natural=False)
     maker.add_pcurves(face, ring)
     return face
@@ -151,12 +151,12 @@ def _seam_outline(front: Front, e: Edges) -> Ring:
     return [
         e.wall[0],
         *front.chain(front.cells.boundary.seam),
-        back_way(e.wall[1]),
+        reversed_side(e.wall[1]),
         e.foot_end[1],
-        back_way(e.foot_step[1]),
-        back_way(e.seam_rim),
+        reversed_side(e.foot_step[1]),
+        reversed_side(e.seam_rim),
         e.foot_step[0],
-        back_way(e.foot_end[0]),
+        reversed_side(e.foot_end[0]),
     ]
 
 
@@ -165,26 +165,31 @@ def _foot_outline(front: Front, e: Edges) -> Ring:
     return [
         e.foot_rim,
         e.wall[1],
-        *turned(front.chain(front.cells.boundary.foot)),
-        back_way(e.wall[0]),
+        *reversed_ring(front.chain(front.cells.boundary.foot)),
+        reversed_side(e.wall[0]),
     ]
 
 
 def _seam_flange(e: Edges) -> Ring:
     """Round the seam flange's face toward the back."""
-    return [e.seam_step[0], e.seam_back, back_way(e.seam_step[1]), back_way(e.seam_rim_back)]
+    return [
+        e.seam_step[0],
+        e.seam_back,
+        reversed_side(e.seam_step[1]),
+        reversed_side(e.seam_rim_back),
+    ]
 
 
 def _foot_flange(e: Edges) -> Ring:
     """Round the foot flange's top, on which the seam flange stands."""
     return [
         e.foot_rim_top,
-        back_way(e.foot_step[1]),
+        reversed_side(e.foot_step[1]),
         e.seam_end[1],
         e.seam_step[1],
-        back_way(e.foot_back),
-        back_way(e.seam_step[0]),
-        back_way(e.seam_end[0]),
+        reversed_side(e.foot_back),
+        reversed_side(e.seam_step[0]),
+        reversed_side(e.seam_end[0]),
         e.foot_step[0],
     ]
 
@@ -197,10 +202,10 @@ def _rim(
     tangent = np.cos(middle) * arc.ellipse.minor - np.sin(middle) * arc.ellipse.major
     natural = bool(np.cross(tangent, along) @ outward > 0)
     near, far = rims
-    ring = [ends[0], far, back_way(ends[1]), back_way(near)]
+    ring = [ends[0], far, reversed_side(ends[1]), reversed_side(near)]
     # This ring turns about along x (low to high); the arc's parameter may run either way.
     if natural == (arc.last > arc.first):
-        ring = turned(ring)
+        ring = reversed_ring(ring)
     face = maker.face(maker.extrusion(arc.ellipse, along), [ring], natural != maker.mirrored)
     height = float(np.linalg.norm(along))
     for (edge, _), v in zip(rims, (0.0, height), strict=True):

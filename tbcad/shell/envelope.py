@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.conics import EllipseArc, Spheroid, offset_beyond, offset_to_hold
+from tbcad.geometry.conics import EllipseArc, Spheroid, enclosing_offset, wall_offset
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.optics.cells import Cells
 from tbcad.spec.design import FlangeSpec, ShellSpec
@@ -81,8 +81,8 @@ def envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
         SpecError: when holes or flanges do not fit.
     """
     foot = float(cells.surfaces.apex[cells.boundary.foot, 2])
-    deepest = offset_to_hold(ellipsoid, _valleys(cells))
-    back = Spheroid(ellipsoid, offset_beyond(ellipsoid, deepest, shell.wall_mm))
+    deepest = enclosing_offset(ellipsoid, _valleys(cells))
+    back = Spheroid(ellipsoid, wall_offset(ellipsoid, deepest, shell.wall_mm))
     x, z = shell.seam_flange.thickness_mm, foot + shell.foot_flange.thickness_mm
     try:
         return _flanged(shell, back, foot, x, z)

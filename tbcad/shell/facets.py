@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import Chain
-from tbcad.shell.rim import Rim, rim_of, steps_of
+from tbcad.shell.rim import Rim, arc_vertices, segment_counts
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
@@ -57,7 +57,7 @@ class Facets:
         return line if forward else line[::-1]
 
 
-def facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
+def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
     """Facets of all cells within the mesh tolerances.
 
     Args:
@@ -65,7 +65,7 @@ def facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
         cells: of the modelled surfaces.
         distance: from each mirror to the object, mm, (m,).
     """
-    rim = rim_of(cells, steps_of(spec, cells, distance))
+    rim = arc_vertices(cells, segment_counts(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(cells, rim)
     return _spherical(spec, cells, rim, distance)

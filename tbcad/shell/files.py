@@ -11,12 +11,12 @@ from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.mirrors.record import part
 from tbcad.shell.envelope import Envelope, envelope
-from tbcad.shell.mesh import mesh
-from tbcad.shell.solid import shell
+from tbcad.shell.mesh import shell_mesh
+from tbcad.shell.solid import shell_solid
 from tbcad.types import Progress
 
 
-def export_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+def write_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
     """Write both shells as STEP, STL and 3MF into a folder.
 
     Raises:
@@ -24,14 +24,14 @@ def export_shells(design: Design, folder: Path, progress: Progress = lambda _: N
         InvalidSolidError: when the kernel finds a solid invalid.
     """
     first = design.halves[0]
-    around = closing(design)
+    around = shell_envelope(design)
     progress("facets")
-    facets = mesh(design.spec, first.body, around, distances(first))
+    facets = shell_mesh(design.spec, first.body, around, object_distances(first))
     for half in design.halves:
         _export(design, half, around, facets, folder, progress)
 
 
-def closing(design: Design) -> Envelope:
+def shell_envelope(design: Design) -> Envelope:
     """What closes camera a's half: back, flanges, holes.
 
     Raises:
@@ -41,7 +41,7 @@ def closing(design: Design) -> Envelope:
     return envelope(design.spec.shell, first.body, first.ellipsoid)
 
 
-def distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def object_distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Distance of each mirror from the object, mm, (m,)."""
     return half.ellipsoid.radial_distance(half.u)
 
@@ -58,7 +58,7 @@ def _export(
     files, mirrored = part(half), half.camera == "b"
     progress(f"{files['name']}: solid")
     own = facets.mirrored() if mirrored else facets
-    solid = shell(files["name"], half.ids, design.halves[0].body, closing, mirrored)
+    solid = shell_solid(files["name"], half.ids, design.halves[0].body, closing, mirrored)
     progress(f"{files['name']}: files")
     write_step(folder / files["step"], solid, design.spec.step.pcurves)
     write_stl(folder / files["stl"], own)

@@ -55,7 +55,7 @@ class Front:
         return [(self.edges[arc], forward) for arc, forward in boundary_chain(self.cells, plane)]
 
 
-def front(maker: Maker, cells: Cells) -> Front:
+def build_front(maker: Maker, cells: Cells) -> Front:
     """Vertices at the corners and an edge for each arc."""
     arcs = cells.arcs
     used = np.unique(np.concatenate([arcs.start, arcs.end])).tolist()

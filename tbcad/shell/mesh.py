@@ -11,14 +11,14 @@ from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import boundary_chain
 from tbcad.shell.envelope import Envelope, Holes
-from tbcad.shell.facets import Facets, facets
+from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
 LEAST_AROUND_HOLE = 24
 
 
-def mesh(spec: Spec, cells: Cells, body: Envelope, distance: Floats) -> Mesh:
+def shell_mesh(spec: Spec, cells: Cells, body: Envelope, distance: Floats) -> Mesh:
     """Mesh of camera a's half.
 
     Args:
@@ -27,7 +27,7 @@ def mesh(spec: Spec, cells: Cells, body: Envelope, distance: Floats) -> Mesh:
         body: what closes them.
         distance: from each mirror to the object, mm, (m,).
     """
-    front = facets(spec, cells, distance)
+    front = mirror_facets(spec, cells, distance)
     skin = _Skin(spec.mesh.structure_error_mm, cells, front, body)
     points = np.concatenate([front.vertices, *skin.points])
     # Joining faces are flat to the last bit: rounding noise of 1e-15 mm is no geometry.

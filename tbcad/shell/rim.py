@@ -43,7 +43,7 @@ class Rim:
     late: NDArray[np.bool_]
 
 
-def rim_of(cells: Cells, steps: Ints) -> Rim:
+def arc_vertices(cells: Cells, steps: Ints) -> Rim:
     """Vertices and lines for arcs cut into so many segments each (e,)."""
     arcs = cells.arcs
     used, place = np.unique(np.concatenate([arcs.start, arcs.end]), return_inverse=True)
@@ -62,7 +62,7 @@ def rim_of(cells: Cells, steps: Ints) -> Rim:
     return Rim(vertices, first, steps, start, end, cell, line, _following(cell), k == 0, late)
 
 
-def steps_of(spec: Spec, cells: Cells, distance: Floats) -> Ints:
+def segment_counts(spec: Spec, cells: Cells, distance: Floats) -> Ints:
     """Segments of each arc (e,), for the mirror that needs more of the two.
 
     A facet keeps one normal along its segment of length s, so the rays at its ends shift by

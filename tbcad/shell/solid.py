@@ -4,12 +4,12 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.cad.brep import InvalidSolidError, Maker, Solid
 from tbcad.optics.cells import Cells
-from tbcad.shell.casing import casing
+from tbcad.shell.casing import casing_faces
 from tbcad.shell.envelope import Envelope
-from tbcad.shell.front import front
+from tbcad.shell.front import build_front
 
 
-def shell(name: str, ids: list[str], cells: Cells, body: Envelope, mirrored: bool) -> Solid:
+def shell_solid(name: str, ids: list[str], cells: Cells, body: Envelope, mirrored: bool) -> Solid:
     """Solid of one half.
 
     Args:
@@ -23,8 +23,8 @@ def shell(name: str, ids: list[str], cells: Cells, body: Envelope, mirrored: boo
         InvalidSolidError: when the kernel finds the solid invalid.
     """
     maker = Maker(mirrored)
-    mirrors = front(maker, cells)
-    faces = [*zip(ids, mirrors.faces(), strict=True), *casing(mirrors, body)]
+    mirrors = build_front(maker, cells)
+    faces = [*zip(ids, mirrors.faces(), strict=True), *casing_faces(mirrors, body)]
     solid = maker.solid([face for _, face in faces])
     if not BRepCheck_Analyzer(solid).IsValid():
         raise InvalidSolidError(f"{name}: the kernel's check finds the solid invalid")

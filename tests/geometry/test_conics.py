@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tbcad.geometry.conics import Spheroid, offset_beyond, offset_to_hold
+from tbcad.geometry.conics import Spheroid, enclosing_offset, wall_offset
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import norm, unit
 
@@ -49,7 +49,7 @@ def test_arc_goes_through_the_side_asked_for() -> None:
 
 @given(st.floats(0.5, 20), st.floats(0, 10))
 def test_wall_between_spheroids(wall: float, inner: float) -> None:
-    outer = offset_beyond(ELLIPSOID, inner, wall)
+    outer = wall_offset(ELLIPSOID, inner, wall)
     rng = np.random.default_rng(1)
     a, b = (
         Spheroid(ELLIPSOID, offset).from_sphere @ unit(rng.normal(size=(4000, 3))).T
@@ -68,4 +68,4 @@ def test_least_spheroid_that_holds_points() -> None:
     rng = np.random.default_rng(2)
     points = spheroid.centre + unit(rng.normal(size=(50, 3))) @ spheroid.from_sphere
     inside = spheroid.centre + 0.9 * (points - spheroid.centre)
-    assert offset_to_hold(ELLIPSOID, np.concatenate([inside, points])) == pytest.approx(7.5)
+    assert enclosing_offset(ELLIPSOID, np.concatenate([inside, points])) == pytest.approx(7.5)

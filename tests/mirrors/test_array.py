@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import MirrorArray, design, directions
+from tbcad.mirrors.array import MirrorArray, design, numbered_directions
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 
@@ -83,7 +83,7 @@ def test_other_half_is_the_mirror_image(small_design: object) -> None:
 
 
 def test_numbers_run_from_the_zenith_down() -> None:
-    every, faces = directions(6)
+    every, faces = numbered_directions(6)
     mine = every[(every[:, 0] >= 0) & (every[:, 2] >= 0)]
     assert mine[0] == pytest.approx([0, 0, 1])
     assert (np.diff(mine[:, 2]) < 1e-8).all()

@@ -17,14 +17,14 @@ def some(paper_half: MirrorArray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def outline(paper_half: MirrorArray, some: np.ndarray) -> np.ndarray:
-    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[some])
+    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
     pinhole = norm(paper_half.view.pinhole)
-    return ball_light.outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
+    return ball_light.used_outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
 
 
 def test_poses_turned_are_the_mirrors(paper_half: MirrorArray) -> None:
     ellipsoid, mirrors = paper_half.ellipsoid, paper_half.mirrors
-    at = ball_light.poses(ellipsoid, paper_half.polar)
+    at = ball_light.ball_poses(ellipsoid, paper_half.polar)
     frame = ellipsoid.frame()
     assert ball_light.turned(at.apex, paper_half.azimuth) @ frame == pytest.approx(mirrors.apex)
     assert ball_light.turned(at.normal, paper_half.azimuth) @ frame == pytest.approx(mirrors.normal)
@@ -47,10 +47,10 @@ def test_light_lies_in_its_hulls(
     """Rays over all of the part in use, by points along them."""
     pinhole = norm(paper_half.view.pinhole)
     camera = np.array([pinhole, 0.0, 0.0])
-    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[some])
+    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
     radius = paper_half.mirrors.radius[some][:, None, None]
     centre = (at.apex - radius[:, 0] * at.normal)[:, None]
-    to_object, to_camera = ball_light.light(outline, pinhole, CAPTURE)
+    to_object, to_camera = ball_light.light_hulls(outline, pinhole, CAPTURE)
     for share in (0.0, 0.4, 0.8, 1.0):
         inner = at.apex[:, None] + share * (outline - at.apex[:, None])
         point = centre + radius * unit(inner - centre)
@@ -77,25 +77,25 @@ def outside(cones: RoundCones, point: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (3.0, 1.5)])
 def test_area_of_an_ellipse(a: float, b: float) -> None:
-    turn = 2 * np.pi * np.arange(ball_light.POINTS) / ball_light.POINTS
+    turn = 2 * np.pi * np.arange(ball_light.OUTLINE_POINTS) / ball_light.OUTLINE_POINTS
     curve = np.stack([7 + a * np.cos(turn), b * np.sin(turn) - 2], axis=-1)[None]
-    assert ball_light.enclosed(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
+    assert ball_light.enclosed_areas(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
 
 
 def test_pixels_against_counting(paper_half: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
     view, mirrors, i = paper_half.view, paper_half.mirrors, 400
-    at = ball_light.poses(paper_half.ellipsoid, paper_half.polar[[i]])
-    shape = ball_light.outlines(at, mirrors.radius[[i]], norm(view.pinhole), CAPTURE)
+    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[[i]])
+    shape = ball_light.used_outlines(at, mirrors.radius[[i]], norm(view.pinhole), CAPTURE)
     frame = paper_half.ellipsoid.frame()
-    found = ball_light.pixels(view, frame, shape, paper_half.azimuth[[i]])[0]
+    found = ball_light.pixel_counts(view, frame, shape, paper_half.azimuth[[i]])[0]
     size = 2 * view.half_sizes[0] / view.width_px / 4  # sixteen rays a pixel
     way = mirrors.apex[i] - view.pinhole
     down = np.cross(view.forward, view.right)
     place = np.array([way @ view.right, way @ down]) / (way @ view.forward)
     x, y = np.meshgrid(*(p + size * np.arange(-400, 401) for p in place))
     ray = unit(view.forward + x[..., None] * view.right + y[..., None] * down)
-    miss = ball_light.miss_off_balls(
+    miss = ball_light.ball_miss_distances(
         view.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i])
     )
     assert found == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
@@ -104,7 +104,7 @@ def test_pixels_against_counting(paper_half: MirrorArray) -> None:
 def test_rays_past_a_ball_miss_by_infinity() -> None:
     camera, centre = np.zeros(3), np.array([100.0, 0.0, 0.0])
     ray = unit(np.array([[1.0, 0.2, 0.0], [1.0, 0.0, 0.0]]))
-    miss = ball_light.miss_off_balls(camera, ray, centre, np.array(10.0))
+    miss = ball_light.ball_miss_distances(camera, ray, centre, np.array(10.0))
     assert miss[0] == np.inf
     assert miss[1] == 0
 
@@ -114,4 +114,6 @@ def test_facing_an_apex(paper_half: MirrorArray) -> None:
     pinhole = paper_half.view.pinhole
     way = unit(paper_half.mirrors.apex - pinhole)
     expected = np.arccos(way @ unit(-pinhole))
-    assert ball_light.facing(paper_half.ellipsoid, paper_half.polar) == pytest.approx(expected)
+    assert ball_light.field_angles(paper_half.ellipsoid, paper_half.polar) == pytest.approx(
+        expected
+    )

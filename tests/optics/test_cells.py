@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.optics.cells import Cells, areas, cells_of
-from tbcad.optics.power_diagram import bounded, covered
+from tbcad.optics.cells import Cells, cell_areas, cells_of
+from tbcad.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
@@ -77,7 +77,7 @@ def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
     points = cells.arcs.at(arc, t)
     for face in cells.arcs.faces.T:
         assert np.abs(cells.surfaces.value(face[:, None], points)).max() < 1e-9
-    assert covered(cells.surfaces, points.reshape(-1, 3)) > -1e-9
+    assert lowest_value(cells.surfaces, points.reshape(-1, 3)) > -1e-9
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 12, 18, 25])
@@ -119,8 +119,8 @@ def test_areas_against_monte_carlo(rule: str) -> None:
     weight = 4 * np.pi / count * distance**2 / cosine
     estimate = np.bincount(mirror, weights=weight, minlength=cells.mirrors)
     error = np.sqrt(np.bincount(mirror, weights=weight**2, minlength=cells.mirrors))
-    assert (np.abs(estimate - areas(cells)) < 5 * error).all()
-    assert (error < 0.05 * areas(cells)).all()
+    assert (np.abs(estimate - cell_areas(cells)) < 5 * error).all()
+    assert (error < 0.05 * cell_areas(cells)).all()
 
 
 @pytest.mark.parametrize("diagonal", [0, 1])
@@ -131,7 +131,7 @@ def test_four_cells_that_meet_in_one_point(diagonal: int, curvature: float) -> N
     mirrors = Surfaces(10 * u, -u, np.full(4, curvature))
     walls = planes(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     inner = np.array([[[0, 2, 3], [0, 3, 1]], [[0, 2, 1], [2, 3, 1]]])[diagonal]
-    triangles, boundary = bounded(inner, u, np.ones(4, dtype=bool))
+    triangles, boundary = bounded_triangulation(inner, u, np.ones(4, dtype=bool))
     cells = cells_of(mirrors.joined(walls), boundary, triangles)
     arcs = cells.arcs
     ends = np.concatenate([arcs.start, arcs.end])
@@ -139,7 +139,7 @@ def test_four_cells_that_meet_in_one_point(diagonal: int, curvature: float) -> N
     assert len(centre) == 1
     assert unit(cells.corners[centre[0]]) == pytest.approx(unit(np.array([1.0, 0, 1.0])))
     assert len(np.unique(ends)) - len(arcs) + 4 == 1
-    assert np.ptp(areas(cells)) < 1e-9 * areas(cells).max()
+    assert np.ptp(cell_areas(cells)) < 1e-9 * cell_areas(cells).max()
 
 
 @settings(max_examples=25, deadline=None)
@@ -156,6 +156,6 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
         cells = design(load_spec(None, options)).halves[0].cells
     except SpecError:
         assume(False)
-    assert (areas(cells) > 0).all()
+    assert (cell_areas(cells) > 0).all()
     arc, t = np.broadcast_arrays(np.arange(len(cells.arcs))[:, None], np.linspace(0, 1, 5))
-    assert covered(cells.surfaces, cells.arcs.at(arc, t).reshape(-1, 3)) > -1e-7
+    assert lowest_value(cells.surfaces, cells.arcs.at(arc, t).reshape(-1, 3)) > -1e-7

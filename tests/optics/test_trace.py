@@ -4,7 +4,7 @@ import pytest
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells
-from tbcad.optics.trace import coverage, miss_distances, reflected
+from tbcad.optics.trace import coverage_diameters, miss_distances, reflected
 from tbcad.spec.design import load_spec
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
@@ -58,16 +58,16 @@ def test_the_seam_does_not_limit_halved_mirrors(paper_half: MirrorArray) -> None
     """With the cut counted a halved mirror would see nothing: its apex lies on the cut."""
     halved = paper_half.u[:, 0] == 0
     assert halved.sum() == 37
-    assert coverage(paper_half.cells, PINHOLE)[halved].min() > 60
+    assert coverage_diameters(paper_half.cells, PINHOLE)[halved].min() > 60
 
 
 def test_smaller_radius_sees_more(paper_half: MirrorArray) -> None:
     cells = paper_half.cells
-    before = coverage(cells, PINHOLE)
+    before = coverage_diameters(cells, PINHOLE)
     finer = Cells(
         cells.surfaces.with_curvature(1.01 * cells.surfaces.curvature),
         cells.boundary,
         cells.triangles,
         cells.corners,
     )
-    assert (coverage(finer, PINHOLE) > before).all()
+    assert (coverage_diameters(finer, PINHOLE) > before).all()

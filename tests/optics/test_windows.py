@@ -4,25 +4,25 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import miss_off_balls
-from tbcad.optics.trace import coverage
-from tbcad.optics.windows import Pieces, Windows, rotated, windows
+from tbcad.optics.ball_light import ball_miss_distances
+from tbcad.optics.trace import coverage_diameters
+from tbcad.optics.windows import SubstituteBalls, Windows, cell_windows, rotated
 
 
 @pytest.fixture(scope="module")
 def seen(paper_half: MirrorArray) -> Windows:
-    return windows(paper_half.cells, paper_half.view.pinhole)
+    return cell_windows(paper_half.cells, paper_half.view.pinhole)
 
 
-def own(half: MirrorArray, turn: float = 0.0) -> Pieces:
+def own(half: MirrorArray, turn: float = 0.0) -> SubstituteBalls:
     """Every mirror's own sphere, its window turned a little about the upright."""
     axis = np.broadcast_to([0.0, 0.0, 1.0], half.u.shape)
     mirrors = half.mirrors
-    return Pieces(mirrors.centre, mirrors.radius, axis, np.full(len(half), turn))
+    return SubstituteBalls(mirrors.centre, mirrors.radius, axis, np.full(len(half), turn))
 
 
 def test_own_spheres_cover_what_the_shell_covers(paper_half: MirrorArray, seen: Windows) -> None:
-    expected = coverage(paper_half.cells, paper_half.view.pinhole)
+    expected = coverage_diameters(paper_half.cells, paper_half.view.pinhole)
     assert seen.coverage(own(paper_half)) == pytest.approx(expected, abs=2e-4)
 
 
@@ -37,7 +37,7 @@ def test_turned_windows_against_brute_force(paper_half: MirrorArray, seen: Windo
     ray = unit(np.concatenate(points) - seen.pinhole)
     ray = Rotation.from_rotvec([0, 0, turn]).apply(ray)
     mirrors = paper_half.mirrors
-    miss = miss_off_balls(seen.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i]))
+    miss = ball_miss_distances(seen.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i]))
     assert found == pytest.approx(2 * miss.min(), abs=1e-3)
 
 

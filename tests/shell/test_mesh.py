@@ -5,7 +5,7 @@ import trimesh
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import Design, design
 from tbcad.optics.trace import miss_distances
-from tbcad.shell.facets import facets
+from tbcad.shell.facets import mirror_facets
 from tbcad.spec.design import load_spec
 from tests.helpers import body_of, mesh_of
 
@@ -38,7 +38,7 @@ def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
 
 def test_facets_lie_on_their_spheres_and_face_the_light(small_design: Design) -> None:
     half = small_design.halves[0]
-    made = facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     surfaces = half.body.surfaces
     corner = made.vertices[made.triangles]
     for k in range(3):
@@ -52,7 +52,7 @@ def test_no_facet_folds_in_sharp_corners_of_coarse_cells(n: int) -> None:
     """At n = 3 and 5 the foot cuts cells in corners so sharp that a mitred strip would fold."""
     made = design(load_spec(None, [f"n={n}"]))
     half = made.halves[0]
-    every = facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    every = mirror_facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
     corner = every.vertices[every.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     assert dot(normal, half.body.surfaces.gradient(every.mirror, corner.mean(axis=1))).min() > 0
@@ -60,7 +60,7 @@ def test_no_facet_folds_in_sharp_corners_of_coarse_cells(n: int) -> None:
 
 def test_chord_error_is_kept(small_design: Design) -> None:
     half = small_design.halves[0]
-    made = facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     middle = made.vertices[made.triangles].mean(axis=1)
     depth = np.abs(half.body.surfaces.value(made.mirror, middle))
     assert depth.max() < small_design.spec.mesh.chord_error_mm
@@ -68,7 +68,7 @@ def test_chord_error_is_kept(small_design: Design) -> None:
 
 def test_area_of_facets_is_that_of_the_cells(paper_design: Design) -> None:
     half = paper_design.halves[0]
-    made = facets(paper_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    made = mirror_facets(paper_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     corner = made.vertices[made.triangles]
     area = norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) / 2
     assert area.sum() == pytest.approx(half.area.sum(), rel=1e-3)
@@ -84,7 +84,7 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     made = design(load_spec(None, ["n=12", f"ray_error_mm={error_mm}", "chord_error_mm=0.002"]))
     half = made.halves[0]
     pinhole = half.view.pinhole
-    every = facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    every = mirror_facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
     on_rim = every.triangles < every.first[-1] + every.steps[-1] - 1
     rim = on_rim.sum(axis=1) == 2
     triangle = every.triangles[rim]

@@ -23,8 +23,8 @@ from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
-from tbcad.shell.files import closing, distances
-from tbcad.shell.mesh import mesh
+from tbcad.shell.files import object_distances, shell_envelope
+from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerance.montecarlo.draws import Draws
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
@@ -58,12 +58,12 @@ def slowly(half: MirrorArray, draws: Draws, k: int) -> np.ndarray:
     whole = half.cells.surfaces.apex[:, 0] != 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trace, "ROUNDS", FINE)
-        patch.setattr(trace, "counted_sides", lambda one: _counted(one, whole))
-        return trace.coverage(placed(cells, scale, middle), pinhole - middle)
+        patch.setattr(trace, "limiting_sides", lambda one: _counted(one, whole))
+        return trace.coverage_diameters(placed(cells, scale, middle), pinhole - middle)
 
 
 def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What tbcad.optics.trace.counted_sides does, with the halved mirrors known beforehand."""
+    """What tbcad.optics.trace.limiting_sides does, with the halved mirrors known beforehand."""
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]
@@ -73,10 +73,12 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def meshed(design: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
     """Write both shells of machine k as STL files, as the exporter would."""
-    first, body = design.halves[0], closing(design)
+    first, body = design.halves[0], shell_envelope(design)
     for half, drawn in zip(design.halves, draws, strict=True):
         own = made(half, drawn, k)
-        facets = mesh(design.spec, own if half is first else own.mirrored(), body, distances(first))
+        facets = shell_mesh(
+            design.spec, own if half is first else own.mirrored(), body, object_distances(first)
+        )
         facets = facets if half is first else facets.mirrored()
         turn = Rotation.from_rotvec(drawn.shell_tilt[k])
         points = turn.apply(facets.vertices * drawn.scale[k]) + drawn.shell_shift[k]

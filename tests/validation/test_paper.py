@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray, design, directions
+from tbcad.mirrors.array import MirrorArray, design, numbered_directions
 from tbcad.optics import flat
 from tbcad.spec.design import load_spec
 
@@ -17,7 +17,7 @@ ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)
 
 def camera_a(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions of camera a's mirrors and all directions."""
-    every, _ = directions(n)
+    every, _ = numbered_directions(n)
     return every[(every[:, 0] >= 0) & (every[:, 2] >= 0)], every
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.round_cones import RoundCones, contact_angle, spheres
-from tbcad.optics.ball_light import light
+from tbcad.optics.ball_light import light_hulls
 from tbcad.optics.camera import Camera
 from tbcad.prototype.balls.selection import Balls
 from tbcad.spec.errors import SpecError
@@ -47,7 +47,7 @@ def min_separations(
     """
     centre, radius = balls.body_centre[:, :2], balls.body_radius
     touch = contact_angle(centre, radius, spheres(centre, radius).grown(keys.ball_wall_mm))
-    to_object, to_camera = light(balls.outline, pinhole, capture)
+    to_object, to_camera = light_hulls(balls.outline, pinhole, capture)
     dark = np.maximum(
         contact_angle(centre, radius, to_object.grown(keys.light_margin_mm)),
         contact_angle(centre, radius, to_camera.grown(keys.light_margin_mm)),

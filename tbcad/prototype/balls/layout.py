@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.vectors import MIRROR
+from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import Design, MirrorArray
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls import selection as ball
@@ -263,7 +263,7 @@ def _twins(half: MirrorArray) -> Ints:
     Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's
     mirror with the number of (x, -y, z).
     """
-    turned_by = half.u * MIRROR[[1, 0, 2]]
+    turned_by = half.u * FLIP_X[[1, 0, 2]]
     near = half.u @ turned_by.T
     result: Ints = near.argmax(axis=0)
     return result

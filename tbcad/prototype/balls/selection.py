@@ -7,8 +7,15 @@ import numpy as np
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import Poses, facing, outlines, pixels, poses, turned
-from tbcad.optics.windows import Pieces, Windows, windows
+from tbcad.optics.ball_light import (
+    BallPoses,
+    ball_poses,
+    field_angles,
+    pixel_counts,
+    turned,
+    used_outlines,
+)
+from tbcad.optics.windows import SubstituteBalls, Windows, cell_windows
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.spec.prototype import PrototypeSpec
@@ -38,7 +45,7 @@ class Balls:
         body_depth: of its centre behind the apex along the normal, mm, (k,).
     """
 
-    at: Poses
+    at: BallPoses
     radius: Floats
     stock: Ints
     catalogue: Catalogue
@@ -135,25 +142,25 @@ class BallCandidates:
     def coverage(self, radius: Floats, moved: bool) -> Floats:
         """Coverage diameter (m,) with reflecting radii (k,), in moved cells or fixed ones, mm."""
         half, of = self.half, self.groups.of
-        at = poses(half.ellipsoid, self.groups.polar)
+        at = ball_poses(half.ellipsoid, self.groups.polar)
         centre = turned((at.apex - radius[:, None] * at.normal)[of], half.azimuth)
         across = turned(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), half.azimuth)
         frame = half.ellipsoid.frame()
         turn = self._turn() if moved else np.zeros(len(half))
-        pieces = Pieces(centre @ frame, radius[of], across @ frame, turn)
+        pieces = SubstituteBalls(centre @ frame, radius[of], across @ frame, turn)
         covered = self.windows.coverage(pieces)
         return covered if moved else np.where(self._shown(), covered, 0.0)
 
     def _turn(self) -> Floats:
         """Turn of each mirror's window about the pinhole that brings its apex to the ball's."""
-        angle = facing(self.half.ellipsoid, self.groups.polar)[self.groups.of]
-        return facing(self.half.ellipsoid, self.half.polar) - angle
+        angle = field_angles(self.half.ellipsoid, self.groups.polar)[self.groups.of]
+        return field_angles(self.half.ellipsoid, self.half.polar) - angle
 
     def _shown(self) -> Bools:
         """Whether the ball's apex, which shows the origin, lies in the mirror's own cell, (m,)."""
         half = self.half
         frame = half.ellipsoid.frame()
-        apex = poses(half.ellipsoid, self.groups.polar).apex[self.groups.of]
+        apex = ball_poses(half.ellipsoid, self.groups.polar).apex[self.groups.of]
         away = turned(apex, half.azimuth) @ frame - half.view.pinhole
         direction = away / norm(away)[:, None]
         return self.windows.surround(direction, direction, np.zeros(len(half)))
@@ -165,7 +172,7 @@ class BallCandidates:
 
 def ball_candidates(half: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
     """Groups of mirrors ready to try balls in their places; target is a coverage in mm."""
-    return BallCandidates(half, groups, windows(half.cells, half.view.pinhole), target)
+    return BallCandidates(half, groups, cell_windows(half.cells, half.view.pinhole), target)
 
 
 def choose_balls(here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue) -> Balls:
@@ -182,8 +189,8 @@ def balls_with_radii(
 ) -> Balls:
     """Balls with reflecting radii (k,) in the places of the groups, caps with a rim (mm)."""
     ellipsoid = here.half.ellipsoid
-    at = poses(ellipsoid, here.groups.polar)
-    outline = outlines(at, radius, 2 * ellipsoid.linear_eccentricity, here.target / 2)
+    at = ball_poses(ellipsoid, here.groups.polar)
+    outline = used_outlines(at, radius, 2 * ellipsoid.linear_eccentricity, here.target / 2)
     loose = Balls(at, radius, stock, catalogue, outline, radius, radius)
     body, depth = _bodies(radius, loose.in_use + rim)
     made = loose.cap & (body < radius)
@@ -218,8 +225,8 @@ def ball_fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallFit
     """What the balls show in place of the mirrors."""
     half, groups = here.half, here.groups
     moved = keys.picture == "moved"
-    shell = outlines(
-        poses(half.ellipsoid, half.polar),
+    shell = used_outlines(
+        ball_poses(half.ellipsoid, half.polar),
         half.mirrors.radius,
         2 * half.ellipsoid.linear_eccentricity,
         here.target / 2,
@@ -238,7 +245,7 @@ def ball_fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallFit
 def _counted(half: MirrorArray, outline: Floats) -> Floats:
     """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
     share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
-    return share * pixels(half.view, half.ellipsoid.frame(), outline, half.azimuth)
+    return share * pixel_counts(half.view, half.ellipsoid.frame(), outline, half.azimuth)
 
 
 def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, Ints]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.ball_light import light
+from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import Hub, hub_layout
 from tbcad.prototype.base.profile import (
@@ -139,7 +139,7 @@ def _light(keys: BaseSpec, made: PrototypeLayout) -> LightSpheroid:
     The capture sphere lies inside the mirrors' ellipsoid and so far below the level of any ball.
     """
     pinhole = 2 * made.half.ellipsoid.linear_eccentricity
-    free, cones = LightSpheroid(pinhole, 0.0), light(made.balls.outline, pinhole, 0.0)[0]
+    free, cones = LightSpheroid(pinhole, 0.0), light_hulls(made.balls.outline, pinhole, 0.0)[0]
     level = (free.beyond(cones.end) + 2 * cones.end_radius).max()
     return LightSpheroid(pinhole, float(level) + 2 * keys.light_clearance_mm)
 

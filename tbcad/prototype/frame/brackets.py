@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Component, Prism, rod
+from tbcad.geometry.primitives import Component, Primitive, Prism, cylinder_between
 from tbcad.prototype.drive.drive import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
@@ -47,7 +47,7 @@ def slab(corners: Floats, low: float, high: float, axes: Floats) -> Prism:
     return Prism(at @ axes, (high - low) * axes[1])
 
 
-def webs(corners: Floats, inner: float, thickness: float, axes: Floats) -> list[Body]:
+def webs(corners: Floats, inner: float, thickness: float, axes: Floats) -> list[Primitive]:
     """Two webs of a polygon (n, 2) of (level, up), from inner outward to either side."""
     return [
         slab(corners, inner, inner + thickness, axes),
@@ -55,10 +55,10 @@ def webs(corners: Floats, inner: float, thickness: float, axes: Floats) -> list[
     ]
 
 
-def drilled(places: Sequence[Floats], along: Floats, diameter: float) -> list[Body]:
+def drilled(places: Sequence[Floats], along: Floats, diameter: float) -> list[Primitive]:
     """Holes from points (3,) along a vector, a little longer to both sides."""
     out = THROUGH_MM * along / np.linalg.norm(along)
-    return [rod(place - out, place + along + out, diameter / 2) for place in places]
+    return [cylinder_between(place - out, place + along + out, diameter / 2) for place in places]
 
 
 def fitting(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Component, Rod, box, rod, slot
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, box, cylinder_between, slot
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.prototype.drive.drive import PurchasedPart
@@ -49,7 +49,7 @@ def upright_foot(keys: FrameSpec, axes: Floats, face: float, side: int) -> Brack
     start = face if side > 0 else face - EXTRUSION_MM
     half = keys.uprights_mm / 2 + 10
 
-    def wide(near: float, far: float, bottom: float, top: float) -> Body:
+    def wide(near: float, far: float, bottom: float, top: float) -> Primitive:
         x0, x1 = sorted((start + side * near, start + side * far))
         return slab(np.array([[x0, bottom], [x1, bottom], [x1, top], [x0, top]]), -half, half, axes)
 
@@ -91,11 +91,13 @@ def stage_foot(keys: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
     base = np.array([-half, -half, low]), np.array([max(half, ear + 1), half, stage.foot])
     ears = np.array([stage.post + 3, -EAR_MM, low]), np.array([ear, EAR_MM, top])
     middle = np.array([0.0, 0.0, low])
-    added = (box(*base, axes), Rod(middle, axes[2], radius, COLLAR_MM), box(*ears, axes))
+    added = (box(*base, axes), Cylinder(middle, axes[2], radius, COLLAR_MM), box(*ears, axes))
     places = reach * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
     removed = [
-        Rod(np.array([0, 0, stage.foot]), axes[2], stage.post + keys.post_play_mm / 2, COLLAR_MM),
-        Rod(middle - THROUGH_MM * axes[2], axes[2], wire, COLLAR_MM),
+        Cylinder(
+            np.array([0, 0, stage.foot]), axes[2], stage.post + keys.post_play_mm / 2, COLLAR_MM
+        ),
+        Cylinder(middle - THROUGH_MM * axes[2], axes[2], wire, COLLAR_MM),
         *_clamp(axes, stage, ear, top, insert),
         *drilled([np.array([*p, low]) @ axes for p in places], keys.flange_mm * axes[2], 5.5),
     ]
@@ -115,7 +117,7 @@ def stage_foot(keys: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
 
 def _clamp(
     axes: Floats, stage: StageLayout, ear: float, top: float, insert: PurchasedPart
-) -> list[Body]:
+) -> list[Primitive]:
     """Slit, screw's hole across it, and the insert's hole."""
     low = stage.foot + 1
     slit = np.array([0.0, -SLIT_MM / 2, low]), np.array([ear + 1, SLIT_MM / 2, top + 1])
@@ -124,8 +126,8 @@ def _clamp(
     deep = np.array([0.0, EAR_MM - insert["length_mm"] - 0.4, 0.0])
     return [
         box(*slit, axes),
-        rod((at - side) @ axes, (at + side) @ axes, HOLES_MM[insert["thread_mm"]] / 2),
-        rod((at + deep) @ axes, (at + side) @ axes, insert["hole_mm"] / 2),
+        cylinder_between((at - side) @ axes, (at + side) @ axes, HOLES_MM[insert["thread_mm"]] / 2),
+        cylinder_between((at + deep) @ axes, (at + side) @ axes, insert["hole_mm"] / 2),
     ]
 
 
@@ -180,16 +182,16 @@ def camera_bracket(keys: FrameSpec, axes: Floats, own: ProtoKeys, view: Camera) 
 
 def _camera_slot(
     keys: FrameSpec, axes: Floats, view: Camera, out: Floats, radius: float
-) -> tuple[Body, ...]:
+) -> tuple[Primitive, ...]:
     away = out @ axes
     start = view.pinhole - keys.camera_screw_mm * view.forward + (radius - THROUGH_MM) * away
     depth = (keys.flange_mm + 2 * THROUGH_MM) * away
     return slot(start, view.forward, keys.camera_travel_mm, HOLES_MM[6.35] / 2, depth)
 
 
-def _foot_slots(keys: FrameSpec, axes: Floats, places: Floats) -> list[Body]:
+def _foot_slots(keys: FrameSpec, axes: Floats, places: Floats) -> list[Primitive]:
     depth = (keys.flange_mm + 2 * THROUGH_MM) * axes[2]
-    found: list[Body] = []
+    found: list[Primitive] = []
     for place in places:
         start = np.array([*place, keys.floor_mm - THROUGH_MM]) @ axes
         found += slot(start, axes[0], FOOT_TRAVEL_MM, HOLES_MM[5.0] / 2, depth)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Component, box, rod, slot
+from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, slot
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
 from tbcad.prototype.frame.brackets import (
@@ -156,14 +156,14 @@ def _bearings(base: BaseLayout, plan: Plan, parts: Parts) -> Bearings:
     return Bearings(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + WALL_MM)
 
 
-def _plate(base: BaseLayout, plan: Plan) -> list[Body]:
+def _plate(base: BaseLayout, plan: Plan) -> list[Primitive]:
     low = np.array([plan.back, plan.low, -plan.half])
     return [box(low, np.array([plan.front, plan.high, plan.half]), base.frame)]
 
 
 def _flange(
     keys: FrameSpec, base: BaseLayout, plan: Plan, axes: Floats, at: tuple[float, float, float]
-) -> list[Body]:
+) -> list[Primitive]:
     face, low, top = at
     half = keys.uprights_mm / 2 + 10
     front, inside = face + keys.flange_mm, face + keys.flange_mm - SUNK_MM
@@ -179,14 +179,16 @@ def _flange(
     return [plate, *webs(corners, WEB_MM, keys.web_mm, axes)]
 
 
-def _screws(keys: FrameSpec, axes: Floats, face: float, heights: tuple[float, float]) -> list[Body]:
+def _screws(
+    keys: FrameSpec, axes: Floats, face: float, heights: tuple[float, float]
+) -> list[Primitive]:
     places = [
         np.array([face, side * keys.uprights_mm / 2, z]) @ axes for z in heights for side in (-1, 1)
     ]
     return drilled(places, keys.flange_mm * axes[0], HOLES_MM[5.0])
 
 
-def _seats(keys: FrameSpec, base: BaseLayout, plan: Plan, held: Bearings) -> list[Body]:
+def _seats(keys: FrameSpec, base: BaseLayout, plan: Plan, held: Bearings) -> list[Primitive]:
     """Seats to either end, and between them a bore that leaves a shoulder."""
     width, outer = held.bearing["width_mm"], held.bearing["outer_mm"]
     seat, beyond = (outer + keys.bearing_fit_mm) / 2, held.rear - 2 * held.tube
@@ -199,7 +201,7 @@ def _seats(keys: FrameSpec, base: BaseLayout, plan: Plan, held: Bearings) -> lis
 
 def _motor_holes(
     keys: FrameSpec, base: BaseLayout, drive: Drive, plan: Plan, parts: Parts
-) -> list[Body]:
+) -> list[Primitive]:
     """Pilot and screws: slots along the plate for a belt, a window for a motor on the axis."""
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plan.back - THROUGH_MM
@@ -222,8 +224,8 @@ def _motor_holes(
 
 def _circle(
     base: BaseLayout, start: float, depth: Floats, circle: float, hole: float
-) -> list[Body]:
+) -> list[Primitive]:
     turn = np.pi / 4 + np.arange(4) * np.pi / 2
     places = circle / 2 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     at = [local(base, start, float(out), float(side)) for out, side in places]
-    return [rod(place, place + depth, hole / 2) for place in at]
+    return [cylinder_between(place, place + depth, hole / 2) for place in at]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Rod, box
+from tbcad.geometry.primitives import Component, Cylinder, box
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
@@ -200,7 +200,7 @@ def _camera(own: PrototypeSpec, made: PrototypeLayout) -> list[Component]:
     if own.camera_diameter_mm == 0:
         return []
     view, radius = made.half.view, own.camera_diameter_mm / 2
-    body = Rod(view.pinhole, -view.forward, radius, own.camera_length_mm)
+    body = Cylinder(view.pinhole, -view.forward, radius, own.camera_length_mm)
     return [Component("camera", "camera behind its pinhole", (body,))]
 
 

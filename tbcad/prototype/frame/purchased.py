@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Rod, box, rod
+from tbcad.geometry.primitives import Component, Cylinder, box, cylinder_between
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, PurchasedPart, pitch_diameter
 from tbcad.prototype.frame.brackets import SUNK_MM
@@ -54,9 +54,9 @@ def local(base: BaseLayout, along: float, out: float = 0.0, side: float = 0.0) -
     return result
 
 
-def along(base: BaseLayout, start: float, end: float, radius: float, out: float = 0.0) -> Rod:
+def along(base: BaseLayout, start: float, end: float, radius: float, out: float = 0.0) -> Cylinder:
     """A cylinder between two places along the axis, or beside it, mm."""
-    return rod(local(base, start, out), local(base, end, out), radius)
+    return cylinder_between(local(base, start, out), local(base, end, out), radius)
 
 
 def bought(

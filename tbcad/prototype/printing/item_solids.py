@@ -15,7 +15,7 @@ from tbcad.cad.solids import (
     volume,
     volume_by_meshes,
 )
-from tbcad.geometry.primitives import Body, Component, Rod, Turned
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, Revolved
 from tbcad.geometry.primitives import Prism as Straight
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.base_keys import BaseSpec
@@ -25,11 +25,11 @@ COARSE_MM = 0.02
 VOLUME_ERROR = 2e-3
 
 
-def shape(body: Body) -> TopoDS_Shape:
+def shape(body: Primitive) -> TopoDS_Shape:
     """The solid of a body."""
-    if isinstance(body, Rod):
+    if isinstance(body, Cylinder):
         return cylinder(body.start, body.axis, body.radius, body.length)
-    if isinstance(body, Turned):
+    if isinstance(body, Revolved):
         return ring(body.profile, 0.0, 2 * np.pi)
     return prism(polygon(_upward(body)), body.along)
 

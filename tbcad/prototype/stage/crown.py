@@ -4,7 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Body, Component, Prism, Rod, Turned, box, rod
+from tbcad.geometry.primitives import (
+    Component,
+    Cylinder,
+    Primitive,
+    Prism,
+    Revolved,
+    box,
+    cylinder_between,
+)
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
@@ -53,19 +61,19 @@ def crown(
 ) -> Component:
     """Plate, neck and plug in one turned body, with pillars and studs on it."""
     studs = [
-        Rod(np.array([*place, at.plate - 1]), np.array(UP), _stud(keys), STUD_HEIGHT_MM + 1)
+        Cylinder(np.array([*place, at.plate - 1]), np.array(UP), _stud(keys), STUD_HEIGHT_MM + 1)
         for place in _studs(keys, leds, at.wire)
     ]
-    added: list[Body] = [Turned(_profile(at)), *studs]
-    removed: list[Body] = []
+    added: list[Primitive] = [Revolved(_profile(at)), *studs]
+    removed: list[Primitive] = []
     for place, floor in zip(leds, pockets.tolist(), strict=True):
         middle = float(place[2])
         end = floor + POCKET * (middle - floor)
         foot, top = np.array([*place[:2], at.plate - INSIDE_MM]), np.array([*place[:2], end])
-        added.append(rod(foot, top, pillar_radius(keys, led)))
+        added.append(cylinder_between(foot, top, pillar_radius(keys, led)))
         removed += _pocket(keys, led, place, floor, end, at.plate)
     inward = np.array([*(SIDE[:2] * (at.plug - SEAT_MM)), at.joint - PLUG_MM / 2])
-    removed.append(Rod(inward, SIDE, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
+    removed.append(Cylinder(inward, SIDE, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
     return Component(
         "stage_crown",
         "crown of the object stage with pockets for LEDs",
@@ -95,13 +103,13 @@ def _profile(at: Sizes) -> Floats:
 
 def _pocket(
     keys: StageSpec, led: PurchasedPart, place: Floats, floor: float, end: float, plate: float
-) -> list[Body]:
+) -> list[Primitive]:
     """Pocket, the wires' way down, and their groove to the bore."""
     hole, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
     low, middle = np.array([*place[:2], groove]), np.array([*place[:2], floor])
     return [
-        rod(middle, np.array([*place[:2], end + THROUGH_MM]), hole),
-        rod(low, middle + THROUGH_MM * np.array(UP), keys.wire_mm / 2),
+        cylinder_between(middle, np.array([*place[:2], end + THROUGH_MM]), hole),
+        cylinder_between(low, middle + THROUGH_MM * np.array(UP), keys.wire_mm / 2),
         _groove(keys, place, groove, plate + OPEN_MM),
     ]
 
@@ -146,9 +154,9 @@ def disc(keys: StageSpec, leds: Floats, plate: float, wire: float) -> Component:
     return Component(
         "stage_disc",
         "disc under the object, turned by 180 degrees for the other half",
-        (Rod(np.array([0, 0, plate]), np.array(UP), keys.disc_mm / 2, DISC_MM),),
+        (Cylinder(np.array([0, 0, plate]), np.array(UP), keys.disc_mm / 2, DISC_MM),),
         tuple(
-            Rod(np.array([*at, low]), np.array(UP), radius, DISC_MM + 2 * THROUGH_MM)
+            Cylinder(np.array([*at, low]), np.array(UP), radius, DISC_MM + 2 * THROUGH_MM)
             for at in holes
         ),
         (DOWN,),
@@ -159,11 +167,11 @@ def post_tube(post: float, wall: float, joint: float, foot: float) -> Component:
     """A tube, with a hole for the set screw that holds the plug."""
     top, bottom = np.array([0, 0, joint]), np.array([0, 0, foot])
     beyond = np.array([0, 0, THROUGH_MM])
-    screw = Rod(top - [0, 0, PLUG_MM / 2], SIDE, SET_SCREW_MM / 2, post + THROUGH_MM)
+    screw = Cylinder(top - [0, 0, PLUG_MM / 2], SIDE, SET_SCREW_MM / 2, post + THROUGH_MM)
     return Component(
         "stage_post",
         "post of the object stage",
-        (rod(bottom, top, post),),
-        (rod(bottom - beyond, top + beyond, post - wall), screw),
+        (cylinder_between(bottom, top, post),),
+        (cylinder_between(bottom - beyond, top + beyond, post - wall), screw),
         (DOWN, UP, (1.0, 0.0, 0.0)),
     )

@@ -11,10 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import directions
+from tbcad.mirrors.array import numbered_directions
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import cells_of
-from tbcad.optics.power_diagram import NotRegularError, bounded
+from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
@@ -126,7 +126,7 @@ def _refused(path: Path, error: ValidationError, prefix: str = "") -> InputError
 
 
 def _reflector(path: Path, document: _Document, spec: Spec, camera: _Camera) -> Reflector:
-    every, faces = directions(spec.optics.n)
+    every, faces = numbered_directions(spec.optics.n)
     kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
     mine = [mirror for mirror in document.mirrors if mirror.camera == camera.id]
     if len(mine) != kept.sum():
@@ -135,7 +135,7 @@ def _reflector(path: Path, document: _Document, spec: Spec, camera: _Camera) -> 
             f"{kept.sum()} at n = {spec.optics.n}: {AGAIN}"
         )
     mirrored = camera.id == "b"
-    triangles, boundary = bounded(faces, every, kept)
+    triangles, boundary = bounded_triangulation(faces, every, kept)
     u, mirrors = _surfaces(path, mine)
     walls = planes(
         np.array([[0, 0, 0], [0, 0, document.foot_z_mm]]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorArray, directions
+from tbcad.mirrors.array import MirrorArray, numbered_directions
 from tbcad.simulate.study.paper import claimed
 from tbcad.simulate.study.pixels import Sensor, counts, virtual_cameras
 from tbcad.simulate.study.sweep import attempt, varied
@@ -34,8 +34,8 @@ def definitions(spec: Spec) -> Table:
 
 def _directions(spec: Spec) -> list[tuple[Cell, ...]]:
     n = spec.optics.n
-    z = directions(n)[0][:, 2]
-    mine = int((directions(n)[0][z >= 0, 0] >= 0).sum())
+    z = numbered_directions(n)[0][:, 2]
+    mine = int((numbered_directions(n)[0][z >= 0, 0] >= 0).sum())
     readings = {
         "virtual cameras: directions with z >= 0": int((z >= 0).sum()),
         "directions with z > 0": int((z > 0).sum()),

@@ -205,7 +205,7 @@ def _lowest(side: Floats, lens: Floats, line: Floats, radius: float) -> float:
 def _miss(side: Floats, lens: Floats, line: Floats, radius: float) -> float:
     """Distance squared from the origin of a ray after a ball; infinite where it misses the ball.
 
-    The same where the ray goes away from the object, as in tbcad.optics.light.miss_off_balls.
+    The same where the ray goes away from the object, as in ball_miss_distances of tbcad.optics.
     """
     x = side[0] * lens[0, 0] + side[1] * lens[1, 0] + side[2] * lens[2, 0]
     y = side[0] * lens[0, 1] + side[1] * lens[1, 1] + side[2] * lens[2, 1]

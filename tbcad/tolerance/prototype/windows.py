@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.trace import reflected
-from tbcad.optics.windows import rotated, windows
+from tbcad.optics.windows import cell_windows, rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import Run, runs
 from tbcad.simulate.scene.reflector import Reflector
@@ -86,7 +86,7 @@ def designed(reflectors: tuple[Reflector, Reflector], plan: Plan) -> Designed:
 
 
 def _windowed(run: Run, axes: Floats) -> Windowed:
-    sides, m = windows(run.at.cells, run.view.pinhole), len(run.at)
+    sides, m = cell_windows(run.at.cells, run.view.pinhole), len(run.at)
     order = np.argsort(sides.mirror, kind="stable")
     mirror = sides.mirror[order]
     t = np.broadcast_to(np.linspace(0, 1, SAMPLES), (len(mirror), SAMPLES))

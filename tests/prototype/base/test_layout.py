@@ -7,7 +7,7 @@ import pytest
 
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import Design
-from tbcad.optics.ball_light import light
+from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -107,7 +107,7 @@ class TestSeats:
 class TestLight:
     def test_all_light_is_within_the_level(self, whole: BaseLayout, paper: PrototypeLayout) -> None:
         random = np.random.default_rng(1)
-        for cone in light(paper.balls.outline, whole.light.pinhole, 30.0):
+        for cone in light_hulls(paper.balls.outline, whole.light.pinhole, 30.0):
             share = random.random((len(cone), 500, 1))
             middle = cone.start[:, None] + share * (cone.end - cone.start)[:, None]
             reach = cone.start_radius[:, None] * (1 - share[..., 0])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.geometry.primitives import Rod
+from tbcad.geometry.primitives import Cylinder
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import prototype_layout
@@ -85,7 +85,7 @@ class TestFrame:
         for item in numbers.bought:
             if item.name in ("bearing_front", "bearing_rear", "shaft", "collar", "wheel"):
                 for body in (*item.added, *item.removed):
-                    assert isinstance(body, Rod)
+                    assert isinstance(body, Cylinder)
                     assert norm(np.cross(body.start, w)) < 1e-9
                     assert abs(body.axis @ w) == pytest.approx(1, abs=1e-12)
         assert hub.face > numbers.head.bearings[0] > numbers.head.bearings[1]
@@ -100,7 +100,7 @@ class TestFrame:
         one = drive("nema17-belt")
         (pinion,) = (item for item in numbers.bought if item.name == "pinion")
         (body,) = pinion.added
-        assert isinstance(body, Rod)
+        assert isinstance(body, Cylinder)
         assert norm(np.cross(body.start, rig.base.frame[0])) == pytest.approx(one.centre_mm)
 
     def test_all_that_stands_still_is_clear(self, numbers: FrameLayout) -> None:

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from tbcad.geometry.primitives import SIDES, Prism, Rod, Turned, box, rod, slot, triangles
+from tbcad.geometry.primitives import (
+    SIDES,
+    Cylinder,
+    Prism,
+    Revolved,
+    box,
+    cylinder_between,
+    enclosing_triangles,
+    slot,
+)
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
@@ -89,8 +98,8 @@ class TestStage:
         self, made: PrototypeLayout, space: Room
     ) -> None:
         disc, crown, _ = staged(made, space).items
-        holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Rod)])
-        studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Rod)])
+        holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Cylinder)])
+        studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Cylinder)])
         assert holes == pytest.approx(studs)
         assert holes[0] == pytest.approx(-holes[1])
 
@@ -160,7 +169,7 @@ class TestStage:
     ) -> None:
         numbers = staged(made, space)
         crown = numbers.items[1]
-        pillars = [body for body in crown.added[3:] if isinstance(body, Rod)]
+        pillars = [body for body in crown.added[3:] if isinstance(body, Cylinder)]
         assert len(pillars) == 4
         cameras = made.half.ellipsoid.camera_distance * made.half.u
         for i, place in enumerate(numbers.leds):
@@ -264,13 +273,13 @@ class TestBodies:
     @pytest.mark.parametrize(
         "body",
         [
-            rod(np.array([1.0, 2.0, 3.0]), np.array([4.0, 6.0, 3.0]), 2.0),
-            Turned(np.array([[0.0, 1.0], [0.0, 3.0], [2.0, 3.0], [2.0, 1.0]])),
+            cylinder_between(np.array([1.0, 2.0, 3.0]), np.array([4.0, 6.0, 3.0]), 2.0),
+            Revolved(np.array([[0.0, 1.0], [0.0, 3.0], [2.0, 3.0], [2.0, 1.0]])),
             Prism(np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]), np.array([0.0, 0, 3])),
         ],
     )
     def test_triangles_enclose_and_close(self, body: object) -> None:
-        corners = triangles(body)  # type: ignore[arg-type]
+        corners = enclosing_triangles(body)  # type: ignore[arg-type]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # Of a closed surface each edge belongs to two triangles.
         ends = np.round(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), 6)
@@ -280,21 +289,23 @@ class TestBodies:
         assert (norm(normal) > 1e-9).all()
 
     def test_round_bodies_are_inside_their_triangles(self) -> None:
-        body = Rod(np.zeros(3), UP, 2.0, 5.0)
-        middles = triangles(body).mean(axis=1)
+        body = Cylinder(np.zeros(3), UP, 2.0, 5.0)
+        middles = enclosing_triangles(body).mean(axis=1)
         sides = middles[(middles[:, 2] > 0.1) & (middles[:, 2] < 4.9)]
         assert norm(sides[:, :2]).min() >= 2.0 - 1e-9
-        assert norm(triangles(body)[..., :2]).max() == pytest.approx(2 / np.cos(np.pi / SIDES))
+        assert norm(enclosing_triangles(body)[..., :2]).max() == pytest.approx(
+            2 / np.cos(np.pi / SIDES)
+        )
 
     def test_a_slot_without_travel_is_a_hole(self) -> None:
         args = (np.zeros(3), np.array([1.0, 0, 0]))
         (only,) = slot(*args, 0.0, 1.5, 4 * UP)
-        assert isinstance(only, Rod)
+        assert isinstance(only, Cylinder)
         assert (only.radius, only.length) == (1.5, 4.0)
         middle, *ends = slot(*args, 6.0, 1.5, 4 * UP)
         assert isinstance(middle, Prism)
         assert np.ptp(middle.corners, axis=0) == pytest.approx([6, 3, 0])
-        assert [end.start[0] for end in ends if isinstance(end, Rod)] == [-3, 3]
+        assert [end.start[0] for end in ends if isinstance(end, Cylinder)] == [-3, 3]
 
 
 def test_the_same_stage_twice(made: PrototypeLayout, space: Room) -> None:

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import Design, design
-from tbcad.optics.ball_light import miss_off_balls
-from tbcad.optics.windows import windows
+from tbcad.optics.ball_light import ball_miss_distances
+from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import Run, runs
@@ -75,7 +75,7 @@ def pictures(both: tuple[Run, Run]) -> list[Picture]:
     """Mirror of each side of both runs' windows, and where the sides are in the picture."""
     result = []
     for run, turn in zip(both, (np.ones(3), HALF_TURN), strict=True):
-        sides, view = windows(run.at.cells, run.view.pinhole), both[0].view
+        sides, view = cell_windows(run.at.cells, run.view.pinhole), both[0].view
         t = np.broadcast_to(np.linspace(0, 1, SAMPLES), (len(sides.arc), SAMPLES))
         way = sides.rays(t, run.at.u, np.zeros(len(run.at))) @ run.turn[sides.mirror] * turn
         axes = np.column_stack([view.right, np.cross(view.forward, view.right)])
@@ -98,7 +98,7 @@ def slow(
     for half, (run, (mirror, place)) in enumerate(zip(both, pictures, strict=True)):
         way = unit(turn.apply(view.forward) + place / draws.focal[machine] @ axes)
         centre, radius = balls(at, run, draws, machine, half)
-        miss = miss_off_balls(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
+        miss = ball_miss_distances(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
         which = at.virtual[half * len(run.at) :][mirror]
         np.minimum.at(least, which, 2 * miss.min(axis=1))
     return least
@@ -167,7 +167,7 @@ def test_highlights_show_the_middle_of_the_object() -> None:
     centre = 130 * unit(generator.normal(size=(50, 3)) + 3 * np.eye(3)[2])
     way = highlights(pinhole, centre, radius)
     assert norm(way) == pytest.approx(1)
-    assert miss_off_balls(pinhole, way, centre, radius) == pytest.approx(0, abs=1e-5)
+    assert ball_miss_distances(pinhole, way, centre, radius) == pytest.approx(0, abs=1e-5)
 
 
 class TestMotions:

@@ -20,7 +20,7 @@ from tbcad_verify.types import Floats
 
 from tbcad.mirrors.array import Design, design
 from tbcad.mirrors.record import rows
-from tbcad.optics.cells import areas
+from tbcad.optics.cells import cell_areas
 from tbcad.spec.design import load_spec
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
@@ -400,7 +400,7 @@ def test_area_under_the_coat() -> None:
     """The record's area is the reflecting surface's, not the solid's."""
     it = made("coat")
     bare = of_export(as_export(it), "a")
-    np.testing.assert_allclose(bare.area, areas(it.halves[0].body), rtol=1e-11)
+    np.testing.assert_allclose(bare.area, cell_areas(it.halves[0].body), rtol=1e-11)
     assert np.abs(bare.area / it.halves[0].area - 1).max() > 1e-3
 
 
