@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.files import read
 from tbcad_verify.record.record import Export
@@ -109,7 +109,7 @@ def _cells(half: MirrorArray, draws: Draws, k: int) -> Cells:
 
 def _measured(record: Export) -> np.ndarray:
     """Coverage of every virtual camera by the proof: mirrors recovered, Embree for what hides."""
-    meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
+    meshes = [mesh_from_facets(parse(read(record.folder, part.stl))) for part in record.parts]
     found = [
         recover(one, record.cameras[part.camera].pinhole, record.target_mm / 2)
         for one, part in zip(meshes, record.parts, strict=True)

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.rays import (
     THREADS,
-    Scene,
+    RayScene,
+    distances_to_planes,
     first_hits,
     in_threads,
     pixel_rows,
-    reach,
     row_chunks,
 )
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.files import read
 from tbcad_verify.record.record import Camera, read_export
 from tbcad_verify.shell import light
-from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
+from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover
 from timing import Row, at_least, in_turns, told
 
@@ -68,30 +68,32 @@ def tracing(export: Path, rounds: int) -> list[Row]:
     ]
 
 
-def on_bench(folder: Path) -> Bench:
+def on_bench(folder: Path) -> OpticalSetup:
     """An export as the proof sees it when it is ready to trace."""
     export = read_export(folder)
-    meshes = [merge(parse(read(export.folder, part.stl))) for part in export.parts]
+    meshes = [mesh_from_facets(parse(read(export.folder, part.stl))) for part in export.parts]
     pairs = zip(meshes, export.parts, strict=True)
     found = [recover(mesh, pinhole_of(export, part), export.target_mm / 2) for mesh, part in pairs]
     return set_up(export, meshes, found)
 
 
-def camera_rays(bench: Bench, scene: Scene) -> None:
+def camera_rays(bench: OpticalSetup, scene: RayScene) -> None:
     """Make every pixel's ray, find its facet, and where it meets that one in float64."""
     for camera in bench.cameras:
         in_threads(partial(hit, scene, camera), row_chunks(camera))
 
 
-def hit(scene: Scene, camera: Camera, rows: tuple[int, int]) -> tuple[NDArray[Any], NDArray[Any]]:
+def hit(
+    scene: RayScene, camera: Camera, rows: tuple[int, int]
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Facets that the rays of some rows meet, and how far away."""
     origin, rays = camera.pinhole[:, None], pixel_rows(camera, *rows)
     facet = first_hits(scene, origin, rays)
     met = np.flatnonzero(facet >= 0)
-    return facet, reach(scene, facet[met], origin, np.take(rays, met, axis=1))
+    return facet, distances_to_planes(scene, facet[met], origin, np.take(rays, met, axis=1))
 
 
-def full_sensor(bench: Bench, scene: Scene) -> None:
+def full_sensor(bench: OpticalSetup, scene: RayScene) -> None:
     """The proof's own last stage: every pixel's ray, its reflection, and the way on from there."""
     for camera in bench.cameras:
         light.full_sensor(replace(bench.stage(camera), scene=scene))
@@ -102,7 +104,7 @@ def straight(embree: Any, calls: Calls) -> None:
     in_threads(lambda call: embree.run(*call), calls)
 
 
-def recorded(bench: Bench, stage: Any) -> Calls:
+def recorded(bench: OpticalSetup, stage: Any) -> Calls:
     """The rays that a stage gives to Embree."""
     recorder = Recorder(bench.scene.embree)
     stage(bench, replace(bench.scene, embree=recorder))

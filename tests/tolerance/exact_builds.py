@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.files import read
 from tbcad_verify.record.record import Export
-from tbcad_verify.shell.optics import Bench, set_up
-from tbcad_verify.shell.outline import least_miss, reflect_on_fits, trace_outline
+from tbcad_verify.shell.optics import OpticalSetup, set_up
+from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
 from tbcad_verify.shell.recover import recover
 
 from tbcad.cad.mesh import Mesh
@@ -92,7 +92,7 @@ def proved(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
         for name, camera in record.cameras.items()
     }
     record = replace(record, cameras=cameras)
-    meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
+    meshes = [mesh_from_facets(parse(read(record.folder, part.stl))) for part in record.parts]
     found = [
         recover(one, cameras[part.camera].pinhole, record.target_mm / 2)
         for one, part in zip(meshes, record.parts, strict=True)
@@ -100,7 +100,7 @@ def proved(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
     return _least(set_up(record, meshes, found))
 
 
-def _least(bench: Bench) -> np.ndarray:
+def _least(bench: OpticalSetup) -> np.ndarray:
     """Minimum coverage by tbcad_verify.shell.coverage, without the check of the seam gaps."""
     patches, virtual = bench.patches(), bench.virtual
     mine = [bench.mine(camera) for camera in bench.cameras]
@@ -111,7 +111,7 @@ def _least(bench: Bench) -> np.ndarray:
     ]
     assert (bench.match.segment >= 0).all()
     pairs = zip(outlines, lines, strict=True)
-    return 2 * np.min([least_miss(o, at, virtual) for o, at in pairs], axis=0)
+    return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 
 
 def brutally(half: MirrorArray, draws: Draws, k: int, mirror: int, ways: int = 4_000) -> float:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tbcad_verify.mesh.mesh import merge
+from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.files import read
 from tbcad_verify.record.record import read_export
 from tbcad_verify.run.verify import Options
-from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
+from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover
 
 HERE = Options(apart=False)  # in this process: quicker, and open to monkeypatches
 
 
-def bench_of(folder: Path) -> Bench:
+def bench_of(folder: Path) -> OpticalSetup:
     record = read_export(folder)
-    meshes = [merge(parse(read(record.folder, part.stl))) for part in record.parts]
+    meshes = [mesh_from_facets(parse(read(record.folder, part.stl))) for part in record.parts]
     found = [
         recover(mesh, pinhole_of(record, part), record.target_mm / 2)
         for mesh, part in zip(meshes, record.parts, strict=True)

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 
 from tests.verify.benches import bench_of
 from tests.verify.synthetic_export import Cells, Design, export
@@ -23,5 +23,5 @@ def good(made: tuple[Path, Cells], tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def bench(made: tuple[Path, Cells]) -> Bench:
+def bench(made: tuple[Path, Cells]) -> OpticalSetup:
     return bench_of(made[0])

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from tbcad_verify.mesh.mesh import Topology, distinct, examine, joined, merge
+from tbcad_verify.mesh.mesh import (
+    Topology,
+    examine_topology,
+    join_meshes,
+    mesh_from_facets,
+    sorted_unique,
+)
 from tbcad_verify.mesh.stl import Facets, parse
 from tbcad_verify.record.files import FileBytes
 
@@ -21,7 +27,7 @@ def facets(triangles: np.ndarray) -> Facets:
 
 def found(triangles: np.ndarray) -> Topology:
     one = facets(triangles)
-    return examine(merge(one), one)
+    return examine_topology(mesh_from_facets(one), one)
 
 
 def test_a_box_is_a_solid() -> None:
@@ -53,9 +59,9 @@ def test_inside_out() -> None:
 def test_stored_normals_that_lie_are_counted() -> None:
     one = facets(BOX.triangles)
     lying = Facets(one.name, -one.normals, one.corners)
-    assert examine(merge(lying), lying).stored_normals == 12
+    assert examine_topology(mesh_from_facets(lying), lying).stored_normals == 12
     silent = Facets(one.name, 0 * one.normals, one.corners)
-    assert examine(merge(silent), silent).stored_normals == 0
+    assert examine_topology(mesh_from_facets(silent), silent).stored_normals == 0
 
 
 def test_two_boxes_are_two_pieces() -> None:
@@ -79,40 +85,40 @@ def test_facets_without_area() -> None:
 
 def test_corners_merge_only_when_equal() -> None:
     box = BOX.triangles.astype(np.float32)
-    assert len(merge(facets(box)).points) == 8
+    assert len(mesh_from_facets(facets(box)).points) == 8
     box[0, 0, 0] = np.nextafter(box[0, 0, 0], np.float32(9))
-    assert len(merge(facets(box)).points) == 9
+    assert len(mesh_from_facets(facets(box)).points) == 9
 
 
 def test_minus_zero_is_zero() -> None:
     box = (BOX.triangles + np.array([1, 0, 0])).astype(np.float32)
     box[box == 0] = np.where(np.arange((box == 0).sum()) % 2, -0.0, 0.0)
-    assert len(merge(facets(box)).points) == 8
+    assert len(mesh_from_facets(facets(box)).points) == 8
 
 
 def test_merging_equals_numpys_unique_rows() -> None:
     rng = np.random.default_rng(1)
     triangles = rng.integers(0, 4, (500, 3, 3)).astype(np.float32)
-    mesh = merge(facets(triangles))
+    mesh = mesh_from_facets(facets(triangles))
     assert len(mesh.points) == len(np.unique(triangles.reshape(-1, 3), axis=0))
     np.testing.assert_array_equal(mesh.points[mesh.faces], triangles)
 
 
 def test_twins_lead_back() -> None:
-    mesh = merge(facets(BOX.triangles))
+    mesh = mesh_from_facets(facets(BOX.triangles))
     np.testing.assert_array_equal(mesh.twin[mesh.twin], np.arange(36))
     start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     np.testing.assert_array_equal(start[mesh.twin], end)
 
 
 def test_joined_meshes_keep_to_themselves() -> None:
-    one = merge(facets(BOX.triangles))
-    two = joined([one, merge(facets(BOX.triangles + 10))])
+    one = mesh_from_facets(facets(BOX.triangles))
+    two = join_meshes([one, mesh_from_facets(facets(BOX.triangles + 10))])
     np.testing.assert_array_equal(two.twin[36:] - 36, one.twin)
     np.testing.assert_array_equal(two.points[two.faces[12:]], BOX.triangles + 10)
 
 
 def test_distinct_sorts_and_keeps_each_once() -> None:
     keys = np.random.default_rng(2).integers(0, 50, 1000)
-    np.testing.assert_array_equal(distinct(keys), np.unique(keys))
-    assert distinct(keys[:0]).size == 0
+    np.testing.assert_array_equal(sorted_unique(keys), np.unique(keys))
+    assert sorted_unique(keys[:0]).size == 0

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.mesh.fits import corners, fit
-from tbcad_verify.mesh.mesh import indexed
-from tbcad_verify.mesh.segments import Segments
-from tbcad_verify.mesh.surfaces import Surfaces, bounce, misses, nearest, reflect, seen_from
-from tbcad_verify.mesh.vectors import across, cross, dot, norm, unit
+from tbcad_verify.mesh.fits import fit_surfaces, patch_vertices
+from tbcad_verify.mesh.mesh import indexed_mesh
+from tbcad_verify.mesh.segments import Segmentation
+from tbcad_verify.mesh.surfaces import (
+    Surfaces,
+    miss_distances,
+    nearest_to_origin,
+    prepare_for_rays,
+    reflect,
+    reflect_directions,
+)
+from tbcad_verify.mesh.vectors import cross, dot, norm, tangent_basis, unit
 
 RNG = np.random.default_rng(5)
 
@@ -25,7 +32,7 @@ def test_vectors_agree_with_numpy() -> None:
     a, b = RNG.normal(size=(2, 3, 50))
     np.testing.assert_allclose(cross(a, b), np.cross(a.T, b.T).T, atol=1e-15)
     np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=0), atol=1e-14)
-    frame = np.stack([*across(unit(a)), unit(a)])
+    frame = np.stack([*tangent_basis(unit(a)), unit(a)])
     np.testing.assert_allclose(
         np.einsum("ijn,kjn->nik", frame, frame), np.eye(3)[None].repeat(50, 0), atol=1e-14
     )
@@ -39,13 +46,13 @@ def test_reflection_off_a_sphere_on_the_axis(angle: float) -> None:
     top = sphere(column(0, 0, -radius), radius, column(0, 0, 1))
     hit = np.array([radius * np.sin(angle), 0, radius * np.cos(angle) - radius])
     pinhole = np.array([0, 0, h])
-    lines = reflect(seen_from(pinhole, top), np.array([0]), (hit - pinhole)[:, None])
+    lines = reflect(prepare_for_rays(pinhole, top), np.array([0]), (hit - pinhole)[:, None])
     np.testing.assert_allclose(lines.point[:, 0], hit, atol=1e-12)
     view = np.arctan2(hit[0], h - hit[2])
     out = view + 2 * angle
     np.testing.assert_allclose(unit(lines.toward)[:, 0], [np.sin(out), 0, np.cos(out)], atol=1e-13)
     expected = abs(hit[0] * np.cos(out) - hit[2] * np.sin(out))
-    assert misses(lines)[0] == pytest.approx(expected, abs=1e-12)
+    assert miss_distances(lines)[0] == pytest.approx(expected, abs=1e-12)
     assert lines.reach[0] == pytest.approx(1)
 
 
@@ -54,8 +61,8 @@ def test_reflection_off_a_plane_comes_from_the_mirror_image() -> None:
     plane = Surfaces(column(4, 5, 6), normal, np.zeros(1))
     pinhole = np.array([30.0, 40, 50])
     image = pinhole - 2 * ((pinhole - [4, 5, 6]) @ normal[:, 0]) * normal[:, 0]
-    d = column(4, 5, 6) + 3 * across(normal)[0] - pinhole[:, None]
-    lines = reflect(seen_from(pinhole, plane), np.array([0]), d)
+    d = column(4, 5, 6) + 3 * tangent_basis(normal)[0] - pinhole[:, None]
+    lines = reflect(prepare_for_rays(pinhole, plane), np.array([0]), d)
     back = unit(lines.point - image[:, None])
     np.testing.assert_allclose(unit(lines.toward), back, atol=1e-13)
 
@@ -65,7 +72,7 @@ def test_nearly_flat_joins_flat_without_a_jump() -> None:
     points = []
     for curvature in (0.0, 1e-14, 1e-10, 1e-7):
         surface = Surfaces(column(0, 0, 0), column(0, 0, 1), np.array([curvature]))
-        points.append(reflect(seen_from(pinhole, surface), np.array([0]), d).toward)
+        points.append(reflect(prepare_for_rays(pinhole, surface), np.array([0]), d).toward)
     for toward in points[1:]:
         np.testing.assert_allclose(toward, points[0], atol=1e-5)
     np.testing.assert_allclose(points[1], points[0], atol=1e-12)
@@ -73,16 +80,20 @@ def test_nearly_flat_joins_flat_without_a_jump() -> None:
 
 def test_a_ray_that_misses_the_sphere_is_nan() -> None:
     top = sphere(column(0, 0, -1), 1.0, column(0, 0, 1))
-    lines = reflect(seen_from(np.array([0, 0, 9.0]), top), np.array([0]), column(1, 0, -1))
+    lines = reflect(prepare_for_rays(np.array([0, 0, 9.0]), top), np.array([0]), column(1, 0, -1))
     assert np.isnan(lines.point).all()
 
 
 def test_nearest_point_is_at_right_angles() -> None:
     plane = Surfaces(column(1, 2, 3), unit(column(1, 1, 1)), np.zeros(1))
-    lines = reflect(seen_from(np.array([9.0, 8, 7]), plane), np.array([0]), column(-1, -1.1, -0.9))
-    miss = nearest(lines)
+    lines = reflect(
+        prepare_for_rays(np.array([9.0, 8, 7]), plane), np.array([0]), column(-1, -1.1, -0.9)
+    )
+    miss = nearest_to_origin(lines)
     assert dot(miss, lines.toward)[0] == pytest.approx(0, abs=1e-12)
-    np.testing.assert_allclose(bounce(bounce(miss, plane.normal), plane.normal), miss)
+    np.testing.assert_allclose(
+        reflect_directions(reflect_directions(miss, plane.normal), plane.normal), miss
+    )
 
 
 def test_coat_lies_above_and_keeps_the_centre() -> None:
@@ -107,12 +118,12 @@ def fitted(points: np.ndarray):
     """Fit one segment whose facets are triples of the points, turned outward."""
     middle = points.mean(axis=0)
     order = np.argsort(np.linalg.norm(points - middle, axis=1))[:300].reshape(-1, 3)
-    mesh = indexed(points, np.sort(order, axis=1).astype(np.int32))
+    mesh = indexed_mesh(points, np.sort(order, axis=1).astype(np.int32))
     outward = mesh.area.T @ np.linalg.svd(points - middle)[2][2]
     faces = np.where((outward < 0)[:, None], mesh.faces[:, ::-1], mesh.faces)
-    mesh = indexed(points, faces)
-    segments = Segments(np.zeros(len(faces), np.int32), 1)
-    return fit(mesh, segments, corners(mesh, segments)), mesh
+    mesh = indexed_mesh(points, faces)
+    segments = Segmentation(np.zeros(len(faces), np.int32), 1)
+    return fit_surfaces(mesh, segments, patch_vertices(mesh, segments)), mesh
 
 
 @pytest.mark.parametrize(("radius", "half"), [(7.0, 2.0), (30.0, 3.5), (65.0, 3.5), (400.0, 8.0)])
@@ -148,9 +159,9 @@ def test_a_plane_has_no_curvature() -> None:
 
 def test_four_corners_of_a_square_are_a_plane() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    mesh = indexed(points, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
-    segments = Segments(np.zeros(2, np.int32), 1)
-    fits = fit(mesh, segments, corners(mesh, segments))
+    mesh = indexed_mesh(points, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    segments = Segmentation(np.zeros(2, np.int32), 1)
+    fits = fit_surfaces(mesh, segments, patch_vertices(mesh, segments))
     assert abs(fits.sag[0]) < 1e-6
     np.testing.assert_allclose(fits.surfaces.normal[:, 0], [0, 0, 1], atol=1e-9)
 

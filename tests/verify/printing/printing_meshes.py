@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import trimesh
-from tbcad_verify.mesh.mass import bulk
-from tbcad_verify.mesh.mesh import Mesh, manifold_status, merge
+from tbcad_verify.mesh.mass import mass_properties
+from tbcad_verify.mesh.mesh import Mesh, manifold_status, mesh_from_facets
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.printing.shape import Shape, measure
 
@@ -15,11 +15,11 @@ from tbcad_verify.printing.shape import Shape, measure
 def mesh_of(*solids: trimesh.Trimesh) -> Mesh:
     """All solids in one mesh, by way of float32 corners."""
     corners = np.concatenate([solid.triangles for solid in solids]).astype(np.float32)
-    return merge(Facets("x.stl", np.zeros((len(corners), 3), np.float32), corners))
+    return mesh_from_facets(Facets("x.stl", np.zeros((len(corners), 3), np.float32), corners))
 
 
 def measured(mesh: Mesh) -> Shape:
-    return measure(mesh, manifold_status(mesh), bulk(mesh))
+    return measure(mesh, manifold_status(mesh), mass_properties(mesh))
 
 
 def box(*sides: float, at: tuple[float, float, float] = (0, 0, 0)) -> trimesh.Trimesh:

@@ -11,7 +11,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
-from tbcad_verify.mesh.mass import bulk
+from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
     axis,
@@ -136,7 +136,7 @@ def test_outlines_are_those_of_cells_cut_by_hand(view: View) -> None:
         points = np.array([point for point, other in outline if other != -1 or not view.halved[k]])
         d = points.T - view.pinhole[:, None]
         chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
-        first, second = cells.across(chief)
+        first, second = cells.tangent_basis(chief)
         angle = axis.between(chief, d)
         turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
         low = np.floor(turn / (2 * np.pi) * cells.AROUND).astype(int) % cells.AROUND
@@ -344,4 +344,4 @@ def test_the_bend_of_a_cube_is_its_edges(view: View) -> None:
     stage = next(one for one in bodies_of(view) if one.part.name == "stage")
     assert stage.placed_bulk is not None
     assert stage.placed_bulk.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
-    assert bulk(stage.needed).volume == pytest.approx(128, rel=1e-6)
+    assert mass_properties(stage.needed).volume == pytest.approx(128, rel=1e-6)

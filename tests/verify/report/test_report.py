@@ -15,7 +15,7 @@ import tbcad_verify
 from tbcad_verify import main, verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.record.poses import geodesic
-from tbcad_verify.report.checks import Check, at_least, at_most, informative, offenders
+from tbcad_verify.report.checks import Check, at_least, at_most, informative, worst_offenders
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import Options
 from tbcad_verify.shell import pixels
@@ -351,7 +351,7 @@ def test_checks_hold_their_limits() -> None:
     assert at_least(name, 1, 1).passed is True
     assert at_least(name, np.nan, 1).passed is False
     assert informative(name, 3).limit is None
-    assert offenders(["a", "b", "c"], np.array([1.0, 2, 3]), "mm", np.array([2, 0])) == (
+    assert worst_offenders(["a", "b", "c"], np.array([1.0, 2, 3]), "mm", np.array([2, 0])) == (
         "c 3.00 mm, a 1.00 mm"
     )
 

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from tbcad_verify.mesh.mesh import Mesh, indexed
-from tbcad_verify.mesh.rays import build
-from tbcad_verify.mesh.surfaces import seen_from
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
+from tbcad_verify.mesh.rays import build_scene
+from tbcad_verify.mesh.surfaces import prepare_for_rays
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.shell import coverage, seam
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
     Patches,
-    least_miss,
+    minimum_miss_distance,
     reflect_on_facets,
     reflect_on_fits,
     trace_outline,
-    turns,
+    winding_numbers,
 )
-from tbcad_verify.shell.recover import recover, smooth
+from tbcad_verify.shell.recover import follows_fit, recover
 
 from tests.verify.benches import bench_of
 from tests.verify.synthetic_export import PIN, Cells, Design, export, poses, unit
@@ -35,16 +35,20 @@ def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float,
     found = recover(mesh, pinhole, 30)
     assert found.mirror.sum() == 1
     owner = np.where(found.mirror, 0, -1)
-    patches = Patches(found.segments.label, owner, found.fits.surfaces, smooth(found.fits), coat)
+    patches = Patches(
+        found.segments.label, owner, found.fits.surfaces, follows_fit(found.fits), coat
+    )
     outline = trace_outline(mesh, patches, np.array([True]), ONE.halved)
-    seen = seen_from(pinhole, found.fits.surfaces.take(np.flatnonzero(found.mirror)).coated(coat))
+    seen = prepare_for_rays(
+        pinhole, found.fits.surfaces.take(np.flatnonzero(found.mirror)).coated(coat)
+    )
     fitted = reflect_on_fits(outline, seen)
-    facets = reflect_on_facets(outline, pinhole, build(mesh).planes)
+    facets = reflect_on_facets(outline, pinhole, build_scene(mesh).planes)
     u = unit(np.array([0.0, 0, 1]))[:, None]
     return (
-        2 * least_miss(outline, facets, ONE)[0],
-        2 * least_miss(outline, fitted, ONE)[0],
-        abs(turns(outline, fitted, ONE, u)[0]),
+        2 * minimum_miss_distance(outline, facets, ONE)[0],
+        2 * minimum_miss_distance(outline, fitted, ONE)[0],
+        abs(winding_numbers(outline, fitted, ONE, u)[0]),
     )
 
 
@@ -56,7 +60,7 @@ def plate(width: float, place: np.ndarray, pinhole: np.ndarray) -> tuple[Mesh, n
     box = trimesh.creation.box((width, width, 2.0))
     points = (box.vertices - [0, 0, 1]) @ turn + place
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * width / 2 @ turn + place
-    return indexed(points, box.faces.astype(np.int32)), corners
+    return indexed_mesh(points, box.faces.astype(np.int32)), corners
 
 
 @pytest.mark.parametrize("width", [4.0, 12.0, 25.0])
@@ -76,7 +80,7 @@ def test_a_square_flat_mirror(width: float) -> None:
 
 def test_a_flat_mirror_beside_the_object_does_not_surround_it() -> None:
     mesh, _ = plate(4.0, np.array([5.0, -3, 60]), PIN)
-    aside = indexed(mesh.points + np.array([4, 0, 0]), mesh.faces)
+    aside = indexed_mesh(mesh.points + np.array([4, 0, 0]), mesh.faces)
     assert measured(aside, PIN)[2] == pytest.approx(0, abs=1e-9)
 
 
@@ -105,7 +109,7 @@ def dome(radius: float, angle: float, height: float, steps: int = 24) -> Mesh:
             p, q = 1 + 240 * k, 1 + 240 * (k + 1)
             faces += [[p + j, p + m, q + m], [p + j, q + m, q + j]]
         faces.append([q + j, q + m, last])
-    return indexed(points, np.array(faces, dtype=np.int32))
+    return indexed_mesh(points, np.array(faces, dtype=np.int32))
 
 
 @pytest.mark.parametrize(("radius", "angle"), [(20.0, 0.1), (8.0, 0.25), (60.0, 0.08)])
@@ -156,7 +160,7 @@ def oracle(cells: Cells) -> dict[int, float]:
 FINE = Cells(Design(arc=80), poses(Design()))
 
 
-def test_every_mirror_against_brute_force(bench: Bench) -> None:
+def test_every_mirror_against_brute_force(bench: OpticalSetup) -> None:
     found = coverage.measure(bench)
     expected = oracle(FINE)
     for v, name in enumerate(bench.virtual_ids):
@@ -188,7 +192,7 @@ def test_a_flat_mirror_tilted_by_a_micrometre_is_seen(tmp_path: Path) -> None:
     assert bench_of(folder).match.centre_error.max() == pytest.approx(0.01, rel=0.3)
 
 
-def test_halves_share_their_coverage(bench: Bench) -> None:
+def test_halves_share_their_coverage(bench: OpticalSetup) -> None:
     found = coverage.measure(bench)
     index = bench.virtual.index
     ids = bench.export.mirrors.ids
@@ -201,7 +205,7 @@ def test_halves_share_their_coverage(bench: Bench) -> None:
         assert found.fitted[index[k]] > 40
 
 
-def test_a_lost_half_is_no_coverage(bench: Bench) -> None:
+def test_a_lost_half_is_no_coverage(bench: OpticalSetup) -> None:
     half = int(np.flatnonzero(bench.virtual.halved)[0])
     segment = bench.match.segment.copy()
     segment[half] = -1
@@ -229,14 +233,16 @@ def test_the_coat_matters(tmp_path: Path) -> None:
     folder, _ = export(tmp_path / "x", Design(coating=0.05))
     bench = bench_of(folder)
     forgotten = replace(bench, export=replace(bench.export, coating_mm=0.0))
-    from tbcad_verify.shell.match import compare
+    from tbcad_verify.shell.match import centre_and_radius_errors
 
     mirrors, fits = bench.export.mirrors, bench.recovery.fits
-    radius = compare(mirrors, fits, bench.match.segment, forgotten.export.coating_mm)[1]
+    radius = centre_and_radius_errors(
+        mirrors, fits, bench.match.segment, forgotten.export.coating_mm
+    )[1]
     assert radius.max() == pytest.approx(0.05, abs=1e-3)
 
 
-def test_seam_gap_against_brute_force(bench: Bench) -> None:
+def test_seam_gap_against_brute_force(bench: OpticalSetup) -> None:
     """Where each half's cut is imaged, from exact circles, and the room between the two."""
     gaps, cells = coverage.measure(bench).gap, FINE
     radius = bench.radius

@@ -12,7 +12,7 @@ import trimesh
 from tbcad_verify import verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.shell import coverage, image_rim, light, pixels
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 
 from tests.verify.benches import HERE, bench_of
 from tests.verify.synthetic_export import PIN, Cells, sign, stl
@@ -20,7 +20,7 @@ from tests.verify.synthetic_export import PIN, Cells, sign, stl
 NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
 
 
-def pixel_directions(bench: Bench) -> np.ndarray:
+def pixel_directions(bench: OpticalSetup) -> np.ndarray:
     """(N, 3) directions of camera a's pixels, row by row, from the definition."""
     c = bench.cameras[0]
     focal = c.width / 2 / np.tan(c.hfov / 2)
@@ -30,7 +30,7 @@ def pixel_directions(bench: Bench) -> np.ndarray:
     return c.forward + (x[:, None] * c.right + y[:, None] * down) / focal
 
 
-def test_pixel_rays_are_the_definitions(bench: Bench) -> None:
+def test_pixel_rays_are_the_definitions(bench: OpticalSetup) -> None:
     camera = bench.cameras[0]
     found = np.hstack([rays.pixel_rows(camera, *rows) for rows in rays.row_chunks(camera)])
     np.testing.assert_allclose(found.T, pixel_directions(bench), atol=1e-13)
@@ -61,7 +61,7 @@ def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.nd
     return mirror, (miss <= radius) & ~outside
 
 
-def test_pixel_counts_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+def test_pixel_counts_against_brute_force(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
     cells = made[1]
     tally = light.full_sensor(bench.stage(bench.cameras[0]))
     mirror, useful = exact(cells, pixel_directions(bench), bench.radius)
@@ -75,7 +75,7 @@ def test_pixel_counts_against_brute_force(bench: Bench, made: tuple[Path, Cells]
     assert tally.blocked.sum() == 0
 
 
-def test_nearest_way_against_brute_force(bench: Bench, made: tuple[Path, Cells]) -> None:
+def test_nearest_way_against_brute_force(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
     d = pixel_directions(bench)
     useful = exact(made[1], d, bench.radius)[1]
     d = d[useful]
@@ -85,7 +85,9 @@ def test_nearest_way_against_brute_force(bench: Bench, made: tuple[Path, Cells])
     assert tally.nearest.min() == pytest.approx(expected, rel=0.02)
 
 
-def test_chunks_and_threads_do_not_matter(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_and_threads_do_not_matter(
+    bench: OpticalSetup, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stage = bench.stage(bench.cameras[1])
     one = light.full_sensor(stage)
     monkeypatch.setattr(rays, "RAYS_A_CHUNK", 999)
@@ -95,12 +97,12 @@ def test_chunks_and_threads_do_not_matter(bench: Bench, monkeypatch: pytest.Monk
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
-def test_hits_in_float64(bench: Bench) -> None:
+def test_hits_in_float64(bench: OpticalSetup) -> None:
     d = rays.pixel_rows(bench.cameras[0], 90, 100)
     origin = bench.cameras[0].pinhole[:, None]
     facet = rays.first_hits(bench.scene, origin, d)
     hit = np.flatnonzero(facet >= 0)
-    t = rays.reach(bench.scene, facet[hit], origin, d[:, hit])
+    t = rays.distances_to_planes(bench.scene, facet[hit], origin, d[:, hit])
     x = origin + t * d[:, hit]
     corners = bench.mesh.points[bench.mesh.faces[facet[hit]]]
     inside = trimesh.triangles.points_to_barycentric(corners, x.T)
@@ -109,7 +111,7 @@ def test_hits_in_float64(bench: Bench) -> None:
     np.testing.assert_allclose(back, x.T, atol=1e-9)
 
 
-def test_facet_error_is_the_facets_size(bench: Bench) -> None:
+def test_facet_error_is_the_facets_size(bench: OpticalSetup) -> None:
     """Off a facet of size s on a sphere of radius r the normal is wrong by up to s / 2 r, and the
     ray at the object by twice that times the distance: millimetres, here."""
     tally = light.full_sensor(bench.stage(bench.cameras[0]))
@@ -147,18 +149,18 @@ def test_a_post_inside_the_capture_sphere_is_the_object(good: Path) -> None:
     assert lines["light path"].passed is True
 
 
-def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: Bench) -> None:
+def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: OpticalSetup) -> None:
     """DESIGN.md section 3: 62.0 mm, at the zenith mirror."""
     camera = bench.cameras[0]
     zenith = np.flatnonzero(bench.u[2] > 1 - 1e-12)[:1]
     start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
     seen = bench.seen(camera)
-    small = image_rim.ring(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
+    small = image_rim.rim_rays(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
     way = image_rim.nearest_on_the_way(seen, small.direction, small.lines)
     assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
 
 
-def test_an_object_too_large_stands_in_the_light(bench: Bench) -> None:
+def test_an_object_too_large_stands_in_the_light(bench: OpticalSetup) -> None:
     lines = {}
     for diameter in (40.0, 75.0):
         big = replace(bench, export=replace(bench.export, target_mm=diameter))
@@ -167,13 +169,13 @@ def test_an_object_too_large_stands_in_the_light(bench: Bench) -> None:
     assert lines[75.0].passed is False
 
 
-def test_ring_grazes_the_capture_sphere(bench: Bench) -> None:
+def test_ring_grazes_the_capture_sphere(bench: OpticalSetup) -> None:
     camera = bench.cameras[0]
     ring = pixels._ring(bench, camera, None)
     assert ring.error.max() < 1e-6
-    from tbcad_verify.mesh.surfaces import misses
+    from tbcad_verify.mesh.surfaces import miss_distances
 
-    np.testing.assert_allclose(misses(ring.lines), bench.radius, atol=1e-6)
+    np.testing.assert_allclose(miss_distances(ring.lines), bench.radius, atol=1e-6)
     assert np.bincount(ring.mirror).max() == image_rim.AZIMUTHS
 
 
@@ -187,17 +189,17 @@ def test_a_narrow_camera_cuts_mirrors_off(good: Path) -> None:
     assert "partly out of the frame: a0" in lines["in frame"].detail
 
 
-def test_the_rim_is_looked_for_only_where_a_mirror_reaches(bench: Bench) -> None:
+def test_the_rim_is_looked_for_only_where_a_mirror_reaches(bench: OpticalSetup) -> None:
     """A mirror that sees little fails for that, and not for being out of frame as well."""
     found = coverage.measure(bench)
     short = replace(found, fitted=np.full_like(found.fitted, 10.0))
     ring = pixels._ring(bench, bench.cameras[0], short)
-    from tbcad_verify.mesh.surfaces import misses
+    from tbcad_verify.mesh.surfaces import miss_distances
 
-    np.testing.assert_allclose(misses(ring.lines), 5.0, atol=1e-6)
+    np.testing.assert_allclose(miss_distances(ring.lines), 5.0, atol=1e-6)
 
 
-def test_margins_by_hand(bench: Bench) -> None:
+def test_margins_by_hand(bench: OpticalSetup) -> None:
     camera = bench.cameras[0]
     corner = camera.forward + camera.right * np.tan(camera.hfov / 2)
     d = np.stack([camera.forward, corner, -camera.forward], axis=1)

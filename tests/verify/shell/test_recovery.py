@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
-from tbcad_verify.mesh.mesh import Mesh, indexed
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.segments import creases, measure_edges, rounding
 from tbcad_verify.shell.mirrors_found import checks
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
 from tests.verify.benches import bench_of
@@ -21,7 +21,7 @@ RNG = np.random.default_rng(7)
 PINHOLE = np.array([100.0, 0, -100])
 
 
-def test_every_facet_goes_to_its_mirror(bench: Bench, made: tuple[Path, Cells]) -> None:
+def test_every_facet_goes_to_its_mirror(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
     cells = made[1]
     owner = bench.owner()[bench.recovery.segments.label]
     count = len(cells.faces)
@@ -32,7 +32,7 @@ def test_every_facet_goes_to_its_mirror(bench: Bench, made: tuple[Path, Cells]) 
     assert (owner[count:walls] == -1).all()
 
 
-def test_recovered_within_a_micrometre(bench: Bench) -> None:
+def test_recovered_within_a_micrometre(bench: OpticalSetup) -> None:
     assert bench.match.centre_error.max() < 1e-3
     assert bench.match.radius_error.max() < 1e-3
     assert all(check.passed for check in checks(bench, "x"))
@@ -117,7 +117,7 @@ def closed_cap(radius: float, warp: float) -> Mesh:
     turn = np.stack([e, np.cross(n, e), n])
     points = np.hstack([points, hub]).T @ turn + place
     points = points.astype(np.float32).astype(np.float64)
-    return indexed(points, np.vstack([faces, back]).astype(np.int32))
+    return indexed_mesh(points, np.vstack([faces, back]).astype(np.int32))
 
 
 @pytest.mark.parametrize("radius", [7.0, 60.0])
@@ -137,7 +137,7 @@ def test_what_faces_away_is_no_mirror() -> None:
     mesh = closed_cap(20.0, 0.0)
     assert recover(mesh, PINHOLE, 30).mirror.sum() == 1
     assert recover(mesh, np.array([0.0, 0, 300]), 30).mirror.sum() == 0
-    turned = indexed(mesh.points, mesh.faces[:, ::-1].copy())
+    turned = indexed_mesh(mesh.points, mesh.faces[:, ::-1].copy())
     assert recover(turned, PINHOLE, 30).mirror.sum() == 0
     assert recover(mesh, None, 30).mirror.sum() == 0
 
@@ -147,7 +147,7 @@ def test_a_misshapen_patch_is_no_mirror() -> None:
     mesh = closed_cap(20.0, 0.0)
     x = mesh.points - mesh.points.mean(axis=0)
     bent = mesh.points + 1e-2 * (x[:, 1:2] / 4) ** 2 * [0, 0, 1]
-    found = recover(indexed(bent, mesh.faces), PINHOLE, 30)
+    found = recover(indexed_mesh(bent, mesh.faces), PINHOLE, 30)
     assert found.mirror.sum() == 0
     assert found.fits.form[found.segments.label[0]] > 1e-3
 
@@ -156,7 +156,7 @@ def test_splinters_are_no_spheres() -> None:
     """A rough surface falls into splinters that each fit some sphere: too few points to tell."""
     mesh = closed_cap(20.0, 0.0)
     rough = mesh.points + 4e-3 * RNG.normal(size=mesh.points.shape)
-    found = recover(indexed(rough, mesh.faces), PINHOLE, 30)
+    found = recover(indexed_mesh(rough, mesh.faces), PINHOLE, 30)
     assert (found.fits.area[found.mirror] < 0.1 * found.fits.area.max()).all()
 
 
@@ -167,7 +167,7 @@ def test_a_fold_is_seen() -> None:
     points = mesh.points.copy()
     inner = mesh.faces[np.argmax(mesh.faces.min(axis=1) > 100)]
     points[inner[0]] += 3 * (points[inner[1]] - points[inner[0]])
-    assert recover(indexed(points, mesh.faces), PINHOLE, 30).folds > 0
+    assert recover(indexed_mesh(points, mesh.faces), PINHOLE, 30).folds > 0
 
 
 def test_a_countersink_is_no_mirror() -> None:
@@ -183,7 +183,7 @@ def test_a_countersink_is_no_mirror() -> None:
     e = np.cross(n, [0, 1, 0])
     e /= np.linalg.norm(e)
     points = local.T @ np.stack([e, np.cross(n, e), n]) + [0, 0, 60]
-    found = recover(indexed(points, np.array(ends, np.int32)), PINHOLE, 30)
+    found = recover(indexed_mesh(points, np.array(ends, np.int32)), PINHOLE, 30)
     tip = found.segments.label[0]
     assert (found.segments.label[:60] == tip).all()
     assert found.fits.form[tip] < 1e-6
@@ -197,7 +197,7 @@ def test_rounding_never_makes_a_crease() -> None:
     faces = Delaunay(flat).simplices.astype(np.int32)
     turn = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
     points = np.column_stack([flat, np.full(len(flat), 9.0)]) @ turn
-    mesh = indexed(points.astype(np.float32).astype(np.float64), faces)
+    mesh = indexed_mesh(points.astype(np.float32).astype(np.float64), faces)
     edges = measure_edges(mesh)
     assert np.abs(edges.angle).max() > 1e-5
     sure = edges.noise < 0.05

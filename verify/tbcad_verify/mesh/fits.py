@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh, distinct
-from tbcad_verify.mesh.segments import Segments, rounding
+from tbcad_verify.mesh.mesh import Mesh, sorted_unique
+from tbcad_verify.mesh.segments import Segmentation, rounding
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import across, dot, norm, slices, unit
+from tbcad_verify.mesh.vectors import chunks, dot, norm, tangent_basis, unit
 from tbcad_verify.types import Floats
 
 STEPS = 4
@@ -24,7 +24,7 @@ RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
-class Fits:
+class SurfaceFits:
     """What each of K segments is, measured on its vertices.
 
     Attributes:
@@ -57,7 +57,7 @@ class Fits:
 
 
 @dataclass(frozen=True)
-class Corners:
+class PatchVertices:
     """Every vertex of every segment once, ordered by segment.
 
     Attributes:
@@ -82,15 +82,15 @@ class _Frames:
     extent: Floats
 
 
-def corners(mesh: Mesh, segments: Segments) -> Corners:
+def patch_vertices(mesh: Mesh, segments: Segmentation) -> PatchVertices:
     """The vertices of each segment; those on creases belong to several."""
     count = len(mesh.points)
-    keys = distinct(np.repeat(segments.label.astype(np.int64), 3) * count + mesh.faces.ravel())
+    keys = sorted_unique(np.repeat(segments.label.astype(np.int64), 3) * count + mesh.faces.ravel())
     segment, vertex = np.divmod(keys, count)
-    return Corners(segment, vertex, np.searchsorted(segment, np.arange(segments.count)))
+    return PatchVertices(segment, vertex, np.searchsorted(segment, np.arange(segments.count)))
 
 
-def fit(mesh: Mesh, segments: Segments, points: Corners) -> Fits:
+def fit_surfaces(mesh: Mesh, segments: Segmentation, points: PatchVertices) -> SurfaceFits:
     """Fit a sphere or plane to each segment's vertices."""
     middle, normal, area = _means(mesh, segments)
     frames = _frames(mesh, points, middle, normal)
@@ -107,7 +107,7 @@ def fit(mesh: Mesh, segments: Segments, points: Corners) -> Fits:
     gap = gap * frames.extent[points.segment]
     share = np.diff(np.append(points.first, points.segment.size))
     surfaces = _surfaces(frames, solution)
-    return Fits(
+    return SurfaceFits(
         surfaces,
         np.sqrt(np.add.reduceat(gap**2, points.first) / share),
         _chords(mesh, segments, surfaces),
@@ -130,37 +130,37 @@ def _gain(surfaces: Surfaces, inverse: Floats, extent: Floats) -> Floats:
     return np.asarray(radius / extent * np.sqrt(np.maximum(tilt, 0) + bulge))
 
 
-def _chords(mesh: Mesh, segments: Segments, surfaces: Surfaces) -> Floats:
+def _chords(mesh: Mesh, segments: Segmentation, surfaces: Surfaces) -> Floats:
     deepest = np.zeros(segments.count)
-    for part in slices(segments.label.size):
+    for part in chunks(segments.label.size):
         label = segments.label[part]
-        height = surfaces.take(label).height(middles(mesh, part))
+        height = surfaces.take(label).height(facet_centres(mesh, part))
         np.maximum.at(deepest, label, np.abs(height))
     return deepest
 
 
-def middles(mesh: Mesh, facets: slice | NDArray[np.intp] = slice(None)) -> Floats:
+def facet_centres(mesh: Mesh, facets: slice | NDArray[np.intp] = slice(None)) -> Floats:
     """(3, N) the middles of some facets, or of all, mm."""
     corner = [np.take(mesh.points, mesh.faces[facets, k], axis=0).T for k in range(3)]
     return (corner[0] + corner[1] + corner[2]) / 3
 
 
-def _means(mesh: Mesh, segments: Segments) -> tuple[Floats, Floats, Floats]:
+def _means(mesh: Mesh, segments: Segmentation) -> tuple[Floats, Floats, Floats]:
     def total(values: Floats) -> Floats:
         return np.bincount(segments.label, values, segments.count).astype(np.float64)
 
     size = norm(mesh.area) / 2
     area = total(size)
-    middle = np.stack([total(size * row) for row in middles(mesh)])
+    middle = np.stack([total(size * row) for row in facet_centres(mesh)])
     normal = unit(np.stack([total(row) for row in mesh.area]))
     normal[2, norm(normal) < 0.5] = 1.0  # a closed tube has no mean normal
     return middle / np.maximum(area, np.finfo(np.float64).tiny), normal, area
 
 
-def _frames(mesh: Mesh, points: Corners, middle: Floats, normal: Floats) -> _Frames:
+def _frames(mesh: Mesh, points: PatchVertices, middle: Floats, normal: Floats) -> _Frames:
     offset = mesh.points[points.vertex].T - np.take(middle, points.segment, axis=1)
     extent = np.sqrt(np.maximum.reduceat(dot(offset, offset), points.first))
-    basis = np.stack([*across(normal), normal])
+    basis = np.stack([*tangent_basis(normal), normal])
     x, y, z = (
         dot(np.take(axis, points.segment, axis=1), offset) / extent[points.segment]
         for axis in basis
@@ -172,11 +172,11 @@ def _square(f: _Frames) -> Floats:
     return np.asarray(f.x**2 + f.y**2 + f.z**2)
 
 
-def _sums(points: Corners, values: Floats) -> Floats:
+def _sums(points: PatchVertices, values: Floats) -> Floats:
     return np.asarray(np.add.reduceat(values, points.first, axis=-1))
 
 
-def _moments(points: Corners, basis: Floats) -> Floats:
+def _moments(points: PatchVertices, basis: Floats) -> Floats:
     """(K, 4, 4) sums of products of the (4, P) basis functions."""
     matrix = np.empty((points.first.size, 4, 4))
     for i in range(4):
@@ -189,7 +189,7 @@ def _times(matrix: Floats, vector: Floats) -> Floats:
     return np.asarray(np.einsum("nij,jn->in", matrix, vector))
 
 
-def _distances(f: _Frames, points: Corners, solution: Floats) -> tuple[Floats, Floats]:
+def _distances(f: _Frames, points: PatchVertices, solution: Floats) -> tuple[Floats, Floats]:
     h, a, b, k = np.take(solution, points.segment, axis=1)
     g = f.z - h - a * f.x - b * f.y + k / 2 * _square(f)
     slope = np.sqrt(np.maximum(1 + a**2 + b**2 + 2 * k * h, 1e-6))

@@ -11,7 +11,7 @@ from tbcad_verify.mesh.vectors import norm
 
 
 @dataclass(frozen=True)
-class Bulk:
+class MassProperties:
     """Plain numbers, so that they go through JSON unchanged.
 
     Attributes:
@@ -32,14 +32,14 @@ class Bulk:
     bend: float | None = None
 
 
-def bulk(mesh: Mesh) -> Bulk:
+def mass_properties(mesh: Mesh) -> MassProperties:
     """Figures of a closed mesh, by the divergence theorem facet by facet."""
     middle = mesh.points.mean(axis=0)  # about which large terms do not cancel
     corners = np.take(mesh.points - middle, mesh.faces, axis=0)
     sixth = np.einsum("ni,in->n", corners[:, 0], mesh.area) / 6
     volume = float(sixth.sum())
     moment = np.einsum("n,ni->i", sixth, corners.sum(axis=1) / 4)
-    return Bulk(
+    return MassProperties(
         volume,
         float(norm(mesh.area).sum() / 2),
         (middle + moment / (volume or np.nan)).tolist(),

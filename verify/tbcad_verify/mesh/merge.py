@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.fits import Corners, Fits, corners, fit
-from tbcad_verify.mesh.mesh import Mesh, distinct, linked
-from tbcad_verify.mesh.segments import Edges, Segments
+from tbcad_verify.mesh.fits import PatchVertices, SurfaceFits, fit_surfaces, patch_vertices
+from tbcad_verify.mesh.mesh import Mesh, connected_groups, sorted_unique
+from tbcad_verify.mesh.segments import Edges, Segmentation
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.types import Floats, Ints
@@ -34,26 +34,30 @@ SOME = 6
 ROUNDS = 8
 
 
-def heal(mesh: Mesh, edges: Edges, segments: Segments) -> tuple[Segments, Fits]:
+def merge_splinters(
+    mesh: Mesh, edges: Edges, segments: Segmentation
+) -> tuple[Segmentation, SurfaceFits]:
     """Join splinters to the best known surface next to them, until nothing changes.
 
     Returns:
         The patches, and the surfaces fitted to them.
     """
     for _ in range(ROUNDS):
-        points = corners(mesh, segments)
-        fits = fit(mesh, segments, points)
+        points = patch_vertices(mesh, segments)
+        fits = fit_surfaces(mesh, segments, points)
         small, large = _joints(mesh, edges, segments, points, fits)
         if not small.size:
             break
-        count, label = linked(segments.count, small, large)
-        segments = Segments(label[segments.label], count)
+        count, label = connected_groups(segments.count, small, large)
+        segments = Segmentation(label[segments.label], count)
     else:
-        fits = fit(mesh, segments, corners(mesh, segments))
+        fits = fit_surfaces(mesh, segments, patch_vertices(mesh, segments))
     return segments, fits
 
 
-def _joints(mesh: Mesh, edges: Edges, segments: Segments, points: Corners, fits: Fits) -> Pairs:
+def _joints(
+    mesh: Mesh, edges: Edges, segments: Segmentation, points: PatchVertices, fits: SurfaceFits
+) -> Pairs:
     """Splinters and what each belongs to: one neighbour, for none must bridge two mirrors."""
     small, large = _neighbours(mesh, edges, segments, fits.area)
     likely = (fits.count[large] >= LEAST) & _along(fits, small, large)
@@ -67,7 +71,7 @@ def _joints(mesh: Mesh, edges: Edges, segments: Segments, points: Corners, fits:
     return small[best], large[best]
 
 
-def _neighbours(mesh: Mesh, edges: Edges, segments: Segments, area: Floats) -> Pairs:
+def _neighbours(mesh: Mesh, edges: Edges, segments: Segmentation, area: Floats) -> Pairs:
     """Pairs of patches with a common edge that is not too sharp, the one of smaller area first."""
     blunt = np.abs(edges.angle) <= EDGE_RAD + edges.noise
     half = edges.half[blunt]
@@ -76,18 +80,18 @@ def _neighbours(mesh: Mesh, edges: Edges, segments: Segments, area: Floats) -> P
     rank = np.empty(segments.count, dtype=np.int64)
     rank[np.argsort(area, kind="stable")] = np.arange(segments.count)
     small = np.where(rank[one] < rank[two], one, two).astype(np.int64)
-    keys = distinct(small * segments.count + (one + two - small))
+    keys = sorted_unique(small * segments.count + (one + two - small))
     return keys // segments.count, keys % segments.count
 
 
-def _along(fits: Fits, small: Ints, large: Ints) -> NDArray[np.bool_]:
+def _along(fits: SurfaceFits, small: Ints, large: Ints) -> NDArray[np.bool_]:
     surface = fits.surfaces.take(large).gradient(fits.middle[:, small])
     thin = fits.area[small] < THIN_MM * fits.extent[small]
     return np.asarray(thin | (dot(surface, fits.normal[:, small]) > ALONG))
 
 
 def _farthest(
-    mesh: Mesh, points: Corners, surfaces: Surfaces, pairs: Pairs, most: int = 1 << 62
+    mesh: Mesh, points: PatchVertices, surfaces: Surfaces, pairs: Pairs, most: int = 1 << 62
 ) -> Floats:
     """Largest distance of (the most first of) a patch's vertices from its neighbour's surface."""
     small, large = pairs

@@ -60,21 +60,21 @@ class Topology:
     status: str
 
 
-def merge(facets: Facets) -> Mesh:
+def mesh_from_facets(facets: Facets) -> Mesh:
     """Merge corners that are equal as float32, and find every half-edge's twin."""
     corners = facets.corners.reshape(-1, 3)
     index, inverse = _unique_rows(corners)
     faces = inverse.reshape(-1, 3).astype(np.int32)
-    return indexed(corners[index].astype(np.float64), faces)
+    return indexed_mesh(corners[index].astype(np.float64), faces)
 
 
-def indexed(points: Floats, faces: Ints) -> Mesh:
+def indexed_mesh(points: Floats, faces: Ints) -> Mesh:
     """A mesh from (V, 3) points and (F, 3) vertex indices."""
     a, b, c = (np.take(points, faces[:, k], axis=0).T for k in range(3))
     return Mesh(points, faces, _twins(faces, len(points)), cross(b - a, c - a))
 
 
-def joined(meshes: list[Mesh]) -> Mesh:
+def join_meshes(meshes: list[Mesh]) -> Mesh:
     """Several meshes as one, in order, sharing nothing."""
     vertices = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     edges = np.cumsum([0, *(mesh.twin.size for mesh in meshes)])
@@ -89,7 +89,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
     )
 
 
-def examine(mesh: Mesh, facets: Facets) -> Topology:
+def examine_topology(mesh: Mesh, facets: Facets) -> Topology:
     """Count what keeps a mesh from being one closed solid."""
     opened, crowded = _edge_faults(mesh)
     return Topology(
@@ -105,14 +105,16 @@ def examine(mesh: Mesh, facets: Facets) -> Topology:
     )
 
 
-def linked(size: int, one: NDArray[np.integer], two: NDArray[np.integer]) -> tuple[int, Ints]:
+def connected_groups(
+    size: int, one: NDArray[np.integer], two: NDArray[np.integer]
+) -> tuple[int, Ints]:
     """How many groups `size` things form that are linked one[k] - two[k], and each one's group."""
     links = coo_array((np.ones(one.size, dtype=np.int8), (one, two)), shape=(size, size))
     count, label = connected_components(links, directed=False)
     return int(count), np.asarray(label, dtype=np.int32)
 
 
-def distinct(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+def sorted_unique(keys: NDArray[np.int64]) -> NDArray[np.int64]:
     """Sorted, each once; for millions of integers many times faster than np.unique."""
     keys = np.sort(keys)
     return keys[np.append(True, keys[1:] != keys[:-1])] if keys.size else keys
@@ -190,7 +192,7 @@ def _contradicted(stored: NDArray[np.float32], area: Floats) -> int:
 def _components(mesh: Mesh) -> int:
     first, second = _paired(mesh)
     size = len(mesh.faces)
-    return linked(size, first // 3, second // 3)[0]
+    return connected_groups(size, first // 3, second // 3)[0]
 
 
 def _volume(mesh: Mesh) -> float:

@@ -29,7 +29,7 @@ THREADS = min(os.cpu_count() or 1, 8)
 
 
 @dataclass(frozen=True)
-class Scene:
+class RayScene:
     """All parts' facets, ready to be hit.
 
     Attributes:
@@ -41,7 +41,7 @@ class Scene:
     planes: Floats
 
 
-def build(mesh: Mesh) -> Scene:
+def build_scene(mesh: Mesh) -> RayScene:
     """Put a mesh into Embree and commit it."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
@@ -50,17 +50,17 @@ def build(mesh: Mesh) -> Scene:
     TriangleMesh(scene, mesh.points.astype(np.float32), mesh.faces)
     one = np.ones((1, 3), dtype=np.float32)
     scene.run(one, one)  # the first call commits; later ones may come from any thread
-    return Scene(scene, _planes(mesh))
+    return RayScene(scene, _planes(mesh))
 
 
-def first_hits(scene: Scene, origin: Floats, d: Floats) -> Ints:
+def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
     """(N,) the first facet along rays from origin (3, 1) or (3, N) along d (3, N); -1 for none."""
     start = np.empty((d.shape[1], 3), dtype=np.float32)
     start[:] = origin.T
     return np.asarray(scene.embree.run(start, d.T.astype(np.float32)), dtype=np.int32)
 
 
-def reach(scene: Scene, facet: Ints, origin: Floats, d: Floats) -> Floats:
+def distances_to_planes(scene: RayScene, facet: Ints, origin: Floats, d: Floats) -> Floats:
     """(N,) lengths of d from origin to the planes of facets, in float64."""
     plane = np.take(scene.planes, facet, axis=0).T
     return np.asarray((plane[3] - dot(origin, plane[:3])) / dot(d, plane[:3]))

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh, linked
-from tbcad_verify.mesh.vectors import cross, dot, norm, slices, unit
+from tbcad_verify.mesh.mesh import Mesh, connected_groups
+from tbcad_verify.mesh.vectors import chunks, cross, dot, norm, unit
 from tbcad_verify.types import Bools, Floats
 
 # A concave edge is a crease beyond this and the rounding. Flat mirrors at n = 60 meet at 0.003.
@@ -45,7 +45,7 @@ class Edges:
 
 
 @dataclass(frozen=True)
-class Segments:
+class Segmentation:
     """Smooth patches.
 
     Attributes:
@@ -62,7 +62,7 @@ def measure_edges(mesh: Mesh) -> Edges:
     half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size, dtype=np.int32))
     normal, double = unit(mesh.area), np.maximum(norm(mesh.area), np.finfo(np.float64).tiny)
     angle, tilt = np.empty((2, half.size))
-    for part in slices(half.size):
+    for part in chunks(half.size):
         angle[part], tilt[part] = _bend(mesh, normal, double, half[part])
     return Edges(half, angle, rounding(mesh) * tilt)
 
@@ -96,7 +96,7 @@ def creases(edges: Edges) -> Bools:
     return np.asarray(concave | sharp | (edges.noise > BLIND_RAD))
 
 
-def folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
+def count_folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
     """How many edges fold the surface back onto itself; a solid one can make has none.
 
     Args:
@@ -107,11 +107,11 @@ def folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
     return int(turned.sum())
 
 
-def split(mesh: Mesh, edges: Edges) -> Segments:
+def segment_mesh(mesh: Mesh, edges: Edges) -> Segmentation:
     """Join facets over all edges that are no creases."""
     smooth = edges.half[~creases(edges)]
-    count, label = linked(len(mesh.faces), smooth // 3, mesh.twin[smooth] // 3)
-    return Segments(label, count)
+    count, label = connected_groups(len(mesh.faces), smooth // 3, mesh.twin[smooth] // 3)
+    return Segmentation(label, count)
 
 
 def _corner(mesh: Mesh, half: NDArray[np.integer], step: int) -> Floats:

@@ -64,7 +64,7 @@ class Surfaces:
 
 
 @dataclass(frozen=True)
-class Lines:
+class ReflectedRays:
     """Reflected rays: points on the mirrors and directions, (3, N) each; and the way there.
 
     Attributes:
@@ -79,7 +79,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Seen:
+class PreparedSurfaces:
     """Surfaces as seen from one point: what is the same for all rays is worked out once.
 
     Attributes:
@@ -92,7 +92,7 @@ class Seen:
     table: Floats
 
 
-def seen_from(origin: Floats, surfaces: Surfaces) -> Seen:
+def prepare_for_rays(origin: Floats, surfaces: Surfaces) -> PreparedSurfaces:
     """Prepare surfaces for rays from one point, (3,) mm."""
     a = origin[:, None] - surfaces.point
     k = surfaces.curvature
@@ -104,10 +104,10 @@ def seen_from(origin: Floats, surfaces: Surfaces) -> Seen:
             *(surfaces.normal - k * surfaces.point),
         ]
     )
-    return Seen(origin, np.ascontiguousarray(table.T))
+    return PreparedSurfaces(origin, np.ascontiguousarray(table.T))
 
 
-def reflect(seen: Seen, index: NDArray[np.integer], d: Floats) -> Lines:
+def reflect(seen: PreparedSurfaces, index: NDArray[np.integer], d: Floats) -> ReflectedRays:
     """Reflect rays of directions d (3, N) on surfaces number index (N,)."""
     row = np.take(seen.table, index, axis=0).T
     k = row[4]
@@ -116,20 +116,20 @@ def reflect(seen: Seen, index: NDArray[np.integer], d: Floats) -> Lines:
         # The root before the bulge, in the form that keeps its digits when k goes to zero.
         reach = 2 * c / (np.sqrt(b * b - 2 * k * c * dot(d, d)) - b)
     point = seen.origin[:, None] + reach * d
-    return Lines(point, bounce(d, row[5:] + k * point), reach)
+    return ReflectedRays(point, reflect_directions(d, row[5:] + k * point), reach)
 
 
-def bounce(d: Floats, normal: Floats) -> Floats:
+def reflect_directions(d: Floats, normal: Floats) -> Floats:
     """(3, N) directions d after reflection on unit normals."""
     return d - 2 * dot(d, normal) * normal
 
 
-def nearest(lines: Lines) -> Floats:
+def nearest_to_origin(lines: ReflectedRays) -> Floats:
     """(3, N) the point of each reflected line that is nearest to the origin."""
     p, r = lines.point, lines.toward
     return p - dot(p, r) / dot(r, r) * r
 
 
-def misses(lines: Lines) -> Floats:
+def miss_distances(lines: ReflectedRays) -> Floats:
     """(N,) distances of the reflected lines from the origin, mm."""
-    return norm(nearest(lines))
+    return norm(nearest_to_origin(lines))

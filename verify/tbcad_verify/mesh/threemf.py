@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.record.files import AGAIN, MAX_BYTES, FileBytes, read
-from tbcad_verify.report.checks import Check, Name, at_most
+from tbcad_verify.report.checks import Check, CheckName, at_most
 
 ROUNDED_MM = 1e-6  # the text has six decimals
 LARGEST_RATIO = 200.0  # of unpacked to packed bytes; meshes as text reach 10
@@ -35,7 +35,7 @@ def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
     return _corners(blob), blob
 
 
-def same_check(name: Name, corners: NDArray[np.float32], facets: Facets) -> Check:
+def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) -> Check:
     """The 3MF has the STL's facets in the same order, to the last place that float32 has there."""
     wanted = facets.corners
     limit = float(np.spacing(np.abs(wanted).max())) + ROUNDED_MM

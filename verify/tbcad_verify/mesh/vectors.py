@@ -31,12 +31,12 @@ def cross(a: Floats, b: Floats) -> Floats:
     )
 
 
-def slices(count: int, step: int = 1 << 17) -> Iterator[slice]:
+def chunks(count: int, step: int = 1 << 17) -> Iterator[slice]:
     """Consecutive pieces of `count` columns, so that intermediate results stay small."""
     return (slice(k, min(k + step, count)) for k in range(0, count, step))
 
 
-def across(n: Floats) -> tuple[Floats, Floats]:
+def tangent_basis(n: Floats) -> tuple[Floats, Floats]:
     """Two unit columns at right angles to unit columns n and to each other.
 
     Source: T. Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.

@@ -13,7 +13,7 @@ from tbcad_verify.printing.placing import SLACK_MM, Placing, place, words
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.walls import thin_area
-from tbcad_verify.report.checks import Check, Name, at_most, finite, informative
+from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
 from tbcad_verify.types import Floats
 
 UNIT = "problems"
@@ -158,7 +158,7 @@ def to_row(one: Print) -> dict[str, Any]:
     }
 
 
-def print_name(part: str, profile: Profile) -> Name:
+def print_name(part: str, profile: Profile) -> CheckName:
     """Name, file and unit of the check of one part on one machine."""
     return f"print {profile.name}", part, UNIT
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh, linked
+from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges
-from tbcad_verify.mesh.vectors import across, dot, norm, unit
+from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.printing.circles import circles, gaps
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -91,7 +91,7 @@ def _joined(size: int, links: Ints, facet: Ints) -> Patches:
     number[facet] = np.arange(facet.size)
     one, two = number[links]
     both = (one >= 0) & (two >= 0)
-    count, group = linked(facet.size, one[both], two[both])
+    count, group = connected_groups(facet.size, one[both], two[both])
     return Patches(facet, group, count)
 
 
@@ -145,7 +145,7 @@ def _round(mesh: Mesh, patches: Patches) -> Holes:
     normal, group = _normals(mesh, patches), np.repeat(patches.group, 3)
     spread = _outer(normal, norm(mesh.area[:, patches.facet]), patches.group, patches.count)
     axis = np.ascontiguousarray(np.linalg.eigh(spread)[1][:, :, 0].T)
-    sides = across(axis)
+    sides = tangent_basis(axis)
     corner = np.take(mesh.points, mesh.faces[patches.facet].ravel(), axis=0).T
     flat = np.stack([dot(side[:, group], corner) for side in sides])
     centre, radius = circles(flat, group, patches.count)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import Mesh, linked
+from tbcad_verify.mesh.mesh import Mesh, connected_groups
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Pieces:
 def pieces(mesh: Mesh) -> Pieces:
     """Connected surfaces by the sign of their volume."""
     half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
-    count, label = linked(len(mesh.faces), half // 3, mesh.twin[half] // 3)
+    count, label = connected_groups(len(mesh.faces), half // 3, mesh.twin[half] // 3)
     corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
     share = np.einsum("ni,in->n", corner, mesh.area)
     inside_out = int((np.bincount(label, share, count) < 0).sum())

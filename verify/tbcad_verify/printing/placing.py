@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.vectors import across, norm
+from tbcad_verify.mesh.vectors import norm, tangent_basis
 from tbcad_verify.printing.overhang import overhang
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.resting import Hull
@@ -104,7 +104,7 @@ def _poses(hull: Hull, directions: Floats, profile: Profile) -> list[Pose]:
 
 
 def _pose(hull: Hull, down: Floats, profile: Profile) -> Pose:
-    level = np.stack([*(side[:, 0] for side in across(-down[:, None])), -down])
+    level = np.stack([*(side[:, 0] for side in tangent_basis(-down[:, None])), -down])
     points = np.einsum("ij,jn->in", level, hull.points)
     width, depth, height = profile.bed_mm
     rim = 2 * profile.clearance_mm

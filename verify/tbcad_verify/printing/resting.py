@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from tbcad_verify.mesh.vectors import across, norm
+from tbcad_verify.mesh.vectors import norm, tangent_basis
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats
 
@@ -73,7 +73,7 @@ def _each_once(directions: Floats) -> Floats:
 
 def _tilted(down: Floats) -> Floats:
     """(3, 20) along the diagonals of a box that stands on the largest face."""
-    one, two = (side[:, 0] for side in across(down[:, None]))
+    one, two = (side[:, 0] for side in tangent_basis(down[:, None]))
     steps = [s for s in product((-1, 0, 1), repeat=3) if np.abs(s).sum() > 1]
     frame = np.stack([one, two, down], axis=1)
     tilted = np.einsum("ij,kj->ik", frame, np.array(steps, dtype=np.float64))

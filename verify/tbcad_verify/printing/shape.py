@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh import rays
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import Edges, measure_edges
 from tbcad_verify.mesh.vectors import norm
@@ -48,7 +48,7 @@ class Shape:
 
     mesh: Mesh
     status: str
-    bulk: Bulk
+    bulk: MassProperties
     pieces: Pieces
     walls: Walls
     holes: Holes
@@ -61,7 +61,7 @@ class Shape:
         return len(self.mesh.faces)
 
 
-def measure(mesh: Mesh, status: str, lump: Bulk) -> Shape:
+def measure(mesh: Mesh, status: str, lump: MassProperties) -> Shape:
     """Measure a mesh.
 
     Args:
@@ -81,7 +81,7 @@ def measure(mesh: Mesh, status: str, lump: Bulk) -> Shape:
         status,
         lump,
         pieces(mesh),
-        walls(mesh, edges, rays.build(mesh)),
+        walls(mesh, edges, rays.build_scene(mesh)),
         holes(mesh, edges),
         _corners(mesh, edges),
         hull,

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, reach
+from tbcad_verify.mesh.rays import RayScene, distances_to_planes, first_hits, in_threads
 from tbcad_verify.mesh.segments import Edges, rounding
-from tbcad_verify.mesh.vectors import dot, norm, slices, unit
+from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
 from tbcad_verify.types import Bools, Floats, Ints
 
 # How squarely the far side must look back at a ray. Where a wall between smooth sides is thinnest,
@@ -67,7 +67,7 @@ class Probes:
     square: float
 
 
-def walls(mesh: Mesh, edges: Edges, scene: Scene) -> Walls:
+def walls(mesh: Mesh, edges: Edges, scene: RayScene) -> Walls:
     """Measure thickness from every facet, and from the bottom of every groove.
 
     Args:
@@ -100,7 +100,7 @@ def _walls(probes: list[Probes], thickness: list[Floats], best: int) -> Walls:
     return Walls(depths, shares, least, probe.start[:, k] + least / 2 * probe.inward[:, k])
 
 
-def _measure(scene: Scene, sound: Bools, probe: Probes) -> Floats:
+def _measure(scene: RayScene, sound: Bools, probe: Probes) -> Floats:
     """(S,) distances to walls that look back; infinite where none does."""
     lift = LIFT * float(np.spacing(np.float32(np.abs(probe.start).max(initial=1e-30))))
 
@@ -108,11 +108,11 @@ def _measure(scene: Scene, sound: Bools, probe: Probes) -> Floats:
         start, d = probe.start[:, these], probe.inward[:, these]
         facet = first_hits(scene, start + lift * d, d)
         with np.errstate(divide="ignore", invalid="ignore"):
-            depth = reach(scene, facet, start, d)
+            depth = distances_to_planes(scene, facet, start, d)
         looks_back = dot(np.take(scene.planes[:, :3], facet, axis=0).T, d) >= probe.square
         return np.where((facet >= 0) & sound[facet] & looks_back, np.maximum(depth, 0), np.inf)
 
-    return np.concatenate(in_threads(part, slices(probe.share.size)) or [np.empty(0)])
+    return np.concatenate(in_threads(part, chunks(probe.share.size)) or [np.empty(0)])
 
 
 def _longest(mesh: Mesh) -> Floats:

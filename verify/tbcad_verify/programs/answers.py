@@ -9,7 +9,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tbcad_verify.report.checks import Check, Name, Unknown, at_most, finite, informative, unknown
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    finite,
+    informative,
+    unknown,
+)
 from tbcad_verify.run.child import Outcome
 
 SKIPPED = "skipped: "
@@ -17,7 +25,7 @@ MAX_ANSWER = 100_000  # bytes
 SHOWN = 160  # characters of a program's own words
 
 
-def skipped(check: Name, reason: str) -> Check:
+def skipped(check: CheckName, reason: str) -> Check:
     """Nobody looked, and nobody was asked to: no failure, and no figure either."""
     return informative(check, math.nan, SKIPPED + reason)
 
@@ -27,14 +35,14 @@ def is_skipped(check: Check) -> bool:
     return check.measured is None and check.detail.startswith(SKIPPED)
 
 
-def exactly(check: Name, measured: float, limit: float, detail: str = "") -> Check:
+def exactly(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a count is as it should be."""
     name, file, unit = check
     good = measured == limit
     return Check(name, file, good, finite(measured), limit, unit, "" if good else detail)
 
 
-def near(check: Name, measured: float, mesh: float, error: float) -> Check:
+def near(check: CheckName, measured: float, mesh: float, error: float) -> Check:
     """A check that a volume is the mesh's.
 
     Args:

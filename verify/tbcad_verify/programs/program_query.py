@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad_verify.record.files import locate
-from tbcad_verify.report.checks import Check, Name
+from tbcad_verify.report.checks import Check, CheckName
 from tbcad_verify.run.child import Limits, Outcome, run
 
 Command = tuple[str, ...]  # a program's absolute path and first arguments; empty: it is absent
@@ -78,7 +78,7 @@ class ProgramQuery:
     find: Callable[[], Command]
     ask: Callable[[Sandbox, Wanted], Sequence[Check]]
 
-    def names(self, wanted: Wanted) -> list[Name]:
+    def names(self, wanted: Wanted) -> list[CheckName]:
         """Name, file and unit of every check; a part without such a file goes by its own name."""
         file = wanted.files.get(self.kind) or wanted.name
         return [(name, file, unit) for name, unit in self.questions.items()]

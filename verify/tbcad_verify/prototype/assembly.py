@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.files import read
-from tbcad_verify.report.checks import Check, Name, Unknown, at_most, listed
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
 from tbcad_verify.types import Floats
 
 Shapes = dict[str, tuple[Floats, NDArray[np.int64]]]
@@ -41,7 +41,7 @@ def shapes(view: View) -> Shapes:
     return {title: _merged(*mesh) for title, mesh in _bodies(data)}
 
 
-def check(name: Name, view: View, bodies: list[Body], found: Shapes) -> Check:
+def check(name: CheckName, view: View, bodies: list[Body], found: Shapes) -> Check:
     """Every part's and every ball's box, against its own mesh's or the record's."""
     placed = of_roles(bodies, "base", "cap", "stage", "frame")
     boxes = {one.part.name: _box(one.needed.points) for one in placed}
@@ -52,7 +52,7 @@ def check(name: Name, view: View, bodies: list[Body], found: Shapes) -> Check:
     off = {title: _off(box, found.get(title)) for title, box in boxes.items()}
     off |= {one.name: 0.0 if one.name in found else np.inf for one in view.made.bought}
     wrong = sorted(title for title, away in off.items() if away > OFF_MM)
-    return at_most(name, max(off.values()), OFF_MM, f"missing or elsewhere: {listed(wrong)}")
+    return at_most(name, max(off.values()), OFF_MM, f"missing or elsewhere: {short_list(wrong)}")
 
 
 def standing(view: View, found: Shapes) -> list[tuple[str, Any]]:
@@ -63,7 +63,7 @@ def standing(view: View, found: Shapes) -> list[tuple[str, Any]]:
     """
     names = [one.name for one in view.made.bought if not one.turns]
     if lost := [name for name in names if name not in found]:
-        raise Unknown(f"the assembly lacks {listed(lost)}")
+        raise Unknown(f"the assembly lacks {short_list(lost)}")
     return [(name, _solid(name, *found[name])) for name in names]
 
 

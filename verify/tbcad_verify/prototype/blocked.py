@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads, reach
-from tbcad_verify.mesh.vectors import dot, norm, slices, unit
+from tbcad_verify.mesh.rays import RAYS_A_CHUNK, distances_to_planes, first_hits, in_threads
+from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
 from tbcad_verify.prototype.nearest import to_segments
 from tbcad_verify.prototype.rig import Obstacles, Rig, to_ground
 from tbcad_verify.prototype.trace import Trace, nearest
@@ -22,7 +22,7 @@ SKIN_MM = 0.1
 
 def blocked(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, tuple[str, ...]]:
     """Which rays do not get from the pinhole by their ball to the capture sphere, and why."""
-    parts = list(slices(mirror.size, RAYS_A_CHUNK))
+    parts = list(chunks(mirror.size, RAYS_A_CHUNK))
     found = in_threads(lambda part: _stopped(made, mirror[part], d[:, part]), parts)
     names = sorted({name for _, said in found for name in said})
     return np.concatenate([stopped for stopped, _ in found]), tuple(names)
@@ -89,7 +89,7 @@ def _parts(
     facet = first_hits(obstacles.scene, origin, along)
     hit = np.flatnonzero(facet >= 0)
     at = np.full(facet.size, np.inf)
-    at[hit] = reach(obstacles.scene, facet[hit], origin[:, hit], along[:, hit])
+    at[hit] = distances_to_planes(obstacles.scene, facet[hit], origin[:, hit], along[:, hit])
     bad = at < length
     for k in np.unique(obstacles.owner[facet[bad]]).tolist():
         count(bad & (obstacles.owner[facet] == k), obstacles.names[k])

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mass import Bulk, bulk
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine, joined, merge
-from tbcad_verify.mesh.segments import Edges, folds, measure_edges
+from tbcad_verify.mesh.mass import MassProperties, mass_properties
+from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes, mesh_from_facets
+from tbcad_verify.mesh.segments import Edges, count_folds, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype_record import Printed
@@ -51,8 +51,8 @@ class Body:
     mesh: Mesh | None
     placed: Mesh | None
     topology: Topology | None
-    bulk: Bulk | None
-    placed_bulk: Bulk | None
+    bulk: MassProperties | None
+    placed_bulk: MassProperties | None
     checks: list[Check]
     reason: str
 
@@ -71,18 +71,19 @@ class Body:
 def body(part: Printed, facets: Facets) -> Body:
     """Measure one part's mesh."""
     try:
-        mesh = merge(facets)
+        mesh = mesh_from_facets(facets)
         edges = measure_edges(mesh)
-        found = examine(mesh, facets)
+        found = examine_topology(mesh, facets)
         placed = put_back(mesh, part)
-        lump = replace(bulk(placed), bend=_bend(mesh, edges))
+        lump = replace(mass_properties(placed), bend=_bend(mesh, edges))
     except Exception as error:
         return Body(part, None, None, None, None, None, _unknown(part, error), reason_of(error))
     checks = _checks(
-        part, lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, folds(edges, FOLD_RAD))]
+        part,
+        lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, count_folds(edges, FOLD_RAD))],
     )
     checks += guarded([(k, part.stl, u) for k, u in POSE.items()], lambda: pose_checks(part, mesh))
-    return Body(part, mesh, placed, found, bulk(mesh), lump, checks, "")
+    return Body(part, mesh, placed, found, mass_properties(mesh), lump, checks, "")
 
 
 def put_back(mesh: Mesh, part: Printed) -> Mesh:
@@ -117,7 +118,7 @@ def joined_bodies(bodies: list[Body]) -> tuple[Mesh, NDArray[np.intp]]:
     """
     meshes = [one.needed for one in bodies]
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    return joined(meshes), owner
+    return join_meshes(meshes), owner
 
 
 def _bend(mesh: Mesh, edges: Edges) -> float:

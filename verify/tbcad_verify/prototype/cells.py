@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
-from tbcad_verify.mesh.vectors import across, dot, unit
+from tbcad_verify.mesh.vectors import dot, tangent_basis, unit
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.record import Camera
 from tbcad_verify.types import Bools, Floats, Ints
@@ -91,7 +91,7 @@ def shell_of(view: View) -> Shell:
 def outlines(shell: Shell) -> Outlines:
     """Edges of all cells; an apex that is not in its own cell has its edge on it."""
     chief = unit(shell.apex - shell.pinhole[:, None])
-    first, second = across(chief)
+    first, second = tangent_basis(chief)
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     out = first[:, :, None] * np.cos(turn) + second[:, :, None] * np.sin(turn)
     near = _neighbours(shell)

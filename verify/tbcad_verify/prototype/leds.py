@@ -8,7 +8,7 @@ from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
 from tbcad_verify.prototype.nearest import distances
 from tbcad_verify.prototype.swing import solid_of
 from tbcad_verify.prototype.view import View
-from tbcad_verify.report.checks import Check, at_most, informative, listed
+from tbcad_verify.report.checks import Check, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
 POINT_MM = 0.02  # edge of the cube that stands for a light
@@ -29,7 +29,7 @@ def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
     position = np.array([led.position for led in leds]).reshape(-1, 3)
     beyond = np.linalg.norm(position, axis=1) > view.radius
     odd = [leds[k].name for k in np.flatnonzero(beyond).tolist()]
-    made = [at_most(inside, len(odd), 0, f"the camera may not see {listed(odd)}")]
+    made = [at_most(inside, len(odd), 0, f"the camera may not see {short_list(odd)}")]
     stage = of_roles(bodies, "stage")
     if not leds or not stage:
         return [*made, informative(free, 0), informative(held, 0, "no light, or no stage")]
@@ -40,7 +40,7 @@ def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
     worst = int(away.argmax())
     return [
         *made,
-        at_most(free, len(sunk), 0, f"in the material of the stage: {listed(sunk)}"),
+        at_most(free, len(sunk), 0, f"in the material of the stage: {short_list(sunk)}"),
         informative(held, float(away[worst]), f"{leds[worst].name} is farthest from the stage"),
     ]
 

@@ -11,7 +11,14 @@ from tbcad_verify.prototype.view import View
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype_record import BALL_COLUMNS, BALLS, RECORD, Balls
 from tbcad_verify.record.prototype_tables import number_in
-from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_most,
+    guarded,
+    short_list,
+    worst_offenders,
+)
 from tbcad_verify.types import Floats
 
 ANGLE = 1e-9  # radians, and of unit vectors
@@ -33,7 +40,7 @@ def checks(view: View) -> list[Check]:
     ]
 
 
-def _agree(name: Name, view: View) -> Check:
+def _agree(name: CheckName, view: View) -> Check:
     balls, rows = view.made.balls, view.made.ball_rows
     if len(rows) != len(balls):
         return at_most(name, abs(len(rows) - len(balls)) * len(BALL_COLUMNS), 0, "rows are missing")
@@ -43,7 +50,7 @@ def _agree(name: Name, view: View) -> Check:
         for key, cell in zip(BALL_COLUMNS, row, strict=True)
         if not _same(cell, item.get(key))
     ]
-    return at_most(name, len(odd), 0, f"differ: {listed(odd)}")
+    return at_most(name, len(odd), 0, f"differ: {short_list(odd)}")
 
 
 def _same(cell: str, value: object) -> bool:
@@ -53,7 +60,7 @@ def _same(cell: str, value: object) -> bool:
     return number_in(cell) == value
 
 
-def _asked(name: Name, view: View) -> Check:
+def _asked(name: CheckName, view: View) -> Check:
     """Target and frame, against the design that the export carries."""
     made, export = view.made, view.export
     wanted = {
@@ -66,10 +73,10 @@ def _asked(name: Name, view: View) -> Check:
     if isinstance(spec, dict) and "picture" in spec:
         wanted["picture"] = float((spec["picture"] == "moved") != made.moved)
     odd = sorted(what for what, away in wanted.items() if not away <= ANGLE)
-    return at_most(name, len(odd), 0, f"not as designed: {listed(odd)}")
+    return at_most(name, len(odd), 0, f"not as designed: {short_list(odd)}")
 
 
-def _places(name: Name, view: View) -> Check:
+def _places(name: CheckName, view: View) -> Check:
     errors = place_errors(view)
     worst = np.argsort(-errors, kind="stable")
     worst = worst[~(errors[worst] <= POSE_MM)]
@@ -78,7 +85,9 @@ def _places(name: Name, view: View) -> Check:
         float(errors.max()),
         POSE_MM,
         "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
-        + offenders(view.made.balls.names(np.arange(errors.size)), errors, "mm", worst, ".3g"),
+        + worst_offenders(
+            view.made.balls.names(np.arange(errors.size)), errors, "mm", worst, ".3g"
+        ),
     )
 
 
@@ -108,7 +117,7 @@ def place_errors(view: View) -> Floats:
     return np.asarray(worst)
 
 
-def _sizes(name: Name, view: View) -> Check:
+def _sizes(name: CheckName, view: View) -> Check:
     balls = view.made.balls
     bad = np.flatnonzero(~_sized(balls))
     return at_most(name, bad.size, 0, f"no ball, or no cap, of its diameter: {listed_of(bad)}")
@@ -129,4 +138,4 @@ def _sized(balls: Balls) -> NDArray[np.bool_]:
 
 def listed_of(which: NDArray[np.intp]) -> str:
     """Some balls by number, from 1."""
-    return listed([f"ball {k + 1}" for k in which.tolist()])
+    return short_list([f"ball {k + 1}" for k in which.tolist()])

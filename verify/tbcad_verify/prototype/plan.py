@@ -10,7 +10,15 @@ from scipy.spatial import cKDTree
 from tbcad_verify.prototype import axis, gcode
 from tbcad_verify.prototype.view import View
 from tbcad_verify.record.prototype_record import PLAN, PROGRAM, STOPS
-from tbcad_verify.report.checks import Check, Name, Unknown, at_most, guarded, listed, offenders
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    guarded,
+    short_list,
+    worst_offenders,
+)
 from tbcad_verify.types import Floats, Ints
 
 ERROR_DEG = 1e-6
@@ -36,7 +44,7 @@ def checks(view: View) -> list[Check]:
     ]
 
 
-def _mirrors(name: Name, view: View) -> Check:
+def _mirrors(name: CheckName, view: View) -> Check:
     """Each of this camera's mirrors once with the object straight, all others once with it turned.
 
     Rows are numbered, and name balls that there are.
@@ -57,7 +65,7 @@ def _mirrors(name: Name, view: View) -> Check:
     served = np.bincount(np.clip(view.ball, 0, None), minlength=len(view.made.balls))
     unlike = np.flatnonzero(served != view.made.balls.of("mirrors"))
     odd += [f"ball {k + 1} serves {served[k]}" for k in unlike.tolist()]
-    return at_most(name, len(odd), 0, listed(odd))
+    return at_most(name, len(odd), 0, short_list(odd))
 
 
 def twins(view: View) -> Ints:
@@ -81,7 +89,7 @@ def twins(view: View) -> Ints:
     return np.asarray(others[near])
 
 
-def _twins(name: Name, view: View) -> Check:
+def _twins(name: CheckName, view: View) -> Check:
     """The turned half goes by the same ball and stop as the mirrors it is the image of."""
     plan, rows = view.made.plan, view.export.rows
     turned = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
@@ -94,7 +102,7 @@ def _twins(name: Name, view: View) -> Check:
     same &= (plan.stop[row] == plan.stop[first]) & (plan.errors[row] == plan.errors[first]).all(1)
     odd = [ids[k] for k in np.flatnonzero(~same).tolist()]
     return at_most(
-        name, len(odd), 0, f"another ball, stop or error than their images: {listed(odd)}"
+        name, len(odd), 0, f"another ball, stop or error than their images: {short_list(odd)}"
     )
 
 
@@ -107,16 +115,18 @@ def errors(view: View) -> Floats:
     return np.stack([ball - mirror, axis.wrapped(psi - phi), axis.between(at, u)], axis=1)
 
 
-def _errors(name: Name, view: View) -> Check:
+def _errors(name: CheckName, view: View) -> Check:
     away = np.abs(np.degrees(errors(view)) - view.made.plan.errors[view.pictures]).max(axis=1)
     worst = np.argsort(-away, kind="stable")
     worst = worst[~(away[worst] <= ERROR_DEG)]
     ids = [view.export.rows.ids[k] for k in view.mine.tolist()]
-    detail = "recorded otherwise than poses make them: " + offenders(ids, away, "deg", worst, ".3g")
+    detail = "recorded otherwise than poses make them: " + worst_offenders(
+        ids, away, "deg", worst, ".3g"
+    )
     return at_most(name, float(away.max()), ERROR_DEG, detail)
 
 
-def _stops(name: Name, view: View) -> Check:
+def _stops(name: CheckName, view: View) -> Check:
     """Numbered, ascending, within the swing, and what the plan makes of them."""
     stops, plan = view.made.stops, view.made.plan
     low, high = view.made.swing
@@ -135,7 +145,7 @@ def _stops(name: Name, view: View) -> Check:
     for k in range(len(stops)):
         here = np.flatnonzero(straight & (plan.stop == k + 1))
         odd += [] if _as_said(view, k, here) else [f"stop {k + 1} is not as the plan has it"]
-    return at_most(name, len(odd), 0, listed(odd))
+    return at_most(name, len(odd), 0, short_list(odd))
 
 
 def _as_said(view: View, k: int, rows: Ints) -> bool:
@@ -149,7 +159,7 @@ def _as_said(view: View, k: int, rows: Ints) -> bool:
     return bool(np.abs(worst - stops.errors[k]).max() <= ERROR_DEG)
 
 
-def _program(name: Name, view: View) -> Check:
+def _program(name: CheckName, view: View) -> Check:
     """Photographs at every stop, in order, twice, and nothing driven beyond the swing."""
     found, wanted = gcode.run(view.made.program), np.tile(view.made.stops.angle, 2)
     odd = list(found.faults)
@@ -161,4 +171,4 @@ def _program(name: Name, view: View) -> Check:
     low, high = view.made.swing
     beyond = (found.moves < low - PROGRAM_DEG) | (found.moves > high + PROGRAM_DEG)
     odd += [f"{found.moves[k]:.4f} deg is beyond the swing" for k in np.flatnonzero(beyond)]
-    return at_most(name, len(odd), 0, listed(odd))
+    return at_most(name, len(odd), 0, short_list(odd))

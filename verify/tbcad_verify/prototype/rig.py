@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.rays import Scene, build
-from tbcad_verify.mesh.surfaces import Seen, Surfaces, seen_from
+from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
@@ -33,7 +33,7 @@ class Obstacles:
         names: of the parts.
     """
 
-    scene: Scene | None
+    scene: RayScene | None
     owner: NDArray[np.intp]
     names: tuple[str, ...]
 
@@ -58,7 +58,7 @@ class Rig:
     radius: Floats
     body: Floats
     body_radius: Floats
-    seen: Seen
+    seen: PreparedSurfaces
     turning: Obstacles
     standing: Obstacles
 
@@ -89,7 +89,7 @@ def rig(view: View, held: Held, caps: list[Cap], bodies: list[Body]) -> Rig:
         radius,
         body,
         body_radius,
-        seen_from(view.pinhole, surfaces),
+        prepare_for_rays(view.pinhole, surfaces),
         obstacles(of_roles(bodies, "base", "cap")),
         obstacles(of_roles(bodies, "stage", "frame")),
     )
@@ -105,7 +105,7 @@ def obstacles(bodies: list[Body]) -> Obstacles:
     if not bodies:
         return Obstacles(None, np.zeros(1, dtype=np.intp), names)
     mesh, owner = joined_bodies(bodies)
-    return Obstacles(build(mesh), np.append(owner, -1), names)
+    return Obstacles(build_scene(mesh), np.append(owner, -1), names)
 
 
 def to_base(view: View, x: Floats, angle: Floats) -> Floats:

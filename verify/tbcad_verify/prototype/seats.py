@@ -18,7 +18,7 @@ from tbcad_verify.report.checks import (
     at_most,
     guarded,
     informative,
-    offenders,
+    worst_offenders,
 )
 from tbcad_verify.types import Floats, Ints
 
@@ -91,7 +91,7 @@ def checks(view: View, held: Held, files: str) -> list[Check]:
 def _worst(view: View, values: Floats, bad: NDArray[np.bool_], unit_: str = "mm") -> str:
     order = np.argsort(-values, kind="stable")
     names = view.made.balls.names(np.arange(values.size))
-    return offenders(names, values, unit_, order[bad[order]], ".3g")
+    return worst_offenders(names, values, unit_, order[bad[order]], ".3g")
 
 
 def _one(view: View, base: Mesh, k: int) -> tuple[Floats, float, float, str]:

@@ -20,16 +20,16 @@ from tbcad_verify.record.prototype_record import Prototype
 from tbcad_verify.record.record import Export
 from tbcad_verify.report.checks import (
     Check,
-    Name,
+    CheckName,
     at_least,
     at_most,
     attempt,
     finite,
     guarded,
     informative,
-    listed,
-    needed,
-    offenders,
+    require,
+    short_list,
+    worst_offenders,
 )
 from tbcad_verify.run.results import ResultSink
 from tbcad_verify.types import Floats
@@ -83,10 +83,10 @@ def prove(
     held, measured = _seats(view, bodies, taker)
     taker.stage(STAGES[3])
     ready, reason = attempt(lambda: rig(view, _known(held), measured, bodies))
-    shown, why = attempt(lambda: show(needed(ready, reason)))
+    shown, why = attempt(lambda: show(require(ready, reason)))
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in LIGHT.items()]
-    taker.checks(guarded(names, lambda: _light(view, needed(shown, reason or why), names)))
+    taker.checks(guarded(names, lambda: _light(view, require(shown, reason or why), names)))
     taker.stage(STAGES[4])
     _swing(view, ready, reason, bodies, taker)
     taker.prototype(rows(view, held, shown))
@@ -96,16 +96,16 @@ def prove(
 def _seats(view: View, bodies: list[Body], taker: ResultSink) -> tuple[Held | None, list[caps.Cap]]:
     files = _files(bodies, "base")
     base, reason = attempt(lambda: joined_bodies(of_roles(bodies, "base"))[0])
-    held, why = attempt(lambda: seats.hold(view, needed(base, reason)))
+    held, why = attempt(lambda: seats.hold(view, require(base, reason)))
     names = [(name, files, unit) for name, unit in seats.CHECKS.items()]
-    taker.checks(guarded(names, lambda: seats.checks(view, needed(held, reason or why), files)))
+    taker.checks(guarded(names, lambda: seats.checks(view, require(held, reason or why), files)))
     made = of_roles(bodies, "cap")
     if not view.made.balls.cap.any():
         return held, []
     found, odd = attempt(lambda: [caps.measure(view, one) for one in made])
     files = _files(bodies, "cap")
     names = [(name, files, unit) for name, unit in caps.CHECKS.items()]
-    taker.checks(guarded(names, lambda: caps.checks(view, needed(found, odd), files)))
+    taker.checks(guarded(names, lambda: caps.checks(view, require(found, odd), files)))
     return held, found or []
 
 
@@ -115,23 +115,23 @@ def _swing(
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
     found, odd = attempt(lambda: assembly.shapes(view))
-    bought, why = attempt(lambda: assembly.standing(view, needed(found, odd)))
+    bought, why = attempt(lambda: assembly.standing(view, require(found, odd)))
     taker.checks(
         guarded(
             names,
-            lambda: swing.checks(needed(ready, reason), bodies, needed(bought, why), files),
+            lambda: swing.checks(require(ready, reason), bodies, require(bought, why), files),
         )
     )
     whole = (assembly.CHECK[0], view.made.assembly[1], assembly.CHECK[1])
     taker.checks(
-        guarded([whole], lambda: [assembly.check(whole, view, bodies, needed(found, odd))])
+        guarded([whole], lambda: [assembly.check(whole, view, bodies, require(found, odd))])
     )
     files = _files(bodies, "stage")
     names = [(name, files, unit) for name, unit in leds.CHECKS.items()]
     taker.checks(guarded(names, lambda: leds.checks(view, bodies, files)))
 
 
-def _light(view: View, found: Shown, names: list[Name]) -> list[Check]:
+def _light(view: View, found: Shown, names: list[CheckName]) -> list[Check]:
     """Every mirror's ball shows all of the object at its stop, and nothing stands in between."""
     cells, covers, off, path, rays, kept = names
     ids = [view.export.rows.ids[k] for k in view.mine.tolist()]
@@ -148,14 +148,14 @@ def _light(view: View, found: Shown, names: list[Name]) -> list[Check]:
             covers,
             float(found.coverage.min()),
             view.export.target_mm,
-            "shows too little: " + offenders(ids, found.coverage, "mm", short),
+            "shows too little: " + worst_offenders(ids, found.coverage, "mm", short),
         ),
         informative(off, float(away[furthest]), f"ball {furthest + 1} shows {least[furthest]:.3f}"),
         at_most(
             path,
             blocked.sum(),
             0,
-            f"{_some(ids, blocked)}; blocked by {listed(found.blockers)}",
+            f"{_some(ids, blocked)}; blocked by {short_list(found.blockers)}",
         ),
         informative(rays, float(found.rays.sum()), "looked at, each on both of its ways"),
         informative(
@@ -219,7 +219,7 @@ def least_of_balls(view: View, coverage: Floats) -> Floats:
 
 def _some(ids: list[str], counts: Floats) -> str:
     worst = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
-    return offenders(ids, counts, "rays", worst, ".0f")
+    return worst_offenders(ids, counts, "rays", worst, ".0f")
 
 
 def _files(bodies: list[Body], *roles: str) -> str:
@@ -232,4 +232,4 @@ def _short(value: float) -> float | None:
 
 
 def _known(held: Held | None) -> Held:
-    return needed(held, "the seats could not be measured")
+    return require(held, "the seats could not be measured")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export
@@ -40,7 +40,7 @@ def readings(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
 
 
 def step_checks(
-    export: Export, bulks: dict[str, Bulk], found: dict[str, StepFile | Unknown]
+    export: Export, bulks: dict[str, MassProperties], found: dict[str, StepFile | Unknown]
 ) -> list[Check]:
     """All checks of the STEP files of a prototype's parts.
 
@@ -61,14 +61,14 @@ def _parts(export: Export) -> list[Printed]:
 
 
 def _part(
-    export: Export, part: Printed, found: StepFile | Unknown, bulk: Bulk | None
+    export: Export, part: Printed, found: StepFile | Unknown, bulk: MassProperties | None
 ) -> list[Check]:
     names = [(name, part.step, unit) for name, unit in UNITS.items()]
     return guarded(names, partial(_known, export, part, found, bulk))
 
 
 def _known(
-    export: Export, part: Printed, found: StepFile | Unknown, bulk: Bulk | None
+    export: Export, part: Printed, found: StepFile | Unknown, bulk: MassProperties | None
 ) -> list[Check]:
     if isinstance(found, Unknown):
         raise found

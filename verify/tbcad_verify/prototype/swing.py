@@ -13,7 +13,7 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.bodies import Body, of_roles
 from tbcad_verify.prototype.rig import Rig
-from tbcad_verify.report.checks import Check, at_least, at_most, informative, listed
+from tbcad_verify.report.checks import Check, at_least, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # clearances beyond this are not told apart
@@ -96,7 +96,7 @@ def checks(made: Rig, bodies: list[Body], bought: list[tuple[str, Any]], files: 
         if one.volume > TOUCH_MM3
     ]
     return [
-        at_most(swing, volume, TOUCH_MM3, listed(hits)),
+        at_most(swing, volume, TOUCH_MM3, short_list(hits)),
         informative(clearance, least.gap if least else SEARCH_MM, _nearest(least)),
         informative(looks, sum(one.looks for one in found), _how(found)),
         _apart(apart, [turning, standing]),
@@ -210,7 +210,7 @@ def _apart(name: tuple[str, str, str], groups: list[list[tuple[str, Mesh]]]) -> 
     worst = sorted((pair for pair in shared if pair[0] > CONTACT_MM3), reverse=True)
     most = max((volume for volume, _ in shared), default=0.0)
     said = [f"{names} {volume:.3g} mm^3" for volume, names in worst]
-    return at_most(name, most, CONTACT_MM3, f"share room: {listed(said)}")
+    return at_most(name, most, CONTACT_MM3, f"share room: {short_list(said)}")
 
 
 def _room(name: tuple[str, str, str], made: Rig) -> Check:

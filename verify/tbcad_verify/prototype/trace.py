@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK
-from tbcad_verify.mesh.surfaces import Lines, reflect
-from tbcad_verify.mesh.vectors import dot, slices
+from tbcad_verify.mesh.surfaces import ReflectedRays, reflect
+from tbcad_verify.mesh.vectors import chunks, dot
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.rig import Rig, to_base, to_ground
 from tbcad_verify.prototype.view import View
@@ -34,7 +34,7 @@ class Trace:
     ball: Ints
     angle: Floats
 
-    def lines(self, mirror: Ints, d: Floats) -> tuple[Floats, Lines]:
+    def lines(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
         """Directions (3, N) of mirrors' cells in the base's frame, and reflected on the balls."""
         way = times(self.on_base[:, :, mirror], d)
         return way, reflect(self.rig.seen, self.ball[mirror], way)
@@ -84,14 +84,14 @@ def misses(made: Trace, mirror: Ints, d: Floats) -> Floats:
         d: (3, m, s) unit.
     """
     found = np.empty_like(d)
-    for part in slices(mirror.size, max(1, RAYS_A_CHUNK // d.shape[2])):
+    for part in chunks(mirror.size, max(1, RAYS_A_CHUNK // d.shape[2])):
         own = np.repeat(mirror[part], d.shape[2])
         at = nearest(made.lines(own, d[:, part].reshape(3, -1))[1])
         found[:, part] = at.reshape(3, -1, d.shape[2])
     return found
 
 
-def nearest(lines: Lines) -> Floats:
+def nearest(lines: ReflectedRays) -> Floats:
     """(3, N) the point of each reflected ray that is nearest to the origin; not before it starts.
 
     A small ball turns rays at its rim so far that they go away from the object.

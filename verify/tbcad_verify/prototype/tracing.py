@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad_verify.mesh.surfaces import Surfaces, reflect, seen_from
-from tbcad_verify.mesh.vectors import across, dot, norm, unit
+from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays, reflect
+from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.blocked import blocked
 from tbcad_verify.prototype.cells import (
@@ -119,7 +119,7 @@ def _coverage(made: Trace, edge: Outlines, miss: Floats) -> Floats:
     # What passes the ball by shows nothing, so it takes nothing away.
     least = 2 * np.where(both & np.isfinite(away), away, np.inf).min(axis=1)
     apex = view.made.balls.columns("px", 3)[:, made.ball]
-    middle = across(unit(apex - view.pinhole[:, None]))
+    middle = tangent_basis(unit(apex - view.pinhole[:, None]))
     way = np.einsum("ijm,jms->ims", made.on_base, edge.direction)
     angle = np.arctan2(*((side[:, :, None] * way).sum(axis=0) for side in reversed(middle)))
     step = axis.wrapped(np.roll(angle, -1, axis=1) - angle)
@@ -167,7 +167,7 @@ def _pixels(made: Trace, shell: Shell) -> tuple[Floats, Ints, Floats, Floats]:
     d, mirror = d[:, on], mirror[on]
     normal = unit(shell.apex - shell.centre)
     balls = Surfaces(shell.centre + shell.radius * normal, normal, 1 / shell.radius)
-    straight = norm(nearest(reflect(seen_from(shell.pinhole, balls), mirror, d))) <= radius
+    straight = norm(nearest(reflect(prepare_for_rays(shell.pinhole, balls), mirror, d))) <= radius
     way = times(made.moved[:, :, mirror], d)
     meets = norm(nearest(made.lines(mirror, d)[1])) <= radius
     depth = dot(way, np.broadcast_to(camera.forward[:, None], way.shape))

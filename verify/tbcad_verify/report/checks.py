@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.types import Floats
 
-Name = tuple[str, str, str]  # of a check: name, file, unit
+CheckName = tuple[str, str, str]  # of a check: name, file, unit
 T = TypeVar("T")
 NAMED = 5  # how many offenders a line names
 
@@ -40,7 +40,7 @@ class Check:
     detail: str = ""
 
 
-def at_most(check: Name, measured: float, limit: float, detail: str = "") -> Check:
+def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure does not exceed its limit; one that is not finite fails.
 
     Args:
@@ -52,17 +52,17 @@ def at_most(check: Name, measured: float, limit: float, detail: str = "") -> Che
     return _held(check, measured, limit, measured <= limit, detail)
 
 
-def at_least(check: Name, measured: float, limit: float, detail: str = "") -> Check:
+def at_least(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure reaches its limit; one that is not finite fails."""
     return _held(check, measured, limit, measured >= limit, detail)
 
 
-def informative(check: Name, measured: float, detail: str = "") -> Check:
+def informative(check: CheckName, measured: float, detail: str = "") -> Check:
     """A figure without a limit: it informs, and passes."""
     return Check(check[0], check[1], True, finite(measured), None, check[2], detail)
 
 
-def unknown(check: Name, reason: str) -> Check:
+def unknown(check: CheckName, reason: str) -> Check:
     """What could not be found out."""
     return Check(check[0], check[1], None, None, None, check[2], reason)
 
@@ -71,7 +71,7 @@ class Unknown(Exception):
     """Something cannot be found out because something before it was not; the message says why."""
 
 
-def guarded(checks: Sequence[Name], work: Callable[[], Sequence[Check]]) -> list[Check]:
+def guarded(checks: Sequence[CheckName], work: Callable[[], Sequence[Check]]) -> list[Check]:
     """Run one stage; if it breaks, everything it should have measured is unknown."""
     try:
         return list(work())
@@ -90,7 +90,7 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def offenders(
+def worst_offenders(
     names: Sequence[str],
     values: Floats,
     unit: str,
@@ -102,17 +102,17 @@ def offenders(
     return _listed(shown, len(worst_first))
 
 
-def listed(names: Sequence[str]) -> str:
+def short_list(names: Sequence[str]) -> str:
     """The first few names, and how many more there are."""
     return _listed(list(names[:NAMED]), len(names))
 
 
-def passed(checks: Sequence[Check]) -> bool:
+def all_passed(checks: Sequence[Check]) -> bool:
     """True if every check passes; unknown is no pass."""
     return all(check.passed is True for check in checks)
 
 
-def _held(check: Name, measured: float, limit: float, good: bool, detail: str) -> Check:
+def _held(check: CheckName, measured: float, limit: float, good: bool, detail: str) -> Check:
     name, file, unit = check
     return Check(name, file, bool(good), finite(measured), limit, unit, "" if good else detail)
 
@@ -130,7 +130,7 @@ def attempt(work: Callable[[], T]) -> tuple[T | None, str]:
         return None, reason_of(error)
 
 
-def needed(value: T | None, reason: str) -> T:
+def require(value: T | None, reason: str) -> T:
     """A value that may be missing.
 
     Raises:

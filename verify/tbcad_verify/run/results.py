@@ -10,7 +10,7 @@ from typing import Any, Protocol, TextIO
 import numpy as np
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.report.checks import Check
 from tbcad_verify.types import Floats
 
@@ -36,7 +36,7 @@ class ResultSink(Protocol):
     def mirrors(self, columns: Mapping[str, Floats]) -> None:
         """Figures of every recorded mirror, columns of `PER_MIRROR`."""
 
-    def bulk(self, part: str, bulk: Bulk) -> None:
+    def bulk(self, part: str, bulk: MassProperties) -> None:
         """Volume, area, middle and box of one part's mesh."""
 
     def prints(self, rows: Sequence[Row]) -> None:
@@ -53,7 +53,7 @@ class Results:
     progress: Callable[[str], None]
     found: list[Check] = field(default_factory=list)
     columns: dict[str, Floats] = field(default_factory=dict)
-    bulks: dict[str, Bulk] = field(default_factory=dict)
+    bulks: dict[str, MassProperties] = field(default_factory=dict)
     printing: list[Row] = field(default_factory=list)
     machine: Row | None = None
     stages: list[str] = field(default_factory=list)
@@ -71,7 +71,7 @@ class Results:
         """Keep the columns that came."""
         self.columns.update(columns)
 
-    def bulk(self, part: str, bulk: Bulk) -> None:
+    def bulk(self, part: str, bulk: MassProperties) -> None:
         """Keep one part's figures."""
         self.bulks[part] = bulk
 
@@ -103,7 +103,7 @@ class JsonLinesSink:
         """Send them; NaN is JSON that Python understands."""
         self.send({"mirrors": {name: values.tolist() for name, values in columns.items()}})
 
-    def bulk(self, part: str, bulk: Bulk) -> None:
+    def bulk(self, part: str, bulk: MassProperties) -> None:
         """Send it."""
         self.send({"part": part, "bulk": asdict(bulk)})
 
@@ -137,7 +137,7 @@ def replay(line: str, taker: ResultSink) -> bool:
     elif "mirrors" in message:
         taker.mirrors({name: np.array(rows) for name, rows in message["mirrors"].items()})
     elif "bulk" in message:
-        taker.bulk(message["part"], Bulk(**message["bulk"]))
+        taker.bulk(message["part"], MassProperties(**message["bulk"]))
     elif "prints" in message:
         taker.prints(message["prints"])
     elif "prototype" in message:

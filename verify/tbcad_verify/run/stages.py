@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tbcad_verify.mesh.mass import Bulk, bulk
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine, merge
+from tbcad_verify.mesh.mass import MassProperties, mass_properties
+from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_facets
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
@@ -20,11 +20,11 @@ from tbcad_verify.prototype.bodies import Body
 from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export, Part, read_export
-from tbcad_verify.report.checks import Check, Name, attempt, guarded, needed
+from tbcad_verify.report.checks import Check, CheckName, attempt, guarded, require
 from tbcad_verify.run.results import ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import fold_check, manifest_checks, mesh_checks, record_checks
-from tbcad_verify.shell.optics import Bench, pinhole_of, set_up
+from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import Recovery, recover
 
 STAGES = (
@@ -47,7 +47,7 @@ class Solid:
 
     mesh: Mesh | None
     topology: Topology | None
-    bulk: Bulk | None
+    bulk: MassProperties | None
     recovery: Recovery | None
     checks: list[Check]
     reason: str
@@ -58,7 +58,7 @@ def stages(export: Export) -> tuple[str, ...]:
     return (*STAGES, *(machine.STAGES if export.prototype else ()))
 
 
-def prove(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) -> None:
+def run_stages(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) -> None:
     """Make all stages, and hand over what each finds.
 
     Args:
@@ -113,8 +113,8 @@ def _printing(
     taker: ResultSink,
 ) -> None:
     def work() -> list[Check]:
-        topology = needed(solid.topology, solid.reason)
-        mesh, lump = needed(solid.mesh, solid.reason), needed(solid.bulk, solid.reason)
+        topology = require(solid.topology, solid.reason)
+        mesh, lump = require(solid.mesh, solid.reason), require(solid.bulk, solid.reason)
         shape = measure(mesh, topology.status, lump)
         prints = [assess(part.stl, shape, profile) for profile in profiles]
         taker.prints([to_row(one) for one in prints])
@@ -144,19 +144,19 @@ def _threemf(
 
 
 def _solid(export: Export, part: Part, facets: Facets) -> Solid:
-    mesh, reason = attempt(lambda: merge(facets))
-    topology, odd = attempt(lambda: examine(needed(mesh, reason), facets))
+    mesh, reason = attempt(lambda: mesh_from_facets(facets))
+    topology, odd = attempt(lambda: examine_topology(require(mesh, reason), facets))
     checks = guarded(
         [(name, part.stl, "") for name in SOLID],
-        lambda: mesh_checks(part.stl, needed(topology, odd)),
+        lambda: mesh_checks(part.stl, require(topology, odd)),
     )
-    lump, off = attempt(lambda: bulk(needed(mesh, reason)))
+    lump, off = attempt(lambda: mass_properties(require(mesh, reason)))
     recovery, why = attempt(
-        lambda: recover(needed(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
+        lambda: recover(require(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
     )
     folds = guarded(
         [("folds", part.stl, "edges")],
-        lambda: [fold_check(part.stl, needed(recovery, reason or why).folds)],
+        lambda: [fold_check(part.stl, require(recovery, reason or why).folds)],
     )
     return Solid(mesh, topology, lump, recovery, checks + folds, reason or why or odd or off)
 
@@ -166,8 +166,8 @@ def _optics(export: Export, solids: list[Solid], taker: ResultSink) -> None:
     taker.stage("optical bench")
     bench, reason = attempt(lambda: _bench(export, solids))
 
-    def ready() -> Bench:
-        return needed(bench, reason)
+    def ready() -> OpticalSetup:
+        return require(bench, reason)
 
     taker.checks(
         guarded(_names(mirrors_found.CHECKS, files), lambda: mirrors_found.checks(ready(), files))
@@ -180,7 +180,7 @@ def _optics(export: Export, solids: list[Solid], taker: ResultSink) -> None:
     taker.checks(
         guarded(
             _names(coverage.CHECKS, files),
-            lambda: coverage.checks(ready(), needed(seen, why), files),
+            lambda: coverage.checks(ready(), require(seen, why), files),
         )
     )
     if seen is not None:
@@ -193,17 +193,18 @@ def _optics(export: Export, solids: list[Solid], taker: ResultSink) -> None:
         )
     taker.stage("every pixel")
     light, why = attempt(lambda: pixels.checks(ready(), seen, files))
-    taker.checks(guarded(_names(pixels.CHECKS, files), lambda: needed(light, why)[1]))
+    taker.checks(guarded(_names(pixels.CHECKS, files), lambda: require(light, why)[1]))
     if light is not None:
         taker.mirrors({"pixels": light[0]})
 
 
-def _names(units: dict[str, str], files: str) -> list[Name]:
+def _names(units: dict[str, str], files: str) -> list[CheckName]:
     return [(name, files, unit) for name, unit in units.items()]
 
 
-def _bench(export: Export, solids: list[Solid]) -> Bench:
+def _bench(export: Export, solids: list[Solid]) -> OpticalSetup:
     ready = [
-        (needed(solid.mesh, solid.reason), needed(solid.recovery, solid.reason)) for solid in solids
+        (require(solid.mesh, solid.reason), require(solid.recovery, solid.reason))
+        for solid in solids
     ]
     return set_up(export, [mesh for mesh, _ in ready], [recovery for _, recovery in ready])

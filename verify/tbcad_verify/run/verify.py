@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import Wanted, client_checks
 from tbcad_verify.prototype import step_files
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import TEXTS, Export, Part, read_export
-from tbcad_verify.report.checks import Check, listed
+from tbcad_verify.report.checks import Check, short_list
 from tbcad_verify.report.report import Report, findings
 from tbcad_verify.run.results import Results
-from tbcad_verify.run.stages import prove, stages
+from tbcad_verify.run.stages import run_stages, stages
 from tbcad_verify.run.watch import SECONDS, watched, worker
 from tbcad_verify.step.checks import step_checks
 
@@ -72,7 +72,7 @@ def verify(
         if wishes.apart:
             watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
         else:
-            prove(export.folder, results, wishes.printers)
+            run_stages(export.folder, results, wishes.printers)
         if any(part.step for part in export.parts):
             results.stage("STEP")
             results.checks(step_checks(export, results.bulks, wishes.seconds))
@@ -102,7 +102,7 @@ def _refuse_changes(export: Export, before: Stamps) -> None:
     changed = sorted(name for name in names if after.get(name) != before.get(name))
     if changed:
         raise BadExport(
-            f"{listed(changed)}: changed while it was read; let the build finish, then verify"
+            f"{short_list(changed)}: changed while it was read; let the build finish, then verify"
         )
 
 
@@ -113,7 +113,7 @@ def _programs(export: Export, results: Results, seconds: float) -> list[Check]:
     return client_checks(export.folder, wanted, seconds, results.stage)
 
 
-def _wanted(export: Export, part: Part, bulk: Bulk | None) -> Wanted:
+def _wanted(export: Export, part: Part, bulk: MassProperties | None) -> Wanted:
     """What other programs should find in a part's files."""
     mirrors = export.rows.camera == part.camera
     volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
@@ -126,7 +126,7 @@ def _wanted(export: Export, part: Part, bulk: Bulk | None) -> Wanted:
     )
 
 
-def _printed(export: Export, part: Printed, bulk: Bulk | None) -> Wanted:
+def _printed(export: Export, part: Printed, bulk: MassProperties | None) -> Wanted:
     """The same of a prototype's part, whose spherical faces nobody counts."""
     volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
     return Wanted(

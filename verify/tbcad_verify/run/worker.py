@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.run.results import JsonLinesSink
-from tbcad_verify.run.stages import prove
+from tbcad_verify.run.stages import run_stages
 
 
 def main(folder: Path, printers: list[str]) -> None:
@@ -21,7 +21,7 @@ def main(folder: Path, printers: list[str]) -> None:
     lines = JsonLinesSink(os.fdopen(os.dup(1), "w", encoding="utf-8"))
     os.dup2(2, 1)
     try:
-        prove(folder, lines, printers)
+        run_stages(folder, lines, printers)
         lines.send({"done": True})
     except BadExport as error:
         lines.send({"refused": str(error)})

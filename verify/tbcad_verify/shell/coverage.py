@@ -7,29 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.fits import middles
+from tbcad_verify.mesh.fits import facet_centres
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads
-from tbcad_verify.mesh.surfaces import Lines
-from tbcad_verify.mesh.vectors import slices
+from tbcad_verify.mesh.surfaces import ReflectedRays
+from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.record.record import Camera
 from tbcad_verify.report.checks import (
     Check,
-    Name,
+    CheckName,
     at_least,
     at_most,
     informative,
-    listed,
-    offenders,
+    short_list,
+    worst_offenders,
 )
 from tbcad_verify.shell import seam
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
     Outline,
-    least_miss,
+    minimum_miss_distance,
     reflect_on_facets,
     reflect_on_fits,
     trace_outline,
-    turns,
+    winding_numbers,
 )
 from tbcad_verify.types import Floats
 
@@ -63,7 +63,7 @@ class Coverage:
     blockers: tuple[str, ...]
 
 
-def measure(bench: Bench) -> Coverage:
+def measure(bench: OpticalSetup) -> Coverage:
     """Trace every mirror's outline from its camera."""
     cameras, virtual, u = bench.cameras, bench.virtual, bench.u
     patches = bench.patches()
@@ -71,7 +71,9 @@ def measure(bench: Bench) -> Coverage:
     pairs = list(zip(cameras, outlines, strict=True))
     fitted = [reflect_on_fits(outline, bench.seen(camera)) for camera, outline in pairs]
     facet = [reflect_on_facets(o, camera.pinhole, bench.scene.planes) for camera, o in pairs]
-    turned = np.abs(sum(turns(o, at, virtual, u) for o, at in zip(outlines, fitted, strict=True)))
+    turned = np.abs(
+        sum(winding_numbers(o, at, virtual, u) for o, at in zip(outlines, fitted, strict=True))
+    )
     hits = [_hidden(bench, camera, outline) for camera, outline in pairs]
     hidden, blockers = (np.concatenate([pair[k] for pair in hits]) for k in range(2))
     return Coverage(
@@ -83,44 +85,46 @@ def measure(bench: Bench) -> Coverage:
     )
 
 
-def checks(bench: Bench, found: Coverage, files: str) -> list[Check]:
+def checks(bench: OpticalSetup, found: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
     facets, spheres, seen, gap, off = ((name, files, unit) for name, unit in CHECKS.items())
     worst = np.argsort(-found.hidden, kind="stable")[: np.count_nonzero(found.hidden)]
-    who = offenders(bench.export.mirrors.ids, found.hidden, "points", worst, ".0f")
+    who = worst_offenders(bench.export.mirrors.ids, found.hidden, "points", worst, ".0f")
     widest = bench.virtual_ids[int(np.argmax(found.gap))]
     return [
         _covers(bench, facets, found.facet),
         _covers(bench, spheres, found.fitted),
-        at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {listed(found.blockers)}"),
+        at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {short_list(found.blockers)}"),
         informative(gap, float(found.gap.max()), f"widest at {widest}"),
         informative(off, _off_the_record(bench, found)),
     ]
 
 
-def _diameters(bench: Bench, outlines: list[Outline], lines: list[Lines], turned: Floats) -> Floats:
+def _diameters(
+    bench: OpticalSetup, outlines: list[Outline], lines: list[ReflectedRays], turned: Floats
+) -> Floats:
     virtual = bench.virtual
-    each = [least_miss(o, at, virtual) for o, at in zip(outlines, lines, strict=True)]
+    each = [minimum_miss_distance(o, at, virtual) for o, at in zip(outlines, lines, strict=True)]
     least = np.min(each, axis=0)
     least[np.abs(turned - 1) > ROUND] = 0.0
     least[virtual.index[bench.match.segment < 0]] = np.nan
     return np.asarray(2 * least)
 
 
-def _covers(bench: Bench, name: Name, diameter: Floats) -> Check:
+def _covers(bench: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
     target, lost = bench.export.target_mm, np.isnan(diameter)
     known = np.where(lost, np.inf, diameter)
     worst = np.argsort(known, kind="stable")
     worst = worst[known[worst] < target]
-    said = ["sees too little: " + offenders(bench.virtual_ids, diameter, "mm", worst)]
+    said = ["sees too little: " + worst_offenders(bench.virtual_ids, diameter, "mm", worst)]
     unseen = [bench.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
-    said += [f"unknown, for want of a mirror: {listed(unseen)}"] if unseen else []
+    said += [f"unknown, for want of a mirror: {short_list(unseen)}"] if unseen else []
     measured = -np.inf if lost.all() else float(known.min())
     # One missing mirror is as bad as one that sees nothing.
     return at_least(name, 0.0 if unseen else measured, target, "; ".join(said))
 
 
-def _off_the_record(bench: Bench, found: Coverage) -> float:
+def _off_the_record(bench: OpticalSetup, found: Coverage) -> float:
     """Largest difference between coverage on fitted surfaces and as the designer computed it."""
     recorded = bench.export.mirrors.columns("coverage_mm")[0]
     off = np.abs(found.fitted[bench.virtual.index] - recorded)
@@ -128,7 +132,7 @@ def _off_the_record(bench: Bench, found: Coverage) -> float:
 
 
 def _hidden(
-    bench: Bench, camera: Camera, outline: Outline
+    bench: OpticalSetup, camera: Camera, outline: Outline
 ) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
     """Mirrors of points that the pinhole does not see first, and the facets it sees instead.
 
@@ -142,10 +146,10 @@ def _hidden(
         return first_hits(bench.scene, origin, outline.inside[:, part] - origin)
 
     def insides(part: slice) -> NDArray[np.int32]:
-        return first_hits(bench.scene, origin, middles(bench.mesh, facets[part]) - origin)
+        return first_hits(bench.scene, origin, facet_centres(bench.mesh, facets[part]) - origin)
 
-    jobs = [(edges, part) for part in slices(outline.mirror.size, RAYS_A_CHUNK)]
-    jobs += [(insides, part) for part in slices(facets.size, RAYS_A_CHUNK)]
+    jobs = [(edges, part) for part in chunks(outline.mirror.size, RAYS_A_CHUNK)]
+    jobs += [(insides, part) for part in chunks(facets.size, RAYS_A_CHUNK)]
     hits = in_threads(lambda job: job[0](job[1]), jobs)
     facet = np.concatenate([np.zeros(0, dtype=np.int32), *hits])
     mirror = np.concatenate([outline.mirror, owner[facets]])

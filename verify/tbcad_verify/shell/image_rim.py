@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.surfaces import Lines, Seen, nearest, reflect
-from tbcad_verify.mesh.vectors import across, dot, norm, unit
+from tbcad_verify.mesh.surfaces import PreparedSurfaces, ReflectedRays, nearest_to_origin, reflect
+from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.record.record import Camera
 from tbcad_verify.types import Floats
 
@@ -18,7 +18,7 @@ CLOSE_MM = 1e-4
 
 
 @dataclass(frozen=True)
-class Ring:
+class RimRays:
     """Camera rays that, off their mirror, graze the capture sphere: AZIMUTHS for each mirror.
 
     Attributes:
@@ -30,11 +30,13 @@ class Ring:
 
     mirror: NDArray[np.intp]
     direction: Floats
-    lines: Lines
+    lines: ReflectedRays
     error: Floats
 
 
-def ring(seen: Seen, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius: Floats) -> Ring:
+def rim_rays(
+    seen: PreparedSurfaces, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius: Floats
+) -> RimRays:
     """Aim at the rim of the capture sphere off each mirror, by Newton's method.
 
     Args:
@@ -50,16 +52,16 @@ def ring(seen: Seen, mirrors: NDArray[np.intp], start: Floats, u: Floats, radius
     target = np.repeat(radius, AZIMUTHS) * np.stack([np.cos(angle), np.sin(angle)])
     d = _aim(seen, index, np.repeat(chief, AZIMUTHS, axis=1), u, target)
     lines = reflect(seen, index, d)
-    return Ring(index, d, lines, np.asarray(np.hypot(*(_miss(lines, u) - target))))
+    return RimRays(index, d, lines, np.asarray(np.hypot(*(_miss(lines, u) - target))))
 
 
-def chosen(found: Ring, own: NDArray[np.bool_]) -> Ring:
+def chosen(found: RimRays, own: NDArray[np.bool_]) -> RimRays:
     """Some of a ring's rays."""
     lines = found.lines
-    return Ring(
+    return RimRays(
         found.mirror[own],
         found.direction[:, own],
-        Lines(lines.point[:, own], lines.toward[:, own], lines.reach[own]),
+        ReflectedRays(lines.point[:, own], lines.toward[:, own], lines.reach[own]),
         found.error[own],
     )
 
@@ -74,26 +76,28 @@ def margins(camera: Camera, d: Floats) -> Floats:
     return np.where(depth > 0, inside, -np.inf)
 
 
-def nearest_on_the_way(seen: Seen, d: Floats, lines: Lines) -> Floats:
+def nearest_on_the_way(seen: PreparedSurfaces, d: Floats, lines: ReflectedRays) -> Floats:
     """(N,) least distance from the origin of the rays between pinhole and mirror, mm."""
     pinhole = seen.origin[:, None]
     foot = np.minimum(-dot(pinhole, d) / dot(d, d), lines.reach)
     return norm(pinhole + foot * d)
 
 
-def _miss(lines: Lines, u: Floats) -> Floats:
+def _miss(lines: ReflectedRays, u: Floats) -> Floats:
     """(2, N) how a line misses the origin, across u; as long as the distance in space."""
-    miss = nearest(lines)
-    flat = np.stack([dot(axis, miss) for axis in across(u)])
+    miss = nearest_to_origin(lines)
+    flat = np.stack([dot(axis, miss) for axis in tangent_basis(u)])
     size = np.sqrt(np.maximum(np.einsum("in,in->n", flat, flat), 1e-300))
     return np.asarray(flat * (norm(miss) / size))
 
 
-def _aim(seen: Seen, index: NDArray[np.intp], d: Floats, u: Floats, target: Floats) -> Floats:
+def _aim(
+    seen: PreparedSurfaces, index: NDArray[np.intp], d: Floats, u: Floats, target: Floats
+) -> Floats:
     """(3, N) rays whose reflected lines miss the origin by target (2, N)."""
     step = 1e-6
     for _ in range(NEWTON):
-        axes = [norm(d) * axis for axis in across(unit(d))]
+        axes = [norm(d) * axis for axis in tangent_basis(unit(d))]
         here = _miss(reflect(seen, index, d), u)
         slopes = [(_miss(reflect(seen, index, d + step * axis), u) - here) / step for axis in axes]
         a, b = _solve(slopes, target - here)

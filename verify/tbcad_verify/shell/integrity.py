@@ -24,13 +24,13 @@ from tbcad_verify.record.poses import (
 from tbcad_verify.record.record import Export
 from tbcad_verify.report.checks import (
     Check,
-    Name,
+    CheckName,
     at_least,
     at_most,
     guarded,
     informative,
-    listed,
-    offenders,
+    short_list,
+    worst_offenders,
 )
 from tbcad_verify.report.report import NAME
 
@@ -60,9 +60,9 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
             len(wrong + unlisted + unread),
             0,
             "missing, unlisted, not as written, or of no part: "
-            + listed(wrong + unlisted + unread),
+            + short_list(wrong + unlisted + unread),
         ),
-        informative(("other files", "", "files"), len(others), listed(others)),
+        informative(("other files", "", "files"), len(others), short_list(others)),
     ]
 
 
@@ -81,7 +81,7 @@ def record_checks(export: Export) -> list[Check]:
     return [_guard(name, job, export) for name, job in zip(RECORD, work, strict=True)]
 
 
-def _guard(name: Name, job: Callable[[Name, Export], Check], export: Export) -> Check:
+def _guard(name: CheckName, job: Callable[[CheckName, Export], Check], export: Export) -> Check:
     return guarded([name], lambda: [job(name, export)])[0]
 
 
@@ -133,22 +133,22 @@ def _found(export: Export, name: str) -> tuple[int, str] | None:
         return None
 
 
-def _records_agree(name: Name, export: Export) -> Check:
+def _records_agree(name: CheckName, export: Export) -> Check:
     odd = differing(export.mirrors, export.rows)
-    return at_most(name, len(odd), 0, f"differ: {listed(odd)}")
+    return at_most(name, len(odd), 0, f"differ: {short_list(odd)}")
 
 
-def _requirements(name: Name, export: Export) -> Check:
+def _requirements(name: CheckName, export: Export) -> Check:
     odd = contradictions(export)
-    return at_most(name, len(odd), 0, f"the record is not its own spec's: {listed(odd)}")
+    return at_most(name, len(odd), 0, f"the record is not its own spec's: {short_list(odd)}")
 
 
-def _ids(name: Name, export: Export) -> Check:
+def _ids(name: CheckName, export: Export) -> Check:
     bad = malformed(export.mirrors)
-    return at_most(name, len(bad), 0, f"twice, or not camera letter and number: {listed(bad)}")
+    return at_most(name, len(bad), 0, f"twice, or not camera letter and number: {short_list(bad)}")
 
 
-def _poses(name: Name, export: Export) -> Check:
+def _poses(name: CheckName, export: Export) -> Check:
     errors = pose_errors(export)
     worst = np.argsort(-errors, kind="stable")
     worst = worst[errors[worst] > POSE_MM]
@@ -157,16 +157,16 @@ def _poses(name: Name, export: Export) -> Check:
         float(errors.max()),
         POSE_MM,
         "off the ellipsoid, not bisecting, or centre off the normal: "
-        + offenders(export.mirrors.ids, errors, "mm", worst, ".3g"),
+        + worst_offenders(export.mirrors.ids, errors, "mm", worst, ".3g"),
     )
 
 
-def _directions(name: Name, export: Export) -> Check:
+def _directions(name: CheckName, export: Export) -> Check:
     odd, lost = missing_directions(export)
     return at_most(
         name,
         len(odd) + lost,
         0,
         f"{lost} vertices of the polyhedron without a mirror; "
-        f"no vertex of their own: {listed(odd) or 'none'}",
+        f"no vertex of their own: {short_list(odd) or 'none'}",
     )

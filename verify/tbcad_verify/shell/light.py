@@ -8,8 +8,21 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.rays import Scene, first_hits, in_threads, pixel_rows, reach, row_chunks
-from tbcad_verify.mesh.surfaces import Lines, Seen, bounce, nearest, reflect
+from tbcad_verify.mesh.rays import (
+    RayScene,
+    distances_to_planes,
+    first_hits,
+    in_threads,
+    pixel_rows,
+    row_chunks,
+)
+from tbcad_verify.mesh.surfaces import (
+    PreparedSurfaces,
+    ReflectedRays,
+    nearest_to_origin,
+    reflect,
+    reflect_directions,
+)
 from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.record.record import Camera
 from tbcad_verify.types import Floats, Ints
@@ -20,7 +33,7 @@ SAMPLED = 7  # a prime: no column of pixels is left out
 
 
 @dataclass(frozen=True)
-class Stage:
+class SensorScene:
     """What light meets, for one camera.
 
     Attributes:
@@ -35,18 +48,18 @@ class Stage:
         coating_mm: the coat that the mesh does not show.
     """
 
-    scene: Scene
+    scene: RayScene
     camera: Camera
     owner: NDArray[np.int32]
     other: NDArray[np.bool_]
-    seen: Seen
+    seen: PreparedSurfaces
     mirrors: int
     radius_mm: float
     coating_mm: float
 
 
 @dataclass(frozen=True)
-class Tally:
+class PixelTally:
     """Counts over pixels; sums of whole numbers and least values, so that order does not matter.
 
     Attributes:
@@ -69,14 +82,14 @@ class Tally:
     spread: NDArray[np.float32]
 
 
-def full_sensor(stage: Stage) -> Tally:
+def full_sensor(stage: SensorScene) -> PixelTally:
     """Trace every pixel of one camera, twice."""
-    return total(in_threads(lambda rows: band(stage, *rows), row_chunks(stage.camera)))
+    return total(in_threads(lambda rows: trace_rows(stage, *rows), row_chunks(stage.camera)))
 
 
-def total(tallies: list[Tally]) -> Tally:
+def total(tallies: list[PixelTally]) -> PixelTally:
     """Tallies of several bands or cameras as one."""
-    return Tally(
+    return PixelTally(
         reduce(np.add, [t.pixels for t in tallies]),
         reduce(np.add, [t.blocked for t in tallies]),
         np.unique(np.concatenate([t.blockers for t in tallies])),
@@ -87,7 +100,7 @@ def total(tallies: list[Tally]) -> Tally:
     )
 
 
-def band(stage: Stage, first: int, last: int) -> Tally:
+def trace_rows(stage: SensorScene, first: int, last: int) -> PixelTally:
     """Trace the pixels of some rows."""
     rays = pixel_rows(stage.camera, first, last)
     facet = first_hits(stage.scene, stage.camera.pinhole[:, None], rays)
@@ -95,14 +108,14 @@ def band(stage: Stage, first: int, last: int) -> Tally:
     on = np.flatnonzero(mirror >= 0)
     d, facet, mirror = np.take(rays, on, axis=1), facet[on], mirror[on]
     lines = reflect(stage.seen, mirror, d)
-    miss = nearest(lines)
+    miss = nearest_to_origin(lines)
     distance = norm(miss)
     useful = distance <= stage.radius_mm
     second, stopped = _second(stage, lines, miss, distance, useful)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
     some = clear[(first * stage.camera.width + on[clear]) % SAMPLED == 0]
-    return Tally(
+    return PixelTally(
         np.bincount(on_object, minlength=stage.mirrors),
         np.bincount(mirror[stopped], minlength=stage.mirrors),
         np.unique(second[stopped]).astype(np.int64),
@@ -114,7 +127,11 @@ def band(stage: Stage, first: int, last: int) -> Tally:
 
 
 def _second(
-    stage: Stage, lines: Lines, miss: Floats, distance: Floats, useful: NDArray[np.bool_]
+    stage: SensorScene,
+    lines: ReflectedRays,
+    miss: Floats,
+    distance: Floats,
+    useful: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """The next facet along reflected rays, and which useful rays it stops before the object."""
     length = norm(lines.toward)
@@ -123,13 +140,15 @@ def _second(
     stopped = np.zeros(second.size, dtype=np.bool_)
     hit = np.flatnonzero(useful & (second >= 0))
     toward, begin = np.take(lines.toward, hit, axis=1), np.take(start, hit, axis=1)
-    at = reach(stage.scene, second[hit], begin, toward) * length[hit]
+    at = distances_to_planes(stage.scene, second[hit], begin, toward) * length[hit]
     depth = np.sqrt(np.maximum(stage.radius_mm**2 - distance[hit] ** 2, 0))
     stopped[hit] = at < norm(np.take(miss, hit, axis=1) - begin) - depth
     return second, stopped
 
 
-def _nearest_on_the_way(stage: Stage, mirror: NDArray[np.int32], d: Floats, t: Floats) -> Floats:
+def _nearest_on_the_way(
+    stage: SensorScene, mirror: NDArray[np.int32], d: Floats, t: Floats
+) -> Floats:
     pinhole = stage.camera.pinhole[:, None]
     foot = np.minimum(-dot(pinhole, d) / dot(d, d), t)
     least = np.full(stage.mirrors, np.inf)
@@ -138,12 +157,12 @@ def _nearest_on_the_way(stage: Stage, mirror: NDArray[np.int32], d: Floats, t: F
 
 
 def _spread(
-    stage: Stage, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
+    stage: SensorScene, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
 ) -> NDArray[np.float32]:
     """Distance at the object, across the fitted ray, of the ray off the facet's plane."""
     plane = np.take(stage.scene.planes, facet, axis=0).T
     pinhole = stage.camera.pinhole[:, None]
     t = (plane[3] + stage.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
-    point, bounced = pinhole + t * d, bounce(d, plane[:3])
+    point, bounced = pinhole + t * d, reflect_directions(d, plane[:3])
     at = point - dot(point, toward) / dot(bounced, toward) * bounced
     return norm(at - miss).astype(np.float32)

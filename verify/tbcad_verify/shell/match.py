@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad_verify.mesh.fits import Fits
+from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import norm, slices, unit
+from tbcad_verify.mesh.vectors import chunks, norm, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.shell.recover import FLAT_MM, Recovery
 from tbcad_verify.types import Floats, Ints
@@ -58,14 +58,14 @@ def match(
             mirrors.columns("px", 3)[:, rows], recovery.fits.middle[:, patches], patches
         )
     extra = np.setdiff1d(np.flatnonzero(recovery.mirror), segment)
-    centre, radius = compare(mirrors, recovery.fits, segment, coating_mm)
+    centre, radius = centre_and_radius_errors(mirrors, recovery.fits, segment, coating_mm)
     blur = np.where(mirrors.flat | (segment < 0), 0.0, recovery.fits.blur[segment])
     surface = _surface_errors(mirrors, recovery, mesh, segment, coating_mm)
     return Match(segment, extra, centre, radius, blur, surface)
 
 
-def compare(
-    mirrors: Mirrors, fits: Fits, segment: Ints, coating_mm: float
+def centre_and_radius_errors(
+    mirrors: Mirrors, fits: SurfaceFits, segment: Ints, coating_mm: float
 ) -> tuple[Floats, Floats]:
     """Centre and radius errors of matched mirrors, (M,) mm each; NaN where there is no patch.
 
@@ -89,14 +89,14 @@ def compare(
     return errors[0], errors[1]
 
 
-def recorded(mirrors: Mirrors) -> Surfaces:
+def recorded_surfaces(mirrors: Mirrors) -> Surfaces:
     """The M reflecting surfaces as recorded, by apex, normal and radius."""
     radius = mirrors.columns("radius_mm")[0]
     curvature = np.where(mirrors.flat, 0.0, 1 / np.where(mirrors.flat, 1.0, radius))
     return Surfaces(mirrors.columns("px", 3), mirrors.columns("nx", 3), curvature)
 
 
-def places(mirrors: Mirrors, middle: Floats) -> list[int]:
+def nearest_mirrors(mirrors: Mirrors, middle: Floats) -> list[int]:
     """The recorded mirrors nearest to patches whose middles are (3, N)."""
     if not middle.size:
         return []
@@ -111,9 +111,9 @@ def _surface_errors(
     owner[segment[segment >= 0]] = np.flatnonzero(segment >= 0)
     mirror = owner[recovery.segments.label]
     facets = np.flatnonzero(mirror >= 0)
-    modelled = recorded(mirrors).coated(-coating_mm)
+    modelled = recorded_surfaces(mirrors).coated(-coating_mm)
     worst = np.where(segment >= 0, 0.0, np.nan)
-    for part in slices(facets.size):
+    for part in chunks(facets.size):
         mine = mirror[facets[part]]
         surfaces = modelled.take(mine)
         for k in range(3):

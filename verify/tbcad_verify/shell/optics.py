@@ -7,22 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.mesh import joined as joined_meshes
-from tbcad_verify.mesh.rays import Scene, build
-from tbcad_verify.mesh.surfaces import Seen, Surfaces, seen_from
+from tbcad_verify.mesh.mesh import Mesh, join_meshes
+from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.poses import Virtual, virtual_cameras
 from tbcad_verify.record.record import Camera, Export, Part
-from tbcad_verify.shell.light import Stage
+from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match
 from tbcad_verify.shell.outline import Patches
-from tbcad_verify.shell.recover import Recovery, smooth
-from tbcad_verify.shell.recover import joined as joined_recoveries
+from tbcad_verify.shell.recover import Recovery, follows_fit, join_recoveries
 from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)
-class Bench:
+class OpticalSetup:
     """Everything that the optical checks look at.
 
     Attributes:
@@ -43,7 +41,7 @@ class Bench:
     part: NDArray[np.intp]
     match: Match
     virtual: Virtual
-    scene: Scene
+    scene: RayScene
     mirrors: Surfaces
 
     @property
@@ -71,9 +69,9 @@ class Bench:
         """(M,) recorded for this camera and found."""
         return np.asarray((self.export.mirrors.camera == camera.id) & (self.match.segment >= 0))
 
-    def seen(self, camera: Camera) -> Seen:
+    def seen(self, camera: Camera) -> PreparedSurfaces:
         """All mirrors from this camera's pinhole."""
-        return seen_from(camera.pinhole, self.mirrors)
+        return prepare_for_rays(camera.pinhole, self.mirrors)
 
     def owner(self) -> NDArray[np.intp]:
         """(K,) recorded mirror of each patch; -1 for none."""
@@ -89,16 +87,16 @@ class Bench:
             self.recovery.segments.label,
             self.owner(),
             fits.surfaces,
-            smooth(fits),
+            follows_fit(fits),
             self.export.coating_mm,
         )
 
-    def stage(self, camera: Camera) -> Stage:
+    def stage(self, camera: Camera) -> SensorScene:
         """One camera, as the full sensor needs it."""
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label
-        return Stage(
+        return SensorScene(
             self.scene,
             camera,
             np.append(owner[label], -1).astype(np.int32),
@@ -126,16 +124,23 @@ class Bench:
         return sorted(found | ({"nothing"} if (facets < 0).any() else set()))
 
 
-def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Bench:
+def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> OpticalSetup:
     """Join all parts, match their mirrors with the record, and get ready for rays."""
-    mesh, recovery = joined_meshes(meshes), joined_recoveries(recoveries)
+    mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
     found = match(export.mirrors, recovery, mesh, camera, export.coating_mm)
     mirrors = recovery.fits.surfaces.take(found.segment).coated(export.coating_mm)
-    return Bench(
-        export, mesh, recovery, part, found, virtual_cameras(export.mirrors), build(mesh), mirrors
+    return OpticalSetup(
+        export,
+        mesh,
+        recovery,
+        part,
+        found,
+        virtual_cameras(export.mirrors),
+        build_scene(mesh),
+        mirrors,
     )
 
 

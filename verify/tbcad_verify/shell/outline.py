@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.surfaces import Lines, Seen, Surfaces, bounce, nearest, reflect
-from tbcad_verify.mesh.vectors import across, dot, norm
+from tbcad_verify.mesh.surfaces import (
+    PreparedSurfaces,
+    ReflectedRays,
+    Surfaces,
+    nearest_to_origin,
+    reflect,
+    reflect_directions,
+)
+from tbcad_verify.mesh.vectors import dot, norm, tangent_basis
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.types import Floats, Ints
 
@@ -98,25 +105,25 @@ def trace_outline(
     )
 
 
-def reflect_on_facets(outline: Outline, pinhole: Floats, planes: Floats) -> Lines:
+def reflect_on_facets(outline: Outline, pinhole: Floats, planes: Floats) -> ReflectedRays:
     """Reflect each sample's ray on its facet's own normal; planes (F, 4) as in `rays.Scene`."""
     d = outline.point - pinhole[:, None]
     normal = planes[outline.facet, :3].T
-    return Lines(outline.point, bounce(d, normal), np.ones(d.shape[1]))
+    return ReflectedRays(outline.point, reflect_directions(d, normal), np.ones(d.shape[1]))
 
 
-def reflect_on_fits(outline: Outline, seen: Seen) -> Lines:
+def reflect_on_fits(outline: Outline, seen: PreparedSurfaces) -> ReflectedRays:
     """Reflect each sample's ray on its mirror's fitted surface, coat included."""
     return reflect(seen, outline.mirror, outline.point - seen.origin[:, None])
 
 
-def least_miss(outline: Outline, lines: Lines, virtual: Virtual) -> Floats:
+def minimum_miss_distance(outline: Outline, lines: ReflectedRays, virtual: Virtual) -> Floats:
     """(V,) least distance from the origin over each virtual camera's outer edges, mm; inf: none.
 
     Between samples the image of an edge is taken for straight, as it is for a flat facet.
     """
     outer = np.flatnonzero(~outline.seam[:: SAMPLES.size])
-    at = nearest(lines).reshape(3, -1, SAMPLES.size)[:, outer]
+    at = nearest_to_origin(lines).reshape(3, -1, SAMPLES.size)[:, outer]
     miss = _from_segments(at[:, :, :-1].reshape(3, -1), at[:, :, 1:].reshape(3, -1))
     camera = virtual.index[outline.mirror[:: SAMPLES.size][outer]]
     least = np.full(virtual.count, np.inf)
@@ -125,7 +132,7 @@ def least_miss(outline: Outline, lines: Lines, virtual: Virtual) -> Floats:
     return least
 
 
-def turns(outline: Outline, lines: Lines, virtual: Virtual, u: Floats) -> Floats:
+def winding_numbers(outline: Outline, lines: ReflectedRays, virtual: Virtual, u: Floats) -> Floats:
     """(V,) how often each virtual camera's reflected outline runs round the origin.
 
     The sign is dropped. What is not about 1 does not surround the object's middle at all, however
@@ -137,8 +144,8 @@ def turns(outline: Outline, lines: Lines, virtual: Virtual, u: Floats) -> Floats
         virtual: pairs halves.
         u: (3, M) directions of the virtual cameras.
     """
-    first, second = across(u[:, outline.mirror])
-    miss = nearest(lines)
+    first, second = tangent_basis(u[:, outline.mirror])
+    miss = nearest_to_origin(lines)
     angle = np.arctan2(dot(miss, second), dot(miss, first)).reshape(-1, SAMPLES.size)
     step = np.diff(angle, axis=1)
     step -= 2 * np.pi * np.round(step / (2 * np.pi))

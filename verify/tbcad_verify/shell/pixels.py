@@ -7,17 +7,17 @@ import numpy as np
 from tbcad_verify.record.record import Camera
 from tbcad_verify.report.checks import (
     Check,
-    Name,
+    CheckName,
     at_least,
     at_most,
     informative,
-    listed,
-    offenders,
+    short_list,
     unknown,
+    worst_offenders,
 )
 from tbcad_verify.shell import image_rim, light
 from tbcad_verify.shell.coverage import Coverage
-from tbcad_verify.shell.optics import Bench
+from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.types import Floats
 
 CHECKS = {
@@ -33,7 +33,7 @@ CHECKS = {
 }
 
 
-def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
+def checks(bench: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
     """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show.
 
     Args:
@@ -53,7 +53,7 @@ def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, lis
     return tally.pixels.astype(np.float64), [
         _path(bench, path, tally),
         _clear(bench, clear, tally, rings),
-        at_least(least, float(each.min()), 1, f"no pixel sees the object in {listed(none)}"),
+        at_least(least, float(each.min()), 1, f"no pixel sees the object in {short_list(none)}"),
         informative(median, float(np.median(each))),
         informative(most, float(each.max())),
         _framed(bench, framed, rings),
@@ -63,10 +63,10 @@ def checks(bench: Bench, seen: Coverage | None, files: str) -> tuple[Floats, lis
     ]
 
 
-def _ring(bench: Bench, camera: Camera, seen: Coverage | None) -> image_rim.Ring:
+def _ring(bench: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_rim.RimRays:
     mine = np.flatnonzero(bench.mine(camera))
     start = bench.recovery.fits.middle[:, bench.match.segment[mine]]
-    found = image_rim.ring(
+    found = image_rim.rim_rays(
         bench.seen(camera), mine, start, bench.u[:, mine], _reach(bench, seen)[mine]
     )
     # A halved mirror shows the camera only what its own half reflects.
@@ -75,7 +75,7 @@ def _ring(bench: Bench, camera: Camera, seen: Coverage | None) -> image_rim.Ring
     return image_rim.chosen(found, own)
 
 
-def _reach(bench: Bench, seen: Coverage | None) -> Floats:
+def _reach(bench: OpticalSetup, seen: Coverage | None) -> Floats:
     """(M,) radius about the origin that each mirror sees, the capture sphere's at most, mm."""
     if seen is None:
         return np.full(len(bench.export.mirrors), bench.radius)
@@ -83,16 +83,19 @@ def _reach(bench: Bench, seen: Coverage | None) -> Floats:
     return np.asarray(np.minimum(each, bench.radius))
 
 
-def _path(bench: Bench, name: Name, tally: light.Tally) -> Check:
+def _path(bench: OpticalSetup, name: CheckName, tally: light.PixelTally) -> Check:
     blocked = tally.blocked.astype(np.float64)
     worst = np.argsort(-blocked, kind="stable")[: np.count_nonzero(blocked)]
-    who = offenders(bench.export.mirrors.ids, blocked, "px", worst, ".0f")
-    by = listed(bench.names(tally.blockers))
+    who = worst_offenders(bench.export.mirrors.ids, blocked, "px", worst, ".0f")
+    by = short_list(bench.names(tally.blockers))
     return at_most(name, int(blocked.sum()), 0, f"{who}; blocked by {by}")
 
 
 def _clear(
-    bench: Bench, name: Name, tally: light.Tally, rings: list[tuple[Camera, image_rim.Ring]]
+    bench: OpticalSetup,
+    name: CheckName,
+    tally: light.PixelTally,
+    rings: list[tuple[Camera, image_rim.RimRays]],
 ) -> Check:
     ways = [
         image_rim.nearest_on_the_way(bench.seen(camera), ring.direction, ring.lines)
@@ -103,13 +106,17 @@ def _clear(
     return at_least(name, float(least) - bench.radius, 0, reason)
 
 
-def _framed(bench: Bench, name: Name, rings: list[tuple[Camera, image_rim.Ring]]) -> Check:
+def _framed(
+    bench: OpticalSetup, name: CheckName, rings: list[tuple[Camera, image_rim.RimRays]]
+) -> Check:
     mirror = np.concatenate([ring.mirror for _, ring in rings])
     error = np.concatenate([ring.error for _, ring in rings])
     margin = np.concatenate([image_rim.margins(camera, ring.direction) for camera, ring in rings])
     ids = bench.export.mirrors.ids
     lost = [ids[k] for k in np.unique(mirror[~(error < image_rim.CLOSE_MM)]).tolist()]
     if lost or not margin.size:
-        return unknown(name, f"no ray grazes the object by way of {listed(lost) or 'any mirror'}")
+        return unknown(
+            name, f"no ray grazes the object by way of {short_list(lost) or 'any mirror'}"
+        )
     outside = [ids[k] for k in np.unique(mirror[margin < 0]).tolist()]
-    return at_least(name, float(margin.min()), 0, f"partly out of the frame: {listed(outside)}")
+    return at_least(name, float(margin.min()), 0, f"partly out of the frame: {short_list(outside)}")

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.mesh.fits import Fits
-from tbcad_verify.mesh.merge import LEAST, heal
+from tbcad_verify.mesh.fits import SurfaceFits
+from tbcad_verify.mesh.merge import LEAST, merge_splinters
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.segments import Segments, folds, measure_edges, split
-from tbcad_verify.mesh.surfaces import Surfaces, bounce
+from tbcad_verify.mesh.segments import Segmentation, count_folds, measure_edges, segment_mesh
+from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
 from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.types import Bools, Floats
 
@@ -39,8 +39,8 @@ class Recovery:
         folds: edges at which the mesh is folded onto itself.
     """
 
-    segments: Segments
-    fits: Fits
+    segments: Segmentation
+    fits: SurfaceFits
     mirror: Bools
     folds: int
 
@@ -57,51 +57,51 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
         radius_mm: of the capture sphere about the origin.
     """
     edges = measure_edges(mesh)
-    segments, fits = heal(mesh, edges, split(mesh, edges))
-    return Recovery(segments, fits, _judge(fits, pinhole, radius_mm), folds(edges))
+    segments, fits = merge_splinters(mesh, edges, segment_mesh(mesh, edges))
+    return Recovery(segments, fits, _judge(fits, pinhole, radius_mm), count_folds(edges))
 
 
-def joined(parts: list[Recovery]) -> Recovery:
+def join_recoveries(parts: list[Recovery]) -> Recovery:
     """Several parts' patches, numbered on."""
     starts = np.cumsum([0, *(part.segments.count for part in parts)])
     label = np.concatenate(
         [part.segments.label + start for part, start in zip(parts, starts, strict=False)]
     )
     return Recovery(
-        Segments(label.astype(np.int32), int(starts[-1])),
+        Segmentation(label.astype(np.int32), int(starts[-1])),
         _joined([part.fits for part in parts]),
         np.concatenate([part.mirror for part in parts]),
         sum(part.folds for part in parts),
     )
 
 
-def _joined(fits: list[Fits]) -> Fits:
+def _joined(fits: list[SurfaceFits]) -> SurfaceFits:
     surfaces = _columns([item.surfaces for item in fits])
-    return Fits(Surfaces(*surfaces), *_columns(fits)[1:])
+    return SurfaceFits(Surfaces(*surfaces), *_columns(fits)[1:])
 
 
-def _columns(items: Sequence[Fits] | Sequence[Surfaces]) -> list[Any]:
+def _columns(items: Sequence[SurfaceFits] | Sequence[Surfaces]) -> list[Any]:
     """Each field of several dataclasses, end to end; fields that are no arrays stay lists."""
     columns = [[getattr(item, field.name) for item in items] for field in fields(items[0])]
     return [np.concatenate(c, axis=-1) if isinstance(c[0], np.ndarray) else c for c in columns]
 
 
-def smooth(fits: Fits) -> Bools:
+def follows_fit(fits: SurfaceFits) -> Bools:
     """(K,) true where the fitted surface is what the patch really is."""
     followed = fits.chord < np.maximum(CHORD_MM, CHORD_SHARE * np.abs(fits.sag))
     return np.asarray((fits.form < FORM_MM) & followed)
 
 
-def _judge(fits: Fits, pinhole: Floats | None, radius_mm: float) -> Bools:
+def _judge(fits: SurfaceFits, pinhole: Floats | None, radius_mm: float) -> Bools:
     if pinhole is None:
         return np.zeros(fits.form.size, dtype=np.bool_)
     middle, normal = fits.middle, fits.normal
     incoming = middle - pinhole[:, None]
     facing = [-dot(way, normal) > GRAZING * norm(way) for way in (incoming, middle)]
-    outgoing = bounce(incoming, normal)
+    outgoing = reflect_directions(incoming, normal)
     along = dot(middle, outgoing) / dot(outgoing, outgoing)
     # Some of its light lands: what leaves the middle may miss by the patch's own image.
     image = fits.extent * (1 + norm(middle) / norm(incoming))
     lands = norm(middle - along * outgoing) <= radius_mm + image
     bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
-    return np.asarray(smooth(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))
+    return np.asarray(follows_fit(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.surfaces import Lines
+from tbcad_verify.mesh.surfaces import ReflectedRays
 from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.shell.outline import Outline
@@ -19,7 +19,11 @@ STEPS = 121
 
 
 def gaps(
-    outlines: list[Outline], lines: list[Lines], virtual: Virtual, u: Floats, radius_mm: float
+    outlines: list[Outline],
+    lines: list[ReflectedRays],
+    virtual: Virtual,
+    u: Floats,
+    radius_mm: float,
 ) -> Floats:
     """(V,) widest gap between the two halves' views over the disc that faces the camera, mm.
 
@@ -50,7 +54,7 @@ def gaps(
 
 def _cut(
     outline: Outline,
-    lines: Lines,
+    lines: ReflectedRays,
     virtual: Virtual,
     u: Floats,
     halves: NDArray[np.intp],
@@ -75,7 +79,7 @@ def _cut(
 
 
 def _image(
-    lines: Lines, u: Floats, mirror: NDArray[np.intp], rows: NDArray[np.intp]
+    lines: ReflectedRays, u: Floats, mirror: NDArray[np.intp], rows: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
     """Where lines pierce the plane through the origin across u: along x, and across it."""
     u = u[:, mirror[rows]]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import slices
+from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.step.charts import Charts, Rings, charts, rings, turned
 from tbcad_verify.step.rims import Arcs, arcs, joined
 from tbcad_verify.types import Bools, Floats, Ints
@@ -100,7 +100,7 @@ def _tasks(maps: Charts, others: Surfaces, spread: float) -> Iterator[Task]:
     """All maps, some at a time; walls come after the mirrors among the others."""
     count, total = len(maps.reach), len(others.curvature)
     wall = np.arange(total + 1) >= count
-    for part in slices(count, max(1, MOST_NUMBERS // (total + 1))):
+    for part in chunks(count, max(1, MOST_NUMBERS // (total + 1))):
         index = np.arange(count)[part]
         some = maps.take(index)
         every = rings(some, index, others, spread)
@@ -110,7 +110,7 @@ def _tasks(maps: Charts, others: Surfaces, spread: float) -> Iterator[Task]:
 def _solved(task: Task, row: Ints, width: int) -> Iterator[tuple[Ints, Arcs]]:
     """Rows of the task (R,) and their arcs, which count rows within R, in batches."""
     width = min(width, task.near.shape[1])
-    for part in slices(len(row), max(1, MOST_NUMBERS // (2 * width**2))):
+    for part in chunks(len(row), max(1, MOST_NUMBERS // (2 * width**2))):
         column = _nearest(task.near[row[part]], width)
         some = arcs(task.rings.rows(row[part]).take(column), task.spread)
         short = _farther(task, row[part], some) > width

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import across, dot, slices
+from tbcad_verify.mesh.vectors import chunks, dot, tangent_basis
 from tbcad_verify.types import Floats, Ints
 
 COINCIDENT = 1e-12
@@ -96,7 +96,7 @@ def charts(surfaces: Surfaces, front: bool, spread: float) -> Charts:
     With `front`, a map ends at the horizon, 90 degrees from the apex; else it has no end. A plane
     has no horizon: its map ends far outside of everything.
     """
-    right, up = across(surfaces.normal)
+    right, up = tangent_basis(surfaces.normal)
     far = np.full(len(surfaces.curvature), FAR * spread)
     reach = np.divide(2, surfaces.curvature, out=far, where=surfaces.curvature > 0)
     whole = ~front & (surfaces.curvature > 0)
@@ -168,7 +168,7 @@ def turned(surfaces: Surfaces, others: Surfaces) -> Surfaces:
 
     So the point that the map cannot show is never part of what is free, unless all is.
     """
-    out = [_opposite(surfaces, others, part) for part in slices(len(surfaces.curvature), 256)]
+    out = [_opposite(surfaces, others, part) for part in chunks(len(surfaces.curvature), 256)]
     normal = np.concatenate(out, axis=1)
     k = surfaces.curvature
     reach = np.divide(1, k, out=np.zeros_like(k), where=k > 0)

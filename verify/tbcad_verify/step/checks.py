@@ -11,11 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.record import Export, Part
-from tbcad_verify.report.checks import Check, Name, at_most, guarded, listed, offenders
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_most,
+    guarded,
+    short_list,
+    worst_offenders,
+)
 from tbcad_verify.step import part_checks
 from tbcad_verify.step.part_checks import Lump
 from tbcad_verify.step.reading import StepFile, examine, load
@@ -66,10 +73,10 @@ class Subject:
         return self.lump.file
 
 
-Job = Callable[[Name, Subject, Export], Check]
+Job = Callable[[CheckName, Subject, Export], Check]
 
 
-def step_checks(export: Export, bulks: dict[str, Bulk], seconds: float) -> list[Check]:
+def step_checks(export: Export, bulks: dict[str, MassProperties], seconds: float) -> list[Check]:
     """All checks of all STEP files that the record names.
 
     Args:
@@ -99,7 +106,7 @@ def _recorded(export: Export) -> Check:
 
 
 def _part(
-    export: Export, part: Part, blob: FileBytes, bulks: dict[str, Bulk], seconds: float
+    export: Export, part: Part, blob: FileBytes, bulks: dict[str, MassProperties], seconds: float
 ) -> list[Check]:
     names = [(name, part.step, unit) for name, unit in UNITS.items()]
 
@@ -114,11 +121,11 @@ def _part(
     return guarded(names, work)
 
 
-def _one(job: Job, name: Name, subject: Subject, export: Export) -> list[Check]:
+def _one(job: Job, name: CheckName, subject: Subject, export: Export) -> list[Check]:
     return [job(name, subject, export)]
 
 
-def _subject(export: Export, part: Part, file: StepFile, bulk: Bulk | None) -> Subject:
+def _subject(export: Export, part: Part, file: StepFile, bulk: MassProperties | None) -> Subject:
     row = np.flatnonzero(export.rows.camera == part.camera)
     ids = [export.rows.ids[k] for k in row.tolist()]
     count = Counter(file.faces.names)
@@ -128,7 +135,7 @@ def _subject(export: Export, part: Part, file: StepFile, bulk: Bulk | None) -> S
     return Subject(lump, row, face, of_export(export, part.camera))
 
 
-def _names(name: Name, subject: Subject, export: Export) -> Check:
+def _names(name: CheckName, subject: Subject, export: Export) -> Check:
     """Every mirror's name on exactly one face; no name twice, none empty."""
     ids = [export.rows.ids[k] for k in subject.row.tolist()]
     count = Counter(subject.file.faces.names)
@@ -137,10 +144,12 @@ def _names(name: Name, subject: Subject, export: Export) -> Check:
     others = {one for one in export.rows.ids if one not in set(ids)}
     foreign = [one for one in count if one in others]
     odd = [*lost, *(one for one in odd if one not in lost), *foreign]
-    return at_most(name, len(odd), 0, f"not on exactly one face, or another part's: {listed(odd)}")
+    return at_most(
+        name, len(odd), 0, f"not on exactly one face, or another part's: {short_list(odd)}"
+    )
 
 
-def _surfaces(name: Name, subject: Subject, export: Export) -> Check:
+def _surfaces(name: CheckName, subject: Subject, export: Export) -> Check:
     """Centre and radius of every sphere, place and tilt of every plane, as recorded."""
     faces, mirrors = subject.file.faces, export.rows.take(subject.row)
     centre, radius = mirrors.columns("cx", 3).T, mirrors.columns("radius_mm")[0]
@@ -160,28 +169,28 @@ def _surfaces(name: Name, subject: Subject, export: Export) -> Check:
     return _worst(name, subject, export, error, limit, "mm", ".3g")
 
 
-def _outward(name: Name, subject: Subject, export: Export) -> Check:
+def _outward(name: CheckName, subject: Subject, export: Export) -> Check:
     """Mirrors bulge out of the solid; where planes face is for `_surfaces`."""
     mirrors = export.rows.take(subject.row)
     good = _of(subject, subject.file.faces.outward)
     turned = [mirrors.ids[k] for k in np.flatnonzero(~good).tolist()]
-    return at_most(name, len(turned), 0, f"the solid lies on the wrong side: {listed(turned)}")
+    return at_most(name, len(turned), 0, f"the solid lies on the wrong side: {short_list(turned)}")
 
 
-def _areas(name: Name, subject: Subject, export: Export) -> Check:
+def _areas(name: CheckName, subject: Subject, export: Export) -> Check:
     """Each mirror's area is its cell's, so that no face is the rest of its sphere."""
     error = np.abs(_of(subject, subject.file.faces.area) / subject.cells.area - 1)
     return _worst(name, subject, export, error, CELL_SHARE, "of its cell's area away", ".3g")
 
 
-def _middles(name: Name, subject: Subject, export: Export) -> Check:
+def _middles(name: CheckName, subject: Subject, export: Export) -> Check:
     wanted = subject.cells.first / subject.cells.area[:, None]
     away = _of(subject, subject.file.faces.middle) - wanted
     error = np.linalg.norm(away, axis=1)
     return _worst(name, subject, export, error, MIDDLE_MM, "mm", ".3g")
 
 
-def _front(name: Name, subject: Subject, export: Export) -> Check:
+def _front(name: CheckName, subject: Subject, export: Export) -> Check:
     """Volume between the origin and all mirrors: what the faces enclose against the closed form."""
     faces, mirrors = subject.file.faces, export.rows.take(subject.row)
     area, middle = _of(subject, faces.area), _of(subject, faces.middle)
@@ -208,7 +217,13 @@ def _of(subject: Subject, column: NDArray[Any]) -> NDArray[Any]:
 
 
 def _worst(
-    name: Name, subject: Subject, export: Export, error: Floats, limit: float, unit: str, form: str
+    name: CheckName,
+    subject: Subject,
+    export: Export,
+    error: Floats,
+    limit: float,
+    unit: str,
+    form: str,
 ) -> Check:
     """The worst mirror; one without a face counts as infinitely wrong."""
     ids = [export.rows.ids[k] for k in subject.row.tolist()]
@@ -216,13 +231,13 @@ def _worst(
 
 
 def _worst_of(
-    name: Name, ids: Sequence[str], error: Floats, limit: float, unit: str, form: str
+    name: CheckName, ids: Sequence[str], error: Floats, limit: float, unit: str, form: str
 ) -> Check:
     error = np.where(np.isnan(error), np.inf, error)
     order = np.argsort(-error, kind="stable")
     order = order[error[order] > limit]
     return at_most(
-        name, float(error.max(initial=0)), limit, offenders(ids, error, unit, order, form)
+        name, float(error.max(initial=0)), limit, worst_offenders(ids, error, unit, order, form)
     )
 
 

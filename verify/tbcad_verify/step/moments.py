@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad_verify.mesh.vectors import slices
+from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.step.charts import Charts
 from tbcad_verify.step.rims import Arcs
 from tbcad_verify.types import Floats
@@ -47,7 +47,7 @@ def moments(charts: Charts, arcs: Arcs) -> Moments:
     """Integrals over the cells of M maps by Gauss and Legendre along their arcs."""
     k = charts.surfaces.curvature
     total = np.zeros((10, len(k)))
-    for part in slices(len(arcs.mirror), 1 << 13):
+    for part in chunks(len(arcs.mirror), 1 << 13):
         pieces = _pieces(arcs.take(np.arange(len(arcs.mirror))[part]), k)
         values = _line_integrals(pieces, k[pieces.mirror])
         total += [np.bincount(pieces.mirror, value, minlength=len(k)) for value in values]

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import Bulk
-from tbcad_verify.report.checks import Check, Name, Unknown, at_most, guarded, listed
+from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded, short_list
 from tbcad_verify.step.reading import StepFile
 
 GAP_MM = 1e-5  # a hundred times the kernel's own precision
@@ -41,12 +41,12 @@ class Lump:
 
     name: str
     file: StepFile
-    bulk: Bulk | None
+    bulk: MassProperties | None
     off: float
     claim: float = CLAIM_SHARE
 
 
-Job = Callable[[Name, Lump], Check]
+Job = Callable[[CheckName, Lump], Check]
 
 
 def lump_checks(file: str, lump: Lump) -> list[Check]:
@@ -59,30 +59,30 @@ def lump_checks(file: str, lump: Lump) -> list[Check]:
     ]
 
 
-def _one(job: Job, name: Name, lump: Lump) -> list[Check]:
+def _one(job: Job, name: CheckName, lump: Lump) -> list[Check]:
     return [job(name, lump)]
 
 
-def solid(name: Name, lump: Lump) -> Check:
+def solid(name: CheckName, lump: Lump) -> Check:
     """One solid of one closed shell, with the part's name."""
     counts, named = lump.file.counts, lump.file.solids
     faults = abs(counts["solids"] - 1) + abs(counts["shells"] - 1) + counts["open_edges"]
     said = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in counts.items())
     odd = int(named != (lump.name,))
-    return at_most(name, faults + odd, 0, f"{said}; named {listed(named)}, not {lump.name}")
+    return at_most(name, faults + odd, 0, f"{said}; named {short_list(named)}, not {lump.name}")
 
 
-def valid(name: Name, lump: Lump) -> Check:
+def valid(name: CheckName, lump: Lump) -> Check:
     """The kernel's own check accepts the shape."""
     return at_most(name, int(not lump.file.valid), 0, "the kernel's check refuses the shape")
 
 
-def gaps(name: Name, lump: Lump) -> Check:
+def gaps(name: CheckName, lump: Lump) -> Check:
     """Corners lie on their edges and edges on their faces, before a reader widens them."""
     return at_most(name, lump.file.gap, GAP_MM, "corners, edges and faces do not meet")
 
 
-def volume(name: Name, lump: Lump) -> Check:
+def volume(name: CheckName, lump: Lump) -> Check:
     """The mesh's, as far as it may be off."""
     mesh, solid = _bulks(lump)
     return at_most(
@@ -93,7 +93,7 @@ def volume(name: Name, lump: Lump) -> Check:
     )
 
 
-def area(name: Name, lump: Lump) -> Check:
+def area(name: CheckName, lump: Lump) -> Check:
     """Facets off by h from a surface of radius r lose some 2 h / r of its area.
 
     Where the mesh's bend is known, that says more: no surface within h differs by more than it.
@@ -107,7 +107,7 @@ def area(name: Name, lump: Lump) -> Check:
     return at_most(name, abs(mesh.area - solid.area), limit, detail)
 
 
-def centroid(name: Name, lump: Lump) -> Check:
+def centroid(name: CheckName, lump: Lump) -> Check:
     """A layer of the mesh's error all on one side moves the middle by its share of the volume."""
     mesh, solid = _bulks(lump)
     wide = float(np.linalg.norm(np.subtract(solid.high, solid.low))) / 2
@@ -116,7 +116,7 @@ def centroid(name: Name, lump: Lump) -> Check:
     return at_most(name, away, wide * solid.area * lump.off / solid.volume, detail)
 
 
-def box(name: Name, lump: Lump) -> Check:
+def box(name: CheckName, lump: Lump) -> Check:
     """Reaches as far as the mesh, on all six sides."""
     mesh, solid = _bulks(lump)
     away = np.abs(np.subtract([mesh.low, mesh.high], [solid.low, solid.high])).max()
@@ -127,11 +127,11 @@ def box(name: Name, lump: Lump) -> Check:
     return at_most(name, float(away), lump.off, detail)
 
 
-def properties(name: Name, lump: Lump) -> Check:
+def properties(name: CheckName, lump: Lump) -> Check:
     """The file's own claims, so that any reader can tell whether it has read what was written."""
     claims, solid = lump.file.properties, lump.file.bulk
     if set(claims) != {"volume", "area", "centroid"}:
-        detail = f"the file claims {listed(sorted(claims)) or 'nothing'}; all three are wanted"
+        detail = f"the file claims {short_list(sorted(claims)) or 'nothing'}; all three are wanted"
         return at_most(name, np.inf, lump.claim, detail)
     wide = float(np.linalg.norm(np.subtract(solid.high, solid.low)))
     shares = (
@@ -143,7 +143,7 @@ def properties(name: Name, lump: Lump) -> Check:
     return at_most(name, max(shares), lump.claim, detail)
 
 
-def _bulks(lump: Lump) -> tuple[Bulk, Bulk]:
+def _bulks(lump: Lump) -> tuple[MassProperties, MassProperties]:
     if lump.bulk is None:
         raise Unknown("the mesh could not be measured")
     return lump.bulk, lump.file.bulk

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import Bulk
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.record.files import AGAIN, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
@@ -75,7 +75,7 @@ class StepFile:
     counts: dict[str, int]
     valid: bool
     gap: float
-    bulk: Bulk
+    bulk: MassProperties
     properties: dict[str, Any]
     faces: Faces
 
@@ -149,7 +149,7 @@ def parse(text: Row, solid: Row) -> StepFile:
         {key: solid[key] for key in ("solids", "shells", "open_edges")},
         solid["valid"],
         solid["gap"],
-        Bulk(solid["volume"], area, solid["centroid"], *solid["box"]),
+        MassProperties(solid["volume"], area, solid["centroid"], *solid["box"]),
         text["properties"],
         _faces(text["faces"], {_key(row): row for row in rows}),
     )
