@@ -16,12 +16,13 @@ from tbcad.prototype.base.purchased import base_purchased_parts as bought_for_ba
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
-from tbcad.prototype.drive.drive import Drive, Parts, choose_drive, load_drives, load_parts
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.frame import frame_solids as frames
 from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import room
 from tbcad.prototype.printing.parts import PrintedPart
 from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage import stage_solids as stages
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.spec.prototype import PrototypeSpec
@@ -104,7 +105,7 @@ def _swing(made: PrototypeLayout) -> tuple[float, float]:
 
 def _drive(made: PrototypeLayout, summed: BaseBalance, keys: PrototypeSpec, parts: Parts) -> Drive:
     acceleration = float(np.radians(keys.motion.acceleration_deg_s2))
-    needed = summed.needed(*_swing(made), acceleration, keys.motion.safety)
+    needed = summed.required_torque(*_swing(made), acceleration, keys.motion.safety)
     return choose_drive(keys.base.drive, needed, load_drives(parts))
 
 

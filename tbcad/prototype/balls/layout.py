@@ -204,7 +204,7 @@ def _curved(half: MirrorArray) -> MirrorArray:
 def _stand(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
     """The groups and their balls, for the number of them that the spec gives or asks for."""
     keys = spec.prototype
-    catalogue = load_catalogue(keys.catalogues).only(keys.grade, keys.largest_ball_mm)
+    catalogue = load_catalogue(keys.catalogues).available(keys.grade, keys.largest_ball_mm)
     if keys.k != "auto":
         return _grouped(spec, half, keys.k, catalogue)
     radius, weight = half.mirrors.radius, keys.radius_weight_deg

@@ -88,7 +88,7 @@ class Balls:
     def size(self) -> tuple[str, ...]:
         """Names of the sizes."""
         return tuple(
-            f"cap R {radius:.1f} mm" if made else self.catalogue.size[place]
+            f"cap R {radius:.1f} mm" if made else self.catalogue.balls[place].size
             for radius, made, place in zip(self.radius, self.cap, self.stock, strict=True)
         )
 

@@ -18,8 +18,8 @@ from tbcad.cad.solids import moved, one_solid, revolved
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.purchased import magnet_name
-from tbcad.prototype.drive.drive import Parts
 from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.purchased.parts import Parts
 
 WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # least material before the pocket

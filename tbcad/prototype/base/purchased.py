@@ -5,7 +5,7 @@ from collections import Counter
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.drive.drive import PurchasedPart, load_parts
+from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
 from tbcad.spec.errors import SpecError
 
 # In the hub: set screws, or the one screw of the clamp.

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tbcad.prototype.drive.drive import PurchasedPart, load_parts
+from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
 

@@ -1,8 +1,8 @@
 """The balance of the base: mass, centre of gravity, and the torque of gravity about its axis.
 
-Gravity is along -z of the shell's frame. The base turns about the axis w, which leans, so its
-weight has no torque when its centre stands straight above the axis or below it, and most when it
-stands beside it.
+Gravity is along -z of the shell's frame. The base turns about the axis w, which is inclined: the
+torque is zero with the centre of gravity straight above or below the axis, and largest with it
+beside the axis.
 """
 
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from tbcad.prototype.balls.selection import Balls
 from tbcad.types import Floats
 
 GRAVITY = 9.80665  # m/s^2, standard
-NEGLIGIBLE = 1e-9  # of a mass's moment: rounding
+ROUNDING = 1e-9  # of first moments, as a share of the sum of their magnitudes
 
 
 @dataclass(frozen=True)
 class PointMasses:
-    """Masses on the base, over n of them.
+    """Masses on the base, n of them.
 
     Attributes:
         mass_g: grams, (n,).
-        centre: of gravity of each, in the frame of the shell at base angle zero, mm, (n, 3).
+        centre: centres of gravity in the frame of the shell at base angle zero, mm, (n, 3).
     """
 
     mass_g: Floats
@@ -40,8 +40,8 @@ class Counterweight:
 
     Attributes:
         mass_g: grams.
-        radius: from the axis, mm.
-        azimuth: on the base, radians; the base's is that plus pi.
+        radius: distance from the axis, mm.
+        azimuth: on the base, radians: that of the base's centre of gravity plus pi.
     """
 
     mass_g: float
@@ -56,77 +56,84 @@ class BaseBalance:
     Attributes:
         frame: rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3).
         mass_g: grams.
-        first: first moments along the rows of the frame at base angle zero, g mm, (3,).
-        inertia: moment of inertia about the axis, of point masses, g mm^2.
+        first_moment: along the rows of the frame at base angle zero, g mm, (3,).
+        inertia: moment of inertia of the point masses about the axis, g mm^2.
     """
 
     frame: Floats
     mass_g: float
-    first: Floats
+    first_moment: Floats
     inertia: float
 
     @property
     def centre(self) -> Floats:
         """Centre of gravity at base angle zero, mm, in the frame of the shell, (3,)."""
-        result: Floats = self.first @ self.frame / self.mass_g
+        result: Floats = self.first_moment @ self.frame / self.mass_g
         return result
 
     @property
     def moment(self) -> float:
         """Mass times distance of the centre of gravity from the axis, g mm."""
-        return float(np.hypot(self.first[1], self.first[2]))
+        return float(np.hypot(self.first_moment[1], self.first_moment[2]))
 
     @property
     def azimuth(self) -> float:
         """Azimuth of the centre of gravity at base angle zero, radians."""
-        return float(np.arctan2(self.first[2], self.first[1]))
+        return float(np.arctan2(self.first_moment[2], self.first_moment[1]))
 
     @property
-    def greatest(self) -> float:
-        """Torque with the centre of gravity just beside the axis, N mm."""
-        return self.moment * GRAVITY * 1e-3 * float(np.hypot(*self.frame[1:, 2]))
+    def torque_amplitude(self) -> float:
+        """Torque with the centre of gravity beside the axis, the largest at any angle, N mm."""
+        return self.moment * GRAVITY * 1e-3 * self._lean
+
+    @property
+    def _lean(self) -> float:
+        """Sine of the angle between the axis and the vertical."""
+        return float(np.hypot(*self.frame[1:, 2]))
+
+    @property
+    def _up(self) -> float:
+        """Azimuth straight above the axis, radians."""
+        return float(np.arctan2(self.frame[2, 2], self.frame[1, 2]))
 
     def torque(self, angle: Floats) -> Floats:
         """Torque of gravity about w with the base at angles (n,), N mm, (n,).
 
         w . (r x F) with F = -m g z: m g (r2 z1 - r1 z2), r and z along the second and third row.
         """
-        up = np.arctan2(self.frame[2, 2], self.frame[1, 2])
-        result: Floats = self.greatest * np.sin(self.azimuth + angle - up)
+        result: Floats = self.torque_amplitude * np.sin(self.azimuth + angle - self._up)
         return result
 
-    def worst(self, low: float, high: float) -> float:
-        """Greatest torque, to either side, between two base angles (radians), N mm."""
-        up = float(np.arctan2(self.frame[2, 2], self.frame[1, 2]))
-        # Beside the axis at these angles, half a turn apart.
-        side = up - self.azimuth + np.pi / 2
-        first = np.ceil((low - side) / np.pi)
-        if side + first * np.pi <= high:
-            return self.greatest
+    def max_torque(self, low: float, high: float) -> float:
+        """Largest magnitude of the torque between two base angles (radians), N mm."""
+        # The torque has an extreme at this base angle and at each half turn from it.
+        extreme = self._up - self.azimuth + np.pi / 2
+        half_turns = np.ceil((low - extreme) / np.pi)
+        if extreme + half_turns * np.pi <= high:
+            return self.torque_amplitude
         return float(np.abs(self.torque(np.array([low, high]))).max())
 
-    def tilting(self, along: float) -> float:
-        """Greatest moment across the axis at a place of it (mm from the origin), N mm.
+    def max_tilting_moment(self, along: float) -> float:
+        """Largest moment across the axis at a point of it (mm from the origin), N mm.
 
-        What bearings or a stage must bear beside the torque, whatever the angle.
+        Bearings or a stage must bear it beside the torque, at any base angle.
         """
-        lever = self.first[0] - self.mass_g * along
-        lean = np.hypot(*self.frame[1:, 2])
-        return GRAVITY * 1e-3 * float(abs(lever) * lean + self.moment * abs(self.frame[0, 2]))
+        lever = self.first_moment[0] - self.mass_g * along
+        return GRAVITY * 1e-3 * float(abs(lever) * self._lean + self.moment * abs(self.frame[0, 2]))
 
-    def needed(self, low: float, high: float, acceleration: float, safety: float) -> float:
-        """Holding torque wanted on the base, N mm.
+    def required_torque(self, low: float, high: float, acceleration: float, safety: float) -> float:
+        """Holding torque that a drive must have on the base, N mm.
 
         Args:
-            low: least base angle, radians.
-            high: largest one.
+            low: minimum base angle, radians.
+            high: maximum base angle, radians.
             acceleration: of the base, radians/s^2.
-            safety: factor on gravity and acceleration together, which stands for friction too.
+            safety: factor on gravity and acceleration together; it covers friction too.
         """
-        return safety * (self.worst(low, high) + self.inertia * acceleration * 1e-6)
+        return safety * (self.max_torque(low, high) + self.inertia * acceleration * 1e-6)
 
     def counterweight(self, radius: float) -> Counterweight:
-        """The mass at a distance from the axis (mm) that takes all torque away."""
+        """The mass at a distance from the axis (mm) that balances the base."""
         return Counterweight(self.moment / radius, radius, self.azimuth + np.pi)
 
 
@@ -134,25 +141,27 @@ def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:
     """Sum up the masses on a base whose axis is the first row of a frame (3, 3)."""
     mass = np.concatenate([load.mass_g for load in loads])
     place = np.concatenate([load.centre for load in loads]) @ frame.T
-    first = mass @ place
-    # A balanced base has no direction: without this, rounding would give it one.
-    first[1:][np.abs(first[1:]) < NEGLIGIBLE * (mass @ np.abs(place[:, 1:]))] = 0.0
+    first_moment = mass @ place
+    # The centre of gravity of a balanced base has no azimuth: rounding must not give it one.
+    rounding = ROUNDING * (mass @ np.abs(place[:, 1:]))
+    first_moment[1:][np.abs(first_moment[1:]) < rounding] = 0.0
     inertia = float(mass @ (place[:, 1] ** 2 + place[:, 2] ** 2))
-    return BaseBalance(frame, float(mass.sum()), first, inertia)
+    return BaseBalance(frame, float(mass.sum()), first_moment, inertia)
 
 
-def ball_masses(made: PrototypeLayout, cap_density: float) -> PointMasses:
-    """All balls in their places, and the caps.
+def ball_masses(prototype: PrototypeLayout, cap_density: float) -> PointMasses:
+    """All balls and caps in their places.
 
     Args:
-        made: the prototype.
-        cap_density: of the caps' material, g/cm^3.
+        prototype: with its balls.
+        cap_density: density of the caps' material, g/cm^3.
 
-    A cap weighs as a body about the middle of its body's sphere, which is at most a few
-    millimetres off.
+    The mass of a cap counts at the centre of its body's sphere, which is at most a few millimetres
+    from its centre of gravity.
     """
-    volume = cap_volume(made.balls)
-    return PointMasses(made.balls.mass_g + volume * cap_density * 1e-3, made.body_centres())
+    volume = cap_volume(prototype.balls)
+    mass = prototype.balls.mass_g + volume * cap_density * 1e-3
+    return PointMasses(mass, prototype.body_centres())
 
 
 def counterweight_masses(weight: Counterweight, along: float, frame: Floats) -> PointMasses:
@@ -165,17 +174,19 @@ def counterweight_masses(weight: Counterweight, along: float, frame: Floats) -> 
 def cap_volume(balls: Balls) -> Floats:
     """Volume of each cap, mm^3, (k,); zero for bought balls.
 
-    A ball of the body's radius, its front beyond the edge of the cap's sphere taken off and the
-    segment of that sphere put there.
+    A ball of the body's radius with its front segment replaced by one of the reflecting sphere;
+    both segments end at the edge where the two spheres meet.
     """
     body, radius = balls.body_radius, balls.radius
     edge = np.minimum(np.where(body < radius, body / np.sqrt(2), body), radius)
-    off = body - np.sqrt(body**2 - edge**2)
-    put = radius - np.sqrt(radius**2 - edge**2)
-    whole = 4 / 3 * np.pi * body**3
-    return np.where(balls.cap, whole - _segment(body, off) + _segment(radius, put), 0.0)
+    removed = body - np.sqrt(body**2 - edge**2)
+    added = radius - np.sqrt(radius**2 - edge**2)
+    ball = 4 / 3 * np.pi * body**3
+    cap = ball - _segment_volume(body, removed) + _segment_volume(radius, added)
+    return np.where(balls.cap, cap, 0.0)
 
 
-def _segment(radius: Floats, height: Floats) -> Floats:
+def _segment_volume(radius: Floats, height: Floats) -> Floats:
+    """Volume of a sphere's segment (spherical cap), mm^3."""
     result: Floats = np.pi * height**2 * (3 * radius - height) / 3
     return result

@@ -54,7 +54,7 @@ def _names(made: PrototypeLayout, j: int) -> list[Value]:
     diameter, size = 2 * float(balls.body_radius[j]), balls.size[j]
     if balls.cap[j]:
         return [j + 1, "cap", size, diameter, None, None, None]
-    standard = balls.catalogue.standard[balls.stock[j]]
+    standard = balls.catalogue.balls[balls.stock[j]].standard
     return [j + 1, "ball", size, diameter, made.grade.grade, standard, float(balls.mass_g[j])]
 
 

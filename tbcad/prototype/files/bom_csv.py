@@ -8,8 +8,9 @@ import numpy as np
 
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance, cap_volume
-from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
+from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.files.balls_csv import Row, Value, write_table
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError, shown
 from tbcad.spec.motion_keys import MotionSpec
 
@@ -101,7 +102,7 @@ def drive_record(
         swing: least and largest base angle, radians.
         radius: at which a counterweight would be, mm.
     """
-    worst = summed.worst(*swing)
+    worst = summed.max_torque(*swing)
     acceleration = float(np.radians(motion.acceleration_deg_s2))
     return {
         "mass_g": summed.mass_g,
@@ -111,13 +112,13 @@ def drive_record(
         "inertia_g_mm2": summed.inertia,
         "worst_torque_nmm": worst,
         "safety": motion.safety,
-        "needed_nmm": summed.needed(*swing, acceleration, motion.safety),
+        "needed_nmm": summed.required_torque(*swing, acceleration, motion.safety),
         "holds_nmm": drive.holds_nmm,
         "drive": drive.name,
         "motor": drive.motor.name,
         "ratio": drive.ratio,
         "steps_per_deg": drive.steps_per_deg(motion.microsteps),
-        "sag_deg": float(np.degrees(drive.sag(worst))),
+        "sag_deg": float(np.degrees(drive.wind_up_angle(worst))),
         "belt_pull_n": drive.belt_pull(worst),
         "belt_centre_mm": drive.centre_mm,
         "counterweight_g": summed.counterweight(radius).mass_g,
@@ -137,20 +138,19 @@ def _bought(part: PurchasedPart, quantity: int) -> list[Value]:
 def _balls(made: PrototypeLayout) -> list[list[Value]]:
     """Bought balls by rising diameter."""
     balls, grade = made.balls, made.grade.grade
-    catalogue = balls.catalogue
     counts = Counter(balls.stock[~balls.cap].tolist())
     return [
         [
             *_values(
                 count,
-                f"ball {catalogue.size[place]}",
-                f"steel ball {catalogue.size[place]} {catalogue.standard[place]} {grade}",
+                f"ball {ball.size}",
+                f"steel ball {ball.size} {ball.standard} {grade}",
                 "steel",
-                float(catalogue.mass_g[place]),
+                ball.mass_g,
             ),
             *(None, BOUGHT),
         ]
-        for place, count in sorted(counts.items())
+        for ball, count in ((balls.catalogue.balls[k], n) for k, n in sorted(counts.items()))
     ]
 
 

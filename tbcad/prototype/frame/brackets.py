@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, Prism, cylinder_between
-from tbcad.prototype.drive.drive import Parts, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 

@@ -5,7 +5,6 @@ import numpy as np
 from tbcad.geometry.primitives import Component, Cylinder, Primitive, box, cylinder_between, slot
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
-from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     HOLES_MM,
@@ -16,6 +15,7 @@ from tbcad.prototype.frame.brackets import (
     slab,
     webs,
 )
+from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec as ProtoKeys

@@ -10,7 +10,7 @@ import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, slot
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
+from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.brackets import (
     HOLES_MM,
     SUNK_MM,
@@ -31,6 +31,7 @@ from tbcad.prototype.frame.purchased import (
     middles,
     wheel_radius,
 )
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import FrameSpec
 from tbcad.types import Floats

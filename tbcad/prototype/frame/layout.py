@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.geometry.primitives import Component, Cylinder, box
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.drive import Drive, Parts, PurchasedPart
+from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
@@ -25,6 +25,7 @@ from tbcad.prototype.frame.feet import camera_bracket, stage_foot, upright_foot
 from tbcad.prototype.frame.head import Head, head
 from tbcad.prototype.frame.purchased import PLATE_MM
 from tbcad.prototype.keepout import Room, least
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec

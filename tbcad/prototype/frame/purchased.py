@@ -6,8 +6,9 @@ import numpy as np
 
 from tbcad.geometry.primitives import Component, Cylinder, box, cylinder_between
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.drive import Drive, PurchasedPart, pitch_diameter
+from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.frame.brackets import SUNK_MM
+from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 
 PLATE_MM = 9.0  # so that M3x12 screws go 3 mm into a motor

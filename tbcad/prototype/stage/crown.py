@@ -14,7 +14,7 @@ from tbcad.geometry.primitives import (
     cylinder_between,
 )
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.drive.drive import PurchasedPart
+from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import StageSpec

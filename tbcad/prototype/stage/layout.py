@@ -14,8 +14,8 @@ from tbcad.geometry.primitives import Component
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.drive import Parts, PurchasedPart
 from tbcad.prototype.keepout import Room, least
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,

@@ -4,8 +4,8 @@ import numpy as np
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.drive import PurchasedPart
 from tbcad.prototype.keepout import Room
+from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import StageSpec
 from tbcad.types import Floats

@@ -1,8 +1,6 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tbcad.prototype.balls.catalogue import (
     COLUMNS,
@@ -17,15 +15,15 @@ HEADER = ",".join(COLUMNS)
 ROW = "5 mm,5,ISO 3290-1,G10 G40,,mine"
 
 
-def mine(folder: Path, *lines: str, header: str = HEADER) -> Catalogue:
+def mine(folder: Path, *lines: str) -> Catalogue:
     path = folder / "mine.csv"
-    path.write_text("\n".join([header, *lines]) + "\n")
+    path.write_text("\n".join([HEADER, *lines]) + "\n")
     return load_catalogue([str(path)])
 
 
-def refusal(folder: Path, *lines: str, header: str = HEADER) -> str:
+def refusal(folder: Path, *lines: str) -> str:
     with pytest.raises(SpecError) as caught:
-        mine(folder, *lines, header=header)
+        mine(folder, *lines)
     assert str(caught.value).isprintable()
     return str(caught.value).replace(str(folder / "mine.csv"), "mine.csv")
 
@@ -41,12 +39,13 @@ class TestBuiltIn:
         stock = load_catalogue(["inch"])
         assert len(stock) == 29 + 16 + 16
         assert stock.diameter[[0, -1]].tolist() == [1.5875, 50.8]
-        assert stock.size[-1] == "2 in"
+        assert stock.balls[-1].size == "2 in"
 
     def test_both_by_rising_diameter_without_doubles(self) -> None:
         both = load_catalogue(["metric", "inch"])
         assert (both.diameter[1:] > both.diameter[:-1]).all()
-        assert len(both) == len({*load_catalogue(["metric"]).size, *load_catalogue(["inch"]).size})
+        separate = [load_catalogue([name]).balls for name in ("metric", "inch")]
+        assert len(both) == len({ball.size for balls in separate for ball in balls})
 
     @pytest.mark.parametrize("name", ["metric", "inch"])
     def test_masses_are_those_of_steel(self, name: str) -> None:
@@ -64,12 +63,12 @@ class TestBuiltIn:
 
     def test_fine_grades_end_at_smaller_sizes(self) -> None:
         stock = load_catalogue(["metric", "inch"])
-        largest = [stock.only(grade, 60).diameter[-1] for grade in ("G5", "G10", "G28", "G40")]
+        largest = [stock.available(grade, 60).diameter[-1] for grade in ("G5", "G10", "G28", "G40")]
         assert largest == [12.7, 25.4, 50.8, 60]
 
     def test_nothing_left(self) -> None:
         with pytest.raises(SpecError, match=r"no ball of grade G40 up to 0\.5 mm"):
-            load_catalogue(["metric"]).only("G40", 0.5)
+            load_catalogue(["metric"]).available("G40", 0.5)
 
 
 class TestOwn:
@@ -77,29 +76,24 @@ class TestOwn:
         stock = mine(tmp_path, ROW, "", "ZrO2 4,4,ISO 3290-2,G5,0.2,mine")
         assert stock.diameter.tolist() == [4, 5]
         assert stock.mass_g == pytest.approx([0.2, steel_mass_g(5)])
-        assert stock.grades[1] == {"G10", "G40"}
+        assert stock.balls[1].grades == {"G10", "G40"}
 
     def test_empty(self, tmp_path: Path) -> None:
         assert "mine.csv: an empty catalogue" in refusal(tmp_path)
-        assert "line 1: the columns must be" in refusal(tmp_path, header="")
 
     @pytest.mark.parametrize(
-        ("row", "told"),
+        ("row", "message"),
         [
             (",5,s,G10,,x", "line 3, column size: empty"),
             ("a,0,s,G10,,x", "line 3, column diameter_mm: '0', allowed is a number above 0 to"),
-            ("a,nan,s,G10,,x", "column diameter_mm: 'nan'"),
-            ("a,5 mm,s,G10,,x", "column diameter_mm: '5 mm'"),
             ("a,5,s,G10,-1,x", "column mass_g: '-1'"),
             ("a,5,s,G11,,x", "column grades: 'G11', allowed are G3 G5"),
             ("a,5,s,,,x", "column grades: ''"),
-            ("a,5,s,G10,x", "line 3: 5 columns, not 6"),
             ("5 mm,6,s,G10,,x", "column size: '5 mm' twice"),
-            ('"a"b,5,s,G10,,x', "line 3: "),
         ],
     )
-    def test_wrong_cells_are_named(self, tmp_path: Path, row: str, told: str) -> None:
-        assert told in refusal(tmp_path, ROW, row)
+    def test_wrong_cells_are_named(self, tmp_path: Path, row: str, message: str) -> None:
+        assert message in refusal(tmp_path, ROW, row)
 
     @pytest.mark.parametrize("name", ["imperial", "", "a\0b"])
     def test_unknown(self, name: str) -> None:
@@ -109,20 +103,3 @@ class TestOwn:
     def test_none(self) -> None:
         with pytest.raises(SpecError, match="names no catalogue"):
             load_catalogue([])
-
-    def test_not_utf8(self, tmp_path: Path) -> None:
-        path = tmp_path / "x.csv"
-        path.write_bytes(b"\xff")
-        with pytest.raises(SpecError, match="not UTF-8"):
-            load_catalogue([str(path)])
-
-    @given(text=st.text(max_size=80))
-    def test_any_file_is_a_catalogue_or_one_line(
-        self, tmp_path_factory: pytest.TempPathFactory, text: str
-    ) -> None:
-        path = tmp_path_factory.getbasetemp() / "any.csv"
-        path.write_bytes(f"{HEADER}\n{text}".encode("utf-8", "replace"))
-        try:
-            assert len(load_catalogue([str(path)]))
-        except SpecError as error:
-            assert str(error).isprintable()  # noqa: PT017

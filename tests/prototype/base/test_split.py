@@ -15,8 +15,8 @@ from tbcad.prototype.base.profile import distance_outside
 from tbcad.prototype.base.purchased import base_purchased_parts, fasteners, magnets
 from tbcad.prototype.base.screws import access_radius, joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.printing.bed import needed, room, shortfall
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError

@@ -50,7 +50,7 @@ class TestTorque:
         assert one.torque(np.array([0, TURN, -TURN, 2 * TURN])) == pytest.approx(
             [0, full, -full, 0]
         )
-        assert one.greatest == pytest.approx(full)
+        assert one.torque_amplitude == pytest.approx(full)
 
     def test_it_is_that_of_its_weight(self) -> None:
         """Against w . (r x F) of the turned masses, from their places alone."""
@@ -67,19 +67,19 @@ class TestTorque:
     def test_symmetric_balls_have_none(self) -> None:
         both = sum_masses(FRAME, at(20, 100, 0.4), at(-20, 100, 0.4 + np.pi))
         assert both.moment == 0
-        assert both.worst(-np.pi, np.pi) == 0
+        assert both.max_torque(-np.pi, np.pi) == 0
 
     def test_an_upright_axis_has_none(self) -> None:
         upright = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
         load = PointMasses(np.array([100.0]), np.array([[50.0, 20, 10]]))
-        assert sum_masses(upright, load).greatest == 0
+        assert sum_masses(upright, load).torque_amplitude == 0
 
     def test_worst_at_an_end_or_beside_the_axis(self) -> None:
         one = sum_masses(FRAME, at(0, 100, 0))
-        assert one.worst(-1, 0.5) == pytest.approx(one.greatest * np.sin(1))
-        assert one.worst(-0.5, 2) == one.greatest
-        assert one.worst(-2, 0.5) == one.greatest
-        assert one.worst(2, 4) == pytest.approx(one.greatest * np.sin(2))
+        assert one.max_torque(-1, 0.5) == pytest.approx(one.torque_amplitude * np.sin(1))
+        assert one.max_torque(-0.5, 2) == one.torque_amplitude
+        assert one.max_torque(-2, 0.5) == one.torque_amplitude
+        assert one.max_torque(2, 4) == pytest.approx(one.torque_amplitude * np.sin(2))
 
     @given(
         azimuth=st.floats(-7, 7),
@@ -92,13 +92,15 @@ class TestTorque:
     ) -> None:
         summed = sum_masses(FRAME, at(0, 100, azimuth, mass), at(0, 30, 1.0))
         tried = np.abs(summed.torque(np.linspace(low, low + width, 2001))).max()
-        assert tried <= summed.worst(low, low + width) * (1 + 1e-12)
-        assert summed.worst(low, low + width) == pytest.approx(tried, rel=1e-5)
+        assert tried <= summed.max_torque(low, low + width) * (1 + 1e-12)
+        assert summed.max_torque(low, low + width) == pytest.approx(tried, rel=1e-5)
 
     def test_holding_torque_wanted(self) -> None:
         one = sum_masses(FRAME, at(0, 100, 0))
         inertia = 0.1 * 0.1**2  # kg m^2
-        assert one.needed(-2, 2, 3.0, 2.0) == pytest.approx(2 * (one.greatest + 1e3 * inertia * 3))
+        assert one.required_torque(-2, 2, 3.0, 2.0) == pytest.approx(
+            2 * (one.torque_amplitude + 1e3 * inertia * 3)
+        )
 
 
 class TestCentre:
@@ -114,7 +116,9 @@ class TestCentre:
             lever = turned(load, angle).centre[0] - along * FRAME[0]
             moment = np.cross(lever, [0, 0, -GRAVITY * 0.1])
             moments.append(np.linalg.norm(moment - (moment @ FRAME[0]) * FRAME[0]))
-        assert sum_masses(FRAME, load).tilting(along) == pytest.approx(max(moments), rel=1e-4)
+        assert sum_masses(FRAME, load).max_tilting_moment(along) == pytest.approx(
+            max(moments), rel=1e-4
+        )
 
 
 class TestCounterweight:
@@ -124,7 +128,7 @@ class TestCounterweight:
         weight = sum_masses(FRAME, load).counterweight(radius)
         assert weight.mass_g == pytest.approx(mass * 90 / radius)
         left = sum_masses(FRAME, load, counterweight_masses(weight, -80, FRAME))
-        assert left.worst(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
+        assert left.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
         assert left.mass_g == pytest.approx(mass + weight.mass_g)
 
     def test_of_a_prototype(self, made: PrototypeLayout) -> None:
@@ -132,8 +136,8 @@ class TestCounterweight:
         before = sum_masses(made.half.ellipsoid.frame(), load)
         weight = before.counterweight(100)
         after = sum_masses(before.frame, load, counterweight_masses(weight, -70, before.frame))
-        assert before.greatest > 100
-        assert after.greatest < 1e-9 * before.greatest
+        assert before.torque_amplitude > 100
+        assert after.torque_amplitude < 1e-9 * before.torque_amplitude
 
 
 class TestBalls:

@@ -9,7 +9,7 @@ import pytest
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives, load_parts
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.bom_csv import (
     COLUMNS,
     PartsNeeded,
@@ -18,6 +18,7 @@ from tbcad.prototype.files.bom_csv import (
     rows,
     write_bom,
 )
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.motion_keys import MotionSpec
@@ -146,7 +147,9 @@ def test_record_of_the_drive(made: PrototypeLayout) -> None:
     summed = sum_masses(made.half.ellipsoid.frame(), ball_masses(made, 1.27))
     low, high = (float(made.stops.angle[i]) for i in (0, -1))
     motion = MotionSpec()
-    needed = summed.needed(low, high, np.radians(motion.acceleration_deg_s2), motion.safety)
+    needed = summed.required_torque(
+        low, high, np.radians(motion.acceleration_deg_s2), motion.safety
+    )
     drive = choose_drive("nema17-belt", needed, DRIVES)
     record = json.loads(json.dumps(drive_record(summed, drive, motion, (low, high), 120.0)))
     assert record["needed_nmm"] <= record["holds_nmm"]

@@ -9,8 +9,9 @@ import pytest
 
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives, load_parts
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.motion_keys import MotionSpec

@@ -12,10 +12,11 @@ from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.drive.drive import Drive, load_drives, load_parts
+from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.brackets import fitting, rig_axes
 from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import Room, room
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError

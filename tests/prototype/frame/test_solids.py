@@ -17,11 +17,12 @@ from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.drive.drive import load_drives, load_parts
+from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.frame_solids import bought, parts
 from tbcad.prototype.frame.layout import FrameLayout, frame
 from tbcad.prototype.keepout import Room, room
 from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage import stage_solids as stages
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.spec.base_keys import BaseSpec

@@ -22,8 +22,8 @@ from tbcad.mirrors.array import Design
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, leds, stage
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError

@@ -14,9 +14,9 @@ from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import Design
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.drive.drive import load_parts
 from tbcad.prototype.keepout import Room, room
 from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.prototype.stage.stage_solids import parts

@@ -1,0 +1,112 @@
+"""Purchased parts: one CSV file for each kind in this folder."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+
+COMMON_COLUMNS = ("part", "what", "material", "mass_g")
+SIZES: dict[str, tuple[str, ...]] = {
+    "motors": (
+        *("frame_mm", "length_mm", "shaft_mm", "pilot_mm", "pilot_height_mm"),
+        *("hole_square_mm", "thread_mm", "holding_nmm", "full_steps"),
+    ),
+    "stages": ("top_mm", "hole_circle_mm", "hole_mm", "ratio", "holding_nmm", "full_steps"),
+    "wheels": ("teeth", "pitch_mm", "width_mm", "bore_mm"),
+    "belts": ("teeth", "pitch_mm", "width_mm"),
+    "couplings": ("bore_mm", "flange_mm", "hole_circle_mm", "hole_mm"),
+    "shafts": ("diameter_mm", "length_mm"),
+    "bearings": ("bore_mm", "outer_mm", "width_mm", "load_n"),
+    "screws": ("thread_mm", "length_mm", "head_mm", "head_height_mm"),
+    "setscrews": ("thread_mm", "length_mm"),
+    "inserts": ("thread_mm", "length_mm", "outer_mm", "hole_mm"),
+    "dowels": ("diameter_mm", "length_mm"),
+    "magnets": ("diameter_mm", "height_mm"),
+    "leds": ("diameter_mm", "flange_mm", "height_mm"),
+    "electronics": (),
+    "extrusions": ("side_mm", "slot_mm", "length_mm"),
+    "tnuts": ("thread_mm", "slot_mm"),
+    "collars": ("bore_mm", "outer_mm", "width_mm"),
+    "plates": ("length_mm", "width_mm", "thickness_mm"),
+}
+"""Columns that describe each kind of part, all above zero.
+
+hole_square_mm is the side of a square of holes, hole_circle_mm the diameter of a circle of holes.
+"""
+MAX_VALUE = 1e6  # of any size or mass
+SAME_SIZE_MM = 1e-6  # sizes are equal up to rounding
+
+
+@dataclass(frozen=True)
+class PurchasedPart:
+    """A purchased part.
+
+    Attributes:
+        kind: its list, a key of SIZES.
+        name: unique in all lists.
+        what: description with standard.
+        material: of it.
+        mass_g: grams.
+        sizes: numbers in the order of SIZES, units in their names.
+        source: where they come from.
+    """
+
+    kind: str
+    name: str
+    what: str
+    material: str
+    mass_g: float
+    sizes: tuple[float, ...]
+    source: str
+
+    def __getitem__(self, size: str) -> float:
+        """One of the sizes, by its name in SIZES."""
+        return self.sizes[SIZES[self.kind].index(size)]
+
+
+Parts = dict[str, PurchasedPart]
+"""Purchased parts by name."""
+
+
+def package_lists() -> Traversable:
+    """The folder of tbcad's own lists."""
+    return files("tbcad.prototype.purchased")
+
+
+def load_parts(folder: Traversable | None = None) -> Parts:
+    """All purchased parts by name.
+
+    Args:
+        folder: that holds a CSV file for each kind; without, tbcad's own.
+
+    Raises:
+        SpecError: when a file is wrong; it names line and column.
+    """
+    folder, names, parts = folder or package_lists(), set[str](), []
+    for kind, sizes in SIZES.items():
+        name = f"{kind}.csv"
+        for where, row in read_rows(folder / name, name, (*COMMON_COLUMNS, *sizes, "source")):
+            check_unique(where, row, "part", names)
+            parts.append(_part(where, kind, row))
+    return {part.name: part for part in parts}
+
+
+def _part(where: str, kind: str, row: Row) -> PurchasedPart:
+    name, what, material, source = (
+        required_text(where, row, column) for column in ("part", "what", "material", "source")
+    )
+    mass, *sizes = (
+        positive_number(where, row, column, MAX_VALUE) for column in ("mass_g", *SIZES[kind])
+    )
+    return PurchasedPart(kind, name, what, material, mass, tuple(sizes), source)
+
+
+def of_kind(parts: Parts, kind: str, **sizes: float) -> list[PurchasedPart]:
+    """Parts of one kind, of those only the ones with the sizes given by name, such as thread_mm."""
+    return [part for part in parts.values() if part.kind == kind and _has(part, sizes.items())]
+
+
+def _has(part: PurchasedPart, sizes: Iterable[tuple[str, float]]) -> bool:
+    return all(abs(part[name] - value) < SAME_SIZE_MM for name, value in sizes)
