@@ -9,8 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tbcad_verify.programs import Wanted, admesh, client_checks, freecad, gmsh, is_skipped, prusa
-from tbcad_verify.programs.program_query import on_path, room
+from tbcad_verify.programs import (
+    ExpectedPart,
+    admesh,
+    check_with_programs,
+    freecad,
+    gmsh,
+    is_skipped,
+    prusa,
+)
+from tbcad_verify.programs.program_query import on_path, sandbox
 from tbcad_verify.report.checks import Check
 from tbcad_verify.run.child import Limits
 
@@ -47,7 +55,7 @@ except Exception as error:
 """
 
 
-def wanted(export: Path, relative: float) -> list[Wanted]:
+def wanted(export: Path, relative: float) -> list[ExpectedPart]:
     """What the records and the meshes say; volumes may differ by this share."""
     import trimesh
 
@@ -59,7 +67,7 @@ def wanted(export: Path, relative: float) -> list[Wanted]:
         volume = float(trimesh.load_mesh(export / part["stl"]).volume)
         files = {kind: part[kind] for kind in ("step", "stl", "3mf")}
         spheres = mirrors(design, part["camera"]) if "camera" in part else None
-        found.append(Wanted(part["name"], files, spheres, volume, relative * volume))
+        found.append(ExpectedPart(part["name"], files, spheres, volume, relative * volume))
     return found
 
 
@@ -88,7 +96,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def parts(export: Path) -> list[Wanted]:
+def parts(export: Path) -> list[ExpectedPart]:
     found = wanted(export, 5e-3)
     shells = [(part.name, part.spheres) for part in found[:2]]
     assert shells == [("shell_a", 847), ("shell_b", 847)]
@@ -97,9 +105,9 @@ def parts(export: Path) -> list[Wanted]:
 
 
 @pytest.fixture(scope="module")
-def checks(export: Path, parts: list[Wanted]) -> list[Check]:
+def checks(export: Path, parts: list[ExpectedPart]) -> list[Check]:
     before = {path: path.stat() for path in export.iterdir()}
-    found = client_checks(export, parts)
+    found = check_with_programs(export, parts)
     assert {path: path.stat().st_mtime_ns for path in export.iterdir()} == {
         path: stat.st_mtime_ns for path, stat in before.items()
     }
@@ -108,7 +116,7 @@ def checks(export: Path, parts: list[Wanted]) -> list[Check]:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_each_program_passes_every_part(
-    checks: list[Check], parts: list[Wanted], program: str
+    checks: list[Check], parts: list[ExpectedPart], program: str
 ) -> None:
     mine = of(program, checks)
     names = [f"{program} {question}" for question in PROGRAMS[program]]
@@ -135,7 +143,7 @@ def test_freecad_sees_bolt_and_dowel_holes(export: Path, camera: str) -> None:
     command = on_path("freecadcmd", "FreeCADCmd")
     if not command:
         pytest.skip("freecadcmd is not installed")
-    with room(command, export, f"shell_{camera}.step", "step", Limits()) as given:
+    with sandbox(command, export, f"shell_{camera}.step", "step", Limits()) as given:
         (given.place / "look.py").write_text(KINDS)
         done = given.run(given.place / "look.py")
         assert done.code == 0, done
@@ -191,7 +199,7 @@ def sample(tmp_path: Path) -> Path:
 def asked(sample: Path, kind: str, program: str, **others: float) -> dict[str, bool | None]:
     """Verdicts on shell_a's one file of a kind."""
     part = replace(wanted(SAMPLE, 0.02)[0], **others)
-    said = of(program, client_checks(sample, [part], errands=[READERS[program, kind]]))
+    said = of(program, check_with_programs(sample, [part], errands=[READERS[program, kind]]))
     return {check.name.split()[1]: check.passed for check in said}
 
 

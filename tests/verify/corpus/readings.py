@@ -13,14 +13,17 @@ from unittest import mock
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.run import stages
-from tbcad_verify.step import checks
+from tbcad_verify.step import shell_checks
 
 
 @contextmanager
 def remembered() -> Iterator[None]:
     """Within, no STEP file is read twice and no mesh is put on printers twice; what fails is."""
-    step, shape = _Once(checks.examine, _bytes), _Once(stages.measure, _corners)
-    with mock.patch.object(checks, "examine", step), mock.patch.object(stages, "measure", shape):
+    step, shape = _Once(shell_checks.examine, _bytes), _Once(stages.measure, _corners)
+    with (
+        mock.patch.object(shell_checks, "examine", step),
+        mock.patch.object(stages, "measure", shape),
+    ):
         yield
 
 

@@ -9,7 +9,7 @@ import trimesh
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.mesh import Mesh, manifold_status, mesh_from_facets
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.printing.shape import Shape, measure
+from tbcad_verify.printing.part_measures import PartMeasures, measure
 
 
 def mesh_of(*solids: trimesh.Trimesh) -> Mesh:
@@ -18,7 +18,7 @@ def mesh_of(*solids: trimesh.Trimesh) -> Mesh:
     return mesh_from_facets(Facets("x.stl", np.zeros((len(corners), 3), np.float32), corners))
 
 
-def measured(mesh: Mesh) -> Shape:
+def measured(mesh: Mesh) -> PartMeasures:
     return measure(mesh, manifold_status(mesh), mass_properties(mesh))
 
 

@@ -10,7 +10,7 @@ from tbcad_verify.types import Floats
 Groups = NDArray[np.int32]
 
 
-def circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
+def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
     """Least-squares circle of each group; not finite where the points lie on a line.
 
     Args:
@@ -38,7 +38,7 @@ def circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
         return middle + offset, np.sqrt(offset[0] ** 2 + offset[1] ** 2 + xx + yy)
 
 
-def gaps(angle: Floats, group: Groups, count: int) -> Floats:
+def widest_gaps(angle: Floats, group: Groups, count: int) -> Floats:
     """(G,) the widest gap between neighbouring angles (N,) of each group, rad; empty ones: a turn.
 
     Args:

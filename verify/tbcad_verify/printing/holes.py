@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
-from tbcad_verify.printing.circles import circles, gaps
+from tbcad_verify.printing.circles import fit_circles, widest_gaps
 from tbcad_verify.types import Bools, Floats, Ints
 
 Groups = NDArray[np.int32]
@@ -26,7 +26,7 @@ GAP_RAD = math.pi / 2 + 1e-3  # what may be missing of the turn
 
 
 @dataclass(frozen=True)
-class Holes:
+class RoundHoles:
     """The H holes, in the order of their first facets.
 
     Attributes:
@@ -43,7 +43,7 @@ class Holes:
 
 
 @dataclass(frozen=True)
-class Patches:
+class FacetPatches:
     """N facets in G patches.
 
     Attributes:
@@ -57,7 +57,7 @@ class Patches:
     count: int
 
 
-def holes(mesh: Mesh, edges: Edges) -> Holes:
+def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
     """Find every round hole that keeps three quarters of its turn.
 
     Args:
@@ -85,25 +85,25 @@ def _flat(edges: Edges) -> Bools:
     return np.asarray(flat & (edges.noise < BLIND_RAD))
 
 
-def _joined(size: int, links: Ints, facet: Ints) -> Patches:
+def _joined(size: int, links: Ints, facet: Ints) -> FacetPatches:
     """The given facets of `size`, in patches that links (2, L) between facets hold together."""
     number = np.full(size, -1)
     number[facet] = np.arange(facet.size)
     one, two = number[links]
     both = (one >= 0) & (two >= 0)
     count, group = connected_groups(facet.size, one[both], two[both])
-    return Patches(facet, group, count)
+    return FacetPatches(facet, group, count)
 
 
-def _bending(patches: Patches, bent: Ints) -> Patches:
+def _bending(patches: FacetPatches, bent: Ints) -> FacetPatches:
     """The patches with enough bends; `bent` has a facet of every bent edge."""
     enough = np.bincount(patches.group[bent], minlength=patches.count) >= BENDS
     mine = enough[patches.group]
     number = (np.cumsum(enough) - 1).astype(np.int32)
-    return Patches(patches.facet[mine], number[patches.group[mine]], int(enough.sum()))
+    return FacetPatches(patches.facet[mine], number[patches.group[mine]], int(enough.sum()))
 
 
-def _label(patches: Patches, size: int) -> Groups:
+def _label(patches: FacetPatches, size: int) -> Groups:
     """(size,) the patch of every facet; -1 for none."""
     label = np.full(size, -1, dtype=np.int32)
     label[patches.facet] = patches.group
@@ -133,11 +133,11 @@ def _outer(a: Floats, weight: Floats, group: Groups, count: int) -> Floats:
     return sums
 
 
-def _normals(mesh: Mesh, patches: Patches) -> Floats:
+def _normals(mesh: Mesh, patches: FacetPatches) -> Floats:
     return unit(mesh.area[:, patches.facet])
 
 
-def _round(mesh: Mesh, patches: Patches) -> Holes:
+def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
     """Look along each patch, fit a circle, and keep those that are the walls of round holes.
 
     They bend inward, or they would not be patches: their normals point to the axis.
@@ -148,16 +148,16 @@ def _round(mesh: Mesh, patches: Patches) -> Holes:
     sides = tangent_basis(axis)
     corner = np.take(mesh.points, mesh.faces[patches.facet].ravel(), axis=0).T
     flat = np.stack([dot(side[:, group], corner) for side in sides])
-    centre, radius = circles(flat, group, patches.count)
+    centre, radius = fit_circles(flat, group, patches.count)
     radius = np.where(np.isfinite(radius), radius, 0.0)  # points on a line are no hole
     centre = np.where(radius > 0, centre, 0.0)
     spoke = flat - centre[:, group]
     off = np.abs(np.hypot(*spoke) - radius[group])
     good = _every(off < ROUND * radius[group], group, patches.count)
-    good &= gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
+    good &= widest_gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
     low, high = _extent(dot(axis[:, group], corner), group, patches.count)
     middle = centre[0] * sides[0] + centre[1] * sides[1] + (low + high) / 2 * axis
-    return Holes(2 * radius[good], middle[:, good], axis[:, good], (high - low)[good])
+    return RoundHoles(2 * radius[good], middle[:, good], axis[:, good], (high - low)[good])
 
 
 def _every(good: Bools, group: Groups, count: int) -> Bools:

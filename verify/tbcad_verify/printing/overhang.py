@@ -14,7 +14,7 @@ BED_MM = 0.01  # facets within this of the lowest point lie on the bed; far less
 DOUBT_RAD = 1e-3
 
 
-def overhang(mesh: Mesh, double: Floats, down: Floats, lean_rad: float) -> float:
+def overhang_area(mesh: Mesh, double: Floats, down: Floats, lean_rad: float) -> float:
     """Area of facets that lean more than allowed and do not lie on the bed, mm^2.
 
     Args:

@@ -10,7 +10,7 @@ from tbcad_verify.mesh.mesh import Mesh, connected_groups
 
 
 @dataclass(frozen=True)
-class Pieces:
+class MeshPieces:
     """How many connected surfaces there are.
 
     Attributes:
@@ -22,11 +22,11 @@ class Pieces:
     cavities: int
 
 
-def pieces(mesh: Mesh) -> Pieces:
+def mesh_pieces(mesh: Mesh) -> MeshPieces:
     """Connected surfaces by the sign of their volume."""
     half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
     count, label = connected_groups(len(mesh.faces), half // 3, mesh.twin[half] // 3)
     corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
     share = np.einsum("ni,in->n", corner, mesh.area)
     inside_out = int((np.bincount(label, share, count) < 0).sum())
-    return Pieces(count - inside_out, inside_out)
+    return MeshPieces(count - inside_out, inside_out)

@@ -34,7 +34,7 @@ LIFT = 8  # units in the last place by which rays start below the surface: float
 
 
 @dataclass(frozen=True)
-class Walls:
+class WallThickness:
     """Thickness wherever it was measured.
 
     Attributes:
@@ -51,7 +51,7 @@ class Walls:
 
 
 @dataclass(frozen=True)
-class Probes:
+class ThicknessRays:
     """Where rays start, and which way they go.
 
     Attributes:
@@ -67,7 +67,7 @@ class Probes:
     square: float
 
 
-def walls(mesh: Mesh, edges: Edges, scene: RayScene) -> Walls:
+def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
     """Measure thickness from every facet, and from the bottom of every groove.
 
     Args:
@@ -85,22 +85,22 @@ def walls(mesh: Mesh, edges: Edges, scene: RayScene) -> Walls:
     return _walls(probes, thickness, best)
 
 
-def thin_area(found: Walls, limit: float) -> float:
+def thin_area(found: WallThickness, limit: float) -> float:
     """Surface over walls thinner than a limit, mm^2; walls of two sides count twice."""
     return float(found.share[found.thickness < limit].sum())
 
 
-def _walls(probes: list[Probes], thickness: list[Floats], best: int) -> Walls:
+def _walls(probes: list[ThicknessRays], thickness: list[Floats], best: int) -> WallThickness:
     depths, shares = np.concatenate(thickness), np.concatenate([probe.share for probe in probes])
     if not np.isfinite(depths).any():
-        return Walls(depths, shares, math.inf, np.full(3, np.nan))
+        return WallThickness(depths, shares, math.inf, np.full(3, np.nan))
     k = int(thickness[best].argmin())
     least = float(thickness[best][k])
     probe = probes[best]
-    return Walls(depths, shares, least, probe.start[:, k] + least / 2 * probe.inward[:, k])
+    return WallThickness(depths, shares, least, probe.start[:, k] + least / 2 * probe.inward[:, k])
 
 
-def _measure(scene: RayScene, sound: Bools, probe: Probes) -> Floats:
+def _measure(scene: RayScene, sound: Bools, probe: ThicknessRays) -> Floats:
     """(S,) distances to walls that look back; infinite where none does."""
     lift = LIFT * float(np.spacing(np.float32(np.abs(probe.start).max(initial=1e-30))))
 
@@ -122,7 +122,7 @@ def _longest(mesh: Mesh) -> Floats:
     return np.asarray(np.sqrt(np.max(squares, axis=0)))
 
 
-def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iterator[Probes]:
+def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iterator[ThicknessRays]:
     size = _steps(np.where(sound, longest, 0), step)
     for k in LATTICES[::-1]:
         yield _on_lattice(mesh, np.flatnonzero(sound & (size == k)), _lattice(k))
@@ -146,7 +146,7 @@ def _lattice(k: int) -> Floats:
     return (1 - INSET) * np.array(points, dtype=np.float64).T / k + INSET / 3
 
 
-def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> Probes:
+def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> ThicknessRays:
     start = np.zeros((3, facets.size, lattice.shape[1]))
     for corner, weight in zip(mesh.faces[facets].T, lattice, strict=True):
         start += np.take(mesh.points, corner, axis=0).T[:, :, None] * weight
@@ -154,10 +154,10 @@ def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> Probes:
     area = mesh.area[:, facets]
     inward = np.repeat(-unit(area), count, axis=1)
     share = np.repeat(norm(area) / (2 * count), count)
-    return Probes(start.reshape(3, -1), inward, share, SQUARE_COS)
+    return ThicknessRays(start.reshape(3, -1), inward, share, SQUARE_COS)
 
 
-def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterator[Probes]:
+def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterator[ThicknessRays]:
     """Facets beside a groove look past the thinnest place below it; its bottom does not."""
     half = edges.half[edges.angle < -(GROOVE_RAD + edges.noise)]
     half = half[sound[half // 3] & sound[mesh.twin[half] // 3]]
@@ -170,7 +170,9 @@ def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterat
         yield _along(start[:, mine], edge[:, mine], inward[:, mine], k)
 
 
-def _along(start: Floats, edge: Floats, inward: Floats, k: int) -> Probes:
+def _along(start: Floats, edge: Floats, inward: Floats, k: int) -> ThicknessRays:
     at = np.linspace(INSET, 1 - INSET, k + 1) if k > 1 else np.array([0.5])
     points = (start[:, :, None] + edge[:, :, None] * at).reshape(3, -1)
-    return Probes(points, np.repeat(inward, at.size, axis=1), np.zeros(points.shape[1]), GROOVE_COS)
+    return ThicknessRays(
+        points, np.repeat(inward, at.size, axis=1), np.zeros(points.shape[1]), GROOVE_COS
+    )

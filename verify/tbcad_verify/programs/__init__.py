@@ -1,14 +1,14 @@
-"""The programs users open our files with: what they say about an export.
+"""Programs that users open the exported files with, and what they report about an export.
 
-They are no part of the proof, which needs none of them; where they are installed, they are a
-second opinion from code that neither tbcad nor the proof shares. Each runs as a child process,
-on a copy of one file, in a private folder, with a time limit. None of them sees the export itself.
+The verification does not need them. Where they are installed, they are a second opinion from code
+that neither tbcad nor the verification shares. Each runs as a child process with a time limit, on
+a copy of one file in a private folder. None of them sees the export itself.
 """
 
 from __future__ import annotations
 
 from tbcad_verify.programs.answers import is_skipped
-from tbcad_verify.programs.clients import client_checks
-from tbcad_verify.programs.program_query import Wanted
+from tbcad_verify.programs.program_checks import check_with_programs
+from tbcad_verify.programs.program_query import ExpectedPart
 
-__all__ = ["Wanted", "client_checks", "is_skipped"]
+__all__ = ["ExpectedPart", "check_with_programs", "is_skipped"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
+from tbcad_verify.programs.answers import count_check, text_of, volume_check
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
 from tbcad_verify.report.checks import Check, Unknown, at_most
 
 PARTS, VOLUME = "parts", "mm^3 off"
@@ -22,7 +22,7 @@ FLAWS = (
 LEAST_FACETS = 4
 
 
-def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
     """Nothing to repair, one part, the mesh's volume.
 
     Raises:
@@ -33,8 +33,8 @@ def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
     found = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)
     return [
         at_most(("admesh repairs", room.file, "flaws"), sum(flaws.values()), 0, found),
-        exactly(("admesh parts", room.file, PARTS), said["Number of parts"], 1, "must be one"),
-        near(
+        count_check(("admesh parts", room.file, PARTS), said["Number of parts"], 1, "must be one"),
+        volume_check(
             ("admesh volume", room.file, VOLUME),
             said["Volume"],
             wanted.volume,

@@ -35,14 +35,14 @@ def is_skipped(check: Check) -> bool:
     return check.measured is None and check.detail.startswith(SKIPPED)
 
 
-def exactly(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
+def count_check(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a count is as it should be."""
     name, file, unit = check
     good = measured == limit
     return Check(name, file, good, finite(measured), limit, unit, "" if good else detail)
 
 
-def near(check: CheckName, measured: float, mesh: float, error: float) -> Check:
+def volume_check(check: CheckName, measured: float, mesh: float, error: float) -> Check:
     """A check that a volume is the mesh's.
 
     Args:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tbcad_verify.programs.answers import figures
-from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
-from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
+from tbcad_verify.programs.solid_checks import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
 from tbcad_verify.report.checks import Check, at_most
 
 KEYS = ("solids", "invalid", "open", "loose", "spheres", "volume")
@@ -41,7 +41,7 @@ sys.exit(3 if "error" in answer else 0)
 """
 
 
-def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
     """One valid, closed solid with the mirrors' faces and the mesh's volume.
 
     Raises:

@@ -8,8 +8,14 @@ import sys
 from pathlib import Path
 
 from tbcad_verify.programs.answers import figures, skipped, text_of
-from tbcad_verify.programs.program_query import Command, ProgramQuery, Sandbox, Wanted, on_path
-from tbcad_verify.programs.solid import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
+from tbcad_verify.programs.program_query import (
+    Command,
+    ExpectedPart,
+    ProgramQuery,
+    Sandbox,
+    on_path,
+)
+from tbcad_verify.programs.solid_checks import SOLID, SPHERES, VOLUME, one_solid, spheres, volume
 from tbcad_verify.report.checks import Check, Unknown
 
 INSTALL = "pip install gmsh"
@@ -65,7 +71,7 @@ def find() -> Command:
     return on_path("gmsh")
 
 
-def ask(room: Sandbox, wanted: Wanted) -> list[Check]:
+def ask(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
     """One solid with the mirrors' faces and the mesh's volume.
 
     Raises:

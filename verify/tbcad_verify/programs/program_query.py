@@ -17,7 +17,7 @@ Command = tuple[str, ...]  # a program's absolute path and first arguments; empt
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExpectedPart:
     """One part, and what the programs should find in its files.
 
     Attributes:
@@ -76,9 +76,9 @@ class ProgramQuery:
     install: str
     questions: Mapping[str, str]
     find: Callable[[], Command]
-    ask: Callable[[Sandbox, Wanted], Sequence[Check]]
+    ask: Callable[[Sandbox, ExpectedPart], Sequence[Check]]
 
-    def names(self, wanted: Wanted) -> list[CheckName]:
+    def names(self, wanted: ExpectedPart) -> list[CheckName]:
         """Name, file and unit of every check; a part without such a file goes by its own name."""
         file = wanted.files.get(self.kind) or wanted.name
         return [(name, file, unit) for name, unit in self.questions.items()]
@@ -91,7 +91,9 @@ def on_path(*names: str) -> Command:
 
 
 @contextmanager
-def room(command: Command, folder: Path, file: str, kind: str, limits: Limits) -> Iterator[Sandbox]:
+def sandbox(
+    command: Command, folder: Path, file: str, kind: str, limits: Limits
+) -> Iterator[Sandbox]:
     """A room that is gone afterwards.
 
     Args:

@@ -6,8 +6,8 @@ import math
 import re
 from pathlib import Path
 
-from tbcad_verify.programs.answers import exactly, near, text_of
-from tbcad_verify.programs.program_query import ProgramQuery, Sandbox, Wanted, on_path
+from tbcad_verify.programs.answers import count_check, text_of, volume_check
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
 from tbcad_verify.report.checks import Check, Unknown, at_most, informative, unknown
 
 INSTALL = "apt install prusa-slicer"
@@ -34,7 +34,7 @@ PROFILE = (
 )
 
 
-def ask_info(room: Sandbox, wanted: Wanted) -> list[Check]:
+def ask_info(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
     Raises:
@@ -43,10 +43,10 @@ def ask_info(room: Sandbox, wanted: Wanted) -> list[Check]:
     said = _lines(text_of(room.run("--datadir", room.place / "home", "--info", room.given)))
     return [
         _manifold(room.file, said),
-        exactly(
+        count_check(
             ("prusa parts", room.file, PARTS), _needed(said, "number_of_parts"), 1, "must be one"
         ),
-        near(
+        volume_check(
             ("prusa volume", room.file, VOLUME),
             _needed(said, "volume"),
             wanted.volume,
@@ -55,7 +55,7 @@ def ask_info(room: Sandbox, wanted: Wanted) -> list[Check]:
     ]
 
 
-def ask_slices(room: Sandbox, wanted: Wanted) -> list[Check]:
+def ask_slices(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
     """The print's volume is the mesh's; how much filament and time it takes is told.
 
     Raises:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.prototype.bodies import Body, of_roles
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
 from tbcad_verify.types import Floats
@@ -28,40 +28,42 @@ METRE_MM = 1000.0
 UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
-def shapes(view: View) -> Shapes:
+def assembly_meshes(context: PrototypeContext) -> Shapes:
     """Corners (V, 3) in mm and facets (F, 3) of all bodies by name, in the frame of the shell.
 
     Raises:
         Unknown: there is no GLB, or it cannot be read.
     """
-    name = view.made.assembly[1]
+    name = context.prototype.assembly[1]
     if not name:
         raise Unknown("there is no GLB of the assembly")
-    data = read(view.export.folder, name).data.tobytes()
+    data = read(context.export.folder, name).data.tobytes()
     return {title: _merged(*mesh) for title, mesh in _bodies(data)}
 
 
-def check(name: CheckName, view: View, bodies: list[Body], found: Shapes) -> Check:
+def check(
+    name: CheckName, context: PrototypeContext, bodies: list[MeasuredPart], found: Shapes
+) -> Check:
     """Every part's and every ball's box, against its own mesh's or the record's."""
     placed = of_roles(bodies, "base", "cap", "stage", "frame")
-    boxes = {one.part.name: _box(one.needed.points) for one in placed}
-    balls = view.made.balls
+    boxes = {one.part.name: _box(one.placed_mesh.points) for one in placed}
+    balls = context.prototype.balls
     for k in np.flatnonzero(~balls.cap).tolist():
         middle, radius = balls.columns("bx", 3)[:, k], balls.of("body_radius_mm")[k]
         boxes[f"ball_{k + 1}"] = np.stack([middle - radius, middle + radius])
     off = {title: _off(box, found.get(title)) for title, box in boxes.items()}
-    off |= {one.name: 0.0 if one.name in found else np.inf for one in view.made.bought}
+    off |= {one.name: 0.0 if one.name in found else np.inf for one in context.prototype.bought}
     wrong = sorted(title for title, away in off.items() if away > OFF_MM)
     return at_most(name, max(off.values()), OFF_MM, f"missing or elsewhere: {short_list(wrong)}")
 
 
-def standing(view: View, found: Shapes) -> list[tuple[str, Any]]:
+def standing_solids(context: PrototypeContext, found: Shapes) -> list[tuple[str, Any]]:
     """Purchased parts that stand still, as manifold3d has them.
 
     Raises:
         Unknown: one is missing, or no closed solid.
     """
-    names = [one.name for one in view.made.bought if not one.turns]
+    names = [one.name for one in context.prototype.bought if not one.turns]
     if lost := [name for name in names if name not in found]:
         raise Unknown(f"the assembly lacks {short_list(lost)}")
     return [(name, _solid(name, *found[name])) for name in names]

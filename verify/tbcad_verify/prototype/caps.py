@@ -9,8 +9,8 @@ import numpy as np
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import rounding
 from tbcad_verify.mesh.vectors import dot, norm, unit
-from tbcad_verify.prototype.bodies import Body
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.report.checks import Check, Unknown, at_most
 from tbcad_verify.types import Floats
 
@@ -25,7 +25,7 @@ CHECKS = {"cap fronts": "um", "cap bodies": "um", "cap form": "um"}
 
 
 @dataclass(frozen=True)
-class Sphere:
+class FittedSphere:
     """A sphere through vertices.
 
     Attributes:
@@ -42,27 +42,29 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Cap:
+class MeasuredCap:
     """Front and body of the cap of one ball, from 0."""
 
     ball: int
-    front: Sphere
-    body: Sphere
+    front: FittedSphere
+    body: FittedSphere
 
 
-def measure(view: View, body: Body) -> Cap:
+def measure_cap(context: PrototypeContext, body: MeasuredPart) -> MeasuredCap:
     """Fit both spheres of a cap.
 
     Raises:
         Unknown: there is no such surface, or no mesh.
     """
-    balls, k = view.made.balls, body.part.ball
+    balls, k = context.prototype.balls, body.part.ball
     centre, middle = balls.columns("cx", 3)[:, k], balls.columns("bx", 3)[:, k]
-    front = sphere(body.needed, centre, float(balls.of("radius_mm")[k]))
-    return Cap(k, front, sphere(body.needed, middle, float(balls.of("body_radius_mm")[k])))
+    front = fit_sphere(body.placed_mesh, centre, float(balls.of("radius_mm")[k]))
+    return MeasuredCap(
+        k, front, fit_sphere(body.placed_mesh, middle, float(balls.of("body_radius_mm")[k]))
+    )
 
 
-def sphere(mesh: Mesh, centre: Floats, radius: float) -> Sphere:
+def fit_sphere(mesh: Mesh, centre: Floats, radius: float) -> FittedSphere:
     """The sphere through the vertices of facets that lie near one.
 
     Facets beyond the rim, where both surfaces run close together, drop out round after round.
@@ -80,7 +82,7 @@ def sphere(mesh: Mesh, centre: Floats, radius: float) -> Sphere:
         guess, inverse = _fitted(points, guess)
     off = np.abs(norm(first - guess[:3, None]) - guess[3])
     blur = 6 * rounding(mesh) / np.sqrt(3) * float(np.sqrt(np.trace(inverse)))
-    return Sphere(guess[:3], float(guess[3]), float(np.percentile(off, MOST_OF)), blur)
+    return FittedSphere(guess[:3], float(guess[3]), float(np.percentile(off, MOST_OF)), blur)
 
 
 def _near(mesh: Mesh, guess: Floats, near: float) -> Floats:
@@ -104,10 +106,10 @@ def _fitted(points: Floats, guess: Floats) -> tuple[Floats, Floats]:
     return guess, np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
-def checks(view: View, caps: list[Cap], files: str) -> list[Check]:
+def checks(context: PrototypeContext, caps: list[MeasuredCap], files: str) -> list[Check]:
     """Fronts and bodies against the record."""
     front, body, form = ((name, files, unit_) for name, unit_ in CHECKS.items())
-    balls = view.made.balls
+    balls = context.prototype.balls
     return [
         _held(
             front,
@@ -131,7 +133,10 @@ def checks(view: View, caps: list[Cap], files: str) -> list[Check]:
 
 
 def _held(
-    name: tuple[str, str, str], found: list[tuple[int, Sphere]], centre: Floats, radius: Floats
+    name: tuple[str, str, str],
+    found: list[tuple[int, FittedSphere]],
+    centre: Floats,
+    radius: Floats,
 ) -> Check:
     """Centre and radius errors less what float32 leaves in doubt."""
     errors = [

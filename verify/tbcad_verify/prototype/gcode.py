@@ -20,7 +20,7 @@ MODES = frozenset({20.0, 91.0})  # inches and steps from where one is: not what 
 
 
 @dataclass(frozen=True)
-class Program:
+class ProgramRun:
     """A program, run once.
 
     Attributes:
@@ -34,7 +34,7 @@ class Program:
     faults: tuple[str, ...]
 
 
-def run(text: str) -> Program:
+def run(text: str) -> ProgramRun:
     """Follow a program from its first line to its last.
 
     A photograph is taken by M8; in a program without M8 by every M0 after the first move, but for
@@ -63,4 +63,4 @@ def run(text: str) -> Program:
             pauses.append(moves[-1])
     middle = len(pauses) // 2
     taken = coolant or pauses[:middle] + pauses[middle + 1 :]
-    return Program(np.array(moves), np.array(taken), tuple(faults))
+    return ProgramRun(np.array(moves), np.array(taken), tuple(faults))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
-from tbcad_verify.prototype.nearest import distances
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
 from tbcad_verify.prototype.swing import solid_of
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.triangle_distances import distances
 from tbcad_verify.report.checks import Check, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
@@ -19,21 +19,21 @@ CHECKS = {
 }
 
 
-def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
+def checks(context: PrototypeContext, bodies: list[MeasuredPart], files: str) -> list[Check]:
     """Every light is inside the capture sphere and not in the stage's material.
 
     How far the farthest is from the stage is told: a light in its pocket has a wall close by.
     """
     inside, free, held = ((name, files, unit) for name, unit in CHECKS.items())
-    leds = view.made.leds
+    leds = context.prototype.leds
     position = np.array([led.position for led in leds]).reshape(-1, 3)
-    beyond = np.linalg.norm(position, axis=1) > view.radius
+    beyond = np.linalg.norm(position, axis=1) > context.radius
     odd = [leds[k].name for k in np.flatnonzero(beyond).tolist()]
     made = [at_most(inside, len(odd), 0, f"the camera may not see {short_list(odd)}")]
     stage = of_roles(bodies, "stage")
     if not leds or not stage:
         return [*made, informative(free, 0), informative(held, 0, "no light, or no stage")]
-    mesh, _ = joined_bodies(stage)
+    mesh, _ = joined_meshes(stage)
     a, b, c = (mesh.points[mesh.faces[:, k]].T for k in range(3))
     away = np.array([float(distances(point, (a, b, c)).min()) for point in position])
     sunk = [led.name for led, point in zip(leds, position, strict=True) if _in(stage, point)]
@@ -45,9 +45,9 @@ def checks(view: View, bodies: list[Body], files: str) -> list[Check]:
     ]
 
 
-def _in(stage: list[Body], point: Floats) -> bool:
+def _in(stage: list[MeasuredPart], point: Floats) -> bool:
     """Whether a small cube about a point is in the material of a part."""
     import manifold3d
 
     cube = manifold3d.Manifold.cube([POINT_MM] * 3, center=True).translate(point)
-    return any((solid_of(one.needed) ^ cube).volume() > cube.volume() / 2 for one in stage)
+    return any((solid_of(one.placed_mesh) ^ cube).volume() > cube.volume() / 2 for one in stage)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import dot, norm, unit
-from tbcad_verify.prototype.nearest import Corners, distances, to_segments
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.triangle_distances import Corners, distances, to_segments
 from tbcad_verify.report.checks import (
     Check,
     Unknown,
@@ -40,7 +40,7 @@ CHECKS = {
 
 
 @dataclass(frozen=True)
-class Held:
+class MeasuredSeats:
     """Where the pads put K balls.
 
     Attributes:
@@ -56,10 +56,10 @@ class Held:
     reason: tuple[str, ...]
 
 
-def hold(view: View, base: Mesh) -> Held:
+def measure_seats(context: PrototypeContext, base: Mesh) -> MeasuredSeats:
     """Recover the balls' centres from the mesh of all base parts, in the frame."""
-    found = [_one(view, base, k) for k in range(len(view.made.balls))]
-    return Held(
+    found = [_one(context, base, k) for k in range(len(context.prototype.balls))]
+    return MeasuredSeats(
         np.array([one[0] for one in found]),
         np.array([one[1] for one in found]),
         np.array([one[2] for one in found]),
@@ -67,36 +67,38 @@ def hold(view: View, base: Mesh) -> Held:
     )
 
 
-def checks(view: View, held: Held, files: str) -> list[Check]:
+def checks(context: PrototypeContext, held: MeasuredSeats, files: str) -> list[Check]:
     """Centres against the record, contacts against the pads, balls against the base."""
     centre, pads, clear, room = ((name, files, unit) for name, unit in CHECKS.items())
-    away = 1000 * norm(held.centre.T - view.made.balls.columns("bx", 3))
+    away = 1000 * norm(held.centre.T - context.prototype.balls.columns("bx", 3))
     lost = [f"ball {k + 1}: {why}" for k, why in enumerate(held.reason) if why]
-    limit = view.made.pad_um
+    limit = context.prototype.pad_um
     return [
         at_most(
             centre,
             np.inf if lost else float(away.max()),
             limit,
-            "; ".join(lost[:3]) or _worst(view, away, away > limit, "um"),
+            "; ".join(lost[:3]) or _worst(context, away, away > limit, "um"),
         ),
-        at_least(pads, float(held.margin.min()), 0, _worst(view, -held.margin, held.margin < 0)),
+        at_least(pads, float(held.margin.min()), 0, _worst(context, -held.margin, held.margin < 0)),
         at_least(
-            clear, float(held.clear.min()), -SUNK_MM, _worst(view, -held.clear, held.clear < 0)
+            clear, float(held.clear.min()), -SUNK_MM, _worst(context, -held.clear, held.clear < 0)
         ),
         informative(room, float(held.clear.min())),
     ]
 
 
-def _worst(view: View, values: Floats, bad: NDArray[np.bool_], unit_: str = "mm") -> str:
+def _worst(
+    context: PrototypeContext, values: Floats, bad: NDArray[np.bool_], unit_: str = "mm"
+) -> str:
     order = np.argsort(-values, kind="stable")
-    names = view.made.balls.names(np.arange(values.size))
+    names = context.prototype.balls.names(np.arange(values.size))
     return worst_offenders(names, values, unit_, order[bad[order]], ".3g")
 
 
-def _one(view: View, base: Mesh, k: int) -> tuple[Floats, float, float, str]:
+def _one(context: PrototypeContext, base: Mesh, k: int) -> tuple[Floats, float, float, str]:
     """Centre, margin and clearance of one ball; or why they are not known."""
-    balls, seats = view.made.balls, view.made.seats
+    balls, seats = context.prototype.balls, context.prototype.seats
     radius = float(balls.of("body_radius_mm")[k])
     try:
         near = _around(base, balls.columns("bx", 3)[:, k], radius + ROOM_MM)
@@ -200,13 +202,15 @@ def _corners(mesh: Mesh, facets: Ints) -> Corners:
     return a, b, c
 
 
-def seat_checks(view: View, base: Mesh, files: str) -> tuple[Held | None, list[Check]]:
+def seat_checks(
+    context: PrototypeContext, base: Mesh, files: str
+) -> tuple[MeasuredSeats | None, list[Check]]:
     """Both, guarded."""
-    found: list[Held] = []
+    found: list[MeasuredSeats] = []
 
     def work() -> list[Check]:
-        found.append(hold(view, base))
-        return checks(view, found[0], files)
+        found.append(measure_seats(context, base))
+        return checks(context, found[0], files)
 
     made = guarded([(name, files, unit_) for name, unit_ in CHECKS.items()], work)
     return (found[0] if found else None), made

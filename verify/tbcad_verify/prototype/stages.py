@@ -10,12 +10,17 @@ import numpy as np
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.prototype import assembly, caps, leds, places, plan, seats, swing
-from tbcad_verify.prototype.bodies import Body, body, joined_bodies, of_roles
-from tbcad_verify.prototype.rig import Rig, rig
-from tbcad_verify.prototype.seats import Held
-from tbcad_verify.prototype.tracing import Shown, show
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype import assembly, caps, leds, plan_checks, record_checks, seats, swing
+from tbcad_verify.prototype.ball_views import BallViews, ball_views
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import (
+    MeasuredPart,
+    joined_meshes,
+    measure_part,
+    of_roles,
+)
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
+from tbcad_verify.prototype.seats import MeasuredSeats
 from tbcad_verify.record.prototype_record import Prototype
 from tbcad_verify.record.record import Export
 from tbcad_verify.report.checks import (
@@ -54,92 +59,100 @@ LIGHT = {
 DIGITS = 9
 
 
-def prove(
-    export: Export, made: Prototype, facets: Sequence[Facets], taker: ResultSink
-) -> list[Body]:
+def verify_prototype(
+    export: Export, prototype: Prototype, facets: Sequence[Facets], taker: ResultSink
+) -> list[MeasuredPart]:
     """Make all stages but printability, and hand over what each finds.
 
     Args:
         export: the record.
-        made: the prototype's.
+        prototype: its's.
         facets: of its parts, as read.
         taker: of stages, checks and figures.
 
     Returns:
         The parts, measured.
     """
-    view = View(export, made)
+    context = PrototypeContext(export, prototype)
     taker.stage(STAGES[0])
-    taker.checks(places.checks(view))
-    taker.checks(plan.checks(view))
+    taker.checks(record_checks.checks(context))
+    taker.checks(plan_checks.checks(context))
     taker.stage(STAGES[1])
-    pairs = list(zip(made.parts, facets, strict=True))
-    bodies = in_threads(lambda pair: body(*pair), pairs)
+    pairs = list(zip(prototype.parts, facets, strict=True))
+    bodies = in_threads(lambda pair: measure_part(*pair), pairs)
     for one in bodies:
         taker.checks(one.checks)
         if one.placed_bulk is not None:
             taker.bulk(one.part.name, one.placed_bulk)
     taker.stage(STAGES[2])
-    held, measured = _seats(view, bodies, taker)
+    held, measured = _seats(context, bodies, taker)
     taker.stage(STAGES[3])
-    ready, reason = attempt(lambda: rig(view, _known(held), measured, bodies))
-    shown, why = attempt(lambda: show(require(ready, reason)))
+    ready, reason = attempt(lambda: measure_prototype(context, _known(held), measured, bodies))
+    shown, why = attempt(lambda: ball_views(require(ready, reason)))
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in LIGHT.items()]
-    taker.checks(guarded(names, lambda: _light(view, require(shown, reason or why), names)))
+    taker.checks(guarded(names, lambda: _light(context, require(shown, reason or why), names)))
     taker.stage(STAGES[4])
-    _swing(view, ready, reason, bodies, taker)
-    taker.prototype(rows(view, held, shown))
+    _swing(context, ready, reason, bodies, taker)
+    taker.prototype(json_rows(context, held, shown))
     return bodies
 
 
-def _seats(view: View, bodies: list[Body], taker: ResultSink) -> tuple[Held | None, list[caps.Cap]]:
+def _seats(
+    context: PrototypeContext, bodies: list[MeasuredPart], taker: ResultSink
+) -> tuple[MeasuredSeats | None, list[caps.MeasuredCap]]:
     files = _files(bodies, "base")
-    base, reason = attempt(lambda: joined_bodies(of_roles(bodies, "base"))[0])
-    held, why = attempt(lambda: seats.hold(view, require(base, reason)))
+    base, reason = attempt(lambda: joined_meshes(of_roles(bodies, "base"))[0])
+    held, why = attempt(lambda: seats.measure_seats(context, require(base, reason)))
     names = [(name, files, unit) for name, unit in seats.CHECKS.items()]
-    taker.checks(guarded(names, lambda: seats.checks(view, require(held, reason or why), files)))
+    taker.checks(guarded(names, lambda: seats.checks(context, require(held, reason or why), files)))
     made = of_roles(bodies, "cap")
-    if not view.made.balls.cap.any():
+    if not context.prototype.balls.cap.any():
         return held, []
-    found, odd = attempt(lambda: [caps.measure(view, one) for one in made])
+    found, odd = attempt(lambda: [caps.measure_cap(context, one) for one in made])
     files = _files(bodies, "cap")
     names = [(name, files, unit) for name, unit in caps.CHECKS.items()]
-    taker.checks(guarded(names, lambda: caps.checks(view, require(found, odd), files)))
+    taker.checks(guarded(names, lambda: caps.checks(context, require(found, odd), files)))
     return held, found or []
 
 
 def _swing(
-    view: View, ready: Rig | None, reason: str, bodies: list[Body], taker: ResultSink
+    context: PrototypeContext,
+    ready: MeasuredPrototype | None,
+    reason: str,
+    bodies: list[MeasuredPart],
+    taker: ResultSink,
 ) -> None:
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
-    found, odd = attempt(lambda: assembly.shapes(view))
-    bought, why = attempt(lambda: assembly.standing(view, require(found, odd)))
+    found, odd = attempt(lambda: assembly.assembly_meshes(context))
+    bought, why = attempt(lambda: assembly.standing_solids(context, require(found, odd)))
     taker.checks(
         guarded(
             names,
             lambda: swing.checks(require(ready, reason), bodies, require(bought, why), files),
         )
     )
-    whole = (assembly.CHECK[0], view.made.assembly[1], assembly.CHECK[1])
+    whole = (assembly.CHECK[0], context.prototype.assembly[1], assembly.CHECK[1])
     taker.checks(
-        guarded([whole], lambda: [assembly.check(whole, view, bodies, require(found, odd))])
+        guarded([whole], lambda: [assembly.check(whole, context, bodies, require(found, odd))])
     )
     files = _files(bodies, "stage")
     names = [(name, files, unit) for name, unit in leds.CHECKS.items()]
-    taker.checks(guarded(names, lambda: leds.checks(view, bodies, files)))
+    taker.checks(guarded(names, lambda: leds.checks(context, bodies, files)))
 
 
-def _light(view: View, found: Shown, names: list[CheckName]) -> list[Check]:
+def _light(context: PrototypeContext, found: BallViews, names: list[CheckName]) -> list[Check]:
     """Every mirror's ball shows all of the object at its stop, and nothing stands in between."""
     cells, covers, off, path, rays, kept = names
-    ids = [view.export.rows.ids[k] for k in view.mine.tolist()]
+    ids = [context.export.rows.ids[k] for k in context.mine.tolist()]
     hidden, blocked = found.hidden.astype(float), found.blocked.astype(float)
     short = np.argsort(found.coverage, kind="stable")
-    short = short[found.coverage[short] < view.export.target_mm]
-    least = least_of_balls(view, found.coverage)
-    recorded = view.made.balls.of("coverage_mm" if view.made.moved else "coverage_fixed_mm")
+    short = short[found.coverage[short] < context.export.target_mm]
+    least = ball_coverage(context, found.coverage)
+    recorded = context.prototype.balls.of(
+        "coverage_mm" if context.prototype.moved else "coverage_fixed_mm"
+    )
     away = np.where(np.isfinite(least), np.abs(least - recorded), 0)
     furthest = int(away.argmax())
     return [
@@ -147,7 +160,7 @@ def _light(view: View, found: Shown, names: list[CheckName]) -> list[Check]:
         at_least(
             covers,
             float(found.coverage.min()),
-            view.export.target_mm,
+            context.export.target_mm,
             "shows too little: " + worst_offenders(ids, found.coverage, "mm", short),
         ),
         informative(off, float(away[furthest]), f"ball {furthest + 1} shows {least[furthest]:.3f}"),
@@ -166,20 +179,22 @@ def _light(view: View, found: Shown, names: list[CheckName]) -> list[Check]:
     ]
 
 
-def rows(view: View, held: Held | None, found: Shown | None) -> dict[str, Any]:
+def json_rows(
+    context: PrototypeContext, held: MeasuredSeats | None, found: BallViews | None
+) -> dict[str, Any]:
     """Ball by ball and stop by stop, as verify.json has it; what is not known is null."""
-    balls = view.made.balls
+    balls = context.prototype.balls
     count = len(balls)
     blank = np.full(count, np.nan)
     error = blank if held is None else 1000 * norm(held.centre.T - balls.columns("bx", 3))
     least = pixels = shell = blank
     stops: list[dict[str, Any]] = []
     if found is not None:
-        least = least_of_balls(view, found.coverage)
+        least = ball_coverage(context, found.coverage)
         pixels, shell = (
-            np.bincount(view.ball, x, count) for x in (found.pixels, found.pixels_shell)
+            np.bincount(context.ball, x, count) for x in (found.pixels, found.pixels_shell)
         )
-        stops = _stops(view, found)
+        stops = _stops(context, found)
     return {
         "balls": [
             {
@@ -196,12 +211,12 @@ def rows(view: View, held: Held | None, found: Shown | None) -> dict[str, Any]:
     }
 
 
-def _stops(view: View, found: Shown) -> list[dict[str, Any]]:
-    stop = view.made.plan.stop[view.pictures]
+def _stops(context: PrototypeContext, found: BallViews) -> list[dict[str, Any]]:
+    stop = context.prototype.plan.stop[context.pictures]
     return [
         {
             "stop": number,
-            "base_angle_deg": _short(np.degrees(view.angle[stop == number][0])),
+            "base_angle_deg": _short(np.degrees(context.angle[stop == number][0])),
             "mirrors": int((stop == number).sum()),
             "coverage_mm": _short(found.coverage[stop == number].min()),
             "blocked": int(found.blocked[stop == number].sum()),
@@ -210,10 +225,10 @@ def _stops(view: View, found: Shown) -> list[dict[str, Any]]:
     ]
 
 
-def least_of_balls(view: View, coverage: Floats) -> Floats:
+def ball_coverage(context: PrototypeContext, coverage: Floats) -> Floats:
     """(K,) least coverage of the mirrors that each ball stands in for; inf: of none."""
-    least = np.full(len(view.made.balls), np.inf)
-    np.minimum.at(least, view.ball, coverage)
+    least = np.full(len(context.prototype.balls), np.inf)
+    np.minimum.at(least, context.ball, coverage)
     return least
 
 
@@ -222,7 +237,7 @@ def _some(ids: list[str], counts: Floats) -> str:
     return worst_offenders(ids, counts, "rays", worst, ".0f")
 
 
-def _files(bodies: list[Body], *roles: str) -> str:
+def _files(bodies: list[MeasuredPart], *roles: str) -> str:
     return ", ".join(one.part.stl for one in of_roles(bodies, *roles))
 
 
@@ -231,5 +246,5 @@ def _short(value: float) -> float | None:
     return None if known is None else round(known, DIGITS)
 
 
-def _known(held: Held | None) -> Held:
+def _known(held: MeasuredSeats | None) -> MeasuredSeats:
     return require(held, "the seats could not be measured")

@@ -9,14 +9,14 @@ from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export
 from tbcad_verify.report.checks import Check, Unknown, guarded
-from tbcad_verify.step.part_checks import UNITS, Lump, lump_checks
-from tbcad_verify.step.reading import StepFile, examine_all, load
+from tbcad_verify.step.part_checks import UNITS, PartComparison, comparison_checks
+from tbcad_verify.step.step_file import StepFile, examine_all, load
 
 AT_ONCE = 2  # processes, each with its share of the files
 CLAIM_SHARE = 1e-5
 
 
-def readings(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
+def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
     """The STEP files of a prototype's parts, or why one is not known, by part.
 
     Args:
@@ -39,7 +39,7 @@ def readings(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
     }
 
 
-def step_checks(
+def part_step_checks(
     export: Export, bulks: dict[str, MassProperties], found: dict[str, StepFile | Unknown]
 ) -> list[Check]:
     """All checks of the STEP files of a prototype's parts.
@@ -72,5 +72,5 @@ def _known(
 ) -> list[Check]:
     if isinstance(found, Unknown):
         raise found
-    lump = Lump(part.name, found, bulk, export.mesh_error_mm, CLAIM_SHARE)
-    return lump_checks(part.step, lump)
+    lump = PartComparison(part.name, found, bulk, export.mesh_error_mm, CLAIM_SHARE)
+    return comparison_checks(part.step, lump)

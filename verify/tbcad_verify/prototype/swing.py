@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.bodies import Body, of_roles
-from tbcad_verify.prototype.rig import Rig
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.report.checks import Check, at_least, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
@@ -34,7 +34,7 @@ CHECKS = {
 
 
 @dataclass(frozen=True)
-class Mover:
+class AxialSolid:
     """A solid, and how it lies about the axis.
 
     Attributes:
@@ -51,7 +51,7 @@ class Mover:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class PairSweep:
     """What one pair of a turning and a standing part comes to.
 
     Attributes:
@@ -71,22 +71,27 @@ class Sweep:
     blind: float
 
 
-def checks(made: Rig, bodies: list[Body], bought: list[tuple[str, Any]], files: str) -> list[Check]:
+def checks(
+    measured: MeasuredPrototype,
+    bodies: list[MeasuredPart],
+    bought: list[tuple[str, Any]],
+    files: str,
+) -> list[Check]:
     """Turn the base from end to end of its swing, and look whether parts fit at angle zero.
 
     Args:
-        made: the rig.
+        measured: the prototype.
         bodies: printed parts.
         bought: solids of purchased parts that stand still, by name.
         files: that all of this is from.
     """
     swing, clearance, looks, apart, balls = ((name, files, unit) for name, unit in CHECKS.items())
-    turning = [(one.part.name, one.needed) for one in of_roles(bodies, "base", "cap")]
-    standing = [(one.part.name, one.needed) for one in of_roles(bodies, "stage", "frame")]
-    moving = [_mover(made, name, solid_of(mesh)) for name, mesh in turning] + _balls(made)
+    turning = [(one.part.name, one.placed_mesh) for one in of_roles(bodies, "base", "cap")]
+    standing = [(one.part.name, one.placed_mesh) for one in of_roles(bodies, "stage", "frame")]
+    moving = [_mover(measured, name, solid_of(mesh)) for name, mesh in turning] + _balls(measured)
     solids = [(name, solid_of(mesh)) for name, mesh in standing]
-    still = [_mover(made, name, solid) for name, solid in [*solids, *bought]]
-    found = [sweep(made, one, two) for one in moving for two in still]
+    still = [_mover(measured, name, solid) for name, solid in [*solids, *bought]]
+    found = [sweep(measured, one, two) for one in moving for two in still]
     volume = max((one.volume for one in found), default=0.0)
     least = min(found, key=lambda one: one.gap, default=None)
     hits = [
@@ -100,11 +105,11 @@ def checks(made: Rig, bodies: list[Body], bought: list[tuple[str, Any]], files: 
         informative(clearance, least.gap if least else SEARCH_MM, _nearest(least)),
         informative(looks, sum(one.looks for one in found), _how(found)),
         _apart(apart, [turning, standing]),
-        _room(balls, made),
+        _room(balls, measured),
     ]
 
 
-def sweep(made: Rig, moving: Mover, still: Mover) -> Sweep:
+def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> PairSweep:
     """Turn one solid past another, each step no larger than their distance allows.
 
     What comes to touch lies no farther from the axis than either of both: no point of it moves
@@ -112,21 +117,21 @@ def sweep(made: Rig, moving: Mover, still: Mover) -> Sweep:
     distances from the axis and along it keep both apart, one look does.
 
     Args:
-        made: the rig; its swing and its axis.
+        measured: the prototype; its swing and its axis.
         moving: at angle zero.
         still: what stands.
     """
-    low, high = np.radians(made.view.made.swing)
+    low, high = np.radians(measured.context.prototype.swing)
     lever = max(min(moving.reach, still.reach), 1e-9)
     apart = _apart_anyhow(moving, still)
     at, looks, blind = float(low), 0, 0.0
     worst, where, gap = 0.0, float(low), min(SEARCH_MM, apart) if apart >= CLEAR_MM else SEARCH_MM
     while True:
-        solid = moving.solid.transform(_turn(made, at))
+        solid = moving.solid.transform(_turn(measured, at))
         shared = float((solid ^ still.solid).volume())
         looks += 1
         if apart >= CLEAR_MM:
-            return Sweep((moving.name, still.name), shared, gap, at, looks, 0.0)
+            return PairSweep((moving.name, still.name), shared, gap, at, looks, 0.0)
         away = float(solid.min_gap(still.solid, SEARCH_MM))
         if shared > worst or (worst == 0 and away < gap):
             where = at
@@ -136,17 +141,17 @@ def sweep(made: Rig, moving: Mover, still: Mover) -> Sweep:
         step = max(away / lever, LEAST_RAD)
         blind = max(blind, min(step, high - at) - away / lever)
         at = min(at + step, float(high))
-    return Sweep((moving.name, still.name), worst, gap, where, looks, max(blind, 0.0))
+    return PairSweep((moving.name, still.name), worst, gap, where, looks, max(blind, 0.0))
 
 
-def _mover(made: Rig, name: str, solid: Any) -> Mover:
+def _mover(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSolid:
     points = solid.refine_to_length(GRAIN_MM).to_mesh64().vert_properties[:, :3]
-    along = points @ made.view.frame[0]
-    out = np.linalg.norm(np.cross(points, made.view.frame[0]), axis=1)
-    return Mover(name, solid, float(out.max(initial=0)), np.stack([along, out], axis=1))
+    along = points @ measured.context.frame[0]
+    out = np.linalg.norm(np.cross(points, measured.context.frame[0]), axis=1)
+    return AxialSolid(name, solid, float(out.max(initial=0)), np.stack([along, out], axis=1))
 
 
-def _apart_anyhow(one: Mover, two: Mover) -> float:
+def _apart_anyhow(one: AxialSolid, two: AxialSolid) -> float:
     """Distance that two solids keep however they are turned about the axis, mm; may be negative.
 
     No point of a facet is farther from a corner than 1/sqrt(3) of its longest edge.
@@ -163,28 +168,30 @@ def solid_of(mesh: Mesh) -> Any:
     return manifold3d.Manifold(manifold3d.Mesh64(points, mesh.faces.astype(np.uint64)))
 
 
-def _balls(made: Rig) -> list[Mover]:
+def _balls(measured: MeasuredPrototype) -> list[AxialSolid]:
     """All bought balls as one body of polyhedra that hold them."""
     import manifold3d
 
-    which = np.flatnonzero(~made.view.made.balls.cap)
+    which = np.flatnonzero(~measured.context.prototype.balls.cap)
     if not which.size:
         return []
     grown = 1 / np.cos(np.pi / CORNERS) ** 2
     solids = [
-        manifold3d.Manifold.sphere(grown * made.body_radius[k], CORNERS).translate(made.body[:, k])
+        manifold3d.Manifold.sphere(grown * measured.body_radius[k], CORNERS).translate(
+            measured.body[:, k]
+        )
         for k in which.tolist()
     ]
-    return [_mover(made, "the balls", manifold3d.Manifold.compose(solids))]
+    return [_mover(measured, "the balls", manifold3d.Manifold.compose(solids))]
 
 
-def _turn(made: Rig, angle: float) -> Floats:
+def _turn(measured: MeasuredPrototype, angle: float) -> Floats:
     """(3, 4) the base's turn by an angle."""
-    turned = axis.turned(np.eye(3), made.view.frame[0][:, None], np.array(angle))
+    turned = axis.turned(np.eye(3), measured.context.frame[0][:, None], np.array(angle))
     return np.hstack([turned, np.zeros((3, 1))])
 
 
-def _nearest(least: Sweep | None) -> str:
+def _nearest(least: PairSweep | None) -> str:
     if least is None:
         return "nothing stands beside the base"
     if least.gap >= SEARCH_MM:
@@ -192,7 +199,7 @@ def _nearest(least: Sweep | None) -> str:
     return f"{least.names[0]} to {least.names[1]} at {np.degrees(least.at):.1f} deg"
 
 
-def _how(found: list[Sweep]) -> str:
+def _how(found: list[PairSweep]) -> str:
     blind = [one for one in found if one.blind > 0]
     if not blind:
         return "no step turns farther than the parts are apart"
@@ -213,12 +220,12 @@ def _apart(name: tuple[str, str, str], groups: list[list[tuple[str, Mesh]]]) -> 
     return at_most(name, most, CONTACT_MM3, f"share room: {short_list(said)}")
 
 
-def _room(name: tuple[str, str, str], made: Rig) -> Check:
+def _room(name: tuple[str, str, str], measured: MeasuredPrototype) -> Check:
     """Least distance between two balls, or caps' bodies."""
-    k = np.arange(made.body_radius.size)
+    k = np.arange(measured.body_radius.size)
     one, two = (index.ravel() for index in np.meshgrid(k, k, indexing="ij"))
-    away = np.linalg.norm(made.body[:, one] - made.body[:, two], axis=0)
-    away = np.where(one < two, away - made.body_radius[one] - made.body_radius[two], np.inf)
+    away = np.linalg.norm(measured.body[:, one] - measured.body[:, two], axis=0)
+    away = np.where(one < two, away - measured.body_radius[one] - measured.body_radius[two], np.inf)
     worst = int(away.argmin())
     least = float(min(away[worst], 1e3))
     return at_least(name, least, 0, f"balls {one[worst] + 1} and {two[worst] + 1} overlap")

@@ -11,12 +11,12 @@ from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_f
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
-from tbcad_verify.printing.assess import assess, print_name, to_row
-from tbcad_verify.printing.assess import checks as printing_checks
+from tbcad_verify.printing.assessment import assess, print_name, to_row
+from tbcad_verify.printing.assessment import checks as printing_checks
+from tbcad_verify.printing.part_measures import measure
 from tbcad_verify.printing.profile import Profile, built_in, load
-from tbcad_verify.printing.shape import measure
 from tbcad_verify.prototype import stages as machine
-from tbcad_verify.prototype.bodies import Body
+from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export, Part, read_export
@@ -99,7 +99,7 @@ def run_stages(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) ->
     if export.parts:
         _optics(export, solids, taker)
     if export.prototype:
-        bodies = machine.prove(export, export.prototype, others, taker)
+        bodies = machine.verify_prototype(export, export.prototype, others, taker)
         taker.stage(machine.PRINTING)
         for body in bodies:
             _printing(body.part, body, profiles, bool(printers), taker)
@@ -107,7 +107,7 @@ def run_stages(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) ->
 
 def _printing(
     part: Part | Printed,
-    solid: Solid | Body,
+    solid: Solid | MeasuredPart,
     profiles: list[Profile],
     wanted: bool,
     taker: ResultSink,

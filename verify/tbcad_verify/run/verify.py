@@ -11,7 +11,7 @@ from pathlib import Path
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.printing.profile import load
-from tbcad_verify.programs import Wanted, client_checks
+from tbcad_verify.programs import ExpectedPart, check_with_programs
 from tbcad_verify.prototype import step_files
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.prototype_record import Printed
@@ -21,7 +21,7 @@ from tbcad_verify.report.report import Report, findings
 from tbcad_verify.run.results import Results
 from tbcad_verify.run.stages import run_stages, stages
 from tbcad_verify.run.watch import SECONDS, watched, worker
-from tbcad_verify.step.checks import step_checks
+from tbcad_verify.step.shell_checks import shell_step_checks
 
 SUMMED = 1e-3  # of a volume: what programs lose that add up in float32
 Stamps = dict[str, tuple[int, ...]]
@@ -68,17 +68,17 @@ def verify(
     results = Results(progress)
     with ThreadPoolExecutor(1) as pool:
         # Processes of their own, which need nothing from all that comes before their checks.
-        early = pool.submit(step_files.readings, export, wishes.seconds)
+        early = pool.submit(step_files.read_step_files, export, wishes.seconds)
         if wishes.apart:
             watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
         else:
             run_stages(export.folder, results, wishes.printers)
         if any(part.step for part in export.parts):
             results.stage("STEP")
-            results.checks(step_checks(export, results.bulks, wishes.seconds))
+            results.checks(shell_step_checks(export, results.bulks, wishes.seconds))
         if export.prototype and any(part.step for part in export.prototype.parts):
             results.stage("STEP of the prototype")
-            results.checks(step_files.step_checks(export, results.bulks, early.result()))
+            results.checks(step_files.part_step_checks(export, results.bulks, early.result()))
     programs = _programs(export, results, wishes.seconds) if wishes.clients else []
     _refuse_changes(export, before)
     report = Report(
@@ -110,14 +110,14 @@ def _programs(export: Export, results: Results, seconds: float) -> list[Check]:
     wanted = [_wanted(export, part, results.bulks.get(part.name)) for part in export.parts]
     for part in export.prototype.parts if export.prototype else ():
         wanted.append(_printed(export, part, results.bulks.get(part.name)))
-    return client_checks(export.folder, wanted, seconds, results.stage)
+    return check_with_programs(export.folder, wanted, seconds, results.stage)
 
 
-def _wanted(export: Export, part: Part, bulk: MassProperties | None) -> Wanted:
+def _wanted(export: Export, part: Part, bulk: MassProperties | None) -> ExpectedPart:
     """What other programs should find in a part's files."""
     mirrors = export.rows.camera == part.camera
     volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
-    return Wanted(
+    return ExpectedPart(
         part.name,
         {"step": part.step, "stl": part.stl, "3mf": part.threemf},
         int((mirrors & ~export.rows.flat).sum()),
@@ -126,10 +126,10 @@ def _wanted(export: Export, part: Part, bulk: MassProperties | None) -> Wanted:
     )
 
 
-def _printed(export: Export, part: Printed, bulk: MassProperties | None) -> Wanted:
+def _printed(export: Export, part: Printed, bulk: MassProperties | None) -> ExpectedPart:
     """The same of a prototype's part, whose spherical faces nobody counts."""
     volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
-    return Wanted(
+    return ExpectedPart(
         part.name,
         {"step": part.step, "stl": part.stl, "3mf": part.threemf},
         None,

@@ -10,7 +10,7 @@ import numpy as np
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded, short_list
-from tbcad_verify.step.reading import StepFile
+from tbcad_verify.step.step_file import StepFile
 
 GAP_MM = 1e-5  # a hundred times the kernel's own precision
 CLAIM_SHARE = 1e-6  # of what the file claims
@@ -27,7 +27,7 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Lump:
+class PartComparison:
     """One part's STEP file and the mesh that it is held against.
 
     Attributes:
@@ -46,10 +46,10 @@ class Lump:
     claim: float = CLAIM_SHARE
 
 
-Job = Callable[[CheckName, Lump], Check]
+Job = Callable[[CheckName, PartComparison], Check]
 
 
-def lump_checks(file: str, lump: Lump) -> list[Check]:
+def comparison_checks(file: str, lump: PartComparison) -> list[Check]:
     """All checks of one file, each guarded; `file` is its name in the report."""
     names = [(name, file, unit) for name, unit in UNITS.items()]
     return [
@@ -59,11 +59,11 @@ def lump_checks(file: str, lump: Lump) -> list[Check]:
     ]
 
 
-def _one(job: Job, name: CheckName, lump: Lump) -> list[Check]:
+def _one(job: Job, name: CheckName, lump: PartComparison) -> list[Check]:
     return [job(name, lump)]
 
 
-def solid(name: CheckName, lump: Lump) -> Check:
+def solid(name: CheckName, lump: PartComparison) -> Check:
     """One solid of one closed shell, with the part's name."""
     counts, named = lump.file.counts, lump.file.solids
     faults = abs(counts["solids"] - 1) + abs(counts["shells"] - 1) + counts["open_edges"]
@@ -72,17 +72,17 @@ def solid(name: CheckName, lump: Lump) -> Check:
     return at_most(name, faults + odd, 0, f"{said}; named {short_list(named)}, not {lump.name}")
 
 
-def valid(name: CheckName, lump: Lump) -> Check:
+def valid(name: CheckName, lump: PartComparison) -> Check:
     """The kernel's own check accepts the shape."""
     return at_most(name, int(not lump.file.valid), 0, "the kernel's check refuses the shape")
 
 
-def gaps(name: CheckName, lump: Lump) -> Check:
+def gaps(name: CheckName, lump: PartComparison) -> Check:
     """Corners lie on their edges and edges on their faces, before a reader widens them."""
     return at_most(name, lump.file.gap, GAP_MM, "corners, edges and faces do not meet")
 
 
-def volume(name: CheckName, lump: Lump) -> Check:
+def volume(name: CheckName, lump: PartComparison) -> Check:
     """The mesh's, as far as it may be off."""
     mesh, solid = _bulks(lump)
     return at_most(
@@ -93,7 +93,7 @@ def volume(name: CheckName, lump: Lump) -> Check:
     )
 
 
-def area(name: CheckName, lump: Lump) -> Check:
+def area(name: CheckName, lump: PartComparison) -> Check:
     """Facets off by h from a surface of radius r lose some 2 h / r of its area.
 
     Where the mesh's bend is known, that says more: no surface within h differs by more than it.
@@ -107,7 +107,7 @@ def area(name: CheckName, lump: Lump) -> Check:
     return at_most(name, abs(mesh.area - solid.area), limit, detail)
 
 
-def centroid(name: CheckName, lump: Lump) -> Check:
+def centroid(name: CheckName, lump: PartComparison) -> Check:
     """A layer of the mesh's error all on one side moves the middle by its share of the volume."""
     mesh, solid = _bulks(lump)
     wide = float(np.linalg.norm(np.subtract(solid.high, solid.low))) / 2
@@ -116,7 +116,7 @@ def centroid(name: CheckName, lump: Lump) -> Check:
     return at_most(name, away, wide * solid.area * lump.off / solid.volume, detail)
 
 
-def box(name: CheckName, lump: Lump) -> Check:
+def box(name: CheckName, lump: PartComparison) -> Check:
     """Reaches as far as the mesh, on all six sides."""
     mesh, solid = _bulks(lump)
     away = np.abs(np.subtract([mesh.low, mesh.high], [solid.low, solid.high])).max()
@@ -127,7 +127,7 @@ def box(name: CheckName, lump: Lump) -> Check:
     return at_most(name, float(away), lump.off, detail)
 
 
-def properties(name: CheckName, lump: Lump) -> Check:
+def properties(name: CheckName, lump: PartComparison) -> Check:
     """The file's own claims, so that any reader can tell whether it has read what was written."""
     claims, solid = lump.file.properties, lump.file.bulk
     if set(claims) != {"volume", "area", "centroid"}:
@@ -143,7 +143,7 @@ def properties(name: CheckName, lump: Lump) -> Check:
     return at_most(name, max(shares), lump.claim, detail)
 
 
-def _bulks(lump: Lump) -> tuple[MassProperties, MassProperties]:
+def _bulks(lump: PartComparison) -> tuple[MassProperties, MassProperties]:
     if lump.bulk is None:
         raise Unknown("the mesh could not be measured")
     return lump.bulk, lump.file.bulk

@@ -8,9 +8,9 @@ import numpy as np
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, distances_to_planes, first_hits, in_threads
 from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
-from tbcad_verify.prototype.nearest import to_segments
-from tbcad_verify.prototype.rig import Obstacles, Rig, to_ground
-from tbcad_verify.prototype.trace import Trace, nearest
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, Obstacles, to_ground
+from tbcad_verify.prototype.ray_transfer import RayTransfer, nearest_to_origin
+from tbcad_verify.prototype.triangle_distances import to_segments
 from tbcad_verify.types import Bools, Floats, Ints
 
 LIFT_MM = 1e-3
@@ -20,23 +20,23 @@ GRAZE_MM = 0.01
 SKIN_MM = 0.1
 
 
-def blocked(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, tuple[str, ...]]:
+def blocked_rays(transfer: RayTransfer, mirror: Ints, d: Floats) -> tuple[Bools, tuple[str, ...]]:
     """Which rays do not get from the pinhole by their ball to the capture sphere, and why."""
     parts = list(chunks(mirror.size, RAYS_A_CHUNK))
-    found = in_threads(lambda part: _stopped(made, mirror[part], d[:, part]), parts)
+    found = in_threads(lambda part: _stopped(transfer, mirror[part], d[:, part]), parts)
     names = sorted({name for _, said in found for name in said})
     return np.concatenate([stopped for stopped, _ in found]), tuple(names)
 
 
-def _stopped(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, set[str]]:
-    rig, view = made.rig, made.rig.view
+def _stopped(transfer: RayTransfer, mirror: Ints, d: Floats) -> tuple[Bools, set[str]]:
+    measured, context = transfer.measured, transfer.measured.context
     names: set[str] = set()
-    way, lines = made.lines(mirror, d)
-    ball, angle = made.ball[mirror], made.angle[mirror]
-    start = np.broadcast_to(view.pinhole[:, None], way.shape)
+    way, lines = transfer.lines(mirror, d)
+    ball, angle = transfer.ball[mirror], transfer.angle[mirror]
+    start = np.broadcast_to(context.pinhole[:, None], way.shape)
     toward = unit(lines.toward)
-    at = nearest(lines)
-    depth = np.sqrt(np.maximum((view.radius + GRAZE_MM) ** 2 - norm(at) ** 2, 0))
+    at = nearest_to_origin(lines)
+    depth = np.sqrt(np.maximum((context.radius + GRAZE_MM) ** 2 - norm(at) ** 2, 0))
     from_ball = lines.point + LIFT_MM * toward
     goal = norm(at - from_ball) - depth
     stopped = np.zeros(mirror.size, dtype=np.bool_)
@@ -46,24 +46,26 @@ def _stopped(made: Trace, mirror: Ints, d: Floats) -> tuple[Bools, set[str]]:
             names.add(name)
         np.logical_or(stopped, bad, out=stopped)
 
-    count(~_on(rig, ball, lines.point), "nothing (beside the ball)")
+    count(~_on(measured, ball, lines.point), "nothing (beside the ball)")
     to_ball = norm(lines.point - start)
     legs = ((start, unit(way), to_ball - SKIN_MM), (from_ball, toward, goal))
-    count(to_segments(np.zeros_like(start), start, lines.point) < view.radius, "the capture sphere")
+    count(
+        to_segments(np.zeros_like(start), start, lines.point) < context.radius, "the capture sphere"
+    )
     for origin, along, length in legs:
-        for k in range(rig.body_radius.size):
-            bad = _meets(rig.body[:, k], rig.body_radius[k], origin, along, length)
+        for k in range(measured.body_radius.size):
+            bad = _meets(measured.body[:, k], measured.body_radius[k], origin, along, length)
             count(bad & (ball != k), f"ball {k + 1}")
-        _parts(rig.turning, origin, along, length, count)
-        ground = [to_ground(view, x, angle) for x in (origin, along)]
-        _parts(rig.standing, ground[0], ground[1], length, count)
+        _parts(measured.turning, origin, along, length, count)
+        ground = [to_ground(context, x, angle) for x in (origin, along)]
+        _parts(measured.standing, ground[0], ground[1], length, count)
     return stopped, names
 
 
-def _on(made: Rig, ball: Ints, point: Floats) -> Bools:
+def _on(measured: MeasuredPrototype, ball: Ints, point: Floats) -> Bools:
     """(N,) whether points on reflecting spheres are on the balls that there are."""
-    away = norm(point - made.body[:, ball])
-    return np.asarray(away <= made.body_radius[ball] + LIFT_MM)
+    away = norm(point - measured.body[:, ball])
+    return np.asarray(away <= measured.body_radius[ball] + LIFT_MM)
 
 
 def _meets(centre: Floats, radius: float, origin: Floats, along: Floats, length: Floats) -> Bools:

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 from tbcad_verify.types import Floats
 
 
-def turn(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
+def best_turn(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
     """The best turn, and the sides of the box then.
 
     The least of the enclosing rectangles that fit; if none of those with a side along an edge

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from tbcad_verify.record.mirrors import from_json
 from tbcad_verify.record.record import Camera, Export, read_export
-from tbcad_verify.step.union import Cells, cells, of_balls, of_export
+from tbcad_verify.step.sphere_union import (
+    ClosedFormCells,
+    cells_of_balls,
+    cells_of_export,
+    closed_form_cells,
+)
 from tbcad_verify.types import Floats
 
 from tbcad.mirrors.array import Design, design
@@ -28,13 +33,13 @@ NO_WALLS = np.zeros((0, 4))
 PI = np.pi
 
 
-def balls(*rows: tuple[float, float, float, float], walls: Floats = NO_WALLS) -> Cells:
+def balls(*rows: tuple[float, float, float, float], walls: Floats = NO_WALLS) -> ClosedFormCells:
     table = np.array(rows)
-    return of_balls(table[:, :3], table[:, 3], walls)
+    return cells_of_balls(table[:, :3], table[:, 3], walls)
 
 
-def planes(normal: Floats, point: Floats, walls: Floats = NO_WALLS) -> Cells:
-    return cells(point, normal, np.zeros(len(point)), walls)
+def planes(normal: Floats, point: Floats, walls: Floats = NO_WALLS) -> ClosedFormCells:
+    return closed_form_cells(point, normal, np.zeros(len(point)), walls)
 
 
 # Closed forms
@@ -158,7 +163,9 @@ def test_the_inside_of_a_box_of_planes() -> None:
 def test_a_plane_round_a_ball() -> None:
     sides = np.array([[1.0, 0, 0, -2], [-1, 0, 0, -2], [0, 1, 0, -2], [0, -1, 0, -2]])
     up = np.array([[0, 0, 1.0], [0, 0, 1]])
-    it = cells(np.array([[0.5, 0, 0], [0.5, 0, 1.5]]), up, np.array([0, 1.0]), sides, front=False)
+    it = closed_form_cells(
+        np.array([[0.5, 0, 0], [0.5, 0, 1.5]]), up, np.array([0, 1.0]), sides, front=False
+    )
     np.testing.assert_allclose(it.area, [16 - 0.75 * PI, 3 * PI], rtol=1e-13)
     np.testing.assert_allclose(it.vector_area[:, 2], [16 - 0.75 * PI, 0.75 * PI], rtol=1e-13)
     assert it.volume.sum() == pytest.approx(PI / 3 * 1.5**2 * 1.5, rel=1e-13)
@@ -172,7 +179,7 @@ def test_nearly_flat_balls_become_planes() -> None:
     inward = -np.concatenate([np.eye(3), -np.eye(3)])
     flat = planes(inward, -inward)
     for k in (1e-3, 1e-6, 1e-9, 1e-12):
-        it = cells(-inward, inward, np.full(6, k), NO_WALLS)
+        it = closed_form_cells(-inward, inward, np.full(6, k), NO_WALLS)
         np.testing.assert_allclose(it.area, flat.area, rtol=3 * k + 1e-14)
         np.testing.assert_allclose(it.moment, flat.moment, atol=5 * k + 1e-13)
         assert it.closed.all()
@@ -201,7 +208,7 @@ def uncovered(table: Floats, walls: Floats, x: Floats, own: int | None) -> NDArr
 def test_samples_on_the_balls(seed: int) -> None:
     table = random_balls(seed, 2 + 4 * seed)
     walls = np.array([[1.0, 0, 0, -0.6], [0.0, 0.6, 0.8, -0.7]])[: seed % 3]
-    it = of_balls(table[:, :3], table[:, 3], walls)
+    it = cells_of_balls(table[:, :3], table[:, 3], walls)
     rng, count = np.random.default_rng(99), 40_000
     for k, ball in enumerate(table):
         n = rng.normal(size=(count, 3))
@@ -223,7 +230,7 @@ def test_samples_on_the_balls(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_volume_and_centroid_of_a_union(seed: int) -> None:
     table = random_balls(seed + 50, 2 + 3 * seed)
-    it = of_balls(table[:, :3], table[:, 3], NO_WALLS)
+    it = cells_of_balls(table[:, :3], table[:, 3], NO_WALLS)
     low, high = (table[:, :3] - table[:, 3:]).min(axis=0), (table[:, :3] + table[:, 3:]).max(axis=0)
     x = np.random.default_rng(7).uniform(low, high, (200_000, 3))
     held = ~uncovered(table, NO_WALLS, x, None)[:, None] * np.prod(high - low)
@@ -251,11 +258,11 @@ def test_motions_scale_and_order(seed: int, count: int, scale: float) -> None:
     rng = np.random.default_rng(seed + 1)
     q, shift, order = turn(rng), rng.normal(size=3), rng.permutation(count)
     wall = np.array([[*rng.normal(size=3), -0.5]])
-    one = of_balls(table[:, :3], table[:, 3], wall)
+    one = cells_of_balls(table[:, :3], table[:, 3], wall)
     moved = np.hstack([wall[:, :3] @ q.T, wall[:, 3:] + wall[:, :3] @ q.T @ shift])
     moved[:, 3] *= scale
     centre = scale * (table[order, :3] @ q.T + shift)
-    two = of_balls(centre, scale * table[order, 3], moved)
+    two = cells_of_balls(centre, scale * table[order, 3], moved)
     close = {"rtol": 1e-8, "atol": 1e-8}
     np.testing.assert_allclose(two.area / scale**2, one.area[order], **close)
     np.testing.assert_allclose(two.vector_area / scale**2, one.vector_area[order] @ q.T, **close)
@@ -273,8 +280,8 @@ def test_what_is_enclosed_moves_along(seed: int) -> None:
     """Volume and centroid of a union move with it; every integral takes part in that."""
     table = random_balls(seed, 12)
     shift = np.array([7.0, -5, 3])
-    one = of_balls(table[:, :3], table[:, 3], NO_WALLS)
-    two = of_balls(table[:, :3] + shift, table[:, 3], NO_WALLS)
+    one = cells_of_balls(table[:, :3], table[:, 3], NO_WALLS)
+    two = cells_of_balls(table[:, :3] + shift, table[:, 3], NO_WALLS)
     volume = one.volume.sum()
     assert two.volume.sum() == pytest.approx(volume, rel=1e-12)
     moved = one.moment.sum(axis=0) + volume * shift
@@ -299,7 +306,7 @@ def test_of_a_ball_recorded_twice_the_first_stays() -> None:
 
 def test_no_mirror_at_all() -> None:
     none = np.zeros((0, 3))
-    assert len(cells(none, none, np.zeros(0), np.eye(3, 4))) == 0
+    assert len(closed_form_cells(none, none, np.zeros(0), np.eye(3, 4))) == 0
 
 
 def test_two_balls_that_cover_a_third_together() -> None:
@@ -310,7 +317,7 @@ def test_two_balls_that_cover_a_third_together() -> None:
 def test_a_mirror_without_neighbours_is_open() -> None:
     up = np.array([[0, 0, 1.0]])
     for k in (0.0, 0.1):
-        it = cells(up, up, np.array([k]), NO_WALLS)
+        it = closed_form_cells(up, up, np.array([k]), NO_WALLS)
         assert (it.closed, it.empty) == (False, False)
 
 
@@ -322,7 +329,10 @@ def test_what_comes_out_behind_the_neighbours_is_not_the_mirror() -> None:
     up = np.tile([0, 0, 1.0], (7, 1))
     point = np.vstack([np.zeros(3), small + 3 * up[1:]])
     k = 1 / np.array([20.0, *([3.0] * 6)])
-    front, all_ = cells(point, up, k, NO_WALLS), cells(point, up, k, NO_WALLS, front=False)
+    front, all_ = (
+        closed_form_cells(point, up, k, NO_WALLS),
+        closed_form_cells(point, up, k, NO_WALLS, front=False),
+    )
     assert front.closed[0]
     assert all_.area[0] > 1000
     assert front.area[0] < 20
@@ -334,8 +344,8 @@ def test_a_small_ball_makes_a_hole() -> None:
     up = np.array([[0, 0, 1.0], [0, 0, 1]])
     walls = np.array([[1.0, 0, 0, -3], [-1, 0, 0, -3], [0, 1, 0, -3], [0, -1, 0, -3]])
     k = np.array([0.1, 1.0])
-    hole = cells(np.array([[0, 0, 0], [1.0, 0, 0.2]]), up, k, walls)
-    bare = cells(np.array([[0, 0, 0.0]]), up[:1], k[:1], walls)
+    hole = closed_form_cells(np.array([[0, 0, 0], [1.0, 0, 0.2]]), up, k, walls)
+    bare = closed_form_cells(np.array([[0, 0, 0.0]]), up[:1], k[:1], walls)
     assert (hole.corners[0], hole.edges[0], hole.closed[0]) == (4, 5, True)
     d = np.hypot(1, 9.2)
     plane = (d * d + 100 - 1) / (2 * d)
@@ -383,7 +393,7 @@ def recorded(export: Export, camera: str) -> Floats:
 @pytest.mark.parametrize("camera", ["a", "b"])
 def test_area_as_recorded(name: str, camera: str) -> None:
     export = as_export(made(name))
-    it = of_export(export, camera, coated=True)
+    it = cells_of_export(export, camera, coated=True)
     np.testing.assert_allclose(it.area, recorded(export, camera), rtol=1e-11)
     assert it.closed.all()
     assert not it.empty.any()
@@ -392,20 +402,20 @@ def test_area_as_recorded(name: str, camera: str) -> None:
 def test_area_as_recorded_in_the_sample() -> None:
     export = read_export(SAMPLE)
     for camera in ("a", "b"):
-        area = of_export(export, camera).area
+        area = cells_of_export(export, camera).area
         np.testing.assert_allclose(area, recorded(export, camera), rtol=1e-11)
 
 
 def test_area_under_the_coat() -> None:
     """The record's area is the reflecting surface's, not the solid's."""
     it = made("coat")
-    bare = of_export(as_export(it), "a")
+    bare = cells_of_export(as_export(it), "a")
     np.testing.assert_allclose(bare.area, cell_areas(it.halves[0].body), rtol=1e-11)
     assert np.abs(bare.area / it.halves[0].area - 1).max() > 1e-3
 
 
 def test_the_halves_mirror_each_other() -> None:
-    a, b = (of_export(as_export(made("n=18")), camera) for camera in "ab")
+    a, b = (cells_of_export(as_export(made("n=18")), camera) for camera in "ab")
     flip = np.array([-1.0, 1, 1])
     np.testing.assert_allclose(a.area, b.area, rtol=1e-12)
     np.testing.assert_allclose(a.vector_area, b.vector_area * flip, rtol=1e-9, atol=1e-9)
@@ -416,7 +426,7 @@ def test_the_halves_mirror_each_other() -> None:
 @pytest.mark.parametrize("name", ["n=4", "n=6", "n=18"])
 def test_euler(name: str) -> None:
     """All cells together are a disc: each edge that is not on a wall is there twice."""
-    it = of_export(as_export(made(name)), "a")
+    it = cells_of_export(as_export(made(name)), "a")
     count = len(it)
     inner = it.rim.other < count
     pair = np.sort(np.stack([it.rim.mirror, it.rim.other])[:, inner], axis=0)
@@ -426,7 +436,7 @@ def test_euler(name: str) -> None:
     assert len(np.unique(ends, axis=0)) - edges + count == 1
 
 
-def gauss_bonnet(it: Cells, centre: Floats, radius: Floats) -> Floats:
+def gauss_bonnet(it: ClosedFormCells, centre: Floats, radius: Floats) -> Floats:
     """(M,) areas of cells with one loop each: r^2 (2 pi - all turning along the boundary)."""
     turning = np.full(len(it), 2 * PI)
     own = it.rim.mirror
@@ -456,7 +466,7 @@ def gauss_bonnet(it: Cells, centre: Floats, radius: Floats) -> Floats:
 @pytest.mark.parametrize("name", ["n=4", "n=6", "n=18"])
 def test_gauss_and_bonnet(name: str) -> None:
     export = as_export(made(name))
-    it = of_export(export, "a")
+    it = cells_of_export(export, "a")
     mine = export.rows.camera == "a"
     centre = export.rows.columns("cx", 3).T[mine]
     radius = export.rows.columns("radius_mm")[0][mine]
@@ -466,7 +476,7 @@ def test_gauss_and_bonnet(name: str) -> None:
 def test_samples_on_a_real_cell() -> None:
     """Corners and points of edges lie on their mirror, in no other ball, beyond no wall."""
     export = as_export(made("n=18"))
-    it = of_export(export, "a")
+    it = cells_of_export(export, "a")
     mine = export.rows.camera == "a"
     centre = export.rows.columns("cx", 3).T[mine]
     radius = export.rows.columns("radius_mm")[0][mine]

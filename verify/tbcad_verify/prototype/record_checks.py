@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype_record import BALL_COLUMNS, BALLS, RECORD, Balls
 from tbcad_verify.record.prototype_tables import number_in
@@ -30,18 +30,18 @@ CHECKS = (
 )
 
 
-def checks(view: View) -> list[Check]:
+def checks(context: PrototypeContext) -> list[Check]:
     """Tables agree, the frame is the camera's, and every ball stands where it must."""
     work = (_agree, _asked, _places, _sizes)
     return [
         check
         for name, job in zip(CHECKS, work, strict=True)
-        for check in guarded([name], lambda name=name, job=job: [job(name, view)])  # type: ignore[misc]
+        for check in guarded([name], lambda name=name, job=job: [job(name, context)])  # type: ignore[misc]
     ]
 
 
-def _agree(name: CheckName, view: View) -> Check:
-    balls, rows = view.made.balls, view.made.ball_rows
+def _agree(name: CheckName, context: PrototypeContext) -> Check:
+    balls, rows = context.prototype.balls, context.prototype.ball_rows
     if len(rows) != len(balls):
         return at_most(name, abs(len(rows) - len(balls)) * len(BALL_COLUMNS), 0, "rows are missing")
     odd = [
@@ -60,24 +60,24 @@ def _same(cell: str, value: object) -> bool:
     return number_in(cell) == value
 
 
-def _asked(name: CheckName, view: View) -> Check:
+def _asked(name: CheckName, context: PrototypeContext) -> Check:
     """Target and frame, against the design that the export carries."""
-    made, export = view.made, view.export
+    prototype, export = context.prototype, context.export
     wanted = {
-        "target_mm": abs(made.target_mm - export.target_mm),
-        "frame": float(np.abs(made.frame - view.frame).max()),
-        "seats": float(np.abs(np.linalg.norm(made.seats.axis, axis=-1) - 1).max()),
-        "pads": float(np.abs(np.linalg.norm(made.seats.normals, axis=-1) - 1).max()),
+        "target_mm": abs(prototype.target_mm - export.target_mm),
+        "frame": float(np.abs(prototype.frame - context.frame).max()),
+        "seats": float(np.abs(np.linalg.norm(prototype.seats.axis, axis=-1) - 1).max()),
+        "pads": float(np.abs(np.linalg.norm(prototype.seats.normals, axis=-1) - 1).max()),
     }
     spec = export.spec.get("prototype")
     if isinstance(spec, dict) and "picture" in spec:
-        wanted["picture"] = float((spec["picture"] == "moved") != made.moved)
+        wanted["picture"] = float((spec["picture"] == "moved") != prototype.moved)
     odd = sorted(what for what, away in wanted.items() if not away <= ANGLE)
     return at_most(name, len(odd), 0, f"not as designed: {short_list(odd)}")
 
 
-def _places(name: CheckName, view: View) -> Check:
-    errors = place_errors(view)
+def _places(name: CheckName, context: PrototypeContext) -> Check:
+    errors = position_errors(context)
     worst = np.argsort(-errors, kind="stable")
     worst = worst[~(errors[worst] <= POSE_MM)]
     return at_most(
@@ -86,22 +86,22 @@ def _places(name: CheckName, view: View) -> Check:
         POSE_MM,
         "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
         + worst_offenders(
-            view.made.balls.names(np.arange(errors.size)), errors, "mm", worst, ".3g"
+            context.prototype.balls.names(np.arange(errors.size)), errors, "mm", worst, ".3g"
         ),
     )
 
 
-def place_errors(view: View) -> Floats:
+def position_errors(context: PrototypeContext) -> Floats:
     """(K,) largest deviation of each ball from the design, mm; angles as lengths at 1 mm.
 
     Checked: the apex lies on the ellipsoid, at the recorded polar angle and azimuth; the normal
     is unit and bisects the ways to both foci; the reflecting sphere's centre lies one radius
     behind the apex on it, and that of the body on it too.
     """
-    balls, pinhole = view.made.balls, view.pinhole[:, None]
+    balls, pinhole = context.prototype.balls, context.pinhole[:, None]
     p, n, c, b = (balls.columns(key, 3) for key in ("px", "nx", "cx", "bx"))
-    double_a = 2 * np.sqrt(view.semi_minor**2 + (view.pinhole**2).sum() / 4)
-    polar, azimuth = axis.angles(view.frame, p)
+    double_a = 2 * np.sqrt(context.semi_minor**2 + (context.pinhole**2).sum() / 4)
+    polar, azimuth = axis.angles(context.frame, p)
     depth = dot(p - b, n)
     worst = np.max(
         [
@@ -117,8 +117,8 @@ def place_errors(view: View) -> Floats:
     return np.asarray(worst)
 
 
-def _sizes(name: CheckName, view: View) -> Check:
-    balls = view.made.balls
+def _sizes(name: CheckName, context: PrototypeContext) -> Check:
+    balls = context.prototype.balls
     bad = np.flatnonzero(~_sized(balls))
     return at_most(name, bad.size, 0, f"no ball, or no cap, of its diameter: {listed_of(bad)}")
 

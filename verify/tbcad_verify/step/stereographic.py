@@ -29,7 +29,7 @@ FAR = 1e4
 
 
 @dataclass(frozen=True)
-class Charts:
+class SurfaceMaps:
     """Maps of M surfaces.
 
     Attributes:
@@ -44,15 +44,15 @@ class Charts:
     up: Floats
     reach: Floats
 
-    def take(self, index: Ints) -> Charts:
+    def take(self, index: Ints) -> SurfaceMaps:
         """The maps with these numbers."""
-        return Charts(
+        return SurfaceMaps(
             self.surfaces.take(index), self.right[:, index], self.up[:, index], self.reach[index]
         )
 
 
 @dataclass(frozen=True)
-class Rings:
+class MapCircles:
     """Circles on the maps, K on each of M, scaled so that |beta|^2 - 4 alpha gamma = 1.
 
     Attributes:
@@ -69,17 +69,17 @@ class Rings:
     real: NDArray[np.bool_]
     covers: NDArray[np.bool_]
 
-    def take(self, column: Ints) -> Rings:
-        """Some of each map's rings: (M, K') numbers of columns."""
+    def take(self, column: Ints) -> MapCircles:
+        """Some of each map's circles: (M, K') numbers of columns."""
         pick = [
             np.take_along_axis(a, column, axis=1)
             for a in (self.alpha, *self.beta, self.gamma, self.real, self.covers)
         ]
-        return Rings(pick[0], np.stack(pick[1:3]), pick[3], pick[4], pick[5])
+        return MapCircles(pick[0], np.stack(pick[1:3]), pick[3], pick[4], pick[5])
 
-    def rows(self, row: Ints) -> Rings:
-        """The rings of these maps."""
-        return Rings(
+    def rows(self, row: Ints) -> MapCircles:
+        """The circles of these maps."""
+        return MapCircles(
             self.alpha[row], self.beta[:, row], self.gamma[row], self.real[row], self.covers[row]
         )
 
@@ -90,7 +90,7 @@ class Rings:
         return np.where(self.real, distance, np.where(self.covers, -np.inf, np.inf))
 
 
-def charts(surfaces: Surfaces, front: bool, spread: float) -> Charts:
+def surface_maps(surfaces: Surfaces, front: bool, spread: float) -> SurfaceMaps:
     """Maps of surfaces that lie `spread` mm apart at most.
 
     With `front`, a map ends at the horizon, 90 degrees from the apex; else it has no end. A plane
@@ -100,16 +100,16 @@ def charts(surfaces: Surfaces, front: bool, spread: float) -> Charts:
     far = np.full(len(surfaces.curvature), FAR * spread)
     reach = np.divide(2, surfaces.curvature, out=far, where=surfaces.curvature > 0)
     whole = ~front & (surfaces.curvature > 0)
-    return Charts(surfaces, right, up, np.where(whole, np.inf, reach))
+    return SurfaceMaps(surfaces, right, up, np.where(whole, np.inf, reach))
 
 
-def rings(charts: Charts, number: Ints, others: Surfaces, spread: float) -> Rings:
+def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float) -> MapCircles:
     """What T others, walls among them, and last the horizon, leave of M maps: (M, T + 1) circles.
 
     `number` (M,) says which of the others each map's own surface is. Of two equal surfaces the
     first keeps what both have.
     """
-    alpha, beta, gamma = _forms(charts, others)
+    alpha, beta, gamma = _forms(maps, others)
     same = (np.abs(alpha) * spread + np.abs(beta).sum(axis=0) + np.abs(gamma) / spread) < COINCIDENT
     own = number[:, None] == np.arange(len(others.curvature))
     earlier = np.arange(len(others.curvature)) < number[:, None]
@@ -119,13 +119,13 @@ def rings(charts: Charts, number: Ints, others: Surfaces, spread: float) -> Ring
     covers = ~own & np.where(same, earlier, ~real & (alpha * spread + gamma / spread < 0))
     scale = 1 / np.sqrt(np.where(real, square, 1))
     return _with_horizon(
-        Rings(alpha * scale, beta * scale, gamma * scale, real, covers), charts.reach
+        MapCircles(alpha * scale, beta * scale, gamma * scale, real, covers), maps.reach
     )
 
 
-def _forms(charts: Charts, others: Surfaces) -> tuple[Floats, Floats, Floats]:
+def _forms(maps: SurfaceMaps, others: Surfaces) -> tuple[Floats, Floats, Floats]:
     """Alpha (M, T), beta (2, M, T) and gamma (M, T), not yet scaled."""
-    mine = charts.surfaces
+    mine = maps.surfaces
     shape = (3, len(mine.curvature), len(others.curvature))
     away = mine.point[:, :, None] - others.point[:, None]
     slope = others.normal[:, None] + others.curvature * away
@@ -133,37 +133,37 @@ def _forms(charts: Charts, others: Surfaces) -> tuple[Floats, Floats, Floats]:
     height = np.broadcast_to(others.normal[:, None], shape).reshape(3, -1)
     gamma = (dot(height, flat)).reshape(shape[1:])
     gamma = gamma + others.curvature / 2 * dot(flat, flat).reshape(shape[1:])
-    along = [np.einsum("im,imt->mt", a, slope) for a in (charts.right, charts.up, mine.normal)]
+    along = [np.einsum("im,imt->mt", a, slope) for a in (maps.right, maps.up, mine.normal)]
     k = mine.curvature[:, None]
     alpha = k**2 / 4 * gamma + (others.curvature - k * along[2]) / 2
     return alpha, np.stack(along[:2]), gamma
 
 
-def _with_horizon(rings: Rings, reach: Floats) -> Rings:
+def _with_horizon(circles: MapCircles, reach: Floats) -> MapCircles:
     """A last column: 1 - |y|^2 / reach^2 >= 0."""
     finite = np.isfinite(reach)
     edge = np.where(finite, reach, 1.0)[:, None]
     no = np.zeros_like(edge, dtype=bool)
-    return Rings(
-        np.hstack([rings.alpha, -1 / (2 * edge)]),
-        np.concatenate([rings.beta, np.zeros((2, *edge.shape))], axis=2),
-        np.hstack([rings.gamma, edge / 2]),
-        np.hstack([rings.real, finite[:, None]]),
-        np.hstack([rings.covers, no]),
+    return MapCircles(
+        np.hstack([circles.alpha, -1 / (2 * edge)]),
+        np.concatenate([circles.beta, np.zeros((2, *edge.shape))], axis=2),
+        np.hstack([circles.gamma, edge / 2]),
+        np.hstack([circles.real, finite[:, None]]),
+        np.hstack([circles.covers, no]),
     )
 
 
-def lift(charts: Charts, y: Floats) -> Floats:
+def to_surface(maps: SurfaceMaps, y: Floats) -> Floats:
     """(3, M) points of the surfaces for points (2, M) of their maps, one each, mm."""
-    s = charts.surfaces
+    s = maps.surfaces
     square = y[0] ** 2 + y[1] ** 2
     w = 1 / (1 + s.curvature**2 * square / 4)
     return np.asarray(
-        s.point + w * (y[0] * charts.right + y[1] * charts.up - s.curvature / 2 * square * s.normal)
+        s.point + w * (y[0] * maps.right + y[1] * maps.up - s.curvature / 2 * square * s.normal)
     )
 
 
-def turned(surfaces: Surfaces, others: Surfaces) -> Surfaces:
+def with_apex_uncovered(surfaces: Surfaces, others: Surfaces) -> Surfaces:
     """Whole spheres with their apex moved to where the largest cap that others cover is opposite.
 
     So the point that the map cannot show is never part of what is free, unless all is.

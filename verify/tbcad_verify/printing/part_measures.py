@@ -11,15 +11,15 @@ from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import Edges, measure_edges
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.holes import Holes, holes
-from tbcad_verify.printing.pieces import Pieces, pieces
-from tbcad_verify.printing.resting import Hull, wrap
-from tbcad_verify.printing.walls import Walls, walls
+from tbcad_verify.printing.holes import RoundHoles, round_holes
+from tbcad_verify.printing.orientations import PartHull, part_hull
+from tbcad_verify.printing.pieces import MeshPieces, mesh_pieces
+from tbcad_verify.printing.walls import WallThickness, wall_thickness
 from tbcad_verify.types import Floats
 
 
 @dataclass(frozen=True)
-class Corners:
+class InnerEdges:
     """Inner edges, where two faces meet at less than a half turn of air.
 
     Attributes:
@@ -32,7 +32,7 @@ class Corners:
 
 
 @dataclass(frozen=True)
-class Shape:
+class PartMeasures:
     """One part.
 
     Attributes:
@@ -42,18 +42,18 @@ class Shape:
         pieces: separate solids, and closed cavities.
         walls: thickness.
         holes: round ones.
-        corners: inner edges.
+        inner_edges: concave ones.
         hull: convex hull, and how the part can rest.
     """
 
     mesh: Mesh
     status: str
     bulk: MassProperties
-    pieces: Pieces
-    walls: Walls
-    holes: Holes
-    corners: Corners
-    hull: Hull
+    pieces: MeshPieces
+    walls: WallThickness
+    holes: RoundHoles
+    inner_edges: InnerEdges
+    hull: PartHull
 
     @property
     def triangles(self) -> int:
@@ -61,7 +61,7 @@ class Shape:
         return len(self.mesh.faces)
 
 
-def measure(mesh: Mesh, status: str, lump: MassProperties) -> Shape:
+def measure(mesh: Mesh, status: str, lump: MassProperties) -> PartMeasures:
     """Measure a mesh.
 
     Args:
@@ -72,25 +72,25 @@ def measure(mesh: Mesh, status: str, lump: MassProperties) -> Shape:
     Raises:
         Unknown: all points lie in a plane: there is nothing to measure.
     """
-    hull = wrap(mesh.points)
+    hull = part_hull(mesh.points)
     # Facets without area have edges without an angle; those are in doubt, and passed over.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         edges = measure_edges(mesh)
-    return Shape(
+    return PartMeasures(
         mesh,
         status,
         lump,
-        pieces(mesh),
-        walls(mesh, edges, rays.build_scene(mesh)),
-        holes(mesh, edges),
+        mesh_pieces(mesh),
+        wall_thickness(mesh, edges, rays.build_scene(mesh)),
+        round_holes(mesh, edges),
         _corners(mesh, edges),
         hull,
     )
 
 
-def _corners(mesh: Mesh, edges: Edges) -> Corners:
+def _corners(mesh: Mesh, edges: Edges) -> InnerEdges:
     inner = edges.angle < -edges.noise
     start = mesh.faces.ravel()[edges.half[inner]]
     end = np.roll(mesh.faces, -1, axis=1).ravel()[edges.half[inner]]
     edge = np.take(mesh.points, end, axis=0).T - np.take(mesh.points, start, axis=0).T
-    return Corners(-edges.angle[inner], norm(edge))
+    return InnerEdges(-edges.angle[inner], norm(edge))

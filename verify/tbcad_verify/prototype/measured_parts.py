@@ -33,7 +33,7 @@ POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 
 @dataclass(frozen=True)
-class Body:
+class MeasuredPart:
     """One part.
 
     Attributes:
@@ -57,7 +57,7 @@ class Body:
     reason: str
 
     @property
-    def needed(self) -> Mesh:
+    def placed_mesh(self) -> Mesh:
         """The placed mesh.
 
         Raises:
@@ -68,7 +68,7 @@ class Body:
         return self.placed
 
 
-def body(part: Printed, facets: Facets) -> Body:
+def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
     """Measure one part's mesh."""
     try:
         mesh = mesh_from_facets(facets)
@@ -77,13 +77,15 @@ def body(part: Printed, facets: Facets) -> Body:
         placed = put_back(mesh, part)
         lump = replace(mass_properties(placed), bend=_bend(mesh, edges))
     except Exception as error:
-        return Body(part, None, None, None, None, None, _unknown(part, error), reason_of(error))
+        return MeasuredPart(
+            part, None, None, None, None, None, _unknown(part, error), reason_of(error)
+        )
     checks = _checks(
         part,
         lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, count_folds(edges, FOLD_RAD))],
     )
     checks += guarded([(k, part.stl, u) for k, u in POSE.items()], lambda: pose_checks(part, mesh))
-    return Body(part, mesh, placed, found, mass_properties(mesh), lump, checks, "")
+    return MeasuredPart(part, mesh, placed, found, mass_properties(mesh), lump, checks, "")
 
 
 def put_back(mesh: Mesh, part: Printed) -> Mesh:
@@ -105,18 +107,18 @@ def pose_checks(part: Printed, mesh: Mesh) -> list[Check]:
     ]
 
 
-def of_roles(bodies: list[Body], *roles: str) -> list[Body]:
+def of_roles(bodies: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
     """Those of some roles."""
     return [one for one in bodies if one.part.role in roles]
 
 
-def joined_bodies(bodies: list[Body]) -> tuple[Mesh, NDArray[np.intp]]:
+def joined_meshes(bodies: list[MeasuredPart]) -> tuple[Mesh, NDArray[np.intp]]:
     """Placed meshes as one, and which body each facet is of.
 
     Raises:
         Unknown: one could not be made out.
     """
-    meshes = [one.needed for one in bodies]
+    meshes = [one.placed_mesh for one in bodies]
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     return join_meshes(meshes), owner
 

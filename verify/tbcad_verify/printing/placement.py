@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.vectors import norm, tangent_basis
-from tbcad_verify.printing.overhang import overhang
+from tbcad_verify.printing.orientations import PartHull
+from tbcad_verify.printing.overhang import overhang_area
+from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.resting import Hull
-from tbcad_verify.printing.shape import Shape
-from tbcad_verify.printing.turning import turn
+from tbcad_verify.printing.rotating_callipers import best_turn
 from tbcad_verify.types import Floats
 
 SLACK_MM = 1e-3  # what no machine can tell, and float32 may have added
@@ -43,7 +43,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Placing:
+class Placement:
     """The best way to lie.
 
     Attributes:
@@ -57,7 +57,7 @@ class Placing:
     overhang: float | None
 
 
-def place(shape: Shape, profile: Profile) -> Placing:
+def place(shape: PartMeasures, profile: Profile) -> Placement:
     """Search resting faces and axes, each at its best turn about the vertical.
 
     Of those that fit, the one with least overhang, then the lowest, then the one most like the
@@ -70,24 +70,24 @@ def place(shape: Shape, profile: Profile) -> Placing:
     fitting = [pose for pose in poses if _fits(pose)]
     if not fitting:
         pose = min(poses, key=lambda pose: pose.excess)
-        return Placing(pose, False, _overhangs(shape, [pose], profile)[0])
+        return Placement(pose, False, _overhangs(shape, [pose], profile)[0])
     areas = _overhangs(shape, fitting, profile)
     keys = [
         (*_rank(shape, pose, area), k)
         for k, (pose, area) in enumerate(zip(fitting, areas, strict=True))
     ]
     best = min(keys)[-1]
-    return Placing(fitting[best], True, areas[best])
+    return Placement(fitting[best], True, areas[best])
 
 
-def _rank(shape: Shape, pose: Pose, overhang: float | None) -> tuple[int, int, int]:
+def _rank(shape: PartMeasures, pose: Pose, overhang: float | None) -> tuple[int, int, int]:
     # Whole numbers, so that rounding does not choose between orientations that are alike.
     grain = 1e-6 * shape.bulk.area
     height, tilt = float(pose.size[2]), 1 - float(pose.rotation[2, 2])
     return round((overhang or 0) / grain), round(height / SLACK_MM), round(1e6 * tilt)
 
 
-def words(pose: Pose) -> str:
+def pose_text(pose: Pose) -> str:
     """Which of the file's directions points down, and the turn that follows."""
     k = int(np.abs(pose.down).argmax())
     if abs(pose.down[k]) > AXIS_COS:
@@ -99,16 +99,16 @@ def words(pose: Pose) -> str:
     return f"{down} down{turned}"
 
 
-def _poses(hull: Hull, directions: Floats, profile: Profile) -> list[Pose]:
+def _poses(hull: PartHull, directions: Floats, profile: Profile) -> list[Pose]:
     return [_pose(hull, down, profile) for down in directions.T]
 
 
-def _pose(hull: Hull, down: Floats, profile: Profile) -> Pose:
+def _pose(hull: PartHull, down: Floats, profile: Profile) -> Pose:
     level = np.stack([*(side[:, 0] for side in tangent_basis(-down[:, None])), -down])
     points = np.einsum("ij,jn->in", level, hull.points)
     width, depth, height = profile.bed_mm
     rim = 2 * profile.clearance_mm
-    angle, sides = turn(points[:2], width - rim, depth - rim, SLACK_MM)
+    angle, sides = best_turn(points[:2], width - rim, depth - rim, SLACK_MM)
     size = np.append(sides, np.ptp(points[2]))
     excess = float((size - np.array([width - rim, depth - rim, height])).max())
     return Pose(np.einsum("ij,jk->ik", _about_z(angle), level), size, angle, excess)
@@ -123,8 +123,8 @@ def _fits(pose: Pose) -> bool:
     return pose.excess <= SLACK_MM
 
 
-def _overhangs(shape: Shape, poses: list[Pose], profile: Profile) -> list[float | None]:
+def _overhangs(shape: PartMeasures, poses: list[Pose], profile: Profile) -> list[float | None]:
     if profile.overhang_deg is None:
         return [None] * len(poses)
     double, lean = norm(shape.mesh.area), math.radians(profile.overhang_deg)
-    return [overhang(shape.mesh, double, pose.down, lean) for pose in poses]
+    return [overhang_area(shape.mesh, double, pose.down, lean) for pose in poses]

@@ -15,10 +15,10 @@ from tbcad_verify.mesh.rays import RayScene, build_scene
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.bodies import Body, joined_bodies, of_roles
-from tbcad_verify.prototype.caps import Cap
-from tbcad_verify.prototype.seats import Held
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.caps import MeasuredCap
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
+from tbcad_verify.prototype.seats import MeasuredSeats
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats
 
@@ -39,11 +39,11 @@ class Obstacles:
 
 
 @dataclass(frozen=True)
-class Rig:
+class MeasuredPrototype:
     """The machine as its files make it, base at angle zero.
 
     Attributes:
-        view: the record.
+        context: the record.
         centre: (3, K) of the reflecting spheres, mm.
         radius: (K,) of them, mm.
         body: (3, K) centres of what lies on the pads, mm.
@@ -53,7 +53,7 @@ class Rig:
         standing: stage and frame.
     """
 
-    view: View
+    context: PrototypeContext
     centre: Floats
     radius: Floats
     body: Floats
@@ -63,13 +63,18 @@ class Rig:
     standing: Obstacles
 
 
-def rig(view: View, held: Held, caps: list[Cap], bodies: list[Body]) -> Rig:
+def measure_prototype(
+    context: PrototypeContext,
+    held: MeasuredSeats,
+    caps: list[MeasuredCap],
+    bodies: list[MeasuredPart],
+) -> MeasuredPrototype:
     """Put balls on their pads, and caps as they were measured.
 
     Raises:
         Unknown: a centre, a cap or a mesh is not known.
     """
-    balls = view.made.balls
+    balls = context.prototype.balls
     if lost := [why for why in held.reason if why]:
         raise Unknown(lost[0])
     body, radius = held.centre.T.copy(), balls.of("radius_mm").copy()
@@ -83,19 +88,19 @@ def rig(view: View, held: Held, caps: list[Cap], bodies: list[Body]) -> Rig:
         radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
     normal = unit(balls.columns("nx", 3))
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
-    return Rig(
-        view,
+    return MeasuredPrototype(
+        context,
         centre,
         radius,
         body,
         body_radius,
-        prepare_for_rays(view.pinhole, surfaces),
+        prepare_for_rays(context.pinhole, surfaces),
         obstacles(of_roles(bodies, "base", "cap")),
         obstacles(of_roles(bodies, "stage", "frame")),
     )
 
 
-def obstacles(bodies: list[Body]) -> Obstacles:
+def obstacles(bodies: list[MeasuredPart]) -> Obstacles:
     """Parts as one scene.
 
     Raises:
@@ -104,15 +109,15 @@ def obstacles(bodies: list[Body]) -> Obstacles:
     names = tuple(one.part.name for one in bodies)
     if not bodies:
         return Obstacles(None, np.zeros(1, dtype=np.intp), names)
-    mesh, owner = joined_bodies(bodies)
+    mesh, owner = joined_meshes(bodies)
     return Obstacles(build_scene(mesh), np.append(owner, -1), names)
 
 
-def to_base(view: View, x: Floats, angle: Floats) -> Floats:
+def to_base(context: PrototypeContext, x: Floats, angle: Floats) -> Floats:
     """Columns of the ground's frame (3, N) in the base's, which has turned by angles (N,)."""
-    return axis.turned(x, view.frame[0][:, None], -angle)
+    return axis.turned(x, context.frame[0][:, None], -angle)
 
 
-def to_ground(view: View, x: Floats, angle: Floats) -> Floats:
+def to_ground(context: PrototypeContext, x: Floats, angle: Floats) -> Floats:
     """The way back."""
-    return axis.turned(x, view.frame[0][:, None], angle)
+    return axis.turned(x, context.frame[0][:, None], angle)

@@ -24,9 +24,9 @@ from tbcad_verify.report.checks import (
     worst_offenders,
 )
 from tbcad_verify.step import part_checks
-from tbcad_verify.step.part_checks import Lump
-from tbcad_verify.step.reading import StepFile, examine, load
-from tbcad_verify.step.union import Cells, of_export
+from tbcad_verify.step.part_checks import PartComparison
+from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export
+from tbcad_verify.step.step_file import StepFile, examine, load
 from tbcad_verify.types import Floats
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
@@ -52,7 +52,7 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Subject:
+class ShellComparison:
     """One part's STEP file and all that it is held against.
 
     Attributes:
@@ -62,10 +62,10 @@ class Subject:
         cells: (m,) in closed form.
     """
 
-    lump: Lump
+    lump: PartComparison
     row: NDArray[np.intp]
     face: NDArray[np.intp]
-    cells: Cells
+    cells: ClosedFormCells
 
     @property
     def file(self) -> StepFile:
@@ -73,10 +73,12 @@ class Subject:
         return self.lump.file
 
 
-Job = Callable[[CheckName, Subject, Export], Check]
+Job = Callable[[CheckName, ShellComparison, Export], Check]
 
 
-def step_checks(export: Export, bulks: dict[str, MassProperties], seconds: float) -> list[Check]:
+def shell_step_checks(
+    export: Export, bulks: dict[str, MassProperties], seconds: float
+) -> list[Check]:
     """All checks of all STEP files that the record names.
 
     Args:
@@ -100,7 +102,7 @@ def _recorded(export: Export) -> Check:
     """Areas of the reflecting surfaces as recorded, against what the spheres alone make them."""
     found = np.full(len(export.rows), np.nan)
     for camera in export.cameras:
-        found[export.rows.camera == camera] = of_export(export, camera, coated=True).area
+        found[export.rows.camera == camera] = cells_of_export(export, camera, coated=True).area
     error = np.abs(export.rows.columns("cell_area_mm2")[0] / found - 1)
     return _worst_of(AREAS, export.rows.ids, error, CELL_SHARE, "of its area away", ".3g")
 
@@ -121,21 +123,23 @@ def _part(
     return guarded(names, work)
 
 
-def _one(job: Job, name: CheckName, subject: Subject, export: Export) -> list[Check]:
+def _one(job: Job, name: CheckName, subject: ShellComparison, export: Export) -> list[Check]:
     return [job(name, subject, export)]
 
 
-def _subject(export: Export, part: Part, file: StepFile, bulk: MassProperties | None) -> Subject:
+def _subject(
+    export: Export, part: Part, file: StepFile, bulk: MassProperties | None
+) -> ShellComparison:
     row = np.flatnonzero(export.rows.camera == part.camera)
     ids = [export.rows.ids[k] for k in row.tolist()]
     count = Counter(file.faces.names)
     place = {name: k for k, name in enumerate(file.faces.names)}
     face = np.array([place[name] if count[name] == 1 else -1 for name in ids], dtype=np.intp)
-    lump = Lump(part.name, file, bulk, export.mesh_error_mm)
-    return Subject(lump, row, face, of_export(export, part.camera))
+    lump = PartComparison(part.name, file, bulk, export.mesh_error_mm)
+    return ShellComparison(lump, row, face, cells_of_export(export, part.camera))
 
 
-def _names(name: CheckName, subject: Subject, export: Export) -> Check:
+def _names(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Every mirror's name on exactly one face; no name twice, none empty."""
     ids = [export.rows.ids[k] for k in subject.row.tolist()]
     count = Counter(subject.file.faces.names)
@@ -149,7 +153,7 @@ def _names(name: CheckName, subject: Subject, export: Export) -> Check:
     )
 
 
-def _surfaces(name: CheckName, subject: Subject, export: Export) -> Check:
+def _surfaces(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Centre and radius of every sphere, place and tilt of every plane, as recorded."""
     faces, mirrors = subject.file.faces, export.rows.take(subject.row)
     centre, radius = mirrors.columns("cx", 3).T, mirrors.columns("radius_mm")[0]
@@ -169,7 +173,7 @@ def _surfaces(name: CheckName, subject: Subject, export: Export) -> Check:
     return _worst(name, subject, export, error, limit, "mm", ".3g")
 
 
-def _outward(name: CheckName, subject: Subject, export: Export) -> Check:
+def _outward(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Mirrors bulge out of the solid; where planes face is for `_surfaces`."""
     mirrors = export.rows.take(subject.row)
     good = _of(subject, subject.file.faces.outward)
@@ -177,20 +181,20 @@ def _outward(name: CheckName, subject: Subject, export: Export) -> Check:
     return at_most(name, len(turned), 0, f"the solid lies on the wrong side: {short_list(turned)}")
 
 
-def _areas(name: CheckName, subject: Subject, export: Export) -> Check:
+def _areas(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Each mirror's area is its cell's, so that no face is the rest of its sphere."""
     error = np.abs(_of(subject, subject.file.faces.area) / subject.cells.area - 1)
     return _worst(name, subject, export, error, CELL_SHARE, "of its cell's area away", ".3g")
 
 
-def _middles(name: CheckName, subject: Subject, export: Export) -> Check:
+def _middles(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     wanted = subject.cells.first / subject.cells.area[:, None]
     away = _of(subject, subject.file.faces.middle) - wanted
     error = np.linalg.norm(away, axis=1)
     return _worst(name, subject, export, error, MIDDLE_MM, "mm", ".3g")
 
 
-def _front(name: CheckName, subject: Subject, export: Export) -> Check:
+def _front(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Volume between the origin and all mirrors: what the faces enclose against the closed form."""
     faces, mirrors = subject.file.faces, export.rows.take(subject.row)
     area, middle = _of(subject, faces.area), _of(subject, faces.middle)
@@ -208,7 +212,7 @@ def _front(name: CheckName, subject: Subject, export: Export) -> Check:
     )
 
 
-def _of(subject: Subject, column: NDArray[Any]) -> NDArray[Any]:
+def _of(subject: ShellComparison, column: NDArray[Any]) -> NDArray[Any]:
     """(m, ...) the faces' figures in the order of the mirrors; NaN or empty for none."""
     taken = column[subject.face].copy()
     lost = subject.face < 0
@@ -218,7 +222,7 @@ def _of(subject: Subject, column: NDArray[Any]) -> NDArray[Any]:
 
 def _worst(
     name: CheckName,
-    subject: Subject,
+    subject: ShellComparison,
     export: Export,
     error: Floats,
     limit: float,

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
 from tbcad_verify.mesh.vectors import dot, tangent_basis, unit
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.record import Camera
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -28,7 +28,7 @@ PIXELS = 100_000  # of the sensor are looked at, about
 
 
 @dataclass(frozen=True)
-class Shell:
+class MirrorSpheres:
     """The reflecting balls of m mirrors, as one pinhole sees them, coats included.
 
     Attributes:
@@ -51,7 +51,7 @@ class Shell:
 
 
 @dataclass(frozen=True)
-class Outlines:
+class CellOutlines:
     """Cells' edges: AROUND directions for each of m mirrors, in order round the apex.
 
     Attributes:
@@ -74,21 +74,21 @@ class Outlines:
         return np.asarray(np.cos(angle) * self.chief[:, :, None] + np.sin(angle) * edge)
 
 
-def shell_of(view: View) -> Shell:
+def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:
     """The balls of the camera that the prototype serves."""
-    rows = view.export.rows.take(view.mine)
-    return Shell(
-        view.pinhole,
+    rows = context.export.rows.take(context.mine)
+    return MirrorSpheres(
+        context.pinhole,
         rows.columns("px", 3),
         rows.columns("cx", 3),
         rows.columns("radius_mm")[0],
-        float(np.sign(view.pinhole[0])),
-        view.export.foot_z_mm,
-        view.halved,
+        float(np.sign(context.pinhole[0])),
+        context.export.foot_z_mm,
+        context.halved,
     )
 
 
-def outlines(shell: Shell) -> Outlines:
+def cell_outlines(shell: MirrorSpheres) -> CellOutlines:
     """Edges of all cells; an apex that is not in its own cell has its edge on it."""
     chief = unit(shell.apex - shell.pinhole[:, None])
     first, second = tangent_basis(chief)
@@ -104,10 +104,10 @@ def outlines(shell: Shell) -> Outlines:
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     d = np.cos(low) * chief[:, :, None] + np.sin(low) * out
     own = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
-    return Outlines(chief, d, low, own)
+    return CellOutlines(chief, d, low, own)
 
 
-def first_mirrors(shell: Shell, d: Floats) -> Ints:
+def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
     """(N,) the mirror that the pinhole sees first along d (3, N); -1 for none.
 
     What lies beyond the seam or below the foot is no mirror.
@@ -129,7 +129,7 @@ def _rows(camera: Camera, step: int) -> Iterator[Floats]:
         yield pixel_rows(camera, row, row + 1)[:, step // 2 :: step]
 
 
-def _first(shell: Shell, d: Floats) -> Ints:
+def _first(shell: MirrorSpheres, d: Floats) -> Ints:
     away = shell.pinhole[:, None] - shell.centre
     # No BLAS, whose rounding depends on the number of threads.
     b = np.einsum("in,im->nm", d, away, optimize=False)
@@ -144,14 +144,14 @@ def _first(shell: Shell, d: Floats) -> Ints:
     return np.where(good, mirror, -1)
 
 
-def _neighbours(shell: Shell) -> Ints:
+def _neighbours(shell: MirrorSpheres) -> Ints:
     """(m, NEIGHBOURS) the mirrors nearest to each, without itself."""
     count = min(NEIGHBOURS + 1, shell.radius.size)
     found = cKDTree(unit(shell.apex).T).query(unit(shell.apex).T, k=count)[1]
     return np.asarray(found, dtype=np.int64).reshape(shell.radius.size, count)[:, 1:]
 
 
-def _points(shell: Shell, d: Floats) -> Floats:
+def _points(shell: MirrorSpheres, d: Floats) -> Floats:
     """(3, m, s) where rays d meet their own mirrors' balls first; NaN where they miss."""
     away = (shell.pinhole[:, None] - shell.centre)[:, :, None]
     b = (d * away).sum(axis=0)
@@ -160,7 +160,7 @@ def _points(shell: Shell, d: Floats) -> Floats:
         return np.asarray(shell.pinhole[:, None, None] + (-b - np.sqrt(b * b - rest)) * d)
 
 
-def _inside(shell: Shell, near: Ints, d: Floats) -> Bools:
+def _inside(shell: MirrorSpheres, near: Ints, d: Floats) -> Bools:
     """(m, s) whether rays meet their own mirror, above the foot, on its side, in no neighbour."""
     point = _points(shell, d)
     good = np.isfinite(point[0]) & (point[2] >= shell.foot)

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify import BadExport
-from tbcad_verify.programs import Wanted, client_checks, is_skipped
-from tbcad_verify.programs.clients import ERRANDS
+from tbcad_verify.programs import ExpectedPart, check_with_programs, is_skipped
+from tbcad_verify.programs.program_checks import QUERIES
 from tbcad_verify.report.checks import Check
 
 from tests.verify.programs.fake_programs import ADMESH, BAD, GOOD, INFO, SEEN, install, install_good
 
 FILES = {"step": "part.step", "stl": "part.stl", "3mf": "part.3mf"}
-PART = Wanted("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
-NAMES = [(name, PART.files[e.kind], unit) for e in ERRANDS for name, unit in e.questions.items()]
+PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
+NAMES = [(name, PART.files[e.kind], unit) for e in QUERIES for name, unit in e.questions.items()]
 
 
 @pytest.fixture
@@ -42,8 +42,8 @@ def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "bin"
 
 
-def ask(export: Path, part: Wanted = PART, seconds: float = 20) -> list[Check]:
-    return client_checks(export, [part], seconds)
+def ask(export: Path, part: ExpectedPart = PART, seconds: float = 20) -> list[Check]:
+    return check_with_programs(export, [part], seconds)
 
 
 def failed(checks: Sequence[Check]) -> list[str]:
@@ -355,9 +355,9 @@ note("-")
     install(programs, **bodies)
     parts = [replace(PART, name=name) for name in "ab"]
     begun: list[str] = []
-    checks = client_checks(export, parts, 20, begun.append)
+    checks = check_with_programs(export, parts, 20, begun.append)
     assert [(check.name, check.file, check.unit) for check in checks] == NAMES * 2
-    assert sorted(begun) == sorted(f"{e.program}: {PART.files[e.kind]}" for e in ERRANDS * 2)
+    assert sorted(begun) == sorted(f"{e.program}: {PART.files[e.kind]}" for e in QUERIES * 2)
     running = [log.read_text()[:k].count("+") - log.read_text()[:k].count("-") for k in range(25)]
     assert max(running) == 2
 
@@ -389,5 +389,5 @@ def test_an_interrupt_does_not_wait(
 
     start = time.monotonic()
     with pytest.raises(error):
-        client_checks(export, [PART], 60, progress)
+        check_with_programs(export, [PART], 60, progress)
     assert time.monotonic() - start < 5

@@ -3,7 +3,7 @@
 A cell is the part of a mirror's surface that no other ball, or half-space behind a planar mirror,
 of the same camera covers, on the side that faces the light, cut by the seam x = 0 and the foot
 plane. Nothing of a STEP file, a mesh or a CAD kernel is looked at, nor any neighbourhood that
-somebody else found: the result is an oracle for them.
+somebody else boundaries: the result is an oracle for them.
 
 By Gauss' theorem the columns `volume` and `moment`, summed over all faces of a closed solid, are
 its volume and its volume times its centroid; `vector_area` sums to zero.
@@ -18,19 +18,19 @@ import numpy as np
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.record import Export
-from tbcad_verify.step.boxes import boxes
-from tbcad_verify.step.cells import Rims, rims
-from tbcad_verify.step.charts import lift
-from tbcad_verify.step.loops import facing, loops
-from tbcad_verify.step.moments import Moments, moments, whole_sphere
-from tbcad_verify.step.rims import Arcs
+from tbcad_verify.step.arc_loops import arc_loops, front_pieces
+from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
+from tbcad_verify.step.cell_boxes import cell_boxes
+from tbcad_verify.step.cell_moments import CellMoments, cell_moments, whole_sphere
+from tbcad_verify.step.map_arcs import MapArcs
+from tbcad_verify.step.stereographic import to_surface
 from tbcad_verify.types import Bools, Floats, Ints
 
 TOUCHING = 1e-11  # of the spread: corners that are one corner
 
 
 @dataclass(frozen=True)
-class Edges:
+class CellEdges:
     """E arcs or straight lines between corners, each as seen by one of the two cells it bounds.
 
     An arc that passes the point of its circle farthest from the mirror's apex is cut there in two.
@@ -47,7 +47,7 @@ class Edges:
 
 
 @dataclass(frozen=True)
-class Cells:
+class ClosedFormCells:
     """One cell a mirror, M of them, in the order given.
 
     Attributes:
@@ -75,16 +75,16 @@ class Cells:
     edges: Ints
     empty: Bools
     closed: Bools
-    rim: Edges
+    rim: CellEdges
 
     def __len__(self) -> int:
         """How many mirrors."""
         return len(self.area)
 
 
-def cells(
+def closed_form_cells(
     point: Floats, normal: Floats, curvature: Floats, walls: Floats, *, front: bool = True
-) -> Cells:
+) -> ClosedFormCells:
     """Cells of balls and half-spaces, each without what the others cover.
 
     Args:
@@ -105,18 +105,18 @@ def cells(
     across = (wall[:, :3].T / length).copy()
     planes = Surfaces(across * (wall[:, 3] / length), across, np.zeros(len(wall)))
     mirrors = Surfaces(point.T.copy(), normal.T.copy(), curvature.astype(np.float64))
-    found = rims(mirrors, planes, front)
-    arcs = facing(_merged(found), found.spread) if front else _merged(found)
-    return _measured(replace(found, arcs=arcs), len(point) + len(wall))
+    boundaries = cell_boundaries(mirrors, planes, front)
+    arcs = front_pieces(_merged(boundaries), boundaries.spread) if front else _merged(boundaries)
+    return _measured(replace(boundaries, arcs=arcs), len(point) + len(wall))
 
 
-def of_balls(centre: Floats, radius: Floats, walls: Floats) -> Cells:
+def cells_of_balls(centre: Floats, radius: Floats, walls: Floats) -> ClosedFormCells:
     """All that is free of balls (M, 3) mm, (M,) mm, front and back, on the right side of walls."""
     up = np.zeros_like(centre) + np.array([0.0, 0.0, 1.0])
-    return cells(centre + radius[:, None] * up, up, 1 / radius, walls, front=False)
+    return closed_form_cells(centre + radius[:, None] * up, up, 1 / radius, walls, front=False)
 
 
-def of_export(export: Export, camera: str, *, coated: bool = False) -> Cells:
+def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> ClosedFormCells:
     """The cells of one camera's rows of mirrors.csv, in their order, as the solid has them.
 
     The recorded radius is that of the reflecting surface; the solid ends one coat below it, unless
@@ -131,34 +131,34 @@ def of_export(export: Export, camera: str, *, coated: bool = False) -> Cells:
     solid = recorded.take(mine).coated(0.0 if coated else -export.coating_mm)
     side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
     walls = np.array([[side, 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
-    return cells(solid.point.T, solid.normal.T, solid.curvature, walls)
+    return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
 
 
-def _merged(found: Rims) -> Arcs:
+def _merged(boundaries: CellBoundaries) -> MapArcs:
     """Without the arcs that are nothing but rounding at corners of four cells and more."""
-    return found.arcs.take(found.arcs.length > TOUCHING * found.spread)
+    return boundaries.arcs.take(boundaries.arcs.length > TOUCHING * boundaries.spread)
 
 
-def _measured(found: Rims, horizon: int) -> Cells:
+def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
     """All figures of the cells; `horizon` is the number that stands for it."""
-    count, arcs = len(found.whole), found.arcs
-    empty = ~found.whole & (_count(arcs.mirror, count) == 0)
-    area, vector_area, first, volume, moment = _integrals(found)
+    count, arcs = len(boundaries.whole), boundaries.arcs
+    empty = ~boundaries.whole & (_count(arcs.mirror, count) == 0)
+    area, vector_area, first, volume, moment = _integrals(boundaries)
     passed, circles = _passes(arcs)
     corners = _count(arcs.mirror, count) - _count(passed, count)
-    wrong = loops(arcs, found.spread).loose | (arcs.ring == horizon)
-    return Cells(
+    wrong = arc_loops(arcs, boundaries.spread).loose | (arcs.circle == horizon)
+    return ClosedFormCells(
         area=area,
         vector_area=vector_area.T,
         first=first.T,
         volume=volume,
         moment=moment.T,
-        box=np.where(empty[:, None, None], np.nan, _box(found)),
+        box=np.where(empty[:, None, None], np.nan, _box(boundaries)),
         corners=corners,
         edges=corners + _count(circles, count),
         empty=empty,
         closed=_count(arcs.mirror[wrong], count) == 0,
-        rim=_edges(found),
+        rim=_edges(boundaries),
     )
 
 
@@ -166,18 +166,18 @@ def _count(mirror: Ints, count: int) -> Ints:
     return np.bincount(mirror, minlength=count)
 
 
-def _edges(found: Rims) -> Edges:
-    arcs, maps = found.arcs, found.charts.take(found.arcs.mirror)
+def _edges(boundaries: CellBoundaries) -> CellEdges:
+    arcs, maps = boundaries.arcs, boundaries.maps.take(boundaries.arcs.mirror)
     along = (arcs.s[0], arcs.s.mean(axis=0), arcs.s[1])
-    points = np.stack([lift(maps, arcs.point(s)).T for s in along], axis=1)
-    return Edges(arcs.mirror, arcs.ring, points)
+    points = np.stack([to_surface(maps, arcs.point(s)).T for s in along], axis=1)
+    return CellEdges(arcs.mirror, arcs.circle, points)
 
 
-def _integrals(found: Rims) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+def _integrals(boundaries: CellBoundaries) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Area (M,), vector area and first moment (3, M), volume (M,), moment (3, M)."""
-    mine, local = found.charts.surfaces, _moments(found)
+    mine, local = boundaries.maps.surfaces, _moments(boundaries)
     p, n, k, area = mine.point, mine.normal, mine.curvature, local.area
-    axes = np.stack([found.charts.right, found.charts.up, n])
+    axes = np.stack([boundaries.maps.right, boundaries.maps.up, n])
     first = np.einsum("aim,am->im", axes, local.first)
     # On the surface x.n = p.n0 + d.e: linear in d = x - p, for n = n0 + k d and d.(2 n0 + k d) = 0.
     height, e = dot(p, n), k * p - n
@@ -187,28 +187,30 @@ def _integrals(found: Rims) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     return area, n * area + k * first, p * area + first, volume / 3, moment / 4
 
 
-def _moments(found: Rims) -> Moments:
+def _moments(boundaries: CellBoundaries) -> CellMoments:
     """Integrals over the cells about their apices; of whole spheres too, which have no arcs."""
-    some, k = moments(found.charts, found.arcs), found.charts.surfaces.curvature
-    full = whole_sphere(np.where(found.whole, k, 1.0))
+    some, k = cell_moments(boundaries.maps, boundaries.arcs), boundaries.maps.surfaces.curvature
+    full = whole_sphere(np.where(boundaries.whole, k, 1.0))
     pairs = ((full.area, some.area), (full.first, some.first), (full.second, some.second))
-    return Moments(*(np.where(found.whole, a, b) for a, b in pairs))
+    return CellMoments(*(np.where(boundaries.whole, a, b) for a, b in pairs))
 
 
-def _box(found: Rims) -> Floats:
-    mine = found.charts.surfaces
-    radius = 1 / np.where(found.whole, mine.curvature, 1.0)
+def _box(boundaries: CellBoundaries) -> Floats:
+    mine = boundaries.maps.surfaces
+    radius = 1 / np.where(boundaries.whole, mine.curvature, 1.0)
     centre = (mine.point - radius * mine.normal).T
     whole = np.stack([centre - radius[:, None], centre + radius[:, None]], axis=1)
-    return np.where(found.whole[:, None, None], whole, boxes(found.charts, found.arcs))
+    return np.where(
+        boundaries.whole[:, None, None], whole, cell_boxes(boundaries.maps, boundaries.arcs)
+    )
 
 
-def _passes(arcs: Arcs) -> tuple[Ints, Ints]:
+def _passes(arcs: MapArcs) -> tuple[Ints, Ints]:
     """Mirrors' numbers, one a circle of which both sides of the farthest point are arcs' ends.
 
     Such an end is no corner. And one a full circle.
     """
     begin, end = arcs.t[0] == -np.inf, arcs.t[1] == np.inf
-    circle = arcs.mirror * (arcs.ring.max(initial=0) + 1) + arcs.ring
+    circle = arcs.mirror * (arcs.circle.max(initial=0) + 1) + arcs.circle
     start = np.flatnonzero(begin)
     return arcs.mirror[start[np.isin(circle[start], circle[end])]], arcs.mirror[begin & end]

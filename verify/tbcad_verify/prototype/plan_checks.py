@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.prototype import axis, gcode
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype_record import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,
@@ -34,41 +34,41 @@ CHECKS = (
 )
 
 
-def checks(view: View) -> list[Check]:
+def checks(context: PrototypeContext) -> list[Check]:
     """Hold plan, stops and program against the mirrors, the balls and each other."""
     work = (_mirrors, _twins, _errors, _stops, _program)
     return [
         check
         for name, job in zip(CHECKS, work, strict=True)
-        for check in guarded([name], lambda name=name, job=job: [job(name, view)])  # type: ignore[misc]
+        for check in guarded([name], lambda name=name, job=job: [job(name, context)])  # type: ignore[misc]
     ]
 
 
-def _mirrors(name: CheckName, view: View) -> Check:
+def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
     """Each of this camera's mirrors once with the object straight, all others once with it turned.
 
     Rows are numbered, and name balls that there are.
     """
-    plan, rows = view.made.plan, view.export.rows
+    plan, rows = context.prototype.plan, context.export.rows
     odd: list[str] = []
     for turn in TURNS:
-        own = (rows.camera == view.made.camera) == (turn == 0)
+        own = (rows.camera == context.prototype.camera) == (turn == 0)
         wanted = [rows.ids[k] for k in np.flatnonzero(own).tolist()]
         given = Counter(plan.mirror[k] for k in np.flatnonzero(plan.turn == turn).tolist())
         odd += [one for one in wanted if given[one] != 1]
         odd += sorted(set(given) - set(wanted))
     odd += [f"row {k + 1} turned oddly" for k in np.flatnonzero(~np.isin(plan.turn, TURNS))]
-    foreign = (plan.ball < 1) | (plan.ball > len(view.made.balls))
+    foreign = (plan.ball < 1) | (plan.ball > len(context.prototype.balls))
     odd += [f"row {k + 1} of no ball" for k in np.flatnonzero(foreign).tolist()]
     unordered = np.flatnonzero(plan.order != np.arange(1, len(plan) + 1))
     odd += [f"row {k + 1} out of order" for k in unordered.tolist()]
-    served = np.bincount(np.clip(view.ball, 0, None), minlength=len(view.made.balls))
-    unlike = np.flatnonzero(served != view.made.balls.of("mirrors"))
+    served = np.bincount(np.clip(context.ball, 0, None), minlength=len(context.prototype.balls))
+    unlike = np.flatnonzero(served != context.prototype.balls.of("mirrors"))
     odd += [f"ball {k + 1} serves {served[k]}" for k in unlike.tolist()]
     return at_most(name, len(odd), 0, short_list(odd))
 
 
-def twins(view: View) -> Ints:
+def twins(context: PrototypeContext) -> Ints:
     """(m,) row of mirrors.csv of the mirror that each one shows when the object is turned.
 
     Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
@@ -76,26 +76,26 @@ def twins(view: View) -> Ints:
     Raises:
         Unknown: there is no mirror in that direction.
     """
-    rows = view.export.rows
+    rows = context.export.rows
     u = rows.columns("ux", 3)
-    others = np.flatnonzero(rows.camera != view.made.camera)
+    others = np.flatnonzero(rows.camera != context.prototype.camera)
     if not others.size:
         raise Unknown("there is no other camera")
-    wanted = u[:, view.mine] * np.array([[-1.0], [-1.0], [1.0]])
+    wanted = u[:, context.mine] * np.array([[-1.0], [-1.0], [1.0]])
     away, near = map(np.asarray, cKDTree(u[:, others].T).query(wanted.T))
     if not away.max() <= SAME_DIRECTION:
-        lost = rows.ids[int(view.mine[int(away.argmax())])]
+        lost = rows.ids[int(context.mine[int(away.argmax())])]
         raise Unknown(f"no mirror of the other camera is {lost} turned by 180 degrees")
     return np.asarray(others[near])
 
 
-def _twins(name: CheckName, view: View) -> Check:
+def _twins(name: CheckName, context: PrototypeContext) -> Check:
     """The turned half goes by the same ball and stop as the mirrors it is the image of."""
-    plan, rows = view.made.plan, view.export.rows
+    plan, rows = context.prototype.plan, context.export.rows
     turned = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
-    ids = [rows.ids[k] for k in twins(view).tolist()]
+    ids = [rows.ids[k] for k in twins(context).tolist()]
     row = np.array([turned.get(one, -1) for one in ids])
-    first = view.pictures
+    first = context.pictures
     same = (
         (row >= 0) & (plan.ball[row] == plan.ball[first]) & (plan.angle[row] == plan.angle[first])
     )
@@ -106,30 +106,32 @@ def _twins(name: CheckName, view: View) -> Check:
     )
 
 
-def errors(view: View) -> Floats:
+def errors(context: PrototypeContext) -> Floats:
     """(m, 3) polar angle, azimuth and direction of each ball at its stop less the mirror's, rad."""
-    u = view.export.rows.columns("ux", 3)[:, view.mine]
-    apex = view.made.balls.columns("px", 3)[:, view.ball]
-    at = axis.turned(apex, view.frame[0][:, None], view.angle)
-    (mirror, phi), (ball, psi) = axis.angles(view.frame, u), axis.angles(view.frame, at)
+    u = context.export.rows.columns("ux", 3)[:, context.mine]
+    apex = context.prototype.balls.columns("px", 3)[:, context.ball]
+    at = axis.turned(apex, context.frame[0][:, None], context.angle)
+    (mirror, phi), (ball, psi) = axis.angles(context.frame, u), axis.angles(context.frame, at)
     return np.stack([ball - mirror, axis.wrapped(psi - phi), axis.between(at, u)], axis=1)
 
 
-def _errors(name: CheckName, view: View) -> Check:
-    away = np.abs(np.degrees(errors(view)) - view.made.plan.errors[view.pictures]).max(axis=1)
+def _errors(name: CheckName, context: PrototypeContext) -> Check:
+    away = np.abs(
+        np.degrees(errors(context)) - context.prototype.plan.errors[context.pictures]
+    ).max(axis=1)
     worst = np.argsort(-away, kind="stable")
     worst = worst[~(away[worst] <= ERROR_DEG)]
-    ids = [view.export.rows.ids[k] for k in view.mine.tolist()]
+    ids = [context.export.rows.ids[k] for k in context.mine.tolist()]
     detail = "recorded otherwise than poses make them: " + worst_offenders(
         ids, away, "deg", worst, ".3g"
     )
     return at_most(name, float(away.max()), ERROR_DEG, detail)
 
 
-def _stops(name: CheckName, view: View) -> Check:
+def _stops(name: CheckName, context: PrototypeContext) -> Check:
     """Numbered, ascending, within the swing, and what the plan makes of them."""
-    stops, plan = view.made.stops, view.made.plan
-    low, high = view.made.swing
+    stops, plan = context.prototype.stops, context.prototype.plan
+    low, high = context.prototype.swing
     odd = []
     if not (stops.stop == np.arange(1, len(stops) + 1)).all():
         odd.append("not numbered from 1")
@@ -144,13 +146,13 @@ def _stops(name: CheckName, view: View) -> Check:
     straight = (plan.turn == 0) & known
     for k in range(len(stops)):
         here = np.flatnonzero(straight & (plan.stop == k + 1))
-        odd += [] if _as_said(view, k, here) else [f"stop {k + 1} is not as the plan has it"]
+        odd += [] if _as_said(context, k, here) else [f"stop {k + 1} is not as the plan has it"]
     return at_most(name, len(odd), 0, short_list(odd))
 
 
-def _as_said(view: View, k: int, rows: Ints) -> bool:
+def _as_said(context: PrototypeContext, k: int, rows: Ints) -> bool:
     """Whether a stop's count, balls and worst errors are those of its rows of the plan."""
-    stops, plan = view.made.stops, view.made.plan
+    stops, plan = context.prototype.stops, context.prototype.plan
     if rows.size != stops.mirrors[k]:
         return False
     if sorted(set(plan.ball[rows].tolist())) != sorted(stops.balls[k]):
@@ -159,16 +161,16 @@ def _as_said(view: View, k: int, rows: Ints) -> bool:
     return bool(np.abs(worst - stops.errors[k]).max() <= ERROR_DEG)
 
 
-def _program(name: CheckName, view: View) -> Check:
+def _program(name: CheckName, context: PrototypeContext) -> Check:
     """Photographs at every stop, in order, twice, and nothing driven beyond the swing."""
-    found, wanted = gcode.run(view.made.program), np.tile(view.made.stops.angle, 2)
+    found, wanted = gcode.run(context.prototype.program), np.tile(context.prototype.stops.angle, 2)
     odd = list(found.faults)
     if found.photographs.shape != wanted.shape:
         odd.append(f"{found.photographs.size} photographs, not {wanted.size}")
     else:
         off = np.flatnonzero(~(np.abs(found.photographs - wanted) <= PROGRAM_DEG))
         odd += [f"photograph {k + 1} at {found.photographs[k]:.4f} deg" for k in off.tolist()]
-    low, high = view.made.swing
+    low, high = context.prototype.swing
     beyond = (found.moves < low - PROGRAM_DEG) | (found.moves > high + PROGRAM_DEG)
     odd += [f"{found.moves[k]:.4f} deg is beyond the swing" for k in np.flatnonzero(beyond)]
     return at_most(name, len(odd), 0, short_list(odd))

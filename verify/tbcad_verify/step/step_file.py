@@ -29,7 +29,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Faces:
+class StepFaces:
     """The F faces of a STEP file: surfaces from the text, measures from the kernel.
 
     Attributes:
@@ -77,7 +77,7 @@ class StepFile:
     gap: float
     bulk: MassProperties
     properties: dict[str, Any]
-    faces: Faces
+    faces: StepFaces
 
 
 def load(folder: Path, name: str) -> FileBytes:
@@ -161,9 +161,9 @@ def _key(row: Row) -> tuple[Any, ...]:
     return row["kind"], *(round(number, 9) + 0.0 for number in numbers)
 
 
-def _faces(rows: list[Row], measured: dict[tuple[Any, ...], Row]) -> Faces:
+def _faces(rows: list[Row], measured: dict[tuple[Any, ...], Row]) -> StepFaces:
     joined = [measured.get(_key(row), {}) if row["kind"] in WAYS else {} for row in rows]
-    return Faces(
+    return StepFaces(
         tuple(row["name"] for row in rows),
         np.array([row["kind"] for row in rows], dtype=str),
         _vectors(rows, "point"),

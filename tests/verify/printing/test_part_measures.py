@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tbcad_verify.printing.shape import Shape
+from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Unknown
 
@@ -25,7 +25,7 @@ from tests.verify.printing.printing_meshes import (
 COARSE = 1e-5  # mm, what float32 leaves of parts of this size
 
 
-def shape(*solids: trimesh.Trimesh) -> Shape:
+def shape(*solids: trimesh.Trimesh) -> PartMeasures:
     return measured(mesh_of(*solids))
 
 

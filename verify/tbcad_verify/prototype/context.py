@@ -17,21 +17,21 @@ from tbcad_verify.types import Floats, Ints
 
 
 @dataclass(frozen=True)
-class View:
+class PrototypeContext:
     """One export with a prototype.
 
     Attributes:
         export: all of it.
-        made: the prototype's record.
+        prototype: its's record.
     """
 
     export: Export
-    made: Prototype
+    prototype: Prototype
 
     @property
     def camera(self) -> Camera:
         """The camera that the prototype serves."""
-        return self.export.cameras[self.made.camera]
+        return self.export.cameras[self.prototype.camera]
 
     @property
     def pinhole(self) -> Floats:
@@ -56,7 +56,7 @@ class View:
     @cached_property
     def mine(self) -> Ints:
         """(m,) rows of mirrors.csv that are this camera's mirrors."""
-        return np.flatnonzero(self.export.rows.camera == self.made.camera)
+        return np.flatnonzero(self.export.rows.camera == self.prototype.camera)
 
     @cached_property
     def halved(self) -> NDArray[np.bool_]:
@@ -70,23 +70,25 @@ class View:
         Raises:
             Unknown: a mirror has none, or a row names a ball or stop that there is not.
         """
-        plan, ids = self.made.plan, self.export.rows.ids
+        plan, ids = self.prototype.plan, self.export.rows.ids
         straight = np.flatnonzero(plan.turn == 0).tolist()
         row = {plan.mirror[k]: k for k in straight}
         missing = [ids[k] for k in self.mine.tolist() if ids[k] not in row]
         if missing:
             raise Unknown(f"the plan shows no {missing[0]} ({len(missing)} mirrors missing)")
         found = np.array([row[ids[k]] for k in self.mine.tolist()], dtype=np.int64)
-        if not ((plan.ball[found] >= 1).all() and (plan.ball[found] <= len(self.made.balls)).all()):
+        if not (
+            (plan.ball[found] >= 1).all() and (plan.ball[found] <= len(self.prototype.balls)).all()
+        ):
             raise Unknown("the plan names balls that there are not")
         return found
 
     @property
     def ball(self) -> Ints:
         """(m,) ball that stands in for each mirror, from 0."""
-        return self.made.plan.ball[self.pictures] - 1
+        return self.prototype.plan.ball[self.pictures] - 1
 
     @property
     def angle(self) -> Floats:
         """(m,) base angle at which it does, radians."""
-        return np.radians(self.made.plan.angle[self.pictures])
+        return np.radians(self.prototype.plan.angle[self.pictures])

@@ -15,7 +15,7 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.kernel import read_solid
-from tbcad_verify.step.reading import StepFile, examine, load, parse
+from tbcad_verify.step.step_file import StepFile, examine, load, parse
 from tbcad_verify.step.text import read_text
 
 

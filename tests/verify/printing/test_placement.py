@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.assess import assess, checks, to_row
-from tbcad_verify.printing.overhang import overhang
-from tbcad_verify.printing.placing import place, words
+from tbcad_verify.printing.assessment import assess, checks, to_row
+from tbcad_verify.printing.overhang import overhang_area
+from tbcad_verify.printing.part_measures import PartMeasures
+from tbcad_verify.printing.placement import place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.printing.shape import Shape
-from tbcad_verify.printing.turning import turn
-from tbcad_verify.report.checks import all_passed
+from tbcad_verify.printing.rotating_callipers import best_turn
+from tbcad_verify.report.checks import passed
 
 from tests.verify.printing.printing_meshes import (
     box,
@@ -36,7 +36,7 @@ from tests.verify.printing.printing_meshes import (
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def shape(*solids: object) -> Shape:
+def shape(*solids: object) -> PartMeasures:
     return measured(mesh_of(*solids))  # type: ignore[arg-type]
 
 
@@ -50,7 +50,7 @@ def bed(*sides: float, rim: float = 0.0) -> Profile:
 
 
 def area(mesh: Mesh, lean_deg: float, down: np.ndarray = DOWN) -> float:
-    return overhang(mesh, norm(mesh.area), down, math.radians(lean_deg))
+    return overhang_area(mesh, norm(mesh.area), down, math.radians(lean_deg))
 
 
 def test_a_cube_that_fits_only_turned_back() -> None:
@@ -68,7 +68,7 @@ def test_a_long_plate_fits_only_diagonally() -> None:
     found = place(strip, bed(side + 0.01, side + 0.01, 3.01))
     assert found.fits
     assert found.pose.size == pytest.approx([side, side, 3], abs=1e-4)
-    assert "turned" in words(found.pose)
+    assert "turned" in pose_text(found.pose)
     missed = place(strip, bed(side - 0.5, side - 0.5, 3.01))
     assert not missed.fits
     assert missed.pose.excess == pytest.approx(0.5, abs=1e-4)
@@ -129,7 +129,7 @@ def test_no_turn_beats_the_one_found(
 ) -> None:
     """Against every twentieth of a degree."""
     flat = np.array([*corners, (-9, -8), (9, -7), (8, 9)]).T
-    angle, sides = turn(flat, width, depth, 1e-9)
+    angle, sides = best_turn(flat, width, depth, 1e-9)
     tried = np.linspace(0, np.pi, 3601)
     x = np.cos(tried)[:, None] * flat[0] - np.sin(tried)[:, None] * flat[1]
     y = np.sin(tried)[:, None] * flat[0] + np.cos(tried)[:, None] * flat[1]
@@ -188,7 +188,7 @@ def test_a_good_part() -> None:
     assert (held.measured, held.limit, held.passed) == (0, 0, True)
 
 
-def bad() -> Shape:
+def bad() -> PartMeasures:
     """Two solids and a cavity; walls of 0.5; a hole of 1; 300 long."""
     plates = plate(rectangle(300, 20), [ring(0.5, 32)], 0.5)
     hollow = turned_inside_out(box(3, 3, 3, at=(0, 0, 50)))
@@ -258,4 +258,4 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     assert row["wall_mm"] is None
     assert row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
-    assert not all_passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))
+    assert not passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))

@@ -15,58 +15,63 @@ from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
     axis,
-    cells,
+    ball_views,
     gcode,
-    nearest,
-    plan,
+    pinhole_cells,
+    plan_checks,
+    ray_transfer,
     seats,
     swing,
-    trace,
-    tracing,
+    triangle_distances,
 )
-from tbcad_verify.prototype.bodies import Body, body, joined_bodies, of_roles
-from tbcad_verify.prototype.caps import measure
-from tbcad_verify.prototype.rig import Rig, rig
-from tbcad_verify.prototype.step_files import readings, step_checks
-from tbcad_verify.prototype.view import View
+from tbcad_verify.prototype.caps import measure_cap
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import (
+    MeasuredPart,
+    joined_meshes,
+    measure_part,
+    of_roles,
+)
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
+from tbcad_verify.prototype.step_files import part_step_checks, read_step_files
 from tbcad_verify.record.files import read
 from tbcad_verify.record.record import read_export
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.reading import StepFile, examine_all, load
+from tbcad_verify.step.step_file import StepFile, examine_all, load
 
 from tests.verify.prototype.synthetic_prototype import Machine, balls, export, shell_of, turned
 from tests.verify.synthetic_export import Cells, poses, sign
 
 
-def view_of(folder: Path) -> View:
+def view_of(folder: Path) -> PrototypeContext:
     record = read_export(folder)
     assert record.prototype is not None
-    return View(record, record.prototype)
+    return PrototypeContext(record, record.prototype)
 
 
-def bodies_of(view: View) -> list[Body]:
+def bodies_of(view: PrototypeContext) -> list[MeasuredPart]:
     folder = view.export.folder
-    return [body(part, parse(read(folder, part.stl))) for part in view.made.parts]
+    return [measure_part(part, parse(read(folder, part.stl))) for part in view.prototype.parts]
 
 
-def rig_of(view: View) -> Rig:
+def rig_of(view: PrototypeContext) -> MeasuredPrototype:
     bodies = bodies_of(view)
-    held = seats.hold(view, joined_bodies(of_roles(bodies, "base"))[0])
-    caps = [measure(view, one) for one in of_roles(bodies, "cap")]
-    return rig(view, held, caps, bodies)
+    held = seats.measure_seats(view, joined_meshes(of_roles(bodies, "base"))[0])
+    caps = [measure_cap(view, one) for one in of_roles(bodies, "cap")]
+    return measure_prototype(view, held, caps, bodies)
 
 
 @pytest.fixture(scope="module")
-def view(machine: Path) -> View:
+def view(machine: Path) -> PrototypeContext:
     return view_of(machine)
 
 
 @pytest.fixture(scope="module")
-def ready(view: View) -> Rig:
+def ready(view: PrototypeContext) -> MeasuredPrototype:
     return rig_of(view)
 
 
-def test_centres_are_where_the_pads_were_put(ready: Rig) -> None:
+def test_centres_are_where_the_pads_were_put(ready: MeasuredPrototype) -> None:
     made = balls(Machine())
     np.testing.assert_allclose(ready.body.T, [ball.b for ball in made], atol=1e-5)
     np.testing.assert_allclose(ready.centre.T, [ball.c for ball in made], atol=2e-4)
@@ -76,20 +81,20 @@ def test_centres_are_where_the_pads_were_put(ready: Rig) -> None:
 def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
     """The centre moves along the line that both other planes leave it."""
     view = view_of(export(tmp_path / "x", Machine(pads={(1, 2): 0.02})))
-    base, _ = joined_bodies(of_roles(bodies_of(view), "base"))
+    base, _ = joined_meshes(of_roles(bodies_of(view), "base"))
     ball = balls(Machine())[1]
     shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
-    np.testing.assert_allclose(seats.hold(view, base).centre[1], ball.b + shift, atol=1e-5)
+    np.testing.assert_allclose(seats.measure_seats(view, base).centre[1], ball.b + shift, atol=1e-5)
     assert np.linalg.norm(shift) > 0.02
 
 
-def test_pads_are_found_without_the_contacts_being_right(view: View) -> None:
-    base, _ = joined_bodies(of_roles(bodies_of(view), "base"))
-    made = view.made
+def test_pads_are_found_without_the_contacts_being_right(view: PrototypeContext) -> None:
+    base, _ = joined_meshes(of_roles(bodies_of(view), "base"))
+    made = view.prototype
     off = made.seats.contacts + 0.3 * made.seats.axis[:, None]
-    near = replace(view, made=replace(made, seats=replace(made.seats, contacts=off)))
+    near = replace(view, prototype=replace(made, seats=replace(made.seats, contacts=off)))
     np.testing.assert_allclose(
-        seats.hold(near, base).centre, made.balls.columns("bx", 3).T, atol=1e-5
+        seats.measure_seats(near, base).centre, made.balls.columns("bx", 3).T, atol=1e-5
     )
 
 
@@ -108,12 +113,12 @@ def test_distances_from_triangles_by_brute_force() -> None:
     a, b, c = corners
     tried = a[:, :, None] + s * (b - a)[:, :, None] + t * (c - a)[:, :, None]
     brute = np.linalg.norm(tried - point[:, None, None], axis=0).min(axis=1)
-    found = nearest.distances(point, (a, b, c))
+    found = triangle_distances.distances(point, (a, b, c))
     assert (found <= brute + 1e-12).all()
     np.testing.assert_allclose(found, brute, atol=0.02)
 
 
-def test_turns_about_the_axis(view: View) -> None:
+def test_turns_about_the_axis(view: PrototypeContext) -> None:
     x = np.random.default_rng(2).normal(size=(3, 5))
     for angle in (-70.0, 33.0):
         found = axis.turned(x, view.frame[0][:, None], np.radians(np.full(5, angle)))
@@ -126,21 +131,21 @@ def test_turns_about_the_axis(view: View) -> None:
         )
 
 
-def test_outlines_are_those_of_cells_cut_by_hand(view: View) -> None:
+def test_outlines_are_those_of_cells_cut_by_hand(view: PrototypeContext) -> None:
     """`Cells` goes through all pairs of cutting planes, with no camera."""
     design = shell_of(Machine())
     hand = Cells(design, poses(design))
-    found = cells.outlines(cells.shell_of(view))
+    found = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(view))
     for k, outline in hand.outlines.items():
         # What lies on the seam is no edge of a halved mirror.
         points = np.array([point for point, other in outline if other != -1 or not view.halved[k]])
         d = points.T - view.pinhole[:, None]
         chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
-        first, second = cells.tangent_basis(chief)
+        first, second = pinhole_cells.tangent_basis(chief)
         angle = axis.between(chief, d)
         turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
-        low = np.floor(turn / (2 * np.pi) * cells.AROUND).astype(int) % cells.AROUND
-        both = np.stack([low, (low + 1) % cells.AROUND])
+        low = np.floor(turn / (2 * np.pi) * pinhole_cells.AROUND).astype(int) % pinhole_cells.AROUND
+        both = np.stack([low, (low + 1) % pinhole_cells.AROUND])
         own = found.own[k, both].all(axis=0)
         near, far = found.angle[k, both].min(axis=0)[own], found.angle[k, both].max(axis=0)[own]
         assert own.sum() > 20
@@ -148,10 +153,10 @@ def test_outlines_are_those_of_cells_cut_by_hand(view: View) -> None:
         assert (angle[own] < 1.08 * far).all()  # a corner between two directions stands out
 
 
-def test_first_mirrors_by_brute_force(view: View) -> None:
-    shell = cells.shell_of(view)
+def test_first_mirrors_by_brute_force(view: PrototypeContext) -> None:
+    shell = pinhole_cells.mirror_spheres(view)
     d = np.random.default_rng(3).normal(size=(3, 4000)) + np.array([[-1.0], [0], [2]])
-    found = cells.first_mirrors(shell, d)
+    found = pinhole_cells.first_mirrors(shell, d)
     assert (found >= 0).sum() > 100
     for k in range(0, 4000, 7):
         unit = d[:, k] / np.linalg.norm(d[:, k])
@@ -166,13 +171,15 @@ def test_first_mirrors_by_brute_force(view: View) -> None:
         assert found[k] == (which if good else -1)
 
 
-def test_the_window_goes_along_with_its_ball(view: View, ready: Rig) -> None:
+def test_the_window_goes_along_with_its_ball(
+    view: PrototypeContext, ready: MeasuredPrototype
+) -> None:
     """Each mirror's middle is moved to its ball's apex, which shows the origin."""
-    ways = trace.trace(ready)
-    shell = cells.shell_of(view)
-    chief = cells.outlines(shell).chief
+    ways = ray_transfer.ray_transfer(ready)
+    shell = pinhole_cells.mirror_spheres(view)
+    chief = pinhole_cells.cell_outlines(shell).chief
     _, lines = ways.lines(np.arange(chief.shape[1]), chief)
-    apex = view.made.balls.columns("px", 3)[:, view.ball]
+    apex = view.prototype.balls.columns("px", 3)[:, view.ball]
     np.testing.assert_allclose(lines.point, apex, atol=1e-3)
     away = (
         lines.point
@@ -181,11 +188,13 @@ def test_the_window_goes_along_with_its_ball(view: View, ready: Rig) -> None:
     assert np.linalg.norm(away, axis=0).max() < 0.02
 
 
-def test_coverage_by_rays_on_a_fine_outline(view: View, ready: Rig) -> None:
+def test_coverage_by_rays_on_a_fine_outline(
+    view: PrototypeContext, ready: MeasuredPrototype
+) -> None:
     """One mirror by a plain loop over many directions, its ball turned and not the rays."""
-    shown = tracing.show(ready)
-    edge = cells.outlines(cells.shell_of(view))
-    ways = trace.trace(ready)
+    shown = ball_views.ball_views(ready)
+    edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(view))
+    ways = ray_transfer.ray_transfer(ready)
     for i in (5, 20, 40):
         ball, angle = int(view.ball[i]), float(np.degrees(view.angle[i]))
         made = balls(Machine())[ball]
@@ -208,11 +217,11 @@ def test_coverage_by_rays_on_a_fine_outline(view: View, ready: Rig) -> None:
         assert shown.coverage[i] == pytest.approx(least, rel=5e-3)
 
 
-def test_twins_are_turned_about_z(view: View) -> None:
+def test_twins_are_turned_about_z(view: PrototypeContext) -> None:
     rows = view.export.rows
     u = rows.columns("ux", 3)
     np.testing.assert_allclose(
-        u[:, plan.twins(view)], u[:, view.mine] * [[-1], [-1], [1]], atol=1e-12
+        u[:, plan_checks.twins(view)], u[:, view.mine] * [[-1], [-1], [1]], atol=1e-12
     )
 
 
@@ -229,13 +238,13 @@ def test_a_program_is_followed_as_controllers_do() -> None:
     )
 
 
-def test_no_step_of_the_swing_is_too_large(ready: Rig) -> None:
+def test_no_step_of_the_swing_is_too_large(ready: MeasuredPrototype) -> None:
     """A rod that the base passes at one angle only is found, however thin."""
     import manifold3d
 
     arm = manifold3d.Manifold.cube([100.0, 2.0, 2.0]).translate([0, 80, 0])
     rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate([5.0, 0, 0])
-    rows = ready.view.frame
+    rows = ready.context.frame
     arm = arm.transform(np.hstack([rows[[1, 2, 0]].T, np.zeros((3, 1))]))
     for turn, meets in ((0.0, True), (170.0, False)):
         at = turned(rows.T @ np.array([0.3, 85.0, 80.7]), turn)
@@ -247,13 +256,13 @@ def test_no_step_of_the_swing_is_too_large(ready: Rig) -> None:
         assert found.looks > 5
 
 
-def test_one_look_does_where_nothing_can_ever_meet(ready: Rig) -> None:
+def test_one_look_does_where_nothing_can_ever_meet(ready: MeasuredPrototype) -> None:
     """Cubes at 20 and 30 mm along the axis keep 8 mm; one inside of the other shares its room."""
     import manifold3d
 
-    def at(along: float, out: float, size: float) -> swing.Mover:
+    def at(along: float, out: float, size: float) -> swing.AxialSolid:
         cube = manifold3d.Manifold.cube([size] * 3, center=True).translate([along, out, 0])
-        placed = cube.transform(np.hstack([ready.view.frame.T, np.zeros((3, 1))]))
+        placed = cube.transform(np.hstack([ready.context.frame.T, np.zeros((3, 1))]))
         return swing._mover(ready, "cube", placed)
 
     found = swing.sweep(ready, at(20, 30, 2), at(30, 30, 2))
@@ -287,7 +296,8 @@ def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None
     view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
     bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
     checks = {
-        check.name: check for check in step_checks(view.export, bulks, readings(view.export, 60))
+        check.name: check
+        for check in part_step_checks(view.export, bulks, read_step_files(view.export, 60))
     }
     assert [name for name, check in checks.items() if not check.passed] == ["step properties"]
     assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
@@ -304,7 +314,7 @@ def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
     ):
         view = view_of(stepped(made, low, high))
         bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
-        checks = step_checks(view.export, bulks, readings(view.export, 60))
+        checks = part_step_checks(view.export, bulks, read_step_files(view.export, 60))
         assert {check.name for check in checks if not check.passed} == names
 
 
@@ -320,28 +330,28 @@ def test_one_broken_step_file_leaves_the_others_known(made: Path) -> None:
 def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
     made: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tbcad_verify.step import reading
+    from tbcad_verify.step import step_file
 
-    real = reading.run
+    real = step_file.run
 
     def killed(command, place, limits):  # type: ignore[no-untyped-def]
         if len(command) > 6:  # all files at once
-            return reading.run.__wrapped__(command, place, limits)
+            return step_file.run.__wrapped__(command, place, limits)
         return real(command, place, limits)
 
     killed.__wrapped__ = lambda command, place, limits: real(  # type: ignore[attr-defined]
         [command[0], "-c", "import os; os.abort()"], place, limits
     )
-    monkeypatch.setattr(reading, "run", killed)
+    monkeypatch.setattr(step_file, "run", killed)
     view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
     good = load(view.export.folder, "stage.step")
     found = examine_all([good, good], 60)
     assert [isinstance(one, StepFile) for one in found] == [True, True]
 
 
-def test_the_bend_of_a_cube_is_its_edges(view: View) -> None:
+def test_the_bend_of_a_cube_is_its_edges(view: PrototypeContext) -> None:
     """Twelve edges at a right angle, of 8, 8 and 2 mm."""
     stage = next(one for one in bodies_of(view) if one.part.name == "stage")
     assert stage.placed_bulk is not None
     assert stage.placed_bulk.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
-    assert mass_properties(stage.needed).volume == pytest.approx(128, rel=1e-6)
+    assert mass_properties(stage.placed_mesh).volume == pytest.approx(128, rel=1e-6)

@@ -20,7 +20,7 @@ AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file
 
 
 @dataclass(frozen=True)
-class Hull:
+class PartHull:
     """The convex hull of a part.
 
     Attributes:
@@ -34,7 +34,7 @@ class Hull:
     tilted: Floats
 
 
-def wrap(points: Floats) -> Hull:
+def part_hull(points: Floats) -> PartHull:
     """The hull of points (V, 3), and the directions to try.
 
     Raises:
@@ -46,7 +46,7 @@ def wrap(points: Floats) -> Hull:
         raise Unknown("the part is flat: its points lie in one plane") from error
     faces = _faces(hull, points)
     down = _each_once(np.hstack([faces, AXES]))
-    return Hull(points[hull.vertices].T, down, _tilted(down[:, 0]))
+    return PartHull(points[hull.vertices].T, down, _tilted(down[:, 0]))
 
 
 def _faces(hull: ConvexHull, points: Floats) -> Floats:

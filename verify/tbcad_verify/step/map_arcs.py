@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.step.charts import Rings
+from tbcad_verify.step.stereographic import MapCircles
 from tbcad_verify.types import Floats, Ints
 
 SAME_CIRCLE = 1e-11
 
 
 @dataclass(frozen=True)
-class Arcs:
+class MapArcs:
     """N arcs on maps, what is free to their left.
 
     A circle is followed from its point nearest the apex; an arc that passes the farthest one is
@@ -26,7 +26,7 @@ class Arcs:
 
     Attributes:
         mirror: (N,) number of the map.
-        ring: (N,) column of the circle.
+        circle: (N,) column of the circle.
         near: (2, N) mm, the circle's nearest point.
         inward: (2, N) unit, toward what is free, there.
         bend: (N,) 1/mm, the circle's signed curvature; 0 for lines.
@@ -35,18 +35,18 @@ class Arcs:
     """
 
     mirror: Ints
-    ring: Ints
+    circle: Ints
     near: Floats
     inward: Floats
     bend: Floats
     t: Floats
     s: Floats
 
-    def take(self, index: NDArray[np.generic]) -> Arcs:
+    def take(self, index: NDArray[np.generic]) -> MapArcs:
         """The arcs with these numbers, or for which a mask holds."""
-        return Arcs(
+        return MapArcs(
             self.mirror[index],
-            self.ring[index],
+            self.circle[index],
             self.near[:, index],
             self.inward[:, index],
             self.bend[index],
@@ -71,7 +71,7 @@ class Arcs:
 
     def form(self, alpha: Floats, beta: Floats, gamma: Floats) -> Floats:
         """(3, N) forms (N,), (2, N), (N,), one an arc, as c0 + c1 t + c2 t^2 along it."""
-        return along(self.near, self.inward, self.bend, (alpha, beta, gamma))
+        return form_along_circles(self.near, self.inward, self.bend, (alpha, beta, gamma))
 
     @property
     def forward(self) -> Floats:
@@ -91,13 +91,13 @@ def arc_length(bend: Floats, t: Floats) -> Floats:
     return np.where(bend == 0, t, 2 / safe * np.arctan(safe * t / 2))
 
 
-def joined(parts: list[Arcs]) -> Arcs:
+def joined_arcs(parts: list[MapArcs]) -> MapArcs:
     """All arcs of several maps in one list, which may be empty."""
     none, no = np.zeros((2, 0)), np.zeros(0, dtype=np.intp)
-    every = [Arcs(no, no, none, none, none[0], none, none), *parts]
-    return Arcs(
+    every = [MapArcs(no, no, none, none, none[0], none, none), *parts]
+    return MapArcs(
         np.concatenate([a.mirror for a in every]),
-        np.concatenate([a.ring for a in every]),
+        np.concatenate([a.circle for a in every]),
         np.concatenate([a.near for a in every], axis=1),
         np.concatenate([a.inward for a in every], axis=1),
         np.concatenate([a.bend for a in every]),
@@ -106,30 +106,30 @@ def joined(parts: list[Arcs]) -> Arcs:
     )
 
 
-def arcs(rings: Rings, spread: float) -> Arcs:
-    """The arcs that no ring forbids, of all maps."""
-    near = _near(rings)
-    inward = rings.beta + 2 * rings.alpha * near
-    low, high = _forbidden(rings, near, inward, spread)
+def free_arcs(circles: MapCircles, spread: float) -> MapArcs:
+    """The arcs that no circle forbids, of all maps."""
+    near = _near(circles)
+    inward = circles.beta + 2 * circles.alpha * near
+    low, high = _forbidden(circles, near, inward, spread)
     start, end = _gaps(low, high)
-    cut = rings.real & ~np.any(rings.covers, axis=1, keepdims=True)
+    cut = circles.real & ~np.any(circles.covers, axis=1, keepdims=True)
     free = (end > start) & cut[..., None]
-    mirror, ring, gap = np.nonzero(free)
-    bend = 2 * rings.alpha[mirror, ring]
-    t = np.stack([start[mirror, ring, gap], end[mirror, ring, gap]])
-    pick = (slice(None), mirror, ring)
-    return Arcs(mirror, ring, near[pick], inward[pick], bend, t, arc_length(bend, t))
+    mirror, circle, gap = np.nonzero(free)
+    bend = 2 * circles.alpha[mirror, circle]
+    t = np.stack([start[mirror, circle, gap], end[mirror, circle, gap]])
+    pick = (slice(None), mirror, circle)
+    return MapArcs(mirror, circle, near[pick], inward[pick], bend, t, arc_length(bend, t))
 
 
-def _near(rings: Rings) -> Floats:
+def _near(circles: MapCircles) -> Floats:
     """(2, M, K) the point of each circle that is nearest the apex; any where all are as near."""
-    size = np.hypot(*rings.beta)
+    size = np.hypot(*circles.beta)
     tiny = size < np.finfo(np.float64).eps
-    toward = np.where(tiny, np.array([1.0, 0.0])[:, None, None], rings.beta)
-    return np.asarray(-2 * rings.gamma / (size + 1) * toward / np.where(tiny, 1.0, size))
+    toward = np.where(tiny, np.array([1.0, 0.0])[:, None, None], circles.beta)
+    return np.asarray(-2 * circles.gamma / (size + 1) * toward / np.where(tiny, 1.0, size))
 
 
-def along(
+def form_along_circles(
     near: Floats, inward: Floats, bend: Floats, form: tuple[Floats, Floats, Floats]
 ) -> Floats:
     """(3, ...) alpha |y|^2 + beta . y + gamma along circles, as c0 + c1 t + c2 t^2.
@@ -148,12 +148,14 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[0] * b[0] + a[1] * b[1])
 
 
-def _forbidden(rings: Rings, near: Floats, inward: Floats, spread: float) -> tuple[Floats, Floats]:
+def _forbidden(
+    circles: MapCircles, near: Floats, inward: Floats, spread: float
+) -> tuple[Floats, Floats]:
     """(M, K, 2 K) intervals of t on each circle that the others forbid; none: (inf, inf)."""
-    form = (rings.alpha[:, None], rings.beta[:, :, None], rings.gamma[:, None])
-    c = along(near[..., None], inward[..., None], 2 * rings.alpha[..., None], form)
-    first, last = roots(c)
-    whole, free = _uncrossed(rings, inward, c, spread)
+    form = (circles.alpha[:, None], circles.beta[:, :, None], circles.gamma[:, None])
+    c = form_along_circles(near[..., None], inward[..., None], 2 * circles.alpha[..., None], form)
+    first, last = quadratic_roots(c)
+    whole, free = _uncrossed(circles, inward, c, spread)
     outer = (c[2] < 0) & ~whole & ~free
     low = np.where(free, np.inf, np.where(whole | outer, -np.inf, first))
     high = np.where(free | whole, np.inf, np.where(outer, first, last))
@@ -165,14 +167,14 @@ def _forbidden(rings: Rings, near: Floats, inward: Floats, spread: float) -> tup
 
 
 def _uncrossed(
-    rings: Rings, inward: Floats, c: Floats, spread: float
+    circles: MapCircles, inward: Floats, c: Floats, spread: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(M, K, K) circles that lie wholly where another forbids, and wholly where it does not.
 
     Of a circle drawn twice the first keeps the arcs, and none does if only the circle is left.
     """
-    index = np.arange(rings.alpha.shape[1])
-    absent = ~rings.real[:, None] | (index[:, None] == index)
+    index = np.arange(circles.alpha.shape[1])
+    absent = ~circles.real[:, None] | (index[:, None] == index)
     size = np.abs(c) * np.array([1 / spread, 1, spread])[:, None, None, None]
     same = size.max(axis=0) < SAME_CIRCLE
     keeps = (_dot(inward[..., None], inward[:, :, None]) > 0) & (index[:, None] < index)
@@ -182,7 +184,7 @@ def _uncrossed(
     return ~free & (same | none), free
 
 
-def roots(c: Floats) -> tuple[Floats, Floats]:
+def quadratic_roots(c: Floats) -> tuple[Floats, Floats]:
     """Both roots of c0 + c1 t + c2 t^2 (3, ...), the lesser first, infinite ones too; or NaN."""
     square = c[1] ** 2 - 4 * c[0] * c[2]
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad_verify.mesh.vectors import chunks
-from tbcad_verify.step.charts import Charts
-from tbcad_verify.step.rims import Arcs
+from tbcad_verify.step.map_arcs import MapArcs
+from tbcad_verify.step.stereographic import SurfaceMaps
 from tbcad_verify.types import Floats
 
 NODES = 20
@@ -29,7 +29,7 @@ MOST_PIECES = 64
 
 
 @dataclass(frozen=True)
-class Moments:
+class CellMoments:
     """Integrals over M cells, about each mirror's apex p and in its own axes right, up, normal.
 
     Attributes:
@@ -43,9 +43,9 @@ class Moments:
     second: Floats
 
 
-def moments(charts: Charts, arcs: Arcs) -> Moments:
+def cell_moments(maps: SurfaceMaps, arcs: MapArcs) -> CellMoments:
     """Integrals over the cells of M maps by Gauss and Legendre along their arcs."""
-    k = charts.surfaces.curvature
+    k = maps.surfaces.curvature
     total = np.zeros((10, len(k)))
     for part in chunks(len(arcs.mirror), 1 << 13):
         pieces = _pieces(arcs.take(np.arange(len(arcs.mirror))[part]), k)
@@ -54,19 +54,19 @@ def moments(charts: Charts, arcs: Arcs) -> Moments:
     area, x, y, m, mm, xx, xy, yy, xm, ym = total
     xz, yz = -k / 2 * xm, -k / 2 * ym
     second = np.stack([[xx, xy, xz], [xy, yy, yz], [xz, yz, k**2 / 4 * mm]])
-    return Moments(area, np.stack([x, y, -k / 2 * m]), second)
+    return CellMoments(area, np.stack([x, y, -k / 2 * m]), second)
 
 
-def whole_sphere(k: Floats) -> Moments:
+def whole_sphere(k: Floats) -> CellMoments:
     """Integrals over whole spheres of curvatures k (M,), about any of their points."""
     area = 4 * np.pi / k**2
     zero = np.zeros_like(k)
     part = area / (3 * k**2)
     second = np.stack([[part, zero, zero], [zero, part, zero], [zero, zero, part + area / k**2]])
-    return Moments(area, np.stack([zero, zero, -area / k]), second)
+    return CellMoments(area, np.stack([zero, zero, -area / k]), second)
 
 
-def _pieces(arcs: Arcs, k: Floats) -> Arcs:
+def _pieces(arcs: MapArcs, k: Floats) -> MapArcs:
     """Arcs cut so that each turns by 90 degrees at most and is short against what varies there."""
     nearest = np.clip(0, *arcs.s)
     square = (arcs.point(nearest) ** 2).sum(axis=0)
@@ -81,7 +81,7 @@ def _pieces(arcs: Arcs, k: Floats) -> Arcs:
     return replace(cut, s=np.stack([start, end]))
 
 
-def _line_integrals(pieces: Arcs, k: Floats) -> Floats:
+def _line_integrals(pieces: MapArcs, k: Floats) -> Floats:
     """(10, N): area, and integrals of x, y, m, m^2, xx, xy, yy, x m, y m."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     total = np.zeros((10, len(k)))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tbcad_verify.step.rims import Arcs, arc_length, roots
+from tbcad_verify.step.map_arcs import MapArcs, arc_length, quadratic_roots
 from tbcad_verify.types import Bools, Floats, Ints
 
 CLOSED = 1e-8  # of the spread: how far apart one corner may be in two arcs
@@ -20,7 +20,7 @@ RAY = np.array([0.8137159, 0.5812531])  # no direction that a symmetric design p
 
 
 @dataclass(frozen=True)
-class Loops:
+class ArcLoops:
     """How N arcs, in ascending order of mirror, hang together.
 
     Attributes:
@@ -32,7 +32,7 @@ class Loops:
     loose: Bools
 
 
-def loops(arcs: Arcs, spread: float) -> Loops:
+def arc_loops(arcs: MapArcs, spread: float) -> ArcLoops:
     """Follow arcs, in ascending order of mirror, from end to start."""
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
     index, other = _partners(arcs.mirror, arcs.mirror)
@@ -42,7 +42,7 @@ def loops(arcs: Arcs, spread: float) -> Loops:
     count = len(arcs.mirror)
     graph = coo_array((np.ones(count, dtype=np.int8), (index[best], other[best])), (count, count))
     label = connected_components(graph, directed=False)[1].astype(np.intp)
-    return Loops(label, ~(away[best] <= CLOSED * spread))
+    return ArcLoops(label, ~(away[best] <= CLOSED * spread))
 
 
 def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
@@ -53,9 +53,9 @@ def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
     return index, np.arange(len(index)) - np.repeat(np.cumsum(count) - count - first, count)
 
 
-def facing(arcs: Arcs, spread: float) -> Arcs:
+def front_pieces(arcs: MapArcs, spread: float) -> MapArcs:
     """Of each mirror only the piece nearest to its apex: its outer loop, and the holes in it."""
-    label = loops(arcs, spread).label
+    label = arc_loops(arcs, spread).label
     outer = np.bincount(label, _swept(arcs))[label] > 0
     least = np.hypot(*arcs.point(np.clip(0, *arcs.s)))
     order = np.lexsort((least, arcs.mirror))
@@ -68,7 +68,7 @@ def facing(arcs: Arcs, spread: float) -> Arcs:
     return arcs.take(main | np.isin(label, label[held]))
 
 
-def _swept(arcs: Arcs) -> Floats:
+def _swept(arcs: MapArcs) -> Floats:
     """(N,) twice the area on the map between each arc and the apex, mm^2; < 0 clockwise."""
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
     turn = arcs.bend * arcs.length  # to the right
@@ -83,7 +83,7 @@ def _bulge(turn: Floats) -> Floats:
     return np.where(small, 1 / 6 - turn**2 / 120, (safe - np.sin(safe)) / safe**3)
 
 
-def inside(arcs: Arcs, mirror: Ints, y: Floats) -> Bools:
+def inside(arcs: MapArcs, mirror: Ints, y: Floats) -> Bools:
     """Whether points y (2, P) of the maps of `mirror` (P,) lie within that mirror's loops.
 
     A ray from such a point crosses the loops an odd number of times.
@@ -93,7 +93,7 @@ def inside(arcs: Arcs, mirror: Ints, y: Floats) -> Bools:
     across = np.array([[-RAY[1]], [RAY[0]]])
     form = some.form(np.zeros(len(other)), across + 0 * from_, -(across * from_).sum(axis=0))
     crossings = np.zeros(len(mirror), dtype=np.intp)
-    for t in roots(form):
+    for t in quadratic_roots(form):
         hit = (t > some.t[0]) & (t < some.t[1]) & np.isfinite(t)
         there = some.point(arc_length(some.bend, np.where(hit, t, 0.0)))
         ahead = hit & ((RAY[:, None] * (there - from_)).sum(axis=0) > 0)

@@ -9,22 +9,22 @@ from pathlib import Path
 
 from tbcad_verify.programs import admesh, freecad, gmsh, prusa
 from tbcad_verify.programs.answers import skipped
-from tbcad_verify.programs.program_query import Command, ProgramQuery, Wanted, room
+from tbcad_verify.programs.program_query import Command, ExpectedPart, ProgramQuery, sandbox
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
 AT_ONCE = 2
-ERRANDS = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
+QUERIES = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
 
 
-def client_checks(
+def check_with_programs(
     folder: Path,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[ExpectedPart],
     seconds: float = 300.0,
     progress: Progress = lambda _: None,
-    errands: Sequence[ProgramQuery] = ERRANDS,
+    errands: Sequence[ProgramQuery] = QUERIES,
 ) -> list[Check]:
     """Ask the programs about every file that they open.
 
@@ -66,7 +66,7 @@ def _two_at_a_time(jobs: Sequence[Callable[[], list[Check]]], limits: Limits) ->
 
 
 def _settle(
-    folder: Path, part: Wanted, errand: ProgramQuery, limits: Limits, progress: Progress
+    folder: Path, part: ExpectedPart, errand: ProgramQuery, limits: Limits, progress: Progress
 ) -> list[Check]:
     file = part.files.get(errand.kind, "")
     if not file:
@@ -81,7 +81,7 @@ def _settle(
 
 
 def _ask(
-    folder: Path, part: Wanted, errand: ProgramQuery, command: Command, limits: Limits
+    folder: Path, part: ExpectedPart, errand: ProgramQuery, command: Command, limits: Limits
 ) -> Sequence[Check]:
-    with room(command, folder, part.files[errand.kind], errand.kind, limits) as given:
+    with sandbox(command, folder, part.files[errand.kind], errand.kind, limits) as given:
         return errand.ask(given, part)

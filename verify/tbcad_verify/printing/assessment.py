@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.printing.placing import SLACK_MM, Placing, place, words
+from tbcad_verify.printing.part_measures import PartMeasures
+from tbcad_verify.printing.placement import SLACK_MM, Placement, place, pose_text
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.shape import Shape
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
 from tbcad_verify.types import Floats
@@ -21,7 +21,7 @@ DIGITS = 9
 
 
 @dataclass(frozen=True)
-class Print:
+class PrintAssessment:
     """What making one part on one machine comes to. What could not be found is None.
 
     Attributes:
@@ -63,12 +63,12 @@ class Print:
     hole_mm: float | None
     hole_at_mm: Sequence[float] | None
     holes: int
-    placing: Placing
+    placing: Placement
     inner_edges_mm: float | None
     problems: tuple[str, ...]
 
 
-def assess(part: str, shape: Shape, profile: Profile) -> Print:
+def assess(part: str, shape: PartMeasures, profile: Profile) -> PrintAssessment:
     """Hold a part against a profile.
 
     Args:
@@ -79,7 +79,7 @@ def assess(part: str, shape: Shape, profile: Profile) -> Print:
     holes, wall = shape.holes, finite(shape.walls.least)
     smallest = int(holes.diameter.argmin()) if holes.diameter.size else None
     placing = place(shape, profile)
-    return Print(
+    return PrintAssessment(
         part=part,
         profile=profile,
         volume_mm3=shape.bulk.volume,
@@ -97,12 +97,12 @@ def assess(part: str, shape: Shape, profile: Profile) -> Print:
         hole_at_mm=None if smallest is None else holes.middle[:, smallest].tolist(),
         holes=holes.diameter.size,
         placing=placing,
-        inner_edges_mm=left_over(shape, profile),
+        inner_edges_mm=uncut_edge_length(shape, profile),
         problems=(*_of_mesh(shape, profile), *_of_size(shape, profile, placing)),
     )
 
 
-def left_over(shape: Shape, profile: Profile) -> float | None:
+def uncut_edge_length(shape: PartMeasures, profile: Profile) -> float | None:
     """Length of inner edges in which a round tool leaves more than the tolerance, mm.
 
     A tool of radius r that touches both faces of an edge that bends by beta stays away from the
@@ -110,11 +110,11 @@ def left_over(shape: Shape, profile: Profile) -> float | None:
     """
     if profile.process != "machined":
         return None
-    left = profile.spot_mm / 2 * (1 / np.cos(shape.corners.bend / 2) - 1)
-    return float(shape.corners.length[left > profile.tolerance_mm].sum())
+    left = profile.spot_mm / 2 * (1 / np.cos(shape.inner_edges.bend / 2) - 1)
+    return float(shape.inner_edges.length[left > profile.tolerance_mm].sum())
 
 
-def checks(prints: Sequence[Print], wanted: bool) -> list[Check]:
+def checks(prints: Sequence[PrintAssessment], wanted: bool) -> list[Check]:
     """One line for each part and profile.
 
     Args:
@@ -124,7 +124,7 @@ def checks(prints: Sequence[Print], wanted: bool) -> list[Check]:
     return [_check(one, wanted) for one in prints]
 
 
-def to_row(one: Print) -> dict[str, Any]:
+def to_row(one: PrintAssessment) -> dict[str, Any]:
     """Everything as JSON holds it, rounded to 9 digits."""
     pose, area = one.placing.pose, one.placing.overhang
     return {
@@ -148,7 +148,7 @@ def to_row(one: Print) -> dict[str, Any]:
         "holes": one.holes,
         "fits": one.placing.fits,
         "too_large_mm": 0.0 if one.placing.fits else _short(pose.excess),
-        "orientation": words(pose),
+        "orientation": pose_text(pose),
         "rotation": [_shorts(row) for row in pose.rotation.tolist()],
         "size_mm": _shorts(pose.size.tolist()),
         "overhang_mm2": _short(area),
@@ -163,7 +163,7 @@ def print_name(part: str, profile: Profile) -> CheckName:
     return f"print {profile.name}", part, UNIT
 
 
-def _check(one: Print, wanted: bool) -> Check:
+def _check(one: PrintAssessment, wanted: bool) -> Check:
     name = print_name(one.part, one.profile)
     count = float(len(one.problems))
     detail = "; ".join(one.problems)
@@ -172,11 +172,11 @@ def _check(one: Print, wanted: bool) -> Check:
     return informative(name, count, detail or _fitting(one))
 
 
-def _fitting(one: Print) -> str:
-    return f"fits: {words(one.placing.pose)}, {one.mass_g:.0f} g {one.profile.material}"
+def _fitting(one: PrintAssessment) -> str:
+    return f"fits: {pose_text(one.placing.pose)}, {one.mass_g:.0f} g {one.profile.material}"
 
 
-def _of_mesh(shape: Shape, profile: Profile) -> Iterator[str]:
+def _of_mesh(shape: PartMeasures, profile: Profile) -> Iterator[str]:
     if shape.status != "NoError":
         yield f"no closed solid: manifold3d says {shape.status}"
     if shape.pieces.solids != 1:
@@ -187,7 +187,7 @@ def _of_mesh(shape: Shape, profile: Profile) -> Iterator[str]:
         yield f"{shape.triangles} triangles, at most {profile.max_triangles} are read"
 
 
-def _of_size(shape: Shape, profile: Profile, placing: Placing) -> Iterator[str]:
+def _of_size(shape: PartMeasures, profile: Profile, placing: Placement) -> Iterator[str]:
     walls, holes = shape.walls, shape.holes
     if walls.least < profile.wall_mm - SLACK_MM:
         yield f"least wall {_against(walls.least, profile.wall_mm)}, {_at(walls.where)}"
@@ -199,7 +199,7 @@ def _of_size(shape: Shape, profile: Profile, placing: Placing) -> Iterator[str]:
     if not placing.fits:
         size, bed = _by(placing.pose.size), _by(profile.bed_mm)
         yield (
-            f"{placing.pose.excess:.2f} mm too large: {size} with {words(placing.pose)}, "
+            f"{placing.pose.excess:.2f} mm too large: {size} with {pose_text(placing.pose)}, "
             f"the bed is {bed} less {profile.clearance_mm:g} at the rim"
         )
 
