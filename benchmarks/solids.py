@@ -13,7 +13,7 @@ from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, told
 
 from tbcad.cad.brep import Solid
-from tbcad.mirrors.array import Design, MirrorArray, design, numbered_directions
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.shell.envelope import envelope
@@ -59,7 +59,7 @@ def radii(rounds: int) -> list[Row]:
     ]
 
 
-def shells(made: Design) -> list[Solid]:
+def shells(made: MirrorDesign) -> list[Solid]:
     """Cells and both solids with the kernel's check, given the radii: what no boolean does here.
 
     The cells start from the polyhedron, not from those that the radii were solved with.

@@ -18,7 +18,7 @@ from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, told
 
 from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import Design, MirrorArray, design
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
@@ -70,7 +70,10 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
 
 
 def _meshes(
-    made: Design, draws: tuple[Draws, Draws], folder: Path, halves: tuple[EdgeModel, EdgeModel]
+    made: MirrorDesign,
+    draws: tuple[Draws, Draws],
+    folder: Path,
+    halves: tuple[EdgeModel, EdgeModel],
 ) -> tuple[float, float]:
     """Seconds a machine, and the largest difference from the fast model, mm."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -87,7 +90,7 @@ def _meshes(
     return seconds / count, float(np.abs(found - coverage(halves, draws)[0]).max())
 
 
-def _write(made: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
+def _write(made: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
     """Mesh both shells of a machine, as the exporter does."""
     first, body = made.halves[0], shell_envelope(made)
     for half, drawn in zip(made.halves, draws, strict=True):

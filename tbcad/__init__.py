@@ -1,3 +1,70 @@
-"""Light-field cameras from convex mirrors: the optics, the parts, and the proof on the files."""
+"""CAD and verification for a light-field camera made of convex mirrors.
 
-__version__ = "0.1.0"
+>>> import tbcad
+>>> small = tbcad.design(n=4)               # poses and exact radii of all mirrors
+>>> small
+<Design 'turtleback': n = 4, 49 + 49 mirrors, minimum coverage 60.60 mm>
+>>> shell = small.shell("a")                # a build123d part, mm
+>>> shell.is_valid
+True
+
+The names in `__all__` are the public interface: they change only with an entry in CHANGELOG.md,
+and until version 1.0 only in minor releases (0.1 -> 0.2). Every other name may change at any
+time. Loading this module is quick; each name is loaded when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tbcad.version import __version__
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.report import Report
+
+    from tbcad.api import Build, Design, analyse, build, capture, design, verify
+    from tbcad.errors import InputError
+    from tbcad.mirrors.array import MirrorArray
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.spec.design import Spec, load_spec
+    from tbcad.tolerance.analysis import Analysis
+
+__all__ = [
+    "Analysis",
+    "Build",
+    "Design",
+    "InputError",
+    "LightField",
+    "MirrorArray",
+    "Report",
+    "Spec",
+    "__version__",
+    "analyse",
+    "build",
+    "capture",
+    "design",
+    "load_spec",
+    "verify",
+]
+
+_MODULES = {
+    "Analysis": "tbcad.tolerance.analysis",
+    "InputError": "tbcad.errors",
+    "LightField": "tbcad.simulate.capture.light_field",
+    "MirrorArray": "tbcad.mirrors.array",
+    "Report": "tbcad_verify.report.report",
+    "Spec": "tbcad.spec.design",
+    "load_spec": "tbcad.spec.design",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first used (PEP 562)."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_MODULES.get(name, "tbcad.api")), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -21,8 +21,8 @@ from time import monotonic
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from tbcad import __version__
 from tbcad.errors import InputError
+from tbcad.version import __version__
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")

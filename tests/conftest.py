@@ -2,34 +2,34 @@
 
 import pytest
 
-from tbcad.mirrors.array import Design, MirrorArray, design
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.shell.envelope import Envelope, envelope
 from tbcad.spec.design import load_spec
 
 
 @pytest.fixture(scope="session")
-def paper_design() -> Design:
+def paper_design() -> MirrorDesign:
     """The paper's design with exact radii: n = 18, target 60 mm plus the default margin."""
     return design(load_spec(None))
 
 
 @pytest.fixture(scope="session")
-def paper_half(paper_design: Design) -> MirrorArray:
+def paper_half(paper_design: MirrorDesign) -> MirrorArray:
     return paper_design.halves[0]
 
 
 @pytest.fixture(scope="session")
-def small_design() -> Design:
+def small_design() -> MirrorDesign:
     """A quick one with everything in it: few mirrors, both flanges, halved mirrors."""
     return design(load_spec(None, ["n=6"]))
 
 
 @pytest.fixture(scope="session")
-def small_half(small_design: Design) -> MirrorArray:
+def small_half(small_design: MirrorDesign) -> MirrorArray:
     return small_design.halves[0]
 
 
 @pytest.fixture(scope="session")
-def small_body(small_design: Design) -> Envelope:
+def small_body(small_design: MirrorDesign) -> Envelope:
     half = small_design.halves[0]
     return envelope(small_design.spec.shell, half.body, half.ellipsoid)

@@ -19,7 +19,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.brep import Solid
 from tbcad.cad.mesh import Mesh
-from tbcad.mirrors.array import Design, MirrorArray
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.shell.envelope import Envelope, envelope
 from tbcad.shell.files import object_distances
 from tbcad.shell.mesh import shell_mesh
@@ -94,17 +94,17 @@ def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return vertices, triangles
 
 
-def solid_of(made: Design, which: int) -> Solid:
+def solid_of(made: MirrorDesign, which: int) -> Solid:
     half = made.halves[which]
     name = f"shell_{half.camera}"
     return shell_solid(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
 
 
-def body_of(made: Design) -> Envelope:
+def body_of(made: MirrorDesign) -> Envelope:
     half = made.halves[0]
     return envelope(made.spec.shell, half.body, half.ellipsoid)
 
 
-def mesh_of(made: Design) -> Mesh:
+def mesh_of(made: MirrorDesign) -> Mesh:
     half: MirrorArray = made.halves[0]
     return shell_mesh(made.spec, half.body, body_of(made), object_distances(half))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
 from tbcad.prototype.files.balls_csv import rows as ball_rows
@@ -31,7 +31,7 @@ def plan_of(made: PrototypeLayout) -> Plan:
     )
 
 
-def write_export(folder: Path, little: Design, made: PrototypeLayout) -> Path:
+def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
     write_plan(folder / "rotation_plan.csv", rows(planned_pictures(made)))

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from tbcad import __version__
+from tbcad.version import __version__
 
 app = typer.Typer(
     name="tbcad",

@@ -87,21 +87,21 @@ class MirrorArray:
 
 
 @dataclass(frozen=True)
-class Design:
+class MirrorDesign:
     """The spec and the two halves that follow from it."""
 
     spec: Spec
     halves: tuple[MirrorArray, MirrorArray]
 
 
-def design(spec: Spec, progress: Progress = lambda _: None) -> Design:
+def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
     """Poses, radii and cells of all mirrors.
 
     Raises:
         SpecError: when the spec's mirrors cannot be made; it names them.
     """
     half = _half_a(spec, progress)
-    return Design(spec, (half, half.mirrored()))
+    return MirrorDesign(spec, (half, half.mirrored()))
 
 
 def numbering_order(u: Floats) -> Ints:

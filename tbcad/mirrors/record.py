@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.mirrors.array import Design, MirrorArray
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.spec.design import spec_dict
 
 Row = dict[str, str | float | None]
@@ -52,14 +52,14 @@ def write_mirrors(path: Path, records: list[Row]) -> None:
         writer.writerows(records)
 
 
-def write_record(folder: Path, design: Design, shells: bool) -> None:
+def write_record(folder: Path, design: MirrorDesign, shells: bool) -> None:
     """Write mirrors.csv and design.json; whether the shells' files are there too is recorded."""
     records = [row for half in design.halves for row in rows(half)]
     write_mirrors(folder / "mirrors.csv", records)
     write_design(folder / "design.json", design, records, shells)
 
 
-def write_design(path: Path, design: Design, records: list[Row], shells: bool = True) -> None:
+def write_design(path: Path, design: MirrorDesign, records: list[Row], shells: bool = True) -> None:
     """Write design.json."""
     spec = design.spec
     document = {

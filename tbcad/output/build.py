@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.background import beside
 from tbcad.output.manifest import write_manifest
@@ -16,7 +16,7 @@ from tbcad.types import Progress
 
 
 def export(
-    design: Design,
+    design: MirrorDesign,
     folder: Path,
     parts: Sequence[str] = PARTS,
     progress: Progress = lambda _: None,

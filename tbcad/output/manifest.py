@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-from tbcad import __version__
+from tbcad.version import __version__
 
 MANIFEST, VERDICT = "manifest.json", "verify.json"
 SCHEMA = "tbcad-manifest/1"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.cad.solids import centroid
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
@@ -71,8 +71,8 @@ class Machine:
         return dict(sorted((for_base + in_caps + around).items()))
 
 
-def machine(design: Design, progress: Progress = lambda _: None) -> Machine:
-    """Design and build the prototype.
+def machine(design: MirrorDesign, progress: Progress = lambda _: None) -> Machine:
+    """MirrorDesign and build the prototype.
 
     Raises:
         SpecError: when something does not fit; it says what to change.

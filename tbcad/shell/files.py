@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tbcad.cad.brep import Solid
 from tbcad.cad.mesh import Mesh
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
-from tbcad.mirrors.array import Design, MirrorArray
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import part
 from tbcad.shell.envelope import Envelope, envelope
 from tbcad.shell.mesh import shell_mesh
@@ -16,7 +17,7 @@ from tbcad.shell.solid import shell_solid
 from tbcad.types import Progress
 
 
-def write_shells(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda _: None) -> None:
     """Write both shells as STEP, STL and 3MF into a folder.
 
     Raises:
@@ -31,7 +32,19 @@ def write_shells(design: Design, folder: Path, progress: Progress = lambda _: No
         _export(design, half, around, facets, folder, progress)
 
 
-def shell_envelope(design: Design) -> Envelope:
+def camera_solid(design: MirrorDesign, half: MirrorArray, around: Envelope | None = None) -> Solid:
+    """Solid of one camera's half; the envelope is worked out when it is not given.
+
+    Raises:
+        SpecError: when flanges or holes do not fit.
+        InvalidSolidError: when the kernel finds the solid invalid.
+    """
+    name, modelled = part(half)["name"], design.halves[0].body
+    closing = around or shell_envelope(design)
+    return shell_solid(name, half.ids, modelled, closing, mirrored=half.camera == "b")
+
+
+def shell_envelope(design: MirrorDesign) -> Envelope:
     """What closes camera a's half: back, flanges, holes.
 
     Raises:
@@ -47,7 +60,7 @@ def object_distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.fl
 
 
 def _export(
-    design: Design,
+    design: MirrorDesign,
     half: MirrorArray,
     closing: Envelope,
     facets: Mesh,
@@ -55,10 +68,10 @@ def _export(
     progress: Progress,
 ) -> None:
     """Write one half; closing and facets are camera a's."""
-    files, mirrored = part(half), half.camera == "b"
+    files = part(half)
     progress(f"{files['name']}: solid")
-    own = facets.mirrored() if mirrored else facets
-    solid = shell_solid(files["name"], half.ids, design.halves[0].body, closing, mirrored)
+    own = facets.mirrored() if half.camera == "b" else facets
+    solid = camera_solid(design, half, closing)
     progress(f"{files['name']}: files")
     write_step(folder / files["step"], solid, design.spec.step.pcurves)
     write_stl(folder / files["stl"], own)

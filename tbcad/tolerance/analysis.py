@@ -9,7 +9,7 @@ from typing import Any
 
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.object import SceneObject
@@ -188,7 +188,7 @@ def analyse(
     ]
     stage("every process, and the margin it needs")
 
-    def after(design: Design, errors: Errors) -> Floats:
+    def after(design: MirrorDesign, errors: Errors) -> Floats:
         return worst_of(nominals(reflectors(design)), errors)
 
     choices = tuple(_choice(export, one, worst, after, wishes, detail) for one in BUILT_IN)
@@ -229,7 +229,7 @@ def _choice(
     export: Exported,
     name: str,
     worst: Callable[[Errors], Floats],
-    after: Callable[[Design, Errors], Floats],
+    after: Callable[[MirrorDesign, Errors], Floats],
     wishes: Options,
     detail: Progress,
 ) -> ProcessOption:

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from math import ceil
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.types import Floats, Progress
 
-WorstOf = Callable[[Design, Errors], Floats]
+WorstOf = Callable[[MirrorDesign, Errors], Floats]
 """Least coverage, mm, (s,), of machines made after a design with some errors."""
 
 STEPS = 6

@@ -2,7 +2,7 @@
 
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec
 from tbcad.tolerance.margin import check_share, margin, with_margin
@@ -46,6 +46,6 @@ def for_process(
     return with_margin(spec, needed.mm)
 
 
-def _worst(design: Design, errors: Errors) -> Floats:
+def _worst(design: MirrorDesign, errors: Errors) -> Floats:
     task = MonteCarloCase(nominals(reflectors(design)), errors, SEED)
     return simulate(task, MACHINES, schedule.run).worst

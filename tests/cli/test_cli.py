@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tbcad import __version__
 from tbcad.cli import run
+from tbcad.version import __version__
 
 COMMAND = [
     sys.executable,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tbcad.cli import run
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.spec.design import load_spec
@@ -40,7 +40,7 @@ def _quick() -> Iterator[None]:
         yield
 
 
-def exported(folder: Path, *options: str) -> Design:
+def exported(folder: Path, *options: str) -> MirrorDesign:
     """Write a record, as `tbcad build --parts shell` does."""
     made = design(load_spec(None, [*SMALL, *options]))
     write_record(folder, made, shells=False)

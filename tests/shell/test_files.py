@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import export
 from tbcad.output.parts import SHELL
@@ -15,7 +15,7 @@ from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 
 
 @pytest.fixture(scope="module")
-def exported(small_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def exported(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
     export(small_design, folder, [SHELL])
     return folder
@@ -33,7 +33,7 @@ def test_all_files_are_there(exported: Path) -> None:
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_step_round_trip(exported: Path, small_design: Design, which: int) -> None:
+def test_step_round_trip(exported: Path, small_design: MirrorDesign, which: int) -> None:
     half = small_design.halves[which]
     content = read_step(exported / f"shell_{half.camera}.step")
     built = solid_of(small_design, which)
@@ -46,7 +46,7 @@ def test_step_round_trip(exported: Path, small_design: Design, which: int) -> No
     assert sum(content.kinds.values()) == len(built.faces)
 
 
-def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Design) -> None:
+def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: MirrorDesign) -> None:
     """Read by a parser that is no CAD kernel: sphere of each named face."""
     from steputils import p21
 
@@ -69,7 +69,9 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Des
 
 @pytest.mark.parametrize("kind", ["stl", "3mf"])
 @pytest.mark.parametrize("camera", ["a", "b"])
-def test_mesh_round_trip(exported: Path, small_design: Design, camera: str, kind: str) -> None:
+def test_mesh_round_trip(
+    exported: Path, small_design: MirrorDesign, camera: str, kind: str
+) -> None:
     made, read = mesh_of(small_design), read_mesh(exported / f"shell_{camera}.{kind}")
     assert len(read.faces) == len(made.triangles)
     assert read.is_watertight
@@ -77,7 +79,7 @@ def test_mesh_round_trip(exported: Path, small_design: Design, camera: str, kind
     assert read.volume == pytest.approx(made.volume, rel=1e-6)
 
 
-def test_record(exported: Path, small_design: Design) -> None:
+def test_record(exported: Path, small_design: MirrorDesign) -> None:
     with (exported / "mirrors.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == COLUMNS

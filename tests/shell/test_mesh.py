@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.trace import miss_distances
 from tbcad.shell.facets import mirror_facets
 from tbcad.spec.design import load_spec
@@ -36,7 +36,7 @@ def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
     assert other.volume == pytest.approx(made.volume)
 
 
-def test_facets_lie_on_their_spheres_and_face_the_light(small_design: Design) -> None:
+def test_facets_lie_on_their_spheres_and_face_the_light(small_design: MirrorDesign) -> None:
     half = small_design.halves[0]
     made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     surfaces = half.body.surfaces
@@ -58,7 +58,7 @@ def test_no_facet_folds_in_sharp_corners_of_coarse_cells(n: int) -> None:
     assert dot(normal, half.body.surfaces.gradient(every.mirror, corner.mean(axis=1))).min() > 0
 
 
-def test_chord_error_is_kept(small_design: Design) -> None:
+def test_chord_error_is_kept(small_design: MirrorDesign) -> None:
     half = small_design.halves[0]
     made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     middle = made.vertices[made.triangles].mean(axis=1)
@@ -66,7 +66,7 @@ def test_chord_error_is_kept(small_design: Design) -> None:
     assert depth.max() < small_design.spec.mesh.chord_error_mm
 
 
-def test_area_of_facets_is_that_of_the_cells(paper_design: Design) -> None:
+def test_area_of_facets_is_that_of_the_cells(paper_design: MirrorDesign) -> None:
     half = paper_design.halves[0]
     made = mirror_facets(paper_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
     corner = made.vertices[made.triangles]
@@ -100,7 +100,7 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     assert np.quantile(loss - chord, 0.99) < error_mm
 
 
-def test_joining_faces_are_flat_to_the_last_bit(small_design: Design) -> None:
+def test_joining_faces_are_flat_to_the_last_bit(small_design: MirrorDesign) -> None:
     made, foot = mesh_of(small_design), body_of(small_design).foot
     x, z = made.vertices[:, 0], made.vertices[:, 2]
     assert x.min() == 0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from OCP.BRepCheck import BRepCheck_Analyzer
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.spec.design import load_spec
 from tests.helpers import area, body_of, mesh_of, solid_of, volume
 
@@ -42,13 +42,13 @@ def test_each_face_has_its_cells_area(rule: str) -> None:
         assert [area(face) for _, face in faces] == pytest.approx(half.area, rel=1e-6)
 
 
-def test_paper_design_areas(paper_design: Design) -> None:
+def test_paper_design_areas(paper_design: MirrorDesign) -> None:
     half = paper_design.halves[0]
     faces = solid_of(paper_design, 0).faces[: len(half)]
     assert sum(area(face) for _, face in faces) == pytest.approx(half.area.sum(), rel=1e-6)
 
 
-def test_faces_are_named_after_mirrors_and_parts(small_design: Design) -> None:
+def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> None:
     names = [name for name, _ in solid_of(small_design, 1).faces]
     count = len(small_design.halves[1])
     assert names[:count] == small_design.halves[1].ids
@@ -59,7 +59,7 @@ def test_faces_are_named_after_mirrors_and_parts(small_design: Design) -> None:
     assert len(set(names)) == len(names)
 
 
-def test_holes_go_through(small_design: Design) -> None:
+def test_holes_go_through(small_design: MirrorDesign) -> None:
     """Area of each hole's wall: circumference times thickness of its flange."""
     made = body_of(small_design)
     faces = dict(solid_of(small_design, 0).faces)

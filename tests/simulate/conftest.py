@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.capture.light_field import LightField, in_memory
@@ -22,12 +22,12 @@ CAPTURE_MM = 60.0
 
 
 @pytest.fixture(scope="session")
-def little() -> Design:
+def little() -> MirrorDesign:
     return design(load_spec(None, OPTIONS))
 
 
 @pytest.fixture(scope="session")
-def record(little: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def record(little: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the record only, as `tbcad build` writes it."""
     folder = tmp_path_factory.mktemp("record")
     write_record(folder, little, shells=False)
@@ -40,7 +40,7 @@ def exported(record: Path) -> Exported:
 
 
 @pytest.fixture(scope="session")
-def cameras(little: Design) -> tuple[Reflector, Reflector]:
+def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
     return reflectors(little)
 
 
@@ -57,12 +57,12 @@ def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField
 
 
 @pytest.fixture(scope="session")
-def made(little: Design) -> PrototypeLayout:
+def made(little: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(little.spec, little)
 
 
 @pytest.fixture(scope="session")
 def written(
-    made: PrototypeLayout, little: Design, tmp_path_factory: pytest.TempPathFactory
+    made: PrototypeLayout, little: MirrorDesign, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     return write_export(tmp_path_factory.mktemp("export"), little, made)

@@ -2,12 +2,12 @@
 
 import pytest
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
 
 
 @pytest.fixture(scope="session")
-def halves(small_design: Design) -> tuple[EdgeModel, EdgeModel]:
+def halves(small_design: MirrorDesign) -> tuple[EdgeModel, EdgeModel]:
     a, b = (nominal(at) for at in reflectors(small_design))
     return a, b

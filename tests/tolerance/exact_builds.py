@@ -19,7 +19,7 @@ from tbcad_verify.shell.recover import recover
 
 from tbcad.cad.mesh import Mesh
 from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import Design, MirrorArray
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
@@ -71,7 +71,7 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mirror[counted], arc[counted]
 
 
-def meshed(design: Design, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
+def meshed(design: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
     """Write both shells of machine k as STL files, as the exporter would."""
     first, body = design.halves[0], shell_envelope(design)
     for half, drawn in zip(design.halves, draws, strict=True):

@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec, load_spec
 from tbcad.spec.errors import SpecError
@@ -40,7 +40,7 @@ def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def losing(loss: Loss) -> Callable[[Design, Errors], np.ndarray]:
+def losing(loss: Loss) -> Callable[[MirrorDesign, Errors], np.ndarray]:
     """Coverage of machines that see the target and the margin but for what they lose."""
     return lambda made, _: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
 
@@ -94,7 +94,7 @@ class TestMadeUpLosses:
         wanted = float(generator.uniform(0.2, 0.999))
         told: list[float] = []
 
-        def worst(_: Design, __: Errors) -> np.ndarray:
+        def worst(_: MirrorDesign, __: Errors) -> np.ndarray:
             seen = TARGET + generator.normal(0.3, 0.5, 50)
             told.append(float((seen >= TARGET).mean()))
             return seen
@@ -153,7 +153,7 @@ class TestRealDesigns:
     """Made anew with the margin that was found, and with machines of the same numbers."""
 
     @staticmethod
-    def worst(made: Design, errors: Errors) -> np.ndarray:
+    def worst(made: MirrorDesign, errors: Errors) -> np.ndarray:
         a, b = (nominal(at) for at in reflectors(made))
         return simulate(MonteCarloCase((a, b), errors, 1), 40).worst
 

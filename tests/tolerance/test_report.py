@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.record import contents_of
 from tbcad.simulate.study.tables import SUMMARY
@@ -42,12 +42,12 @@ SHARP = Sharpness(np.array([0.9, 0.8]), np.array([[0.7, 0.6]]), np.array([[0.84,
 
 
 @pytest.fixture(scope="module")
-def little() -> Design:
+def little() -> MirrorDesign:
     return design(load_spec(None, ["n=4"]))
 
 
 @pytest.fixture(scope="module")
-def found(little: Design) -> Analysis:
+def found(little: MirrorDesign) -> Analysis:
     """Real machines, some good and some not; all else made up."""
     cameras = reflectors(little)
     halves = nominal(cameras[0]), nominal(cameras[1])
@@ -265,7 +265,7 @@ class TestTables:
             assert row["margin_needed_mm"] == ("" if margin is None else str(margin))
             assert row["reason"] == one["reason"]
 
-    def test_cameras(self, found: Analysis, little: Design) -> None:
+    def test_cameras(self, found: Analysis, little: MirrorDesign) -> None:
         rows, coverage = rows_of(found, "cameras"), found.result.coverage
         assert len(rows) == coverage.shape[1]
         short = [float(row["share_short"]) for row in rows]

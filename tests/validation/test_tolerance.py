@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tbcad_verify.record.record import Export
 from tbcad_verify.record.record import read_export as read_record
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
@@ -36,13 +36,13 @@ POSED = replace(COARSE, shell_shift=Error(0.2), shell_tilt=Error(0.002))
 TARGET = 60.0
 
 
-def halves_of(made: Design) -> Halves:
+def halves_of(made: MirrorDesign) -> Halves:
     a, b = (nominal(at) for at in reflectors(made))
     return a, b
 
 
 @pytest.fixture(scope="module")
-def halves(small_design: Design) -> Halves:
+def halves(small_design: MirrorDesign) -> Halves:
     return halves_of(small_design)
 
 
@@ -70,7 +70,7 @@ def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
         assert (one.passes[0, ~fast.halved] % 2 == 1).all()
 
 
-def test_without_errors_it_is_the_paper_design(paper_design: Design) -> None:
+def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> None:
     """Within 1e-6 mm of the slow tracing with finer samples.
 
     The coverage that the design records is off by up to 5.6e-6 mm: its samples' parabola.
@@ -191,7 +191,7 @@ def test_pointing_error_is_the_lever_of_a_curved_mirror(
         assert found.angle[0] == pytest.approx(angle, rel=1e-3, abs=1e-10)
 
 
-def test_radius_of_one_mirror_alone(halves: Halves, small_design: Design) -> None:
+def test_radius_of_one_mirror_alone(halves: Halves, small_design: MirrorDesign) -> None:
     """Its own coverage by brute force; its neighbours see less or more, all others the same."""
     half, alone = small_design.halves[0], 40
     radius = np.zeros((1, len(half)))
@@ -221,7 +221,7 @@ def test_coat_too_thick_is_radii_too_large(halves: Halves) -> None:
 
 @pytest.mark.parametrize("share", [0.1, 1.0, 4.0])
 def test_random_machines_against_slow_tracing(
-    halves: Halves, small_design: Design, share: float
+    halves: Halves, small_design: MirrorDesign, share: float
 ) -> None:
     """20 machines of 2 x 103 mirrors, within 1e-6 mm (asked for: 1e-4)."""
     errors = scaled(POSED, share)
@@ -234,7 +234,7 @@ def test_random_machines_against_slow_tracing(
         assert np.abs(found - half.coverage).max() > 5 * share  # it is no small thing
 
 
-def test_random_paper_machines_against_slow_tracing(paper_design: Design) -> None:
+def test_random_paper_machines_against_slow_tracing(paper_design: MirrorDesign) -> None:
     halves = halves_of(paper_design)
     drawn, _ = draw(POSED, 7, range(3), len(halves[0]))
     found = seen(halves[0], drawn).diameter
@@ -251,7 +251,7 @@ def scaled(errors: Errors, share: float) -> Errors:
 
 @pytest.mark.parametrize("mirror", [3, 30, 55])
 def test_uneven_scale_against_brute_force(
-    halves: Halves, small_design: Design, mirror: int
+    halves: Halves, small_design: MirrorDesign, mirror: int
 ) -> None:
     """Spheres become ellipsoids of up to 1 % out of round."""
     errors = replace(COARSE, camera_shift=Error(), scale_axis=Error(0.01))
@@ -265,7 +265,7 @@ def test_uneven_scale_against_brute_force(
 
 
 @pytest.fixture(scope="module")
-def record(small_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Export:
+def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Export:
     """The record as the proof reads it; the meshes beside it are then written anew."""
     folder = tmp_path_factory.mktemp("made")
     write_record(folder, small_design, shells=True)
@@ -275,7 +275,7 @@ def record(small_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Ex
 
 @pytest.mark.parametrize(("errors", "machines"), [(COARSE, range(20)), (POSED, range(20, 24))])
 def test_random_machines_against_the_proof_of_their_meshes(
-    halves: Halves, small_design: Design, record: Export, errors: Errors, machines: range
+    halves: Halves, small_design: MirrorDesign, record: Export, errors: Errors, machines: range
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
 

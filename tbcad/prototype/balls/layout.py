@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.vectors import FLIP_X
-from tbcad.mirrors.array import Design, MirrorArray
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls import selection as ball
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
@@ -131,7 +131,7 @@ class PlannedPicture:
     error: float
 
 
-def prototype_layout(spec: Spec, design: Design) -> PrototypeLayout:
+def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
     Raises:

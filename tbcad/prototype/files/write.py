@@ -6,7 +6,7 @@ from typing import Any
 
 from tbcad.formats.glb import write_glb
 from tbcad.formats.step_assembly import write_assembly
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import rig
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
@@ -23,7 +23,9 @@ PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
 NAME, STEP, GLB = "prototype.json", "prototype.step", "prototype.glb"
 
 
-def export_prototype(design: Design, folder: Path, progress: Progress = lambda _: None) -> None:
+def export_prototype(
+    design: MirrorDesign, folder: Path, progress: Progress = lambda _: None
+) -> None:
     """Build the prototype and write all of its files into a folder.
 
     Raises:
@@ -43,7 +45,7 @@ def export_prototype(design: Design, folder: Path, progress: Progress = lambda _
     (folder / NAME).write_text(text, encoding="utf-8")
 
 
-def document(built: Machine, design: Design) -> dict[str, Any]:
+def document(built: Machine, design: MirrorDesign) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers."""
     made, keys = built.made, design.spec.prototype
     axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
@@ -118,7 +120,7 @@ def _seats(built: Machine) -> list[dict[str, Any]]:
     ]
 
 
-def _write_tables(built: Machine, design: Design, folder: Path) -> None:
+def _write_tables(built: Machine, design: MirrorDesign, folder: Path) -> None:
     made, motion = built.made, design.spec.prototype.motion
     balls_csv.write_balls(folder / "balls.csv", balls_csv.rows(made))
     plan_csv.write_plan(folder / "rotation_plan.csv", plan_csv.rows(planned_pictures(made)))
@@ -130,7 +132,7 @@ def _write_tables(built: Machine, design: Design, folder: Path) -> None:
     )
 
 
-def _needed(built: Machine, design: Design) -> bom_csv.PartsNeeded:
+def _needed(built: Machine, design: MirrorDesign) -> bom_csv.PartsNeeded:
     keys = design.spec.prototype.base
     return bom_csv.PartsNeeded(
         bought=built.bought,

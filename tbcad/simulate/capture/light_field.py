@@ -19,8 +19,9 @@ import json
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -70,6 +71,10 @@ class Frame:
         """All arrays of a part of the picture."""
         return {name: np.asarray(plane[rows, columns]) for name, plane in self.planes.items()}
 
+    def in_memory(self) -> Frame:
+        """The same with all arrays in memory."""
+        return replace(self, planes=self.read(slice(None)))
+
     def image(self) -> NDArray[np.uint8]:
         """The picture, (h, w, 3)."""
         return np.asarray(self.planes["colour"][:])
@@ -101,9 +106,28 @@ class LightField:
         with _opened(file) as store:
             yield _read(file, store)
 
+    @staticmethod
+    def read(path: Path) -> LightField:
+        """Read a whole file, or the file in a folder that `tbcad capture` wrote, into memory.
+
+        Raises:
+            InputError: as `open`.
+        """
+        with LightField.open(path) as stored:
+            frames = {name: frame.in_memory() for name, frame in stored.frames.items()}
+            return replace(stored, frames=frames)
+
     def __len__(self) -> int:
         """Number of mirrors."""
         return sum(len(frame.u) for frame in self.frames.values())
+
+    def __repr__(self) -> str:
+        """Return object, cameras and numbers of mirrors and pixels."""
+        sizes = ", ".join(
+            f"camera {name}: {len(frame.u)} mirrors, {frame.view.width_px} x {frame.view.height_px}"
+            for name, frame in self.frames.items()
+        )
+        return f"<LightField of {self.facts.get('object', 'an object')}: {sizes}>"
 
 
 @contextmanager
@@ -182,7 +206,9 @@ def arrays_of(band: Band) -> dict[str, NDArray[Any]]:
 
 
 def in_memory(
-    captured: Mapping[str, tuple[Reflector, Iterable[Band]]], capture_mm: float
+    captured: Mapping[str, tuple[Reflector, Iterable[Band]]],
+    capture_mm: float,
+    facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> LightField:
     """A light field that is in no file."""
     frames = {}
@@ -190,7 +216,7 @@ def in_memory(
         parts = [arrays_of(band) for band in bands]
         planes = {name: np.concatenate([part[name] for part in parts]) for name in PLANES}
         frames[camera] = Frame(at.view, at.u, at.mirrors, at.boxes(), planes)
-    return LightField(frames, capture_mm, {})
+    return LightField(frames, capture_mm, dict(facts))
 
 
 def _write_view(group: h5py.Group, view: Camera) -> None:

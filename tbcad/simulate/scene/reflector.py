@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
@@ -101,7 +101,7 @@ class SubstitutedReflector(Reflector):
         return self.surfaces
 
 
-def reflectors(design: Design) -> tuple[Reflector, Reflector]:
+def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
     """Both cameras of a design with their mirrors."""
     a, b = (Reflector(half.camera, half.view, half.u, half.cells) for half in design.halves)
     return a, b

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.schedule import run
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
@@ -25,7 +25,7 @@ class Attempt:
         reason: what the refusal says, else "".
     """
 
-    made: Design | None
+    made: MirrorDesign | None
     reason: str = ""
 
 

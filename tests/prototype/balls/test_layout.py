@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.trace import reflected
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
@@ -27,7 +27,7 @@ DEGREE = np.radians(1)
 
 
 @pytest.fixture(scope="module")
-def made(paper_design: Design) -> PrototypeLayout:
+def made(paper_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(SPEC, paper_design)
 
 
@@ -36,7 +36,7 @@ def here(made: PrototypeLayout) -> BallCandidates:
     return ball_candidates(made.half, made.groups, 60.0)
 
 
-def small(made: Design, *options: str) -> PrototypeLayout:
+def small(made: MirrorDesign, *options: str) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", *options]), made)
 
 
@@ -100,7 +100,7 @@ class TestBalls:
         assert (found.coverage_fixed[found.possible] >= 60 - SAME_MM).all()
         assert found.kept < 0.05
 
-    def test_cost_of_each_choice(self, small_design: Design) -> None:
+    def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, made = small_design.spec, small(small_design)
         found = {
             c.name: c for c in ball_alternatives(spec, made.half, made.groups, made.balls.catalogue)
@@ -219,7 +219,7 @@ class TestStops:
         assert len(made.stops) <= len(other)
 
     def test_other_half_with_the_object_turned(
-        self, made: PrototypeLayout, paper_design: Design
+        self, made: PrototypeLayout, paper_design: MirrorDesign
     ) -> None:
         """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
         b = paper_design.halves[1]
@@ -233,13 +233,15 @@ class TestStops:
 
 
 class TestAsked:
-    def test_same_numbers_every_time(self, made: PrototypeLayout, paper_design: Design) -> None:
+    def test_same_numbers_every_time(
+        self, made: PrototypeLayout, paper_design: MirrorDesign
+    ) -> None:
         again = prototype_layout(SPEC, paper_design)
         assert again.placement.azimuth.tobytes() == made.placement.azimuth.tobytes()
         assert again.stops.angle.tobytes() == made.stops.angle.tobytes()
         assert again.balls.size == made.balls.size
 
-    def test_auto_is_the_least_number_within_the_limits(self, small_design: Design) -> None:
+    def test_auto_is_the_least_number_within_the_limits(self, small_design: MirrorDesign) -> None:
         auto = small(small_design, "prototype.k=auto")
         keys = load_spec(None).prototype
 
@@ -255,19 +257,19 @@ class TestAsked:
         assert within(len(auto))
         assert not within(len(auto) - 1)
 
-    def test_one_ball(self, small_design: Design) -> None:
+    def test_one_ball(self, small_design: MirrorDesign) -> None:
         alone = small(small_design, "prototype.k=1")
         assert len(alone) == 1
         assert alone.placement.swing / DEGREE < 180
 
-    def test_smaller_balls_are_lighter(self, small_design: Design) -> None:
+    def test_smaller_balls_are_lighter(self, small_design: MirrorDesign) -> None:
         light, heavy = (
             small(small_design, f"prototype.largest_ball_mm={size}") for size in (30, 60)
         )
         assert light.mass_g < heavy.mass_g
         assert light.balls.cap.sum() > heavy.balls.cap.sum()
 
-    def test_no_post_gives_more_room(self, small_design: Design) -> None:
+    def test_no_post_gives_more_room(self, small_design: MirrorDesign) -> None:
         task = small(small_design, "post_diameter_mm=0", "camera_diameter_mm=0").task
         assert (task.ceiling == np.pi).all()
         assert (task.floor == -np.pi).all()
@@ -292,7 +294,7 @@ class TestRefused:
         ],
     )
     def test_what_cannot_be_built(
-        self, small_design: Design, options: list[str], told: str
+        self, small_design: MirrorDesign, options: list[str], told: str
     ) -> None:
         with pytest.raises(SpecError) as caught:
             small(small_design, *options)
@@ -304,7 +306,7 @@ class TestRefused:
         with pytest.raises(SpecError, match=r"needs curved mirrors.*traced or paper"):
             prototype_layout(spec, design(spec))
 
-    def test_an_empty_catalogue(self, small_design: Design, tmp_path: Path) -> None:
+    def test_an_empty_catalogue(self, small_design: MirrorDesign, tmp_path: Path) -> None:
         path = tmp_path / "none.csv"
         path.write_text("size,diameter_mm,standard,grades,mass_g,source\n")
         keys = small_design.spec.prototype.model_copy(update={"catalogues": (str(path),)})

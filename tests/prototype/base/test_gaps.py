@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -14,7 +14,7 @@ from tbcad.spec.design import load_spec
 
 
 @pytest.fixture(scope="module")
-def whole(paper_design: Design) -> BaseLayout:
+def whole(paper_design: MirrorDesign) -> BaseLayout:
     return base_layout(BaseSpec(), prototype_layout(load_spec(None), paper_design))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import dot, norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.hub import hub_layout
@@ -33,12 +33,12 @@ def keys(**changed: object) -> BaseSpec:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: Design) -> PrototypeLayout:
+def paper(paper_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None), paper_design)
 
 
@@ -89,7 +89,7 @@ class TestSeats:
         assert insertion_clearance(whole.seats).min() > APART_MM
 
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
-        self, paper_design: Design
+        self, paper_design: MirrorDesign
     ) -> None:
         made = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
         seat = seat_layout(KEYS, made)

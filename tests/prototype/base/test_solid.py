@@ -30,7 +30,7 @@ from tbcad.cad.solids import (
 )
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import hub_solids as hubs
 from tbcad.prototype.base import seat_solids as seat
@@ -51,7 +51,7 @@ KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     options = ["n=6", "prototype.k=4", "prototype.snap=nearest", "prototype.largest_ball_mm=50"]
     return prototype_layout(load_spec(None, options), small_design)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.joints import flange_profile
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -34,12 +34,12 @@ def cube(size: float) -> BaseSpec:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: Design) -> PrototypeLayout:
+def paper(paper_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None), paper_design)
 
 

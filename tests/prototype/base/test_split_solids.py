@@ -17,7 +17,7 @@ from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
@@ -47,13 +47,13 @@ def as_trimesh(part: PlacedSolid) -> trimesh.Trimesh:
 
 
 @pytest.fixture(scope="module")
-def small(small_design: Design) -> Cut:
+def small(small_design: MirrorDesign) -> Cut:
     made = prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
     return cut_up(base_layout(KEYS, made))
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: Design) -> Cut:
+def paper(paper_design: MirrorDesign) -> Cut:
     made = prototype_layout(load_spec(None), paper_design)
     return cut_up(base_layout(BaseSpec(bed_mm=(180.0, 180.0, 180.0)), made))
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.files.balls_csv import COLUMNS, rows, write_balls
 from tbcad.spec.design import load_spec
@@ -14,7 +14,7 @@ Read = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     """Balls and caps, both."""
     return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design

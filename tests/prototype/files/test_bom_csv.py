@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
@@ -36,7 +36,7 @@ Read = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     """Balls and caps, both."""
     return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
@@ -103,7 +103,7 @@ def sent(lines: list[str], axis: str = "X") -> Grbl:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
@@ -201,7 +201,7 @@ def test_other_motions(made: PrototypeLayout, drive: Drive, motion: MotionSpec) 
     assert len(machine.shots) == 2 * len(made.stops)
 
 
-def test_the_approach_ends_where_something_stands(small_design: Design) -> None:
+def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
     tight = prototype_layout(spec, small_design)
     start = run(tight, MotionSpec(approach_deg=20)).start

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
 from tbcad.prototype.files.balls_csv import Row
 from tbcad.prototype.files.plan_csv import (
@@ -26,7 +26,7 @@ def read_back(path: Path) -> Read:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 

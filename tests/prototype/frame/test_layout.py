@@ -9,7 +9,7 @@ import pytest
 
 from tbcad.geometry.primitives import Cylinder
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
@@ -37,7 +37,7 @@ def drive(name: str, number: int = 0) -> Drive:
 class Rig:
     """A prototype with its base, the room it leaves and a stage."""
 
-    def __init__(self, spec: Spec, design: Design, name: str = "nema17-belt") -> None:
+    def __init__(self, spec: Spec, design: MirrorDesign, name: str = "nema17-belt") -> None:
         self.own = spec.prototype
         self.made = prototype_layout(spec, design)
         keys = spec.prototype.base.model_copy(update={"drive": name})
@@ -57,7 +57,7 @@ class Rig:
 
 
 @pytest.fixture(scope="module")
-def rig(small_design: Design) -> Rig:
+def rig(small_design: MirrorDesign) -> Rig:
     return Rig(SPEC, small_design)
 
 
@@ -111,7 +111,7 @@ class TestFrame:
         assert min(numbers.swept.values()) >= KEYS.clearance_mm
         assert min(numbers.light.values()) >= 30
 
-    def test_the_paper_design_is_clear_with_all_defaults(self, paper_design: Design) -> None:
+    def test_the_paper_design_is_clear_with_all_defaults(self, paper_design: MirrorDesign) -> None:
         whole = Rig(load_spec(None), paper_design)
         found = frame(
             (FrameSpec(), whole.own),
@@ -153,7 +153,7 @@ class TestFrame:
         assert away[~np.eye(len(away), dtype=bool)].min() > 15
 
     @pytest.mark.parametrize("number", [0, 1, 2])
-    def test_a_motor_on_the_axis(self, small_design: Design, number: int) -> None:
+    def test_a_motor_on_the_axis(self, small_design: MirrorDesign, number: int) -> None:
         direct = Rig(SPEC, small_design, "nema17-direct")
         found = direct.frame(drive("nema17-direct", number))
         assert found.head.bearings == ()

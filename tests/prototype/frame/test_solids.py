@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.cad.solids import faces, meshed, volume
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -38,7 +38,7 @@ PRINTER = BaseSpec()
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(SPEC, small_design)
 
 

@@ -11,7 +11,7 @@ from tbcad.cad.brep import Solid
 from tbcad.cad.solids import meshed
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.keepout import Room, room
@@ -31,7 +31,7 @@ KEYS = BaseSpec()
 
 
 @pytest.fixture(scope="module")
-def made(small_design: Design) -> PrototypeLayout:
+def made(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
 
 

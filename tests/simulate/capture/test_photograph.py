@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import Design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.photograph import Tracer, photograph, shifts
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.facets import on_mesh, read_shells
@@ -91,7 +91,7 @@ def test_progress_is_told(cameras: Cameras, knot: Scene) -> None:
 
 @pytest.fixture(scope="module")
 def with_meshes(
-    little: Design, record: Path, exported: Exported, tmp_path_factory: pytest.TempPathFactory
+    little: MirrorDesign, record: Path, exported: Exported, tmp_path_factory: pytest.TempPathFactory
 ) -> Exported:
     """The record with shells beside it, as STL."""
     folder, made = tmp_path_factory.mktemp("meshes"), mesh_of(little)
@@ -119,7 +119,7 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
 
 
-def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: Design) -> None:
+def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: MirrorDesign) -> None:
     """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
     corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
     shells = read_shells(with_meshes)

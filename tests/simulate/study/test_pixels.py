@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design, MirrorArray, design
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.simulate.scene.reflector import Reflector, pixels_of, reflectors
 from tbcad.simulate.study.pixels import Sensor, _traced, counts, sensor_of, virtual_cameras
 from tbcad.simulate.study.resolution import Ratio, balance, ratio_of
@@ -17,7 +17,7 @@ WIDE = ("n=8", "hfov_deg=95", "width_px=832", "height_px=620")
 
 
 @pytest.fixture(scope="module")
-def wide() -> Design:
+def wide() -> MirrorDesign:
     return design(load_spec(None, WIDE))
 
 
@@ -33,7 +33,7 @@ def window(at: Reflector, mirror: int) -> float:
     return abs(total)
 
 
-def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: Design) -> None:
+def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: MirrorDesign) -> None:
     """Pixels counted one by one against the area within the cell's arcs."""
     at = reflectors(wide)[0]
     on = counts(wide.halves[0], (Sensor(832, 620),), 30.0)[0].on
@@ -42,13 +42,13 @@ def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: Design) -> None:
     assert on.sum() == pytest.approx(area.sum(), rel=5e-4)
 
 
-def test_both_cameras_have_the_same_pixels(wide: Design) -> None:
+def test_both_cameras_have_the_same_pixels(wide: MirrorDesign) -> None:
     a, b = (_traced(at, 30.0) for at in reflectors(wide))
     assert np.array_equal(a[0], b[0])
     assert np.array_equal(a[1], b[1])
 
 
-def test_no_ray_meets_nothing_and_all_meet_everything(wide: Design) -> None:
+def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> None:
     half = wide.halves[0]
     sensor = (Sensor(416, 310),)
     assert counts(half, sensor, 0.0)[0].seen.sum() == 0
@@ -60,7 +60,7 @@ def test_no_ray_meets_nothing_and_all_meet_everything(wide: Design) -> None:
     assert np.array_equal(most.seen, most.on)
 
 
-def test_share_that_sees_the_sphere_follows_its_size(wide: Design) -> None:
+def test_share_that_sees_the_sphere_follows_its_size(wide: MirrorDesign) -> None:
     """A mirror shows a small sphere in an area that grows with the square of its radius."""
     seen = [
         counts(wide.halves[0], (Sensor(1664, 1240),), r)[0].seen.sum() for r in (5.0, 10.0, 20.0)
@@ -69,7 +69,7 @@ def test_share_that_sees_the_sphere_follows_its_size(wide: Design) -> None:
     assert seen[2] / seen[1] == pytest.approx(4, rel=0.05)
 
 
-def test_rays_for_blocks_of_pixels_give_the_same_count(wide: Design) -> None:
+def test_rays_for_blocks_of_pixels_give_the_same_count(wide: MirrorDesign) -> None:
     half, sensor = wide.halves[0], Sensor(1664, 1240)
     every = counts(half, (sensor,), 30.0)[0]
     some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]
@@ -79,7 +79,7 @@ def test_rays_for_blocks_of_pixels_give_the_same_count(wide: Design) -> None:
     assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
 
 
-def test_sides_that_do_not_divide_are_sampled_too(wide: Design) -> None:
+def test_sides_that_do_not_divide_are_sampled_too(wide: MirrorDesign) -> None:
     half, sensor = wide.halves[0], Sensor(1663, 1239)
     every = counts(half, (sensor,), 30.0)[0]
     some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]

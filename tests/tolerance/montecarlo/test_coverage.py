@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.rays import exact
 from tbcad.simulate.scene.reflector import pixels_of, reflectors
 from tbcad.spec.design import load_spec
@@ -32,7 +32,7 @@ def test_virtual_cameras_share_halved_mirrors(halves: Halves) -> None:
     assert (which[m:][~halved] >= m).all()
 
 
-def test_pixels_are_those_that_are_counted(small_design: Design) -> None:
+def test_pixels_are_those_that_are_counted(small_design: MirrorDesign) -> None:
     """Against one exact ray a pixel, for mirrors whose picture lies inside the frame."""
     a, _ = reflectors(small_design)
     half = nominal(a)
@@ -47,7 +47,7 @@ def test_pixels_are_those_that_are_counted(small_design: Design) -> None:
     assert np.abs(area - count)[inside] == pytest.approx(0, abs=0.5 * np.sqrt(count.max()))
 
 
-def test_pixels_are_the_area_of_the_outline(small_design: Design) -> None:
+def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
     """To a millionth of a polygon with 512 corners on every edge."""
     a, b = reflectors(small_design)
     for at in (a, b):
@@ -104,7 +104,7 @@ def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: Halves) -> None
 
 @pytest.mark.parametrize(("shift", "all_look"), [(3.0, True), (45.0, False), (60.0, False)])
 def test_mirror_that_looks_past_the_object_sees_nothing(
-    halves: Halves, small_design: Design, shift: float, all_look: bool
+    halves: Halves, small_design: MirrorDesign, shift: float, all_look: bool
 ) -> None:
     """Its rays may miss the middle by far and yet not surround it."""
     a, _ = none(halves)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.object import built_in
 from tbcad.simulate.scene.rays import exact, reflected
@@ -37,12 +37,12 @@ LARGE = Errors(
 
 
 @pytest.fixture(scope="module")
-def little() -> Design:
+def little() -> MirrorDesign:
     return design(load_spec(None, ["n=4", "camera.width_px=416", "camera.height_px=310"]))
 
 
 @pytest.fixture(scope="module")
-def cameras(little: Design) -> tuple[Reflector, Reflector]:
+def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
     return reflectors(little)
 
 

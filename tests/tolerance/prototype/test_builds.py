@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.ball_light import ball_miss_distances
 from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
@@ -42,12 +42,12 @@ Picture = tuple[np.ndarray, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def little() -> Design:
+def little() -> MirrorDesign:
     return design(load_spec(None, OPTIONS))
 
 
 @pytest.fixture(scope="module")
-def made(little: Design) -> PrototypeLayout:
+def made(little: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(little.spec, little)
 
 
@@ -57,12 +57,12 @@ def plan(made: PrototypeLayout) -> Plan:
 
 
 @pytest.fixture(scope="module")
-def at(little: Design, plan: Plan) -> Designed:
+def at(little: MirrorDesign, plan: Plan) -> Designed:
     return designed(reflectors(little), plan)
 
 
 @pytest.fixture(scope="module")
-def both(little: Design, plan: Plan) -> tuple[Run, Run]:
+def both(little: MirrorDesign, plan: Plan) -> tuple[Run, Run]:
     return runs(reflectors(little), plan)
 
 
@@ -268,7 +268,9 @@ class TestMonteCarlo:
         assert result.quantiles([0, 0.5])[1].tolist() == [62, 62, 60.5]
 
 
-def test_windows_left_in_their_places_see_less(little: Design, plan: Plan, at: Designed) -> None:
+def test_windows_left_in_their_places_see_less(
+    little: MirrorDesign, plan: Plan, at: Designed
+) -> None:
     """Balls then stand aside of their windows' middles though nothing is off."""
     fixed = designed(reflectors(little), replace(plan, moved=False))
     apart, together = (seen(one, machines(one, 1))[0] for one in (fixed, at))

@@ -23,7 +23,7 @@ from tbcad_verify.step.sphere_union import (
 )
 from tbcad_verify.types import Floats
 
-from tbcad.mirrors.array import Design, design
+from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import rows
 from tbcad.optics.cells import cell_areas
 from tbcad.spec.design import load_spec
@@ -364,11 +364,11 @@ LINES = {
 
 
 @cache
-def made(name: str) -> Design:
+def made(name: str) -> MirrorDesign:
     return design(load_spec(None, LINES[name]))
 
 
-def as_export(it: Design) -> Export:
+def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
     sample = read_export(SAMPLE)
     table = from_json([dict(row) for half in it.halves for row in rows(half)])

@@ -86,6 +86,10 @@ class Report:
     shell: bool = True
     prototype: Mapping[str, Any] | None = None
 
+    def __repr__(self) -> str:
+        """Return the verdict, not the hundreds of figures."""
+        return f"<Report: {self.verdict}>"
+
     @property
     def passed(self) -> bool:
         """True if every check passed; what is unknown does not."""

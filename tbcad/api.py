@@ -1,0 +1,394 @@
+"""The public functions of `import tbcad`: design, build, verify, capture, analyse.
+
+The commands of `tbcad` call the same functions. Heavy libraries are imported inside them, so that
+bad input is refused before they are loaded.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.spec.design import Spec, load_spec
+from tbcad.types import Progress
+
+if TYPE_CHECKING:
+    from build123d import Part
+    from tbcad_verify.report.report import Report
+    from tbcad_verify.run.verify import Options as VerifyOptions
+
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.source import Captured as CameraBands
+    from tbcad.simulate.capture.source import Geometry
+    from tbcad.simulate.scene.object import SceneObject
+    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerance.analysis import Options as AnalysisOptions
+
+Settings = Mapping[str, str] | Sequence[str]
+
+
+def silent(_: str) -> None:
+    """Ignore a report of progress."""
+
+
+class Design(MirrorDesign):
+    """The mirrors of both cameras, computed from a spec, and the solids that follow from them.
+
+    Attributes:
+        spec: what was asked for.
+        halves: camera a's mirrors and camera b's, as arrays over mirrors.
+    """
+
+    def __repr__(self) -> str:
+        """Return name, number of mirrors and minimum coverage."""
+        first, second = self.halves
+        return (
+            f"<Design {self.spec.name!r}: n = {self.spec.optics.n}, "
+            f"{len(first)} + {len(second)} mirrors, "
+            f"minimum coverage {first.coverage.min():.2f} mm>"
+        )
+
+    def shell(self, camera: Literal["a", "b"] = "a") -> "Part":
+        """Return one camera's shell as a build123d part: mm, frame of the design, z up.
+
+        Raises:
+            SpecError: flanges or holes do not fit; it says what to change.
+            InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
+        """
+        from tbcad.cad.part import as_part
+        from tbcad.shell.files import camera_solid
+
+        if camera not in ("a", "b"):
+            raise InputError(f"there is no camera {camera!r}: allowed are 'a' and 'b'")
+        solid = camera_solid(self, self.halves["ab".index(camera)])
+        return as_part(solid.name, solid.shape)
+
+    def printed_parts(self) -> "dict[str, Part]":
+        """Return the printed parts of the prototype by name, as they are assembled, base angle 0.
+
+        Raises:
+            SpecError: the prototype cannot be laid out; it says what to change.
+            InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
+        """
+        from tbcad.cad.part import as_part
+
+        return {
+            printed.name: as_part(printed.name, printed.part.shape)
+            for printed in self._prototype.pieces
+        }
+
+    @cached_property
+    def _prototype(self) -> Any:
+        from tbcad.prototype.machine import machine
+
+        return machine(self)
+
+
+@dataclass(frozen=True)
+class Build:
+    """What a build wrote.
+
+    Attributes:
+        folder: that holds all files.
+        design: the mirrors.
+        parts: what was built: "shell", "prototype" or both.
+        report: the verification of the files; None when it was not asked for.
+    """
+
+    folder: Path
+    design: Design
+    parts: tuple[str, ...]
+    report: "Report | None"
+
+    def __repr__(self) -> str:
+        """Return folder and verdict."""
+        verdict = "not verified" if self.report is None else self.report.verdict
+        return f"<Build {self.folder}: {' and '.join(self.parts)}; {verdict}>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the files are verified and pass every check."""
+        return self.report is not None and self.report.passed
+
+
+def design(
+    spec: Spec | Path | str | None = None,
+    *,
+    n: int | None = None,
+    settings: Settings = (),
+    detail: Progress = silent,
+) -> Design:
+    """Compute the mirrors of both cameras.
+
+    Args:
+        spec: a spec, a design file (TOML), or None for the design of the paper.
+        n: subdivision of the icosahedron, in place of the spec's.
+        settings: "key=value" texts or a mapping of them, on top of a design file.
+        detail: called with the state of the search for the radii.
+
+    Raises:
+        SpecError: the spec is not allowed, or its mirrors cannot be made; it says what to change.
+
+    >>> import tbcad
+    >>> tbcad.design(n=4)
+    <Design 'turtleback': n = 4, 49 + 49 mirrors, minimum coverage 60.60 mm>
+    """
+    from tbcad.mirrors.array import design as mirror_design
+
+    mirrors = mirror_design(_spec(spec, n, settings), detail)
+    return Design(mirrors.spec, mirrors.halves)
+
+
+def _spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> Spec:
+    if isinstance(spec, Spec):
+        if settings or n is not None:
+            raise InputError("n and settings go with a design file: give them to load_spec")
+        return spec
+    options = _texts(settings) + ([f"optics.n={n}"] if n is not None else [])
+    return load_spec(None if spec is None else Path(spec), options)
+
+
+def _texts(settings: Settings) -> list[str]:
+    """Settings as "key=value" texts."""
+    if isinstance(settings, Mapping):
+        return [f"{key}={value}" for key, value in settings.items()]
+    return list(settings)
+
+
+def build(
+    spec: Spec | Path | str | None = None,
+    out: Path | str = "exports",
+    *,
+    parts: Sequence[str] | None = None,
+    verify: bool = True,
+    force: bool = False,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> Build:
+    """Compute the mirrors, write all files into a folder, and verify the files written.
+
+    The folder is replaced as a whole or not at all.
+
+    Args:
+        spec: a spec, a design file (TOML), or None for the design of the paper.
+        out: folder to write.
+        parts: "shell", "prototype" or both; None: both, but no prototype of planar mirrors.
+        verify: verify the files before they replace those of an earlier build.
+        force: keep files in the folder that tbcad did not write, instead of refusing.
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Raises:
+        InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
+    """
+    from tbcad.output.folder import check_target
+    from tbcad.output.parts import default_parts
+
+    chosen = _spec(spec, None, ())
+    asked = tuple(parts) if parts is not None else default_parts(chosen)
+    folder = Path(out)
+    check_target(folder, force)
+    return _built(chosen, folder, asked, verify, force, progress, detail)
+
+
+def _built(
+    spec: Spec,
+    out: Path,
+    parts: tuple[str, ...],
+    verified: bool,
+    force: bool,
+    progress: Progress,
+    detail: Progress,
+) -> Build:
+    """The stages of a build; the files are read back before they replace the old ones."""
+    from tbcad.output.build import export
+    from tbcad.output.folder import replacing
+
+    progress("mirrors: radii and cells")
+    mirrors = design(spec, detail=detail)
+    with replacing(out, force) as folder:
+        export(mirrors, folder, parts, progress)
+        report = verify(folder, progress=progress) if verified else None
+    return Build(out, mirrors, parts, report)
+
+
+def verify(
+    exports: Path | str,
+    options: "VerifyOptions | None" = None,
+    *,
+    progress: Progress = silent,
+) -> "Report":
+    """Verify the files of a build with code that shares nothing with the code that wrote them.
+
+    Args:
+        exports: folder that `build` wrote.
+        options: what else to check, and how long a stage may take.
+        progress: called with the name of each stage.
+
+    Returns:
+        The report; `report.passed` is the verdict. It is written to verify.json too.
+
+    Raises:
+        InputError: the folder is no readable export.
+    """
+    from tbcad_verify.errors import BadExport
+    from tbcad_verify.run.verify import Options
+    from tbcad_verify.run.verify import verify as verify_files
+
+    def stage(name: str) -> None:
+        progress(f"verification: {name}")
+
+    try:
+        return verify_files(Path(exports), stage, options or Options())
+    except BadExport as error:
+        raise InputError(str(error)) from None
+
+
+def capture(
+    exports: Path | str,
+    object_file: Path | str | None = None,
+    *,
+    out: Path | str | None = None,
+    geometry: "Geometry" = "spheres",
+    fit: bool = False,
+    paint: Literal["own", "pattern", "plain"] = "own",
+    samples: int = 1,
+    force: bool = False,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> "LightField":
+    """Simulate the photographs of both cameras through the mirrors of a build.
+
+    Args:
+        exports: folder that `build` wrote.
+        object_file: triangle mesh, mm, z up, about the origin; None for a built-in knot.
+        out: folder to write photographs and light field to, as `tbcad capture` does; None: none.
+        geometry: mirrors of the record ("spheres"), of the exported meshes ("mesh"), or the
+            prototype's balls, stop by stop ("prototype").
+        fit: move and scale the object into the capture sphere.
+        paint: colours of the file ("own"), a pattern, or plain grey.
+        samples: a pixel is the mean of samples x samples rays.
+        force: keep files in the folder that tbcad did not write.
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Returns:
+        The light field, in memory: for every pixel the ray it sees along and its colour.
+
+    Raises:
+        InputError: export or object cannot be read, or the folder cannot be replaced.
+    """
+    from tbcad.simulate.capture.light_field import LightField, in_memory
+
+    taken = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
+    if out is not None:
+        write_photographs(taken, Path(out), force, progress)
+        return LightField.read(Path(out))
+    progress("photographs and light field")
+    bands = {at.camera: (at, bands()) for at, bands in taken.cameras}
+    return in_memory(bands, taken.capture_mm, taken.facts)
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Both photographs before they are taken: light is traced when their bands are asked for.
+
+    Attributes:
+        cameras: each camera with what gives its bands of pixel rows.
+        subject: the object before the cameras.
+        capture_mm: diameter of the capture sphere.
+        facts: how they are taken: design, n, geometry, samples.
+    """
+
+    cameras: "CameraBands"
+    subject: "SceneObject"
+    capture_mm: float
+    facts: dict[str, Any]
+
+
+def photograph(
+    exports: Path | str,
+    object_file: Path | str | None,
+    geometry: "Geometry",
+    fit: bool,
+    paint: Literal["own", "pattern", "plain"],
+    samples: int,
+    progress: Progress,
+    detail: Progress,
+) -> Photographs:
+    """Prepare both photographs; arguments as for `capture`."""
+    from tbcad.simulate.capture.source import cameras
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import chosen
+    from tbcad.simulate.scene.shading import scene_of
+
+    progress("object")
+    export = read_export(Path(exports))
+    path = None if object_file is None else Path(object_file)
+    subject = chosen(path, export.capture_mm, fit, paint)
+    progress("scene")
+    taken = cameras(export, scene_of(subject), geometry, samples, detail)
+    facts = {
+        "object": subject.name,
+        "design": export.spec.name,
+        "n": export.spec.optics.n,
+        "geometry": geometry,
+        "samples": samples,
+    }
+    return Photographs(taken, subject, export.capture_mm, facts)
+
+
+def write_photographs(
+    taken: Photographs, out: Path, force: bool, progress: Progress
+) -> dict[str, Any]:
+    """Take both photographs and replace a folder by their files; return the record of them."""
+    from tbcad.output.folder import replacing
+    from tbcad.output.manifest import write_manifest
+    from tbcad.simulate.capture.files import write_capture
+
+    progress("photographs and light field")
+    with replacing(out, force) as folder:
+        record = write_capture(folder, taken.cameras, taken.subject, taken.capture_mm, taken.facts)
+        write_manifest(folder)
+    return record
+
+
+def analyse(
+    exports: Path | str,
+    process: str = "sla",
+    object_file: Path | str | None = None,
+    *,
+    settings: Settings = (),
+    options: "AnalysisOptions | None" = None,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> "Analysis":
+    """Simulate many builds by a manufacturing process, and find what limits their yield.
+
+    Args:
+        exports: folder that `build` wrote.
+        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file.
+        object_file: mesh that is photographed for the sharpness; None for a built-in knot.
+        settings: "kind=value" texts that change errors of the process.
+        options: number of builds, wanted yield, seed ...
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Raises:
+        InputError: export or process cannot be read, or mirrors are planar.
+    """
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import chosen
+    from tbcad.tolerance.analysis import Options
+    from tbcad.tolerance.analysis import analyse as analyse_export
+    from tbcad.tolerance.process.process import load_process
+
+    asked = (options or Options()).checked()
+    made_by = load_process(process, list(_texts(settings)))
+    progress("record of the export")
+    export = read_export(Path(exports))
+    subject = chosen(None if object_file is None else Path(object_file), export.capture_mm)
+    return analyse_export(export, made_by, subject, asked, progress, detail)

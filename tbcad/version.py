@@ -1,0 +1,3 @@
+"""The version of tbcad: the one record of it."""
+
+__version__ = "0.1.0"
