@@ -325,11 +325,10 @@ def photograph(
     from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.scene.shading import scene_of
 
-    progress("object")
+    progress("object and scene")
     export = read_export(Path(exports))
     path = None if object_file is None else Path(object_file)
     subject = chosen(path, export.capture_mm, fit, paint)
-    progress("scene")
     taken = cameras(export, scene_of(subject), geometry, samples, detail)
     facts = {
         "object": subject.name,

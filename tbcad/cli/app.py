@@ -11,9 +11,9 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
-    "made, proved on the files written. Start with [bold]tbcad build --out exports[/bold].",
+    "made, verified on the files written. Start with **tbcad build --out exports**.",
 )
 
 

@@ -1,4 +1,4 @@
-"""Build, prove and draw: heavy libraries are imported inside the commands."""
+"""Build, verify and draw: heavy libraries are imported inside the commands."""
 
 import sys
 from enum import StrEnum
@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.options import Exports, Force, OutReplaced, Settings
 from tbcad.errors import InputError
 from tbcad.screen import Stages, stages
 
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
-    from tbcad_verify.run.verify import Options
 
     from tbcad.spec.design import Spec
 
-# With mirrors and manifest; both together take a stage for the shells, which are built beside.
+# With mirrors and manifest; both together take one more: waiting for the shells in parallel.
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
-PROOF_STAGES, PIPED_WIDTH = 9, 160
+VERIFY_STAGES, PIPED_WIDTH = 9, 160
 
 
 class RadiusRule(StrEnum):
-    """How the mirrors get their radii."""
+    """Rule for the radii of the mirrors."""
 
     TRACED = "traced"
     PAPER = "paper"
@@ -34,59 +34,55 @@ class RadiusRule(StrEnum):
 def build(
     design: Annotated[
         Path | None,
-        typer.Argument(help="Design file (TOML); without one, the design of the paper."),
+        typer.Argument(help="Design file (TOML); by default the design of the paper."),
     ] = None,
     n: Annotated[
         str | None,
         typer.Option(
             metavar="N",
-            help="Subdivision of the icosahedron, 1 to 60: mirrors grow with its square.",
+            help="Subdivision of the icosahedron, 1 to 60; mirrors grow with n squared.",
         ),
     ] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")
-    ] = Path("exports"),
+    out: OutReplaced = Path("exports"),
     radius_rule: Annotated[
         RadiusRule | None,
         typer.Option(
-            help="traced: every mirror sees the whole object, by exact rays; "
-            "paper: eqs. 1 and 2; flat: planar mirrors."
+            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 and 2 of "
+            "the paper; flat: planar mirrors."
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
-        ),
-    ] = None,
+    settings: Settings = None,
     parts: Annotated[
         str | None,
         typer.Option(
-            help="What to build: shell, prototype, or both with a comma between them; without, "
-            "both, but no prototype of planar mirrors."
+            help="What to build: shell, prototype, or shell,prototype. By default both, but no "
+            "prototype of planar mirrors."
         ),
     ] = None,
     for_process: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="Give the design the margin that this process needs: fdm, sls, sla, cnc, diamond, "
-            "or a TOML file; see tbcad tolerance.",
+            help="Add the coverage margin that a manufacturing process needs: fdm, sls, sla, cnc, "
+            "diamond, or a TOML file; see tbcad tolerance.",
         ),
     ] = None,
-    wanted: Annotated[
-        float, typer.Option("--yield", help="Share of machines that --for-process makes good.")
+    share: Annotated[
+        float,
+        typer.Option(
+            "--yield",
+            help="With --for-process: share of simulated builds that must reach the target.",
+        ),
     ] = 0.99,
-    verify: Annotated[bool, typer.Option(help="Prove the optics on the files written.")] = True,
-    force: Annotated[
-        bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
-    ] = False,
+    verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True,
+    force: Force = False,
 ) -> int:
-    """Compute the mirrors, build shells and prototype, write STEP, STL and 3MF, and prove them.
+    """Compute the mirrors, build shells and prototype, write STEP, STL and 3MF, and verify them.
 
-    Exit code 0: built and proved. 1: built, but the proof fails (the files stay). 2: bad input,
-    nothing written.
+    Exit code 0: built and verified. 1: built, but the verification fails (the files stay). 2: bad
+    input, nothing written.
     """
+    from tbcad.api import build as build_files
     from tbcad.output.folder import check_target
     from tbcad.output.parts import default_parts, parse_parts
     from tbcad.spec.design import load_spec
@@ -96,91 +92,76 @@ def build(
     options += [f"optics.n={n}"] if n is not None else []
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
-    made = asked or default_parts(spec)
+    chosen = asked or default_parts(spec)
     check_target(out, force)
-    with stages(BUILD_STAGES[made] + PROOF_STAGES * verify + bool(for_process)) as told:
+    with stages(BUILD_STAGES[chosen] + VERIFY_STAGES * verify + bool(for_process)) as screen:
         if for_process is not None:
-            spec = _margined(spec, for_process, wanted, told)
-        report = _built(spec, out, made, force, verify, told)
+            spec = _with_margin(spec, for_process, share, screen)
+        built = build_files(
+            spec,
+            out,
+            parts=chosen,
+            verify=verify,
+            force=force,
+            progress=screen.stage,
+            detail=screen.detail,
+        )
     if for_process is not None:
-        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {wanted:.1%} by {for_process}")
-    if report is None:
-        typer.echo(f"{out}: built, not proved: run tbcad verify {out}")
+        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {share:.1%} by {for_process}")
+    if built.report is None:
+        typer.echo(f"{out}: built, not verified: run tbcad verify {out}")
         return 0
-    typer.echo(f"{out}: {' and '.join(made)} as STEP, STL and 3MF; mirrors.csv, design.json")
-    _show(report)
-    return 0 if report.passed else 1
+    typer.echo(f"{out}: {' and '.join(chosen)} as STEP, STL and 3MF; mirrors.csv, design.json")
+    _show(built.report)
+    return 0 if built.passed else 1
 
 
-def _margined(spec: "Spec", name: str, wanted: float, told: Stages) -> "Spec":
+def _with_margin(spec: "Spec", process: str, share: float, screen: Stages) -> "Spec":
     from tbcad.tolerance.process.process import load_process
     from tbcad.tolerance.process_design import for_process
 
-    told.stage(f"margin for {name}")
-    return for_process(spec, load_process(name), wanted, told.detail)
-
-
-def _built(
-    spec: "Spec", out: Path, parts: tuple[str, ...], force: bool, verify: bool, told: Stages
-) -> "Report | None":
-    """The stages of a build; the proof reads the files back before they replace the old ones."""
-    from tbcad.mirrors.array import design
-    from tbcad.output.build import export
-    from tbcad.output.folder import replacing
-
-    told.stage("mirrors: radii and cells")
-    made = design(spec, told.detail)
-    with replacing(out, force) as folder:
-        export(made, folder, parts, told.stage)
-        return _prove(folder, told) if verify else None
+    screen.stage(f"margin for {process}")
+    return for_process(spec, load_process(process), share, screen.detail)
 
 
 @app.command("verify")
 def verify_command(
-    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    folder: Exports,
     printers: Annotated[
         list[str] | None,
         typer.Option(
             "--printer",
             metavar="NAME|FILE",
-            help="Fail unless every part suits this machine: fdm, sla, sls, machined, or a TOML "
-            "file; repeatable.",
+            help="Fail unless every part can be made by this printer: fdm, sla, sls, machined, or "
+            "a TOML file; repeatable.",
         ),
     ] = None,
     clients: Annotated[
         bool,
         typer.Option(
-            "--clients", help="Ask FreeCAD, gmsh, PrusaSlicer and admesh too, where installed."
+            "--clients", help="Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."
         ),
     ] = False,
     time_limit: Annotated[
-        float, typer.Option(metavar="S", help="Seconds that each stage, file or program may take.")
+        float,
+        typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
     ] = 600.0,
 ) -> int:
-    """Prove an export on its files, and write verify.json there.
+    """Verify an export on its files, and write verify.json there.
 
-    Exit code 0: proved. 1: the proof fails. 2: not an export, or a broken one.
+    Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
     """
     from tbcad_verify.run.verify import Options
 
+    from tbcad.api import verify
+
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
-    with stages(PROOF_STAGES) as told:
-        wishes = Options(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
-        report = _prove(folder, told, wishes)
+    options = Options(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
+    with stages(VERIFY_STAGES) as screen:
+        report = verify(folder, options, progress=screen.stage)
     _show(report)
     return 0 if report.passed else 1
-
-
-def _prove(folder: Path, told: Stages, wishes: "Options | None" = None) -> "Report":
-    """The proof knows nothing of tbcad; its own refusals become ours."""
-    from tbcad_verify.errors import BadExport
-    from tbcad_verify.run.verify import Options, verify
-
-    try:
-        return verify(folder, lambda text: told.stage(f"proof: {text}"), wishes or Options())
-    except BadExport as error:
-        raise InputError(str(error)) from None
 
 
 def _show(report: "Report") -> None:
@@ -192,15 +173,15 @@ def _show(report: "Report") -> None:
 
 @app.command()
 def picture(
-    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    folder: Exports,
     out: Annotated[
-        Path | None, typer.Option(help="PNG file to write; without, named after its subject.")
+        Path | None, typer.Option(help="PNG file to write; by default named after the subject.")
     ] = None,
     of: Annotated[
         str,
         typer.Option(
-            help="shell: both halves, from outside and as a camera looks up into the mirrors; "
-            "rig, base, seat or exploded: the prototype."
+            help="Subject: shell (both halves from outside, and the mirrors from a camera); rig, "
+            "base, seat or exploded (the prototype)."
         ),
     ] = "shell",
 ) -> int:
@@ -209,13 +190,13 @@ def picture(
 
     file = out or Path(f"{of}.png")
     draw(folder, file, of)
-    typer.echo(f"{file}: drawn")
+    typer.echo(f"{file}: written")
     return 0
 
 
 @app.command()
 def doctor() -> int:
-    """Check that this Python environment has all that tbcad needs, and say how to mend it."""
+    """Check that this Python environment has all that tbcad needs, and say how to repair it."""
     from rich.console import Console
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""Options that several commands of the simulation have."""
+"""Options that several commands share."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -6,20 +6,39 @@ from typing import Annotated
 
 import typer
 
+Exports = Annotated[Path, typer.Argument(help="Folder written by tbcad build.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."),
+]
+Out = Annotated[Path, typer.Option(help="Folder for the files; other files in it stay.")]
+OutReplaced = Annotated[
+    Path, typer.Option(help="Folder for all files; replaced as a whole or not at all.")
+]
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force", help="Keep files in the folder that tbcad did not write, instead of refusing."
+    ),
+]
 Capture = Annotated[Path, typer.Argument(help="Folder written by tbcad capture.")]
-Azimuth = Annotated[float, typer.Option(help="About z from x, degrees.")]
-Elevation = Annotated[float, typer.Option(help="Above the object's horizon, 0 to 90 degrees.")]
-Distance = Annotated[float, typer.Option(help="From the middle of the object, mm.")]
-Width = Annotated[int, typer.Option(min=16, max=8192, help="Columns of the picture.")]
-Height = Annotated[int, typer.Option(min=16, max=8192, help="Rows of the picture.")]
+Azimuth = Annotated[float, typer.Option(help="Azimuth of the camera about z, from x, degrees.")]
+Elevation = Annotated[float, typer.Option(help="Elevation of the camera, 0 to 90 degrees.")]
+Distance = Annotated[
+    float, typer.Option(help="Distance of the camera from the centre of the object, mm.")
+]
+Width = Annotated[int, typer.Option(min=16, max=8192, help="Width of the picture, pixels.")]
+Height = Annotated[int, typer.Option(min=16, max=8192, help="Height of the picture, pixels.")]
 Fov = Annotated[
     float | None,
-    typer.Option(help="Angle of view across, degrees; without, the capture sphere fills it."),
+    typer.Option(
+        help="Horizontal angle of view, degrees; by default the capture sphere fills the picture."
+    ),
 ]
 
 
 class Paint(StrEnum):
-    """The object's colours."""
+    """Colours of the object."""
 
     OWN = "own"
     PATTERN = "pattern"
@@ -29,14 +48,14 @@ class Paint(StrEnum):
 PaintOption = Annotated[
     Paint,
     typer.Option(
-        help="own: the file's colours or texture, a pattern where it has none; pattern; plain: "
-        "grey."
+        help="own: colours or texture of the file, or a pattern where it has none; pattern: always "
+        "the pattern; plain: grey."
     ),
 ]
 
 
 class Method(StrEnum):
-    """How wanted rays get their colours."""
+    """How the rays of a view get their colours."""
 
     NEAREST = "nearest"
     BLEND = "blend"
@@ -48,20 +67,20 @@ ObjectFile = Annotated[
         "--object",
         metavar="FILE",
         help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with vertex "
-        "colours or a texture; without, a built-in knot.",
+        "colours or a texture; by default a built-in knot.",
     ),
 ]
 MethodOption = Annotated[
     Method,
     typer.Option(
-        help="nearest: the nearest captured ray, as in the paper; blend: several virtual cameras "
-        "that see the same point."
+        help="nearest: the colour of the nearest captured ray, as in the paper; blend: the mean "
+        "of several virtual cameras that see the same point."
     ),
 ]
 
 
 class Surface(StrEnum):
-    """What a blend takes the object for."""
+    """The surface on which a blend compares virtual cameras."""
 
     PLANE = "plane"
     OBJECT = "object"
@@ -71,7 +90,7 @@ Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Dask scheduler, like tcp://host:8786 (pip install tbcad[cluster]); without, all "
-        "cores of this machine.",
+        help="Dask scheduler, for example tcp://host:8786 (pip install 'tbcad\\[cluster]'); by "
+        "default all cores of this machine.",
     ),
 ]

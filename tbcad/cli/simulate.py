@@ -1,4 +1,4 @@
-"""See with a design before it is made: capture, views, refocusing."""
+"""Simulate what an export photographs: capture, views, refocusing."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,11 +11,14 @@ from tbcad.cli.options import (
     Capture,
     Distance,
     Elevation,
+    Exports,
+    Force,
     Fov,
     Height,
     Method,
     MethodOption,
     ObjectFile,
+    OutReplaced,
     Paint,
     PaintOption,
     Surface,
@@ -33,20 +36,13 @@ if TYPE_CHECKING:
 
 MOST_SAMPLES = 8
 WIDEST_DEG = 170
-GEOMETRIES = {
-    "spheres": "mirrors of the record",
-    "mesh": "mirrors of the meshes",
-    "prototype": "plan of the prototype",
-}
 
 
 @app.command()
 def capture(
-    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    folder: Exports,
     object_file: ObjectFile = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for all files; it is replaced as a whole or not at all.")
-    ] = Path("captures"),
+    out: OutReplaced = Path("captures"),
     fit: Annotated[
         bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
     ] = False,
@@ -59,54 +55,37 @@ def capture(
     ] = 1,
     mesh: Annotated[
         bool,
-        typer.Option("--mesh", help="Off the exported meshes instead of the recorded spheres."),
+        typer.Option("--mesh", help="Trace the exported meshes instead of the recorded spheres."),
     ] = False,
     prototype: Annotated[
         bool,
         typer.Option(
-            "--prototype", help="With the balls, stop by stop, merged into the shell's picture."
+            "--prototype",
+            help="Trace the balls of the prototype, stop by stop, and merge the photographs into "
+            "those of the shell.",
         ),
     ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Keep files in the folder that tbcad did not write.")
-    ] = False,
+    force: Force = False,
 ) -> int:
-    """Photograph an object with both cameras through the mirrors of an export.
+    """Simulate the photographs of an object by both cameras through the mirrors of an export.
 
-    Writes both pictures at the sensors' full size, and the light field: the ray, colour and mirror
-    of every pixel.
+    Writes both photographs at the full size of the sensors, and the light field: the ray, colour
+    and mirror of every pixel.
     """
-    from tbcad.output.folder import check_target, replacing
-    from tbcad.output.manifest import write_manifest
-    from tbcad.simulate.capture.files import write_capture
-    from tbcad.simulate.capture.source import cameras
-    from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import chosen
-    from tbcad.simulate.scene.shading import scene_of
+    from tbcad.api import photograph, write_photographs
+    from tbcad.output.folder import check_target
 
     geometry = _geometry(mesh, prototype)
     check_target(out, force)
-    with stages(3) as told:
-        told.stage("object")
-        export = read_export(folder)
-        size = export.capture_mm
-        subject = chosen(object_file, size, fit, paint.value)
-        told.stage(GEOMETRIES[geometry])
-        captured = cameras(export, scene_of(subject), geometry, samples, told.detail)
-        told.stage("photographs and light field")
-        facts = {
-            "design": export.spec.name,
-            "n": export.spec.optics.n,
-            "geometry": geometry,
-            "samples": samples,
-        }
-        with replacing(out, force) as place:
-            record = write_capture(place, captured, subject, size, facts)
-            write_manifest(place)
-    for camera, found in record["cameras"].items():
-        seen, on = found["pixels_that_see_the_capture_sphere"], found["pixels_on_mirrors"]
+    with stages(3) as screen:
+        taken = photograph(
+            folder, object_file, geometry, fit, paint.value, samples, screen.stage, screen.detail
+        )
+        record = write_photographs(taken, out, force, screen.stage)
+    for camera, counts in record["cameras"].items():
+        seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
         typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
-    typer.echo(f"{out}: {subject.name} as camera_a.png, camera_b.png and lightfield.h5")
+    typer.echo(f"{out}: {taken.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
     return 0
 
 
@@ -127,18 +106,18 @@ def view(
     surface: Annotated[
         Surface,
         typer.Option(
-            help="Where a blend takes that point: on the plane through the middle of the object, "
-            "or on the object itself."
+            help="Surface of the points that are compared by blend: the plane through the centre "
+            "of the object, or the object itself."
         ),
     ] = Surface.PLANE,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
 ) -> int:
-    """Make the picture that a camera anywhere round the object would see.
+    """Synthesise the view of a camera anywhere around the object from a light field.
 
-    Beside it, where the capture was simulated: the ray-traced truth, both next to each other, and
-    how like they are.
+    For a simulated capture also writes the ray-traced ground truth and a comparison, and prints
+    PSNR and SSIM.
     """
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.picture_files import check_place
@@ -148,8 +127,8 @@ def view(
     from tbcad.simulate.views.tiles import Tiles
 
     check_place(out)
-    with stages(3) as told, LightField.open(capture_folder) as source:
-        told.stage("light field")
+    with stages(3) as screen, LightField.open(capture_folder) as source:
+        screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
         scene = _scene(capture_folder)
         depth = None
@@ -157,9 +136,9 @@ def view(
             if scene is None:
                 raise InputError(f"{capture_folder} has no object: use --surface plane")
             depth = depth_of(scene)
-        told.stage("view")
+        screen.stage("view")
         picture = synthesise(Tiles(source), at, method.value, depth).image
-        told.stage("truth")
+        screen.stage("truth")
         truth = None if scene is None else whole(pinhole_picture(scene, at))
     _show(out, picture, truth, (method.value, "ray-traced"))
     return 0
@@ -174,24 +153,30 @@ def refocus(
     aperture: Annotated[float, typer.Option(help="Diameter of the lens, mm.")] = 300.0,
     focus: Annotated[
         float,
-        typer.Option(help="The plane to make sharp: mm from the object's middle to the camera."),
+        typer.Option(
+            help="Position of the focal plane: mm from the centre of the object toward the camera."
+        ),
     ] = 0.0,
     out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("refocus.png"),
     sweep: Annotated[
         Path | None,
-        typer.Option(help="Also a film of the focus through the whole object: GIF, WebP or PNG."),
+        typer.Option(
+            help="Also write an animation of the focus through the object: GIF, WebP or PNG."
+        ),
     ] = None,
-    frames: Annotated[int, typer.Option(min=2, max=500, help="Pictures of the sweep.")] = 21,
+    frames: Annotated[
+        int, typer.Option(min=2, max=500, help="Number of pictures in the animation.")
+    ] = 21,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
     truth_samples: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Rays a pixel of the real lens beside it.")
+        int, typer.Option(min=1, max=100_000, help="Rays per pixel of the ray-traced lens.")
     ] = 256,
 ) -> int:
-    """Focus after the fact: the picture of a large lens, out of 69 pinholes all over it.
+    """Refocus a light field: the picture of a large lens, as the mean of 69 pinhole views.
 
-    Beside it, where the capture was simulated: what a real lens would show.
+    For a simulated capture also writes the ray-traced picture of a real lens and a comparison.
     """
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.picture_files import ANIMATED, check_place, write_animation
@@ -203,21 +188,21 @@ def refocus(
     check_place(out)
     if sweep is not None:
         check_place(sweep, ANIMATED)
-    with stages(3 + (sweep is not None)) as told, LightField.open(capture_folder) as source:
-        told.stage("light field")
+    with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
+        screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
         lens = Focus(aperture, focus)
         lens.check(at, source.capture_mm)
         tiles, scene = Tiles(source), _scene(capture_folder)
-        told.stage("69 pinholes")
+        screen.stage("69 pinholes")
         picture = refocused(tiles, at, lens).image
-        told.stage("real lens")
+        screen.stage("real lens")
         truth = None
         if scene is not None:
-            truth = whole(lens_picture(scene, at, lens, truth_samples, told.detail))
+            truth = whole(lens_picture(scene, at, lens, truth_samples, screen.detail))
         if sweep is not None:
-            told.stage("sweep")
-            write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, told.detail))
+            screen.stage("sweep")
+            write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, screen.detail))
     _show(out, picture, truth, ("69 pinholes", "real lens"))
     if sweep is not None:
         typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
@@ -252,17 +237,17 @@ def _scene(folder: Path) -> "Scene | None":
 
 
 def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]) -> None:
-    """Write the picture, and beside it the truth where it is known; say how like they are."""
+    """Write the picture, and a comparison with the ground truth where it is known."""
     from tbcad.simulate.picture_files import beside, difference, write_stills
     from tbcad.simulate.quality import likeness
 
     if truth is None:
         write_stills({out: picture})
-        typer.echo(f"{out}: drawn; no truth beside it, since the capture names no object")
+        typer.echo(f"{out}: written, without ground truth: the capture names no object")
         return
     files = [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
     sheet = beside({names[0]: picture, names[1]: truth, "difference": difference(truth, picture)})
     write_stills({out: picture, files[0]: truth, files[1]: sheet})
     found = likeness(truth, picture)
     typer.echo(f"PSNR {found.psnr_db:.2f} dB, SSIM {found.ssim:.4f} against the {names[1]} picture")
-    typer.echo(f"{out}, {files[0].name}, {files[1].name}: drawn")
+    typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

@@ -1,4 +1,4 @@
-"""Studies of the paper: heavy libraries are imported inside the commands."""
+"""The studies of the paper: heavy libraries are imported inside the commands."""
 
 import sys
 from collections.abc import Callable
@@ -13,9 +13,11 @@ from tbcad.cli.options import (
     Method,
     MethodOption,
     ObjectFile,
+    Out,
     Paint,
     PaintOption,
     Scheduler,
+    Settings,
 )
 from tbcad.screen import stages
 
@@ -27,30 +29,26 @@ PIPED_WIDTH = 160
 
 study = typer.Typer(
     no_args_is_help=True,
-    rich_markup_mode="rich",
-    help="Measure again what the paper claims: CSV files, notes and a plot, beside its figures.",
+    rich_markup_mode="markdown",
+    help="Reproduce a study of the paper: CSV files, notes and a plot, next to the paper's figures.",
 )
 app.add_typer(study, name="study")
 
 DesignFile = Annotated[
-    Path | None, typer.Option(help="Design file (TOML); without one, the design of the paper.")
+    Path | None, typer.Option(help="Design file (TOML); by default the design of the paper.")
 ]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."),
-]
-Out = Annotated[Path, typer.Option(help="Folder for the files; others in it are left as they are.")]
-First = Annotated[int, typer.Option("--from", metavar="N", help="Least n of the sweep, from 1.")]
-Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n of the sweep, to 60.")]
+First = Annotated[int, typer.Option("--from", metavar="N", help="Smallest n, 1 or more.")]
+Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n, up to 60.")]
 Sensors = Annotated[
     list[str] | None,
     typer.Option(
         "--sensor",
         metavar="WxH",
-        help="Columns x rows; repeatable. Without: the design's, and 2, 3, 4 times its sides.",
+        help="Width x height, pixels; repeatable. By default the sensor of the design, and 2, 3 "
+        "and 4 times its width and height.",
     ),
 ]
-Azimuths = Annotated[int, typer.Option(help="Viewpoints all round, at each elevation.")]
+Azimuths = Annotated[int, typer.Option(help="Number of azimuths at each elevation.")]
 STUDIES = Path("studies")
 
 
@@ -67,12 +65,12 @@ def resolution_command(
         typer.Option(
             "--ratio",
             metavar="C:P",
-            help="Virtual cameras to pixels; repeatable. Without: 1:1, 1:4, 4:1.",
+            help="Virtual cameras to pixels; repeatable. By default 1:1, 1:4 and 4:1.",
         ),
     ] = None,
     scheduler: Scheduler = None,
 ) -> int:
-    """Count virtual cameras and pixels, and where they balance (Fig. 5b, Table II)."""
+    """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
     from tbcad.simulate.study.pixels import sensor_of
     from tbcad.simulate.study.resolution import default_sensors, ratio_of, resolution
     from tbcad.simulate.study.sweep import numbers
@@ -84,8 +82,8 @@ def resolution_command(
         design,
         settings,
         out,
-        lambda spec, told: resolution(
-            spec, ns, given or default_sensors(spec), wanted, told, scheduler
+        lambda spec, progress: resolution(
+            spec, ns, given or default_sensors(spec), wanted, progress, scheduler
         ),
     )
 
@@ -99,12 +97,14 @@ def capture_area_command(
     last: Last = 36,
     scheduler: Scheduler = None,
 ) -> int:
-    """Measure how large an object flat and convex mirrors see whole (Fig. 5c)."""
+    """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
     from tbcad.simulate.study.capture_area import capture_area
     from tbcad.simulate.study.sweep import numbers
 
     ns = numbers(first, last)
-    return _run(design, settings, out, lambda spec, told: capture_area(spec, ns, told, scheduler))
+    return _run(
+        design, settings, out, lambda spec, progress: capture_area(spec, ns, progress, scheduler)
+    )
 
 
 @study.command("elevation")
@@ -124,13 +124,13 @@ def depth_command(
     out: Out = STUDIES,
     blur_px: Annotated[float, typer.Option(help="Largest blur circle, in pixels.")] = 1.0,
     pixel_um: Annotated[float, typer.Option(help="Width of a pixel, micrometres.")] = 3.45,
-    wide_open: Annotated[float, typer.Option(help="F-number of the lens fully open.")] = 2.8,
+    wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
 ) -> int:
-    """Find how deep the mirrors' images lie, and the stop a real lens would need (section 6)."""
+    """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
     from tbcad.simulate.study.depth import Optics, depth
 
     optics = Optics(blur_px, pixel_um, wide_open).checked()
-    return _run(design, settings, out, lambda spec, told: depth(spec, optics, told))
+    return _run(design, settings, out, lambda spec, progress: depth(spec, optics, progress))
 
 
 @study.command("ssim")
@@ -145,7 +145,7 @@ def ssim_command(
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
 ) -> int:
-    """Compare views with the truth, sensor by sensor, each with its own n (Fig. 9)."""
+    """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
     from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.study.pixels import sensor_of
     from tbcad.simulate.study.resolution import default_sensors
@@ -158,13 +158,13 @@ def ssim_command(
         design,
         settings,
         out,
-        lambda spec, told: ssim(
+        lambda spec, progress: ssim(
             spec,
             chosen(object_file, spec.optics.capture_diameter_mm, paint=paint.value),
             given or default_sensors(spec),
             places,
             method.value,
-            told,
+            progress,
         ),
     )
 
@@ -179,10 +179,10 @@ def prototype_command(
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
     samples: Annotated[
-        int, typer.Option(min=1, max=8, help="A pixel is the mean of N x N rays.")
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
     ] = 3,
 ) -> int:
-    """Compare views out of the prototype's merged pictures with those of the full shell."""
+    """Compare views from the prototype's merged photographs with those of the full shell."""
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import chosen
     from tbcad.simulate.study.prototype_vs_shell import stand_in
@@ -191,7 +191,9 @@ def prototype_command(
     places = round_of(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = chosen(object_file, export.capture_mm, paint=paint.value)
-    return _done(out, lambda told: stand_in(export, subject, places, method.value, samples, told))
+    return _write(
+        out, lambda progress: stand_in(export, subject, places, method.value, samples, progress)
+    )
 
 
 def _run(
@@ -200,40 +202,40 @@ def _run(
     out: Path,
     work: "Callable[[Spec, Callable[[str], None]], Study]",
 ) -> int:
-    """Do a study of a design."""
+    """Make a study of a design."""
     from tbcad.spec.design import load_spec
 
     spec = load_spec(design, list(settings or []))
-    return _done(out, lambda told: work(spec, told))
+    return _write(out, lambda progress: work(spec, progress))
 
 
-def _done(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
-    """Do a study, write its files, and show its figures beside the paper's."""
+def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
+    """Make a study, write its files, and show its figures next to the paper's."""
     from tbcad.simulate.study.record import check_target, write
 
     check_target(out)
-    with stages(2) as told:
-        told.stage("study: mirrors and rays")
-        found = work(told.detail)
-        told.stage("study: files")
-        files = write(found, out)
-    _show(found)
+    with stages(2) as screen:
+        screen.stage("study: mirrors and rays")
+        result = work(screen.detail)
+        screen.stage("study: files")
+        files = write(result, out)
+    _show(result)
     typer.echo(f"{out}: {', '.join(file.name for file in files)}")
     return 0
 
 
-def _show(found: "Study") -> None:
+def _show(result: "Study") -> None:
     from rich.console import Console
     from rich.table import Table
 
     table = Table("quantity", "tbcad", "the paper", "where in the paper", box=None)
-    for quantity, unit, ours, paper, where in found.summary.rows:
+    for quantity, unit, ours, paper, where in result.summary.rows:
         table.add_row(str(quantity), _shown(ours, unit), _shown(paper, unit), str(where))
     # Piped, a table needs no terminal's width.
     (Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)).print(table)
 
 
 def _shown(value: str | int | float | None, unit: str | int | float | None) -> str:
-    """A figure in short; the files have it in full."""
+    """A figure with four digits; the files have all of them."""
     short = f"{value:.4g}" if isinstance(value, float) else "-" if value is None else str(value)
     return f"{short} {unit}".rstrip() if value is not None else short

@@ -66,7 +66,7 @@ class Options:
             InputError: what cannot be asked.
         """
         if not 10 <= self.machines <= 1_000_000:
-            raise InputError(f"--machines {self.machines}: allowed is 10 to 1000000")
+            raise InputError(f"--builds {self.machines}: allowed is 10 to 1000000")
         check_share(self.wanted)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: allowed is 0 or more")

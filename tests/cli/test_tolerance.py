@@ -23,7 +23,7 @@ FILES = {
     "tolerance.json", "tolerance.png",
 }  # fmt: skip
 # Of ten machines in each step of a search, nine are to be good.
-FEW = ["--machines", "20", "--yield", "0.9"]
+FEW = ["--builds", "20", "--yield", "0.9"]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -163,8 +163,8 @@ class TestWritten:
         (["--process", "slaa"], "did you mean sla?"),
         (["--yield", "2"], "--yield 2"),
         (["--yield", "nan"], "--yield nan"),
-        (["--machines", "1"], "--machines 1: allowed is 10 to"),
-        (["--machines", "many"], "machines"),
+        (["--builds", "1"], "--builds 1: allowed is 10 to"),
+        (["--builds", "many"], "builds"),
         (["--seed", "-1"], "--seed -1"),
         (["--calibrated-mrad", "-2"], "--calibrated-mrad -2"),
         (["--set", "nonsense"], "'nonsense' is not kind=value"),
