@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
+from tbcad.cli.options import Exports, ObjectFile, Scheduler
 from tbcad.screen import stages
 
 
