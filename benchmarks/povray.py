@@ -45,7 +45,7 @@ def write_scene(path: Path, at: Reflector, subject: SceneObject) -> None:
     """Write what one camera has before it; the object is of one grey."""
     parts = [
         HEAD.format(grey=GREY, sky=0.75 * SKY_LIGHT),
-        _camera(at.view),
+        _camera(at.camera),
         *(_lamp(*lamp) for lamp in zip(LAMPS, LAMP_LIGHT.tolist(), strict=True)),
         *_mirrors(at),
         _mesh(subject),

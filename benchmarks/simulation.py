@@ -52,7 +52,7 @@ def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> l
         ours, _ = spent_in_turns(works, rounds)
         return [at_most(what, ours.seconds, 5, "s"), Row("POV-Ray", "not installed")]
     for at in made.reflectors:
-        povray.write_scene(folder / f"{at.camera}.pov", at, grey)
+        povray.write_scene(folder / f"{at.camera_id}.pov", at, grey)
     ours, greys, theirs = spent_in_turns(
         [*works, partial(rendered, made.reflectors, folder)], rounds
     )
@@ -166,15 +166,15 @@ def plain(subject: SceneObject) -> SceneObject:
 def photographed(cameras: Cameras, scene: Scene, folder: Path) -> None:
     """Both pictures, written one after the other."""
     for at in cameras:
-        bands = photograph(at.view, exact(at), scene)
+        bands = photograph(at.camera, exact(at), scene)
         picture = np.concatenate([band.colour for band in bands])
-        write_stills({folder / f"ours_{at.camera}.png": picture})
+        write_stills({folder / f"ours_{at.camera_id}.png": picture})
 
 
 def rendered(cameras: Cameras, folder: Path) -> None:
     """POV-Ray's pictures of both, written one after the other."""
     for at in cameras:
-        povray.render(folder / f"{at.camera}.pov", at.view)
+        povray.render(folder / f"{at.camera_id}.pov", at.camera)
 
 
 def likeness(folder: Path) -> Figure:

@@ -69,10 +69,12 @@ def shells(made: MirrorDesign) -> list[Solid]:
     triangles, boundary = bounded_triangulation(
         faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0)
     )
-    cells = cells_of(half.body.surfaces, boundary, triangles)
+    cells = cells_of(half.modelled_cells.surfaces, boundary, triangles)
     closing = envelope(made.spec.shell, cells, half.ellipsoid)
     return [
-        shell_solid(f"shell_{one.camera}", one.ids, cells, closing, mirrored=one.camera == "b")
+        shell_solid(
+            f"shell_{one.camera_id}", one.ids, cells, closing, mirrored=one.camera_id == "b"
+        )
         for one in made.halves
     ]
 

@@ -98,7 +98,7 @@ def _write(made: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path)
         cells = cells if half is first else cells.mirrored()
         facets = shell_mesh(made.spec, cells, body, object_distances(first))
         facets = facets if half is first else facets.mirrored()
-        write_stl(folder / f"shell_{half.camera}.stl", facets)
+        write_stl(folder / f"shell_{half.camera_id}.stl", facets)
 
 
 def _cells(half: MirrorArray, draws: Draws, k: int) -> Cells:

@@ -32,4 +32,4 @@ def small_half(small_design: MirrorDesign) -> MirrorArray:
 @pytest.fixture(scope="session")
 def small_body(small_design: MirrorDesign) -> Envelope:
     half = small_design.halves[0]
-    return envelope(small_design.spec.shell, half.body, half.ellipsoid)
+    return envelope(small_design.spec.shell, half.modelled_cells, half.ellipsoid)

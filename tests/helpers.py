@@ -96,15 +96,17 @@ def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def solid_of(made: MirrorDesign, which: int) -> Solid:
     half = made.halves[which]
-    name = f"shell_{half.camera}"
-    return shell_solid(name, half.ids, made.halves[0].body, body_of(made), mirrored=which == 1)
+    name = f"shell_{half.camera_id}"
+    return shell_solid(
+        name, half.ids, made.halves[0].modelled_cells, body_of(made), mirrored=which == 1
+    )
 
 
 def body_of(made: MirrorDesign) -> Envelope:
     half = made.halves[0]
-    return envelope(made.spec.shell, half.body, half.ellipsoid)
+    return envelope(made.spec.shell, half.modelled_cells, half.ellipsoid)
 
 
 def mesh_of(made: MirrorDesign) -> Mesh:
     half: MirrorArray = made.halves[0]
-    return shell_mesh(made.spec, half.body, body_of(made), object_distances(half))
+    return shell_mesh(made.spec, half.modelled_cells, body_of(made), object_distances(half))

@@ -23,32 +23,32 @@ class MirrorArray:
     """One camera with its m mirrors, as arrays over mirrors in the order of their ids.
 
     Attributes:
-        camera: "a" or "b".
-        view: the camera itself.
+        camera_id: "a" or "b".
+        camera: its pinhole, axes and sensor.
         ellipsoid: of this camera.
         u: directions of the virtual cameras, (m, 3).
         theta0: half angle a flat mirror would see, radians, (m,).
         theta1: half angle wanted by eq. 1, radians, (m,).
-        size: half width l, mm, (m,).
+        half_width: l, mm, (m,).
         polar: polar angle about w, radians, (m,).
         azimuth: azimuth about w, radians, (m,).
         cells: of the reflecting surfaces, coat included.
-        body: cells of the modelled surfaces, under the coat.
+        modelled_cells: of the modelled surfaces, under the coat.
         area: of the cells, mm^2, (m,).
         coverage: exact coverage diameter, mm, (m,).
     """
 
-    camera: str
-    view: Camera
+    camera_id: str
+    camera: Camera
     ellipsoid: Ellipsoid
     u: Floats
     theta0: Floats
     theta1: Floats
-    size: Floats
+    half_width: Floats
     polar: Floats
     azimuth: Floats
     cells: Cells
-    body: Cells
+    modelled_cells: Cells
     area: Floats
     coverage: Floats
 
@@ -58,7 +58,7 @@ class MirrorArray:
     @property
     def ids(self) -> list[str]:
         """Names of the mirrors: a0001, a0002 ...; b's mirror of the same number mirrors it."""
-        return [f"{self.camera}{i + 1:04d}" for i in range(len(self))]
+        return [f"{self.camera_id}{i + 1:04d}" for i in range(len(self))]
 
     @property
     def mirrors(self) -> Surfaces:
@@ -76,13 +76,13 @@ class MirrorArray:
         """The other camera's half."""
         return replace(
             self,
-            camera="b",
-            view=self.view.mirrored(),
+            camera_id="b",
+            camera=self.camera.mirrored(),
             ellipsoid=Ellipsoid(self.ellipsoid.pinhole * FLIP_X, self.ellipsoid.semi_minor),
             u=self.u * FLIP_X,
             azimuth=-self.azimuth,
             cells=self.cells.mirrored(),
-            body=self.body.mirrored(),
+            modelled_cells=self.modelled_cells.mirrored(),
         )
 
 
@@ -129,28 +129,30 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
     u = every[kept]
     theta0 = flat.half_angles(ellipsoid, u, every)
-    size = flat.half_widths(ellipsoid, u, theta0)
-    theta1 = flat.required_angles(ellipsoid, u, size, optics.capture_diameter_mm / 2)
+    half_width = flat.half_widths(ellipsoid, u, theta0)
+    theta1 = flat.required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
     # The equatorial mirrors stay whole: the foot plane lies the greatest half width below them.
-    foot = -float(size[u[:, 2] == 0].max())
+    foot = -float(half_width[u[:, 2] == 0].max())
     triangles, boundary = bounded_triangulation(faces, every, kept)
     task = RadiusProblem(
         mirrors=Surfaces(
-            ellipsoid.apices(u), ellipsoid.normals(u), flat.paper_curvatures(theta0, theta1, size)
+            ellipsoid.apices(u),
+            ellipsoid.normals(u),
+            flat.paper_curvatures(theta0, theta1, half_width),
         ),
         planes=planes(np.array([[0, 0, 0], [0, 0, foot]]), np.array([[1, 0, 0], [0, 0, 1]])),
         boundary=boundary,
         triangles=triangles,
         pinhole=ellipsoid.pinhole,
-        least=1 / (spec.mirrors.max_radius_widths * size),
+        least=1 / (spec.mirrors.max_radius_widths * half_width),
         target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
     )
     cells, covered = solve_radii(spec.mirrors.radius_rule, task, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
     camera = spec.camera
     return MirrorArray(
-        camera="a",
-        view=fitted_camera(
+        camera_id="a",
+        camera=fitted_camera(
             ellipsoid.pinhole,
             cells.corners,
             camera.width_px,
@@ -161,11 +163,11 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
         u=u,
         theta0=theta0,
         theta1=theta1,
-        size=size,
+        half_width=half_width,
         polar=polar,
         azimuth=azimuth,
         cells=cells,
-        body=_under_coat(cells, spec.mirrors.coating_um / 1000),
+        modelled_cells=_under_coat(cells, spec.mirrors.coating_um / 1000),
         area=cell_areas(cells),
         coverage=covered,
     )

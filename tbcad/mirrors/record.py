@@ -31,7 +31,7 @@ def rows(half: MirrorArray) -> list[Row]:
             mirrors.normal,
             mirrors.centre,
             mirrors.radius,
-            half.size,
+            half.half_width,
             np.degrees([half.theta0, half.theta1, half.polar, half.azimuth]).T,
             half.area,
             half.coverage,
@@ -39,7 +39,7 @@ def rows(half: MirrorArray) -> list[Row]:
     )
     values = [[None if np.isnan(x) else x + 0.0 for x in row] for row in numbers.tolist()]
     return [
-        dict(zip(COLUMNS, [name, half.camera, *row], strict=True))
+        dict(zip(COLUMNS, [name, half.camera_id, *row], strict=True))
         for name, row in zip(half.ids, values, strict=True)
     ]
 
@@ -77,9 +77,9 @@ def write_design(path: Path, design: MirrorDesign, records: list[Row], shells: b
 
 def camera(half: MirrorArray) -> dict[str, Any]:
     """Record of one camera."""
-    view = half.view
+    view = half.camera
     return {
-        "id": half.camera,
+        "id": half.camera_id,
         "pinhole_mm": (view.pinhole + 0.0).tolist(),
         "forward": (view.forward + 0.0).tolist(),
         "right": (view.right + 0.0).tolist(),
@@ -91,6 +91,6 @@ def camera(half: MirrorArray) -> dict[str, Any]:
 
 def part(half: MirrorArray) -> dict[str, str]:
     """Record of one part and its files."""
-    name = f"shell_{half.camera}"
+    name = f"shell_{half.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
-    return {"name": name, "camera": half.camera, **files}
+    return {"name": name, "camera": half.camera_id, **files}

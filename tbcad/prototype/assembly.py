@@ -67,7 +67,7 @@ def _balls(built: Machine) -> SolidGroup:
 
 def _views(built: Machine) -> SolidGroup:
     """The capture sphere, and what the camera sees as far as beyond it."""
-    view, radius = built.made.half.view, built.target / 2
+    view, radius = built.made.half.camera, built.target / 2
     length = float(norm(view.pinhole)) + radius
     wide = length * np.tan(view.hfov / 2)
     high = wide * view.height_px / view.width_px

@@ -27,7 +27,7 @@ def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda
     first = design.halves[0]
     around = shell_envelope(design)
     progress("facets")
-    facets = shell_mesh(design.spec, first.body, around, object_distances(first))
+    facets = shell_mesh(design.spec, first.modelled_cells, around, object_distances(first))
     for half in design.halves:
         _export(design, half, around, facets, folder, progress)
 
@@ -39,9 +39,9 @@ def camera_solid(design: MirrorDesign, half: MirrorArray, around: Envelope | Non
         SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds the solid invalid.
     """
-    name, modelled = part(half)["name"], design.halves[0].body
+    name, modelled = part(half)["name"], design.halves[0].modelled_cells
     closing = around or shell_envelope(design)
-    return shell_solid(name, half.ids, modelled, closing, mirrored=half.camera == "b")
+    return shell_solid(name, half.ids, modelled, closing, mirrored=half.camera_id == "b")
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:
@@ -51,7 +51,7 @@ def shell_envelope(design: MirrorDesign) -> Envelope:
         SpecError: when flanges or holes do not fit.
     """
     first = design.halves[0]
-    return envelope(design.spec.shell, first.body, first.ellipsoid)
+    return envelope(design.spec.shell, first.modelled_cells, first.ellipsoid)
 
 
 def object_distances(half: MirrorArray) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -70,7 +70,7 @@ def _export(
     """Write one half; closing and facets are camera a's."""
     files = part(half)
     progress(f"{files['name']}: solid")
-    own = facets.mirrored() if half.camera == "b" else facets
+    own = facets.mirrored() if half.camera_id == "b" else facets
     solid = camera_solid(design, half, closing)
     progress(f"{files['name']}: files")
     write_step(folder / files["step"], solid, design.spec.step.pcurves)

@@ -25,7 +25,7 @@ def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
 @pytest.mark.parametrize("n", [*range(1, 13), 17, 24, 36])
 def test_traced_mirrors_all_see_the_target(n: int) -> None:
     half = half_of(f"n={n}")
-    curved = half.mirrors.radius < 29.9999 * half.size
+    curved = half.mirrors.radius < 29.9999 * half.half_width
     assert half.coverage.min() > 60.6 - 0.01
     assert half.coverage[curved].max(initial=0) < 60.6 + 0.01
     assert (half.mirrors.radius > 0).all()
@@ -35,7 +35,7 @@ def test_traced_mirrors_all_see_the_target(n: int) -> None:
 def test_mirrors_that_see_enough_are_nearly_flat() -> None:
     """n = 4 and below: the radius stops at a stated multiple of the half width."""
     half = half_of("n=4")
-    nearly_flat = np.isclose(half.mirrors.radius, 30 * half.size)
+    nearly_flat = np.isclose(half.mirrors.radius, 30 * half.half_width)
     assert nearly_flat.sum() > 5
     assert (half.coverage[nearly_flat] >= 60.6 - 0.01).all()
 
@@ -43,7 +43,7 @@ def test_mirrors_that_see_enough_are_nearly_flat() -> None:
 def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
     half = half_of("n=4", "radius_rule=paper")
     assert (half.mirrors.radius > 0).all()
-    assert half.mirrors.radius.max() == pytest.approx((30 * half.size).max(), rel=0.5)
+    assert half.mirrors.radius.max() == pytest.approx((30 * half.half_width).max(), rel=0.5)
 
 
 def test_margin_is_added_to_the_target() -> None:
@@ -54,7 +54,7 @@ def test_coat_is_an_offset_of_the_radius() -> None:
     bare, coated = half_of("n=8"), half_of("n=8", "coating_um=40")
     assert coated.mirrors.radius == pytest.approx(bare.mirrors.radius, rel=1e-12)
     m = len(coated)
-    body = coated.body.surfaces
+    body = coated.modelled_cells.surfaces
     assert 1 / body.curvature[:m] == pytest.approx(coated.mirrors.radius - 0.04, rel=1e-12)
     assert body.centre[:m] == pytest.approx(coated.mirrors.centre, abs=1e-9)
 

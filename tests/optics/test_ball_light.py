@@ -18,7 +18,7 @@ def some(paper_half: MirrorArray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def outline(paper_half: MirrorArray, some: np.ndarray) -> np.ndarray:
     at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
-    pinhole = norm(paper_half.view.pinhole)
+    pinhole = norm(paper_half.camera.pinhole)
     return ball_light.used_outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
 
 
@@ -37,7 +37,7 @@ def test_rays_off_the_outline_touch_the_capture_sphere(
     point = ball_light.turned(outline, azimuth[:, None]) @ paper_half.ellipsoid.frame()
     centre, radius = mirrors.centre[some][:, None], mirrors.radius[some][:, None]
     assert norm(point - centre) == pytest.approx(np.broadcast_to(radius, point.shape[:2]))
-    miss = miss_distances(paper_half.view.pinhole, point, unit(point - centre))
+    miss = miss_distances(paper_half.camera.pinhole, point, unit(point - centre))
     assert miss == pytest.approx(CAPTURE, abs=1e-6)
 
 
@@ -45,7 +45,7 @@ def test_light_lies_in_its_hulls(
     paper_half: MirrorArray, some: np.ndarray, outline: np.ndarray
 ) -> None:
     """Rays over all of the part in use, by points along them."""
-    pinhole = norm(paper_half.view.pinhole)
+    pinhole = norm(paper_half.camera.pinhole)
     camera = np.array([pinhole, 0.0, 0.0])
     at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
     radius = paper_half.mirrors.radius[some][:, None, None]
@@ -84,7 +84,7 @@ def test_area_of_an_ellipse(a: float, b: float) -> None:
 
 def test_pixels_against_counting(paper_half: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
-    view, mirrors, i = paper_half.view, paper_half.mirrors, 400
+    view, mirrors, i = paper_half.camera, paper_half.mirrors, 400
     at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[[i]])
     shape = ball_light.used_outlines(at, mirrors.radius[[i]], norm(view.pinhole), CAPTURE)
     frame = paper_half.ellipsoid.frame()
@@ -111,7 +111,7 @@ def test_rays_past_a_ball_miss_by_infinity() -> None:
 
 def test_facing_an_apex(paper_half: MirrorArray) -> None:
     """By the scalar product with the axis."""
-    pinhole = paper_half.view.pinhole
+    pinhole = paper_half.camera.pinhole
     way = unit(paper_half.mirrors.apex - pinhole)
     expected = np.arccos(way @ unit(-pinhole))
     assert ball_light.field_angles(paper_half.ellipsoid, paper_half.polar) == pytest.approx(

@@ -7,14 +7,14 @@ from tbcad.optics.camera import fitted_camera
 
 def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: MirrorArray) -> None:
     """89 degrees across 2080 x 1552 pixels hold camera a's 847 mirrors."""
-    view = paper_half.view
+    view = paper_half.camera
     assert view.fill(paper_half.cells.corners) <= 1
     assert view.forward @ view.right == pytest.approx(0, abs=1e-12)
     assert abs(view.forward[1]) < 1e-9  # the array is symmetric, and so is the camera
 
 
 def test_no_small_turn_does_better(paper_half: MirrorArray) -> None:
-    view, corners = paper_half.view, paper_half.cells.corners
+    view, corners = paper_half.camera, paper_half.cells.corners
     best = view.fill(corners)
     for turn in (-1e-3, 1e-3):
         for axis in (view.right, np.cross(view.forward, view.right)):
@@ -29,7 +29,7 @@ def test_no_small_turn_does_better(paper_half: MirrorArray) -> None:
 
 def test_mirrored_camera_sees_the_mirrored_array_alike(paper_half: MirrorArray) -> None:
     flipped = paper_half.cells.corners * [-1, 1, 1]
-    view = paper_half.view
+    view = paper_half.camera
     assert view.mirrored().fill(flipped) == pytest.approx(view.fill(paper_half.cells.corners))
     assert np.linalg.det(
         [view.right, np.cross(view.forward, view.right), view.forward]

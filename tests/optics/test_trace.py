@@ -49,7 +49,7 @@ def test_coverage_against_brute_force(rule: str) -> None:
     whole = np.flatnonzero(half.u[:, 0] > 0)
     extremes = whole[np.argsort(half.coverage[whole])[[0, 1, -1]]]
     for i in [*extremes, *whole[:: len(whole) // 6]]:
-        found = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.size[i])
+        found = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.half_width[i])
         # The grid's step is a third of a percent of its reach, and so is its error.
         assert found == pytest.approx(half.coverage[i], rel=4e-3)
 

@@ -11,7 +11,7 @@ from tbcad.optics.windows import SubstituteBalls, Windows, cell_windows, rotated
 
 @pytest.fixture(scope="module")
 def seen(paper_half: MirrorArray) -> Windows:
-    return cell_windows(paper_half.cells, paper_half.view.pinhole)
+    return cell_windows(paper_half.cells, paper_half.camera.pinhole)
 
 
 def own(half: MirrorArray, turn: float = 0.0) -> SubstituteBalls:
@@ -22,7 +22,7 @@ def own(half: MirrorArray, turn: float = 0.0) -> SubstituteBalls:
 
 
 def test_own_spheres_cover_what_the_shell_covers(paper_half: MirrorArray, seen: Windows) -> None:
-    expected = coverage_diameters(paper_half.cells, paper_half.view.pinhole)
+    expected = coverage_diameters(paper_half.cells, paper_half.camera.pinhole)
     assert seen.coverage(own(paper_half)) == pytest.approx(expected, abs=2e-4)
 
 

@@ -10,7 +10,7 @@ from tbcad.spec.errors import SpecError
 
 def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Envelope) -> None:
     """Least distance from any corner or arc to the back is the wall, within the samples."""
-    arcs = small_half.body.arcs
+    arcs = small_half.modelled_cells.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, 9))
     valley = arcs.at(arc, t).reshape(-1, 3)
     rng = np.random.default_rng(3)
@@ -53,7 +53,7 @@ def test_holes_by_kind(small_body: Envelope) -> None:
 def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     spec = load_spec(None, ["shell.seam_flange.bolts=60"])
     with pytest.raises(SpecError, match="holes") as caught:
-        envelope(spec.shell, small_half.body, small_half.ellipsoid)
+        envelope(spec.shell, small_half.modelled_cells, small_half.ellipsoid)
     assert "lower bolts" in str(caught.value)
 
 
@@ -61,4 +61,4 @@ def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
 def test_every_n_gets_a_body(n: int) -> None:
     made = design(load_spec(None, [f"n={n}"]))
     half = made.halves[0]
-    assert envelope(made.spec.shell, half.body, half.ellipsoid).back.offset > 0
+    assert envelope(made.spec.shell, half.modelled_cells, half.ellipsoid).back.offset > 0

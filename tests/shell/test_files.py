@@ -35,7 +35,7 @@ def test_all_files_are_there(exported: Path) -> None:
 @pytest.mark.parametrize("which", [0, 1])
 def test_step_round_trip(exported: Path, small_design: MirrorDesign, which: int) -> None:
     half = small_design.halves[which]
-    content = read_step(exported / f"shell_{half.camera}.step")
+    content = read_step(exported / f"shell_{half.camera_id}.step")
     built = solid_of(small_design, which)
     assert content.solids == 1
     assert content.valid
@@ -87,7 +87,7 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
     assert document["spec"] == spec_dict(small_design.spec)
     assert [row["id"] for row in rows] == [row["id"] for row in document["mirrors"]]
     for half in small_design.halves:
-        own = [row for row in rows if row["camera"] == half.camera]
+        own = [row for row in rows if row["camera"] == half.camera_id]
         apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own])
         assert np.array_equal(apex, half.mirrors.apex)  # full double precision
         assert np.array_equal([float(row["coverage_mm"]) for row in own], half.coverage)

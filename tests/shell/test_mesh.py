@@ -38,8 +38,10 @@ def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
 
 def test_facets_lie_on_their_spheres_and_face_the_light(small_design: MirrorDesign) -> None:
     half = small_design.halves[0]
-    made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
-    surfaces = half.body.surfaces
+    made = mirror_facets(
+        small_design.spec, half.modelled_cells, half.ellipsoid.radial_distance(half.u)
+    )
+    surfaces = half.modelled_cells.surfaces
     corner = made.vertices[made.triangles]
     for k in range(3):
         assert np.abs(surfaces.value(made.mirror, corner[:, k])).max() < 1e-9
@@ -52,23 +54,30 @@ def test_no_facet_folds_in_sharp_corners_of_coarse_cells(n: int) -> None:
     """At n = 3 and 5 the foot cuts cells in corners so sharp that a mitred strip would fold."""
     made = design(load_spec(None, [f"n={n}"]))
     half = made.halves[0]
-    every = mirror_facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    every = mirror_facets(made.spec, half.modelled_cells, half.ellipsoid.radial_distance(half.u))
     corner = every.vertices[every.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    assert dot(normal, half.body.surfaces.gradient(every.mirror, corner.mean(axis=1))).min() > 0
+    assert (
+        dot(normal, half.modelled_cells.surfaces.gradient(every.mirror, corner.mean(axis=1))).min()
+        > 0
+    )
 
 
 def test_chord_error_is_kept(small_design: MirrorDesign) -> None:
     half = small_design.halves[0]
-    made = mirror_facets(small_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    made = mirror_facets(
+        small_design.spec, half.modelled_cells, half.ellipsoid.radial_distance(half.u)
+    )
     middle = made.vertices[made.triangles].mean(axis=1)
-    depth = np.abs(half.body.surfaces.value(made.mirror, middle))
+    depth = np.abs(half.modelled_cells.surfaces.value(made.mirror, middle))
     assert depth.max() < small_design.spec.mesh.chord_error_mm
 
 
 def test_area_of_facets_is_that_of_the_cells(paper_design: MirrorDesign) -> None:
     half = paper_design.halves[0]
-    made = mirror_facets(paper_design.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    made = mirror_facets(
+        paper_design.spec, half.modelled_cells, half.ellipsoid.radial_distance(half.u)
+    )
     corner = made.vertices[made.triangles]
     area = norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) / 2
     assert area.sum() == pytest.approx(half.area.sum(), rel=1e-3)
@@ -83,8 +92,8 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     """
     made = design(load_spec(None, ["n=12", f"ray_error_mm={error_mm}", "chord_error_mm=0.002"]))
     half = made.halves[0]
-    pinhole = half.view.pinhole
-    every = mirror_facets(made.spec, half.body, half.ellipsoid.radial_distance(half.u))
+    pinhole = half.camera.pinhole
+    every = mirror_facets(made.spec, half.modelled_cells, half.ellipsoid.radial_distance(half.u))
     on_rim = every.triangles < every.first[-1] + every.steps[-1] - 1
     rim = on_rim.sum(axis=1) == 2
     triangle = every.triangles[rim]
@@ -92,10 +101,10 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     normal = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
     flag = on_rim[rim][:, :, None]
     point = (corner * flag).sum(axis=1) / 2
-    exact = unit(half.body.surfaces.gradient(every.mirror[rim], point))
+    exact = unit(half.modelled_cells.surfaces.gradient(every.mirror[rim], point))
     loss = miss_distances(pinhole, point, exact) - miss_distances(pinhole, point, normal)
     # Chords along curved arcs add their own sagitta, bounded by the chord error.
-    radius = half.body.surfaces.radius[every.mirror[rim]]
+    radius = half.modelled_cells.surfaces.radius[every.mirror[rim]]
     chord = 2 * made.spec.mesh.chord_error_mm * norm(point) / radius
     assert np.quantile(loss - chord, 0.99) < error_mm
 

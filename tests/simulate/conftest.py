@@ -52,7 +52,7 @@ def knot() -> Scene:
 @pytest.fixture(scope="session")
 def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField:
     return in_memory(
-        {at.camera: (at, photograph(at.view, exact(at), knot)) for at in cameras}, CAPTURE_MM
+        {at.camera_id: (at, photograph(at.camera, exact(at), knot)) for at in cameras}, CAPTURE_MM
     )
 
 

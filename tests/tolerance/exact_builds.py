@@ -52,7 +52,7 @@ def slowly(half: MirrorArray, draws: Draws, k: int) -> np.ndarray:
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
     back = Rotation.from_rotvec(draws.shell_tilt[k]).inv()
-    pinhole = back.apply(half.view.pinhole + draws.camera_shift[k] - draws.shell_shift[k])
+    pinhole = back.apply(half.camera.pinhole + draws.camera_shift[k] - draws.shell_shift[k])
     middle = back.apply(-draws.shell_shift[k])
     cells = made(half, draws, k)
     whole = half.cells.surfaces.apex[:, 0] != 0
@@ -82,7 +82,7 @@ def meshed(design: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Pat
         facets = facets if half is first else facets.mirrored()
         turn = Rotation.from_rotvec(drawn.shell_tilt[k])
         points = turn.apply(facets.vertices * drawn.scale[k]) + drawn.shell_shift[k]
-        write_stl(folder / f"shell_{half.camera}.stl", Mesh(points, facets.triangles))
+        write_stl(folder / f"shell_{half.camera_id}.stl", Mesh(points, facets.triangles))
 
 
 def proved(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -153,7 +153,7 @@ def brutally(half: MirrorArray, draws: Draws, k: int, mirror: int, ways: int = 4
     point = at(low)
     normal = (point / scale - centre[mirror]) / scale
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return float(2 * trace.miss_distances(half.view.pinhole, point, normal).min())
+    return float(2 * trace.miss_distances(half.camera.pinhole, point, normal).min())
 
 
 def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
@@ -161,7 +161,7 @@ def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
 
     By the angle that the outline's image turns about the middle, along finely sampled arcs.
     """
-    cells, pinhole = half.cells, half.view.pinhole + shift
+    cells, pinhole = half.cells, half.camera.pinhole + shift
     offsets, sides = cells.rings
     mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
     t = np.broadcast_to(np.linspace(0, 1, 65), (len(sides), 65))

@@ -121,4 +121,4 @@ def test_equatorial_mirrors_stay_whole(paper_half: MirrorArray) -> None:
     """The foot plane lies half a mirror below z = 0: all of their apices and widths are above."""
     equator = paper_half.u[:, 2] == 0
     assert equator.sum() == 36 or equator.sum() == 37
-    assert (paper_half.size[equator] <= -paper_half.foot + 1e-12).all()
+    assert (paper_half.half_width[equator] <= -paper_half.foot + 1e-12).all()

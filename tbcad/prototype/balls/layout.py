@@ -244,7 +244,7 @@ def _task(spec: Spec, half: MirrorArray, balls: Balls, wanted: StopRequests) -> 
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, spec.optics.capture_diameter_mm / 2
     length = POST_LENGTHS * ellipsoid.semi_major
     floor, ceiling = allowed_azimuths(
-        balls, keys, obstacles(keys, ellipsoid.frame(), half.view, length)
+        balls, keys, obstacles(keys, ellipsoid.frame(), half.camera, length)
     )
     return PlacementProblem(
         apart=np.maximum(*min_separations(balls, keys, pinhole, capture)),

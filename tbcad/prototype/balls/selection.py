@@ -161,7 +161,7 @@ class BallCandidates:
         half = self.half
         frame = half.ellipsoid.frame()
         apex = ball_poses(half.ellipsoid, self.groups.polar).apex[self.groups.of]
-        away = turned(apex, half.azimuth) @ frame - half.view.pinhole
+        away = turned(apex, half.azimuth) @ frame - half.camera.pinhole
         direction = away / norm(away)[:, None]
         return self.windows.surround(direction, direction, np.zeros(len(half)))
 
@@ -172,7 +172,7 @@ class BallCandidates:
 
 def ball_candidates(half: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
     """Groups of mirrors ready to try balls in their places; target is a coverage in mm."""
-    return BallCandidates(half, groups, cell_windows(half.cells, half.view.pinhole), target)
+    return BallCandidates(half, groups, cell_windows(half.cells, half.camera.pinhole), target)
 
 
 def choose_balls(here: BallCandidates, keys: PrototypeSpec, catalogue: Catalogue) -> Balls:
@@ -245,7 +245,7 @@ def ball_fit(here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallFit
 def _counted(half: MirrorArray, outline: Floats) -> Floats:
     """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
     share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
-    return share * pixel_counts(half.view, half.ellipsoid.frame(), outline, half.azimuth)
+    return share * pixel_counts(half.camera, half.ellipsoid.frame(), outline, half.azimuth)
 
 
 def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, Ints]:

@@ -51,7 +51,7 @@ def document(built: Machine, design: MirrorDesign) -> dict[str, Any]:
     axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
     return {
         "schema": SCHEMA,
-        "camera": made.half.camera,
+        "camera": made.half.camera_id,
         "target_mm": design.spec.optics.capture_diameter_mm,
         "picture": keys.picture,
         "target_pad_um": PAD_UM,

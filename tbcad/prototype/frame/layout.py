@@ -147,7 +147,7 @@ def _brackets(
     found = [upright_foot(keys, axes, top.face, side) for side in (1, -1)]
     found.append(stage_foot(keys, axes, stage, parts["INSERT-M4"]))
     if own.camera_diameter_mm > 0:
-        found.append(camera_bracket(keys, axes, own, made.half.view))
+        found.append(camera_bracket(keys, axes, own, made.half.camera))
     return found
 
 
@@ -200,7 +200,7 @@ def _plate(
 def _camera(own: PrototypeSpec, made: PrototypeLayout) -> list[Component]:
     if own.camera_diameter_mm == 0:
         return []
-    view, radius = made.half.view, own.camera_diameter_mm / 2
+    view, radius = made.half.camera, own.camera_diameter_mm / 2
     body = Cylinder(view.pinhole, -view.forward, radius, own.camera_length_mm)
     return [Component("camera", "camera behind its pinhole", (body,))]
 

@@ -35,9 +35,9 @@ def write_capture(
     with light_field.writing(folder / light_field.NAME, capture_mm, record) as store:
         for at, bands in captured:
             picture, counts = light_field.write(store, at, bands())
-            file = folder / f"camera_{at.camera}.png"
+            file = folder / f"camera_{at.camera_id}.png"
             picture_files.write_stills({file: picture})
-            record["cameras"][at.camera] = {"picture": file.name, **counts}
+            record["cameras"][at.camera_id] = {"picture": file.name, **counts}
     write_object(folder / OBJECT, subject)
     text = json.dumps(record, indent=1) + "\n"
     (folder / RECORD).write_text(text, encoding="utf-8")

@@ -149,7 +149,7 @@ def write(
         Its picture (h, w, 3), and how many of its pixels are on mirrors, and of those how many
         rays meet the capture sphere.
     """
-    view, group = at.view, store.create_group(at.camera)
+    view, group = at.camera, store.create_group(at.camera_id)
     _write_view(group, view)
     _write_mirrors(group.create_group("mirrors"), at)
     shape = (view.height_px, view.width_px)
@@ -215,7 +215,7 @@ def in_memory(
     for camera, (at, bands) in captured.items():
         parts = [arrays_of(band) for band in bands]
         planes = {name: np.concatenate([part[name] for part in parts]) for name in PLANES}
-        frames[camera] = Frame(at.view, at.u, at.mirrors, at.boxes(), planes)
+        frames[camera] = Frame(at.camera, at.u, at.mirrors, at.boxes(), planes)
     return LightField(frames, capture_mm, dict(facts))
 
 

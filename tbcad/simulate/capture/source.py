@@ -47,6 +47,6 @@ def cameras(
         return on_mesh(shells, at) if shells else exact(at)
 
     return [
-        (at, partial(photograph, at.view, tracer(at), scene, samples, progress))
+        (at, partial(photograph, at.camera, tracer(at), scene, samples, progress))
         for at in export.reflectors
     ]

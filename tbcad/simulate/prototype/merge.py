@@ -96,7 +96,7 @@ def light_field(
     The other arguments are those of `merge`.
     """
     captured = {
-        run.at.camera: (stand_ins(run), merge(run, scene, resample, samples, progress))
+        run.at.camera_id: (stand_ins(run), merge(run, scene, resample, samples, progress))
         for run in both
     }
     return in_memory(captured, capture_mm)
@@ -126,9 +126,9 @@ def merge(
     photographs = resample == "photograph"
     picture = _resampled(ready, scene, samples, progress) if photographs else None
     work = partial(_band, ready, scene, samples, picture)
-    every = row_bands(run.at.view.height_px)
+    every = row_bands(run.at.camera.height_px)
     for first in range(0, len(every), 2 * THREADS):
-        progress(f"row {every[first].start} of {run.at.view.height_px}")
+        progress(f"row {every[first].start} of {run.at.camera.height_px}")
         yield from in_threads(work, every[first : first + 2 * THREADS])
 
 
@@ -145,7 +145,7 @@ def _ready(run: Run, scene: Scene) -> Merging:
 
 def _object_box(run: Run, scene: Scene) -> Ints:
     """Columns and rows that hold the object as the camera sees it directly, (4,)."""
-    view = run.at.view
+    view = run.at.camera
     corners = scene.radius * np.array(list(product((-1.0, 1.0), repeat=3)))
     size = np.array([view.width_px, view.height_px])
     if ((corners - view.pinhole) @ view.forward <= 0).any():
@@ -159,7 +159,7 @@ def _object_box(run: Run, scene: Scene) -> Ints:
 def _resampled(ready: Merging, scene: Scene, samples: int, progress: Progress) -> Bytes:
     """The merged picture (h, w, 3), stop after stop."""
     mirror = np.concatenate(
-        in_threads(partial(_mirrors, ready), row_bands(ready.run.at.view.height_px))
+        in_threads(partial(_mirrors, ready), row_bands(ready.run.at.camera.height_px))
     )
     picture = np.zeros((*mirror.shape, 3), dtype=np.uint8)
     work = partial(_fill, ready, scene, samples, mirror, picture)
@@ -177,7 +177,7 @@ def _fill(
     ready: Merging, scene: Scene, samples: int, mirror: Numbers, picture: Bytes, stop: int
 ) -> None:
     """Paint the pixels of a stop's mirrors; those of other stops are others."""
-    at, view = ready.run.at.view, ready.run.view
+    at, view = ready.run.at.camera, ready.run.view
     served = np.flatnonzero(ready.stop == stop)
     parts = [_inside(mirror, ready.boxes[number], number) for number in served.tolist()]
     pixel = np.concatenate(parts)
@@ -198,7 +198,7 @@ def _inside(mirror: Numbers, box: Ints, number: int) -> Ints:
 
 def _band(ready: Merging, scene: Scene, samples: int, picture: Bytes | None, rows: range) -> Band:
     part = _part(ready, scene, rows, CENTRE)
-    shape = (len(rows), ready.run.at.view.width_px)
+    shape = (len(rows), ready.run.at.camera.width_px)
     if picture is None:
         colour = _traced(ready, scene, samples, rows)
     else:
@@ -215,7 +215,7 @@ def _band(ready: Merging, scene: Scene, samples: int, picture: Bytes | None, row
 
 def _traced(ready: Merging, scene: Scene, samples: int, rows: range) -> Bytes:
     """Colours (n, 3) along the turned directions themselves."""
-    total = np.zeros((len(rows) * ready.run.at.view.width_px, 3), dtype=np.float32)
+    total = np.zeros((len(rows) * ready.run.at.camera.width_px, 3), dtype=np.float32)
     for shift in shifts(samples):
         part = _part(ready, scene, rows, shift)
         total += np.where(part.front[:, None], part.direct, in_balls(scene, part.seen))
@@ -226,7 +226,7 @@ def _part(ready: Merging, scene: Scene, rows: range, shift: Shift) -> Part:
     """The pixels of a band, each turned with its mirror's window."""
     run = ready.run
     mirror = ready.shell(rows, shift).mirror.ravel().astype(np.int64)
-    straight = unit(pixel_directions(run.at.view, rows, shift).reshape(-1, 3))
+    straight = unit(pixel_directions(run.at.camera, rows, shift).reshape(-1, 3))
     way = np.einsum("nx,nxy->ny", straight, ready.turn[mirror])
     seen = sight(run, way, ready.stop[mirror])
     taken = np.isfinite(places_of(run.view, way)[:, 0])

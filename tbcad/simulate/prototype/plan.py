@@ -186,13 +186,13 @@ def _frame(document: _Document) -> Floats:
 
 def _check_balls(path: Path, exported: Exported, document: _Document, balls: Floats) -> None:
     frame, (a, b) = _frame(document), exported.reflectors
-    pinhole = a.view.pinhole
+    pinhole = a.camera.pinhole
     away = norm(pinhole) * frame[0] - pinhole
     if np.abs(frame @ frame.T - np.eye(3)).max() > ROUNDING or np.linalg.det(frame) < 0:
         raise InputError(f"{path}: frame is not square and right-handed: {AGAIN}")
     if norm(away) > ROUNDING_MM:
         raise InputError(f"{path}: frame.axis does not point at the pinhole of camera a: {AGAIN}")
-    if norm(b.view.pinhole - HALF_TURN * pinhole) > ROUNDING_MM:
+    if norm(b.camera.pinhole - HALF_TURN * pinhole) > ROUNDING_MM:
         raise InputError(
             f"{path}: camera b is not where the object turned by 180 degrees about z has camera "
             "a, so one camera cannot take both halves: set y of optics.camera_mm to 0"

@@ -55,7 +55,7 @@ class Run:
 def runs(reflectors: tuple[Reflector, Reflector], plan: Plan) -> tuple[Run, Run]:
     """Both runs: that for camera a's mirrors, and that for camera b's, the object turned."""
     a, b = reflectors
-    return _run(a, a.view, plan, 0, np.ones(3)), _run(b, a.view, plan, 1, HALF_TURN)
+    return _run(a, a.camera, plan, 0, np.ones(3)), _run(b, a.camera, plan, 1, HALF_TURN)
 
 
 def stand_ins(run: Run) -> SubstitutedReflector:
@@ -64,7 +64,9 @@ def stand_ins(run: Run) -> SubstitutedReflector:
     `u` are the directions of the balls: where the virtual cameras really were.
     """
     at = run.at
-    return SubstitutedReflector(at.camera, at.view, unit(run.stands.apex), at.cells, run.stands)
+    return SubstitutedReflector(
+        at.camera_id, at.camera, unit(run.stands.apex), at.cells, run.stands
+    )
 
 
 def _run(at: Reflector, view: Camera, plan: Plan, half: int, turn: Floats) -> Run:

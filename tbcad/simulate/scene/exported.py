@@ -101,7 +101,7 @@ def read_export(folder: Path) -> Exported:
     except ValidationError as error:
         raise _refused(path, error, "spec.") from None
     a, b = (_reflector(path, document, spec, camera) for camera in document.cameras)
-    if (a.camera, b.camera) != ("a", "b"):
+    if (a.camera_id, b.camera_id) != ("a", "b"):
         raise InputError(f"{path}: cameras are not a and b: {AGAIN}")
     return Exported(folder=folder, spec=spec, capture_mm=document.target_mm, reflectors=(a, b))
 

@@ -58,7 +58,7 @@ def read_shells(export: Exported) -> Shells:
     coat = export.spec.mirrors.coating_um / 1000
     corners, owners, surfaces = [], [], []
     for at, sign in zip(export.reflectors, (1, -1), strict=True):
-        path = export.folder / f"shell_{at.camera}.stl"
+        path = export.folder / f"shell_{at.camera_id}.stl"
         facets = _facets(path)
         owner = _owners(at.mirrors.offset(-coat), facets)
         if len(lost := np.setdiff1d(np.arange(len(at)), owner)):
@@ -72,16 +72,16 @@ def read_shells(export: Exported) -> Shells:
 
 def on_mesh(shells: Shells, at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
     """What gives the rays of rows of a camera's picture off the mirrors of the mesh."""
-    sign, surfaces = (1, shells.surfaces[0]) if at.camera == "a" else (-1, shells.surfaces[1])
+    sign, surfaces = (1, shells.surfaces[0]) if at.camera_id == "a" else (-1, shells.surfaces[1])
 
     def trace(rows: range, shift: tuple[float, float]) -> Rays:
-        way = pixel_directions(at.view, rows, shift)
+        way = pixel_directions(at.camera, rows, shift)
         start = np.empty((way.shape[0] * way.shape[1], 3), dtype=np.float32)
-        start[:] = at.view.pinhole
+        start[:] = at.camera.pinhole
         facet = np.asarray(shells.embree.run(start, way.reshape(-1, 3).astype(np.float32)))
         mirror = np.where(facet >= 0, np.maximum(sign * shells.mirror[facet], 0), 0)
         numbers = mirror.reshape(way.shape[:2]).astype(np.int32)
-        return reflected(at.view.pinhole, way, surfaces, numbers)
+        return reflected(at.camera.pinhole, way, surfaces, numbers)
 
     return trace
 

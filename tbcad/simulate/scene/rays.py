@@ -114,11 +114,11 @@ def exact(at: Reflector) -> Callable[[range, Shift], Rays]:
     boxes, beside, table = at.boxes(), at.beside_edge(), _table(at.mirrors)
 
     def trace(rows: range, shift: Shift) -> Rays:
-        way = pixel_directions(at.view, rows, shift)
+        way = pixel_directions(at.camera, rows, shift)
         near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
         in_band = boxes - np.array([0, 0, rows.start, rows.start])
-        mirror = _first(at.view.pinhole, way, table, near, in_band, at.side, at.foot)
-        rays = reflected(at.view.pinhole, way, at.mirrors, mirror)
+        mirror = _first(at.camera.pinhole, way, table, near, in_band, at.side, at.foot)
+        rays = reflected(at.camera.pinhole, way, at.mirrors, mirror)
         return rays.without(_covered(table, beside, mirror, rays.origin))
 
     return trace

@@ -20,14 +20,14 @@ class Reflector:
     """One camera and its m mirrors, in the order of their ids.
 
     Attributes:
-        camera: "a" or "b".
-        view: the camera itself.
+        camera_id: "a" or "b".
+        camera: its pinhole, axes and sensor.
         u: directions of the virtual cameras, (m, 3).
         cells: of the reflecting surfaces.
     """
 
-    camera: str
-    view: Camera
+    camera_id: str
+    camera: Camera
     u: Floats
     cells: Cells
 
@@ -49,19 +49,19 @@ class Reflector:
     @property
     def side(self) -> float:
         """Sign of x on the side of the seam where the mirrors are."""
-        return 1.0 if self.camera == "a" else -1.0
+        return 1.0 if self.camera_id == "a" else -1.0
 
     def boxes(self) -> Ints:
         """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4)."""
         arcs, m = self.cells.arcs, len(self)
         which = np.broadcast_to(np.arange(len(arcs))[:, None], (len(arcs), len(ARC_SAMPLES)))
-        places = pixels_of(self.view, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape)))
+        places = pixels_of(self.camera, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape)))
         low, high = np.full((m, 2), np.inf), np.full((m, 2), -np.inf)
         for faces in (arcs.left, arcs.right):
             mine = faces < m
             np.minimum.at(low, faces[mine], places[mine].min(axis=1))
             np.maximum.at(high, faces[mine], places[mine].max(axis=1))
-        size = np.array([self.view.width_px, self.view.height_px])
+        size = np.array([self.camera.width_px, self.camera.height_px])
         first = np.clip(np.floor(low) - MARGIN_PX, 0, size)
         last = np.clip(np.ceil(high) + 1 + MARGIN_PX, 0, size)
         return np.stack([first, last], axis=2).reshape(m, 4).astype(np.int64)
@@ -103,7 +103,7 @@ class SubstitutedReflector(Reflector):
 
 def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
     """Both cameras of a design with their mirrors."""
-    a, b = (Reflector(half.camera, half.view, half.u, half.cells) for half in design.halves)
+    a, b = (Reflector(half.camera_id, half.camera, half.u, half.cells) for half in design.halves)
     return a, b
 
 

@@ -43,7 +43,7 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
 
 def _rows(halves: dict[str, MirrorArray], spec: Spec) -> tuple[tuple[Cell, ...], ...]:
     traced, paper = halves["traced"], halves["paper"]
-    longest = spec.mirrors.max_radius_widths * traced.size
+    longest = spec.mirrors.max_radius_widths * traced.half_width
     numbers = np.column_stack(
         [
             np.degrees(traced.polar),

@@ -53,12 +53,12 @@ def behind(curvature: Floats, incidence: Floats, distance: Floats) -> tuple[Floa
 
 def images(half: MirrorArray, radius: float) -> Images:
     """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
-    mirrors, pinhole = half.mirrors, half.view.pinhole
+    mirrors, pinhole = half.mirrors, half.camera.pinhole
     toward = mirrors.apex - pinhole
     to_mirror, way = norm(toward), unit(toward)
     incidence = np.arccos(np.clip(-dot(way, mirrors.normal), -1, 1))
     objects = norm(mirrors.apex)[:, None] + radius * np.array([-1.0, 0.0, 1.0])
     image = behind(mirrors.curvature[:, None], incidence[:, None], objects)
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
-    along = way @ half.view.forward
+    along = way @ half.camera.forward
     return Images(to_mirror, incidence, distance, distance * along[:, None, None])

@@ -103,16 +103,16 @@ def _counted(half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius
     """Counts of the rays themselves, through the middles of so many columns and rows."""
     corners = half.cells.corners
     full = fitted_camera(
-        half.view.pinhole, corners, sensor.width_px, sensor.height_px, half.view.hfov
+        half.camera.pinhole, corners, sensor.width_px, sensor.height_px, half.camera.hfov
     )
     view = replace(full, width_px=sampled[0], height_px=sampled[1])
-    on, seen = _traced(Reflector(half.camera, view, half.u, half.cells), radius)
+    on, seen = _traced(Reflector(half.camera_id, view, half.u, half.cells), radius)
     return Counts(on, seen, full.fill(corners), sampled[0] * sampled[1])
 
 
 def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
     """Rays on each mirror and those that go on to the capture sphere, each (m,)."""
-    trace, height, m = exact(at), at.view.height_px, len(at)
+    trace, height, m = exact(at), at.camera.height_px, len(at)
     on, seen = np.zeros(m + 1), np.zeros(m + 1)
     for rows in row_bands(height):
         rays = trace(rows, CENTRE)

@@ -107,7 +107,7 @@ def _tiles(
     export: Exported, scene: Scene, kind: Geometry, samples: int, progress: Progress
 ) -> Tiles:
     captured = {
-        at.camera: (at, bands()) for at, bands in cameras(export, scene, kind, samples, progress)
+        at.camera_id: (at, bands()) for at, bands in cameras(export, scene, kind, samples, progress)
     }
     return Tiles(in_memory(captured, export.capture_mm))
 

@@ -118,7 +118,7 @@ def _rows(
         file = Path(folder) / NAME
         with writing(file, spec.optics.capture_diameter_mm, {}) as store:
             for at in reflectors(tried.made):
-                write(store, at, photograph(at.view, exact(at), scene, 1, progress))
+                write(store, at, photograph(at.camera, exact(at), scene, 1, progress))
         with LightField.open(file) as source:
             found = scores(Tiles(source), scene, views, pictures, method, progress)
     return [(*head, *angle, *pair, "") for angle, pair in zip(angles, found.tolist(), strict=True)]

@@ -47,7 +47,7 @@ def nominal(at: Reflector) -> EdgeModel:
     table = np.column_stack([every.apex, every.normal, every.curvature])
     first = unit(ASKEW - dot(at.u, ASKEW)[:, None] * at.u)
     screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
-    return EdgeModel(at.view, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
+    return EdgeModel(at.camera, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
 
 
 def nominals(cameras: tuple[Reflector, Reflector]) -> tuple[EdgeModel, EdgeModel]:

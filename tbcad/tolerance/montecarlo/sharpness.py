@@ -102,7 +102,7 @@ class AsMade(SubstitutedReflector):
         """Columns and rows about each cell, wider by its own size on all sides, (m, 4)."""
         box = super().boxes()
         room = np.repeat(box[:, 1::2] - box[:, 0::2], 2, axis=1) * [-1, 1, -1, 1]
-        size = np.repeat([self.view.width_px, self.view.height_px], 2)
+        size = np.repeat([self.camera.width_px, self.camera.height_px], 2)
         wider: Ints = np.clip(box + room, 0, size)
         return wider
 
@@ -122,7 +122,7 @@ def actual(at: Reflector, draws: Draws, machine: int) -> AsMade:
     grown = Surfaces(
         turn.apply(centre) + shift + scale * radius[:, None] * normal, normal, 1 / (scale * radius)
     )
-    return AsMade(at.camera, _view(at.view, draws, machine), at.u, at.cells, grown)
+    return AsMade(at.camera_id, _view(at.camera, draws, machine), at.u, at.cells, grown)
 
 
 def _view(view: Camera, draws: Draws, machine: int) -> Camera:
@@ -138,7 +138,7 @@ def _view(view: Camera, draws: Draws, machine: int) -> Camera:
 
 
 def _captured(cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float) -> LightField:
-    both = {at.camera: (at, photograph(at.view, exact(at), scene)) for at in cameras}
+    both = {at.camera_id: (at, photograph(at.camera, exact(at), scene)) for at in cameras}
     return in_memory(both, capture_mm)
 
 

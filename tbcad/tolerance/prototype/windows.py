@@ -79,7 +79,7 @@ class Designed:
 def designed(reflectors: tuple[Reflector, Reflector], plan: Plan) -> Designed:
     """What the fast model needs of both cameras and the plan."""
     a, b = runs(reflectors, plan)
-    view = reflectors[0].view
+    view = reflectors[0].camera
     axes = np.stack([view.right, np.cross(view.forward, view.right), view.forward])
     both = _windowed(a, axes), _windowed(b, axes * HALF_TURN)
     return Designed(view.pinhole, axes, plan, both, _virtual(*both))

@@ -55,7 +55,7 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
     paper_half: MirrorArray, balls: Balls
 ) -> None:
     """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
-    pinhole = norm(paper_half.view.pinhole)
+    pinhole = norm(paper_half.camera.pinhole)
     _, dark = min_separations(balls, KEYS, pinhole, 30.0)
     turn = np.radians(np.arange(0, 60, 0.5))
     nearest = np.full((K, K), np.inf)
@@ -74,7 +74,7 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
 
 
 def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> None:
-    touch, _ = min_separations(balls, KEYS, norm(paper_half.view.pinhole), 30.0)
+    touch, _ = min_separations(balls, KEYS, norm(paper_half.camera.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
         other = turned(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
@@ -84,7 +84,7 @@ def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> 
 def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None:
     """Its half-plane is opposite to the mirrors; only the lowest polar angles come near it."""
     frame = paper_half.ellipsoid.frame()
-    post, camera = obstacles(KEYS, frame, paper_half.view, 400.0)
+    post, camera = obstacles(KEYS, frame, paper_half.camera, 400.0)
     assert post.azimuth == pytest.approx(np.pi)
     assert post.cone.end[0] == pytest.approx(400 * np.array([1, 1]) / np.sqrt(2))
     assert camera.cone.start[0] == pytest.approx([np.sqrt(2) * 100, 0])

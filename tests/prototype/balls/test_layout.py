@@ -114,7 +114,7 @@ class TestBalls:
 class TestPlaces:
     def test_apices_stay_on_the_ellipsoid(self, made: PrototypeLayout) -> None:
         apex = made.apices(0.3)
-        pinhole = made.half.view.pinhole
+        pinhole = made.half.camera.pinhole
         assert norm(apex) + norm(apex - pinhole) == pytest.approx(
             np.full(len(made), 2 * made.half.ellipsoid.semi_major)
         )
@@ -132,7 +132,7 @@ class TestPlaces:
     def test_no_ball_stands_in_anothers_light(self, made: PrototypeLayout) -> None:
         """Rays off every ball by brute force against every other ball."""
         outline, balls = made.balls.outline, made.balls
-        camera, frame = made.half.view.pinhole, made.half.ellipsoid.frame()
+        camera, frame = made.half.camera.pinhole, made.half.ellipsoid.frame()
         for share in (0.0, 0.5, 1.0):
             inner = balls.at.apex[:, None] + share * (outline - balls.at.apex[:, None])
             centre = balls.centre[:, None]
@@ -157,7 +157,7 @@ class TestPlaces:
                     assert (gap - balls.body_radius[others]).min() > KEYS.light_margin_mm
 
     def test_post_and_camera_stay_clear_over_the_swing(self, made: PrototypeLayout) -> None:
-        view = made.half.view
+        view = made.half.camera
         back = view.pinhole - KEYS.camera_length_mm * view.forward
         for angle in np.linspace(-1, 1, 41) * made.placement.swing / 2:
             centre = made.body_centres(angle)

@@ -196,8 +196,8 @@ class TestRefusals:
 
     def test_a_camera_that_looks_aside(self, rig: Rig) -> None:
         half = rig.made.half
-        view = replace(half.view, forward=np.array([0.0, 0.6, 0.8]))
-        made = replace(rig.made, half=replace(half, view=view))
+        view = replace(half.camera, forward=np.array([0.0, 0.6, 0.8]))
+        made = replace(rig.made, half=replace(half, camera=view))
         with pytest.raises(SpecError, match=r"second number of optics\.camera_mm"):
             frame(
                 (KEYS, rig.own),

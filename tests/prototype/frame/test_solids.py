@@ -140,7 +140,7 @@ class TestSolids:
         self, made: PrototypeLayout, solids: dict[str, PlacedSolid]
     ) -> None:
         """From the bracket alone: its face and slot, and the camera's radius and thread."""
-        view, own = made.half.view, SPEC.prototype
+        view, own = made.half.camera, SPEC.prototype
         slot = [
             (point, way)
             for point, way, radius in cylinders(solids["camera_bracket"].shape)
@@ -241,7 +241,7 @@ class TestClearance:
         shapes += [shape for name, shape in things.items() if name not in ("camera", "shaft")]
         mesh = trimesh.util.concatenate([as_trimesh(shape) for shape in shapes])
         frame_, stops = made.half.ellipsoid.frame(), made.stops
-        pinhole = made.half.view.pinhole
+        pinhole = made.half.camera.pinhole
         for mirror in range(len(made.half)):
             ball = int(made.fit.ball[mirror])
             turn = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]

@@ -192,7 +192,7 @@ class TestRoom:
             azimuth = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
             rim = turned(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
             start = CAPTURE * unit(rng.normal(size=(len(rim), 3)))
-            ends = [start, np.broadcast_to(made.half.view.pinhole, rim.shape)]
+            ends = [start, np.broadcast_to(made.half.camera.pinhole, rim.shape)]
             for other in ends:
                 share = rng.uniform(size=(len(rim), 1))
                 assert (space.light(other + share * (rim - other)) < 1e-6).all()

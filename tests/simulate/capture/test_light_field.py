@@ -19,7 +19,7 @@ Cameras = tuple[Reflector, Reflector]
 def written(path: Path, cameras: Cameras, scene: Scene) -> Path:
     with writing(path, 60.0, {"object": "knot"}) as store:
         for at in cameras:
-            write(store, at, photograph(at.view, exact(at), scene))
+            write(store, at, photograph(at.camera, exact(at), scene))
     return path
 
 
@@ -34,13 +34,13 @@ def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: Light
         assert source.capture_mm == 60.0
         assert len(source) == len(light_field)
         for at, frame in zip(cameras, source.frames.values(), strict=True):
-            memory = light_field.frames[at.camera]
+            memory = light_field.frames[at.camera_id]
             for name in PLANES:
                 assert np.array_equal(frame.planes[name][:], memory.planes[name])
             assert np.array_equal(frame.u, at.u)
             assert np.array_equal(frame.boxes, at.boxes())
-            assert np.array_equal(frame.view.pinhole, at.view.pinhole)
-            assert frame.view.hfov == at.view.hfov
+            assert np.array_equal(frame.view.pinhole, at.camera.pinhole)
+            assert frame.view.hfov == at.camera.hfov
             assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
 
 

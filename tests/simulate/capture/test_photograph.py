@@ -21,7 +21,7 @@ Cameras = tuple[Reflector, Reflector]
 
 
 def picture(at: Reflector, scene: Scene, samples: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    bands = list(photograph(at.view, exact(at), scene, samples))
+    bands = list(photograph(at.camera, exact(at), scene, samples))
     return (
         np.concatenate([band.colour for band in bands]),
         np.concatenate([band.rays.mirror for band in bands]),
@@ -31,7 +31,7 @@ def picture(at: Reflector, scene: Scene, samples: int = 1) -> tuple[np.ndarray, 
 def test_a_pixel_sees_what_its_ray_sees(cameras: Cameras, knot: Scene) -> None:
     at = cameras[0]
     colour, mirror = picture(at, knot)
-    rays = exact(at)(range(at.view.height_px), (0.0, 0.0))
+    rays = exact(at)(range(at.camera.height_px), (0.0, 0.0))
     seen = look(knot, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
     on = mirror.ravel() > 0
     assert np.array_equal(np.rint(seen.colour[on]), colour.reshape(-1, 3)[on])
@@ -46,20 +46,20 @@ def test_the_object_hides_what_is_behind_it(cameras: Cameras, knot: Scene) -> No
     assert direct.sum() > 100
     middle = np.argwhere(direct).mean(axis=0)
     # The middle of the object appears where the camera sees the origin, above the seam.
-    way = -at.view.pinhole
-    down = np.cross(at.view.forward, at.view.right)
-    x, y = (way @ at.view.right, way @ down) / (way @ at.view.forward)
-    expected = np.array([y, x]) / (2 * at.view.half_sizes[0] / at.view.width_px)
-    size = (np.array([at.view.height_px, at.view.width_px]) - 1) / 2
+    way = -at.camera.pinhole
+    down = np.cross(at.camera.forward, at.camera.right)
+    x, y = (way @ at.camera.right, way @ down) / (way @ at.camera.forward)
+    expected = np.array([y, x]) / (2 * at.camera.half_sizes[0] / at.camera.width_px)
+    size = (np.array([at.camera.height_px, at.camera.width_px]) - 1) / 2
     assert np.abs(middle - size - expected)[1] < 5
-    assert middle[0] < at.view.height_px / 4
+    assert middle[0] < at.camera.height_px / 4
 
 
 def test_anti_aliasing_is_the_mean_of_finer_pixels(cameras: Cameras, knot: Scene) -> None:
     at = cameras[1]
     fine = [
         np.concatenate(
-            [band.colour for band in photograph(at.view, _shifted(at, shift), knot)]
+            [band.colour for band in photograph(at.camera, _shifted(at, shift), knot)]
         ).astype(float)
         for shift in shifts(2)
     ]
@@ -84,7 +84,7 @@ def test_places_in_a_pixel_are_even() -> None:
 
 def test_progress_is_told(cameras: Cameras, knot: Scene) -> None:
     said: list[str] = []
-    list(photograph(cameras[0].view, exact(cameras[0]), knot, 1, said.append))
+    list(photograph(cameras[0].camera, exact(cameras[0]), knot, 1, said.append))
     assert said[0] == "row 0 of 310"
     assert len(said) > 1
 
@@ -103,7 +103,7 @@ def with_meshes(
 def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
     shells = read_shells(with_meshes)
     for at in with_meshes.reflectors:
-        rows = range(at.view.height_px)
+        rows = range(at.camera.height_px)
         one, other = exact(at)(rows, (0.0, 0.0)), on_mesh(shells, at)(rows, (0.0, 0.0))
         same = one.mirror == other.mirror
         assert same.mean() > 0.999  # but for pixel centres on an edge
@@ -113,7 +113,7 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
         turned = np.cross(one.direction[both], other.direction[both])
         assert 200 * np.linalg.norm(turned, axis=1).max() < 2e-3  # mm at the object
         pictures = [
-            np.concatenate([band.colour for band in photograph(at.view, trace, knot)]).astype(int)
+            np.concatenate([band.colour for band in photograph(at.camera, trace, knot)]).astype(int)
             for trace in (exact(at), on_mesh(shells, at))
         ]
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3

@@ -200,8 +200,8 @@ class TestMerged:
         scene = scene_of(built_in(size_mm))
         found = light_field(runs(cameras, ideal(made, 0.7)), scene, CAPTURE_MM, resample)  # type: ignore[arg-type]
         for at in cameras:
-            shell = list(shell_photograph(at.view, exact(at), scene))
-            planes = found.frames[at.camera].planes
+            shell = list(shell_photograph(at.camera, exact(at), scene))
+            planes = found.frames[at.camera_id].planes
             mirror, picture = joined(shell, "mirror"), np.concatenate([b.colour for b in shell])
             # At the very edge between two cells rounding decides.
             same = planes["mirror"] == mirror
@@ -216,7 +216,7 @@ class TestMerged:
 
     def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, both: Both) -> None:
         for run in both:
-            frame = merged.frames[run.at.camera]
+            frame = merged.frames[run.at.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
             row = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
@@ -228,7 +228,7 @@ class TestMerged:
     def test_light_obeys_the_law_of_reflection(self, merged: LightField, both: Both) -> None:
         """Way in and way out have the ball's normal for their bisector."""
         for run in both:
-            frame = merged.frames[run.at.camera]
+            frame = merged.frames[run.at.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
             centre = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1], :3]
@@ -301,7 +301,7 @@ class TestMerged:
                 write(store, stand_ins(run), merge(run, scene))
         with LightField.open(tmp_path / "field.h5") as found:
             for run in both:
-                frame, other = found.frames[run.at.camera], merged.frames[run.at.camera]
+                frame, other = found.frames[run.at.camera_id], merged.frames[run.at.camera_id]
                 assert (frame.image() == other.image()).all()
                 assert (frame.mirrors.apex == run.stands.apex).all()
                 assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
@@ -422,7 +422,7 @@ class TestReading:
     def test_one_camera_that_cannot_take_both_halves(self, written: Path) -> None:
         exported = read_export(written)
         a, b = exported.reflectors
-        askew = replace(b, view=replace(b.view, pinhole=b.view.pinhole + np.array([0, 1, 0])))
+        askew = replace(b, camera=replace(b.camera, pinhole=b.camera.pinhole + np.array([0, 1, 0])))
         with pytest.raises(InputError, match="one camera cannot take both halves"):
             read_plan(exported.model_copy(update={"reflectors": (a, askew)}))
 

@@ -14,7 +14,7 @@ Cameras = tuple[Reflector, Reflector]
 
 
 def every_row(at: Reflector) -> Rays:
-    return exact(at)(range(at.view.height_px), (0.0, 0.0))
+    return exact(at)(range(at.camera.height_px), (0.0, 0.0))
 
 
 def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -24,16 +24,16 @@ def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     where the point lies beyond seam or foot, or inside another sphere.
     """
     mirrors = at.mirrors
-    to_centre = mirrors.centre - at.view.pinhole
+    to_centre = mirrors.centre - at.camera.pinhole
     along = way @ to_centre.T
     rest = mirrors.radius**2 - dot(to_centre, to_centre) + along**2
     reach = np.where((rest > 0) & (along > 0), along - np.sqrt(np.maximum(rest, 0)), np.inf)
     finite = np.where(np.isfinite(reach), reach, 0)
-    x, z = (at.view.pinhole[i] + finite * way[:, [i]] for i in (0, 2))
+    x, z = (at.camera.pinhole[i] + finite * way[:, [i]] for i in (0, 2))
     reach[(at.side * x < 0) | (z < at.foot)] = np.inf
     first = reach.argmin(axis=1)
     t = reach[np.arange(len(way)), first]
-    point = at.view.pinhole + np.where(np.isfinite(t), t, 0)[:, None] * way
+    point = at.camera.pinhole + np.where(np.isfinite(t), t, 0)[:, None] * way
     away = [norm(point - centre) for centre in mirrors.centre]
     inside = np.stack(away, axis=1) < mirrors.radius - 1e-7
     there = np.isfinite(t) & ~inside.any(axis=1)
@@ -44,11 +44,11 @@ def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def test_first_mirror_is_the_one_that_a_search_finds(cameras: Cameras, camera: int) -> None:
     at = cameras[camera]
     rays = every_row(at)
-    way = unit(pixel_directions(at.view, range(at.view.height_px)))
+    way = unit(pixel_directions(at.camera, range(at.camera.height_px)))
     found, reach = searched(at, way.reshape(-1, 3))
     assert np.array_equal(rays.mirror.ravel(), found)
     on = found > 0
-    assert norm(rays.origin.reshape(-1, 3)[on] - at.view.pinhole) == pytest.approx(reach[on])
+    assert norm(rays.origin.reshape(-1, 3)[on] - at.camera.pinhole) == pytest.approx(reach[on])
 
 
 def points_in_cells(at: Reflector) -> tuple[np.ndarray, np.ndarray]:
@@ -83,11 +83,11 @@ def test_reflection_obeys_its_law(cameras: Cameras) -> None:
     on = rays.mirror > 0
     point, out = rays.origin[on], rays.direction[on]
     normal = at.mirrors.gradient(rays.mirror[on] - 1, point)
-    back = unit(at.view.pinhole - point)
+    back = unit(at.camera.pinhole - point)
     assert norm(out) == pytest.approx(np.ones(len(out)))
     assert dot(out, normal) == pytest.approx(dot(back, normal), abs=1e-12)
     assert dot(np.cross(out, normal), back) == pytest.approx(np.zeros(len(out)), abs=1e-12)
-    assert miss_distances(at.view.pinhole, point, normal) == pytest.approx(
+    assert miss_distances(at.camera.pinhole, point, normal) == pytest.approx(
         norm(np.cross(point, out))
     )
 
@@ -139,7 +139,7 @@ def test_planar_mirrors() -> None:
 
 
 def test_pixels_of_points_undo_directions(cameras: Cameras) -> None:
-    view = cameras[0].view
+    view = cameras[0].camera
     way = pixel_directions(view, range(5, 9))
     place = pixels_of(view, view.pinhole + 7 * way)
     assert place[..., 0] == pytest.approx(np.broadcast_to(np.arange(view.width_px), (4, 416)))

@@ -68,10 +68,10 @@ def test_depth_is_what_the_camera_measures_along_its_axis() -> None:
     """The image point itself, from apex and ray, seen from the pinhole."""
     half = half_of("n=4")
     at = images(half, 30.0)
-    pinhole = half.view.pinhole
+    pinhole = half.camera.pinhole
     way = (half.mirrors.apex - pinhole) / at.to_mirror[:, None]
     point = pinhole + at.distance[:, 1, 0][:, None] * way
-    assert at.depth[:, 1, 0] == pytest.approx((point - pinhole) @ half.view.forward, rel=1e-12)
+    assert at.depth[:, 1, 0] == pytest.approx((point - pinhole) @ half.camera.forward, rel=1e-12)
     assert (at.depth < at.distance).all()
 
 

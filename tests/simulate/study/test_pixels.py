@@ -27,7 +27,7 @@ def window(at: Reflector, mirror: int) -> float:
     steps, total = np.linspace(0, 1, 200), 0.0
     for side in sides[offsets[mirror] : offsets[mirror + 1]]:
         t = steps if side % 2 == 0 else steps[::-1]
-        point = pixels_of(at.view, at.cells.arcs.at(np.full(len(t), side // 2), t))
+        point = pixels_of(at.camera, at.cells.arcs.at(np.full(len(t), side // 2), t))
         for (x0, y0), (x1, y1) in pairwise(point):
             total += (x0 * y1 - x1 * y0) / 2
     return abs(total)

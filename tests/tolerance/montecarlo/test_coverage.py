@@ -37,11 +37,11 @@ def test_pixels_are_those_that_are_counted(small_design: MirrorDesign) -> None:
     a, _ = reflectors(small_design)
     half = nominal(a)
     area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
-    numbers = exact(a)(range(a.view.height_px), (0.0, 0.0)).mirror
+    numbers = exact(a)(range(a.camera.height_px), (0.0, 0.0)).mirror
     count = np.bincount(numbers.ravel(), minlength=len(half) + 1)[1:]
     box = a.boxes()
-    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < a.view.width_px)
-    inside &= box[:, 3] < a.view.height_px
+    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < a.camera.width_px)
+    inside &= box[:, 3] < a.camera.height_px
     # Of the pixels on the border, as many as the root of the area, half of one each is uncertain.
     assert inside.sum() > 60
     assert np.abs(area - count)[inside] == pytest.approx(0, abs=0.5 * np.sqrt(count.max()))
@@ -55,7 +55,7 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
         t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
         t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
         edge = pixels_of(
-            at.view, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
+            at.camera, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
         )
         area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
         for k, (first, last) in enumerate(pairwise(offsets)):

@@ -63,14 +63,14 @@ def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 
 
 
 def numbers(at: Reflector) -> np.ndarray:
-    return exact(at)(range(at.view.height_px), (0.0, 0.0)).mirror
+    return exact(at)(range(at.camera.height_px), (0.0, 0.0)).mirror
 
 
 class WholeFrame(AsMade):
     """Looks for every mirror in the whole picture."""
 
     def boxes(self) -> np.ndarray:
-        return np.tile([0, self.view.width_px, 0, self.view.height_px], (len(self), 1))
+        return np.tile([0, self.camera.width_px, 0, self.camera.height_px], (len(self), 1))
 
 
 class OwnCells(AsMade):
@@ -90,7 +90,7 @@ class TestActual:
         for name in ("apex", "normal", "curvature"):
             close = pytest.approx(getattr(at.mirrors, name), abs=1e-12)
             assert getattr(made.mirrors, name) == close
-        assert made.view.hfov == pytest.approx(at.view.hfov, abs=1e-14)
+        assert made.camera.hfov == pytest.approx(at.camera.hfov, abs=1e-14)
         assert np.array_equal(numbers(made), numbers(at))
 
     @pytest.mark.parametrize("side", [0, 1])
@@ -110,15 +110,15 @@ class TestActual:
 
     def test_camera_is_where_draws_say(self, cameras: tuple[Reflector, Reflector]) -> None:
         at, drawn = cameras[0], machines(cameras, LARGE)[0]
-        view = actual(at, drawn, 0).view
-        assert np.array_equal(view.pinhole, at.view.pinhole + drawn.camera_shift[0])
+        view = actual(at, drawn, 0).camera
+        assert np.array_equal(view.pinhole, at.camera.pinhole + drawn.camera_shift[0])
         angle = np.linalg.norm(drawn.camera_tilt[0])
         axis = drawn.camera_tilt[0] / angle
-        for new, old in ((view.forward, at.view.forward), (view.right, at.view.right)):
+        for new, old in ((view.forward, at.camera.forward), (view.right, at.camera.right)):
             along = axis * (axis @ old)
             turned = along + np.cos(angle) * (old - along) + np.sin(angle) * np.cross(axis, old)
             assert new == pytest.approx(turned, abs=1e-12)
-        longer = np.tan(at.view.hfov / 2) / np.tan(view.hfov / 2)
+        longer = np.tan(at.camera.hfov / 2) / np.tan(view.hfov / 2)
         assert longer == pytest.approx(drawn.focal[0], rel=1e-12)
         assert drawn.focal[0] != 1
 
@@ -130,7 +130,7 @@ class TestActual:
             for k in range(3):
                 made = actual(at, drawn, k)
                 count = np.bincount(numbers(made).ravel(), minlength=len(at) + 1)[1:]
-                box, view = made.boxes(), made.view
+                box, view = made.boxes(), made.camera
                 inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
                 inside &= box[:, 3] < view.height_px
                 close = pytest.approx(area[k][inside], abs=0.5 * np.sqrt(count.max()))
@@ -144,11 +144,11 @@ class TestActual:
         """The pixels that should show the apices, seen by the made camera off the made mirrors."""
         for at, drawn in zip(cameras, machines(cameras, LARGE), strict=True):
             made, m = actual(at, drawn, 0), len(at)
-            ray = at.mirrors.apex - at.view.pinhole
-            old, new = (_axes(view) for view in (at.view, made.view))
+            ray = at.mirrors.apex - at.camera.pinhole
+            old, new = (_axes(view) for view in (at.camera, made.camera))
             way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
-            rays = reflected(made.view.pinhole, way[None], made.mirrors, mirror)
+            rays = reflected(made.camera.pinhole, way[None], made.mirrors, mirror)
             missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
             offset = pointing(nominal(at), drawn).offset[0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
@@ -165,7 +165,7 @@ def test_boxes_hold_all_pixels(cameras: tuple[Reflector, Reflector]) -> None:
     for at, drawn in zip(cameras, machines(cameras, LARGE, 3), strict=True):
         for k in range(3):
             made = actual(at, drawn, k)
-            parts = (made.camera, made.view, made.u, made.cells, made.surfaces)
+            parts = (made.camera_id, made.camera, made.u, made.cells, made.surfaces)
             everywhere = numbers(WholeFrame(*parts))
             assert np.array_equal(numbers(made), everywhere)
             lost += int((numbers(OwnCells(*parts)) != everywhere).sum())

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from helpers import read_3mf
 
+from tests.helpers import read_3mf
 from tests.verify.corpus import facets, part21
 
 # Nothing that the proof promises hangs on these.

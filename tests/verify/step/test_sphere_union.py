@@ -372,7 +372,7 @@ def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
     sample = read_export(SAMPLE)
     table = from_json([dict(row) for half in it.halves for row in rows(half)])
-    views = {half.camera: half.view.pinhole for half in it.halves}
+    views = {half.camera_id: half.camera.pinhole for half in it.halves}
     cameras: dict[str, Camera] = {
         key: replace(sample.cameras[key], pinhole=pinhole) for key, pinhole in views.items()
     }
@@ -410,7 +410,7 @@ def test_area_under_the_coat() -> None:
     """The record's area is the reflecting surface's, not the solid's."""
     it = made("coat")
     bare = cells_of_export(as_export(it), "a")
-    np.testing.assert_allclose(bare.area, cell_areas(it.halves[0].body), rtol=1e-11)
+    np.testing.assert_allclose(bare.area, cell_areas(it.halves[0].modelled_cells), rtol=1e-11)
     assert np.abs(bare.area / it.halves[0].area - 1).max() > 1e-3
 
 
