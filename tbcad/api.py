@@ -288,7 +288,7 @@ def capture(
         write_photographs(taken, Path(out), force, progress)
         return LightField.read(Path(out))
     progress("photographs and light field")
-    bands = {at.camera: (at, bands()) for at, bands in taken.cameras}
+    bands = {at.camera_id: (at, bands()) for at, bands in taken.cameras}
     return in_memory(bands, taken.capture_mm, taken.facts)
 
 
