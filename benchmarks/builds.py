@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from timing import Figure, Row, at_most, shown, told
+from timing import Figure, Row, at_most, measured
 
 COMMAND = "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))"
 BUILT = {0: "proved", 1: "built, the proof fails"}
@@ -66,13 +66,13 @@ def small_and_large(folder: Path, rounds: int) -> list[Row]:
     memory = [Figure(tuple(run.memory for run in runs[n])) for n in (18, 36)]
     return [
         at_most("shells, n = 18", small, 30, "s"),
-        told("- seconds of both cores together", cpu[0], "s"),
+        measured("- seconds of both cores together", cpu[0], "s"),
         at_most("- most memory", memory[0], 2, "GB"),
-        told("shells, n = 36", large, "s"),
-        told("- seconds of both cores together", cpu[1], "s"),
-        told("- most memory", memory[1], "GB"),
+        measured("shells, n = 36", large, "s"),
+        measured("- seconds of both cores together", cpu[1], "s"),
+        measured("- most memory", memory[1], "GB"),
         at_most("shells, n = 36 to n = 18", large.over(small), 4.5, "times"),
-        told("- seconds of both cores together", cpu[1].over(cpu[0]), "times"),
+        measured("- seconds of both cores together", cpu[1].over(cpu[0]), "times"),
     ]
 
 
@@ -83,7 +83,7 @@ def whole(folder: Path, rounds: int) -> list[Row]:
         at_most(
             "shells and prototype, n = 18", Figure(tuple(run.seconds for run in runs)), 90, "s"
         ),
-        told("- seconds of both cores together", Figure(tuple(run.cpu for run in runs)), "s"),
+        measured("- seconds of both cores together", Figure(tuple(run.cpu for run in runs)), "s"),
         at_most("- most memory", Figure(tuple(run.memory for run in runs)), 2, "GB"),
     ]
 
@@ -91,8 +91,10 @@ def whole(folder: Path, rounds: int) -> list[Row]:
 def largest(folder: Path) -> list[Row]:
     """The largest n there is, once."""
     run = build(folder / "60", *LARGEST, *SHELLS)
-    measured = f"{shown(run.seconds)} s, {shown(run.memory)} GB, {run.verdict}"
-    return [Row("shells, n = 60, margin 1 mm", measured, "finishes", True)]
+    return [
+        measured(f"shells, n = 60, margin 1 mm, {run.verdict}", Figure((run.seconds,)), "s"),
+        measured("- most memory", Figure((run.memory,)), "GB"),
+    ]
 
 
 def step_sizes(export: Path) -> list[Row]:

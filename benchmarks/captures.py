@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from builds import Build, run
-from timing import Figure, Row, at_most, told
+from timing import Figure, Row, at_most, measured
 
 FOLDER = "capture"
 FINER = 4  # 8320 x 6208 instead of 2080 x 1552
@@ -23,7 +23,7 @@ def captures(export: Path, folder: Path, rounds: int, subject: Path | None) -> l
     return [
         at_most("tbcad capture", Figure(tuple(one.seconds for one in runs)), 5, "s"),
         *_beside(runs),
-        told("- the first ever, with numba's compilation", Figure((first.seconds,)), "s"),
+        measured("- the first ever, with numba's compilation", Figure((first.seconds,)), "s"),
     ]
 
 
@@ -35,9 +35,9 @@ def sharper(export: Path, folder: Path, subject: Path | None) -> list[Row]:
     capture = run(folder, *_capture(record, out, subject))
     view = run(folder, "view", str(out), *PLACE, "--out", str(folder / "view.png"))
     return [
-        told("tbcad capture, 8320 x 6208", Figure((capture.seconds,)), "s"),
+        measured("tbcad capture, 8320 x 6208", Figure((capture.seconds,)), "s"),
         *_beside([capture], 4),
-        told("tbcad view of it, 640 x 480, truth too", Figure((view.seconds,)), "s"),
+        measured("tbcad view of it, 640 x 480, truth too", Figure((view.seconds,)), "s"),
         *_beside([view], 4),
     ]
 
@@ -59,6 +59,9 @@ def _capture(export: Path, out: Path, subject: Path | None) -> list[str]:
 
 def _beside(runs: list[Build], memory: float | None = None) -> list[Row]:
     most = Figure(tuple(one.memory for one in runs))
-    cpu = told("- seconds of both cores together", Figure(tuple(one.cpu for one in runs)), "s")
+    cpu = measured("- seconds of both cores together", Figure(tuple(one.cpu for one in runs)), "s")
     name = "- most memory"
-    return [cpu, told(name, most, "GB") if memory is None else at_most(name, most, memory, "GB")]
+    return [
+        cpu,
+        measured(name, most, "GB") if memory is None else at_most(name, most, memory, "GB"),
+    ]

@@ -1,20 +1,24 @@
-"""Measure how fast tbcad is and print a markdown table: python benchmarks/run.py --help."""
+"""Measure how fast tbcad is: one JSON file a run. `python benchmarks/run.py --help`."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import platform
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import builds
 import captures
 from timing import Row
 
-HEAD = "| what | median (least ... most) | limit | holds |\n|---|---|---|---|"
+from tbcad.version import __version__
+
+RESULTS = Path(__file__).parent / "results"
 
 
 def rows(folder: Path, rounds: int, largest: bool, subject: Path | None) -> Iterator[list[Row]]:
@@ -47,12 +51,16 @@ def simulated(export: Path, folder: Path, rounds: int, subject: Path | None) -> 
     yield views(folder / captures.FOLDER, rounds)
 
 
-def circumstances(rounds: int) -> str:
-    """What one must know to read the table."""
-    return (
-        f"{os.cpu_count()} cores ({processor()}), Python {platform.python_version()}, "
-        f"{rounds} rounds, load of the machine before the first: {os.getloadavg()[0]:.1f}."
-    )
+def circumstances(rounds: int) -> dict[str, object]:
+    """What one must know to read the figures."""
+    return {
+        "tbcad": __version__,
+        "cores": os.cpu_count(),
+        "processor": processor(),
+        "python": platform.python_version(),
+        "rounds": rounds,
+        "load_before": round(os.getloadavg()[0], 1),
+    }
 
 
 def processor() -> str:
@@ -64,22 +72,27 @@ def processor() -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure tbcad and print a markdown table.")
+    parser = argparse.ArgumentParser(description="Measure tbcad and write a JSON file.")
     parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
     parser.add_argument("--skip-largest", action="store_true", help="leave out the build of n = 60")
     parser.add_argument("--object", type=Path, help="mesh to photograph (default: built-in knot)")
     parser.add_argument("--export", type=Path, help="measure the simulation alone, of this export")
-    wanted = parser.parse_args()
-    sys.stdout.write(f"{circumstances(wanted.rounds)}\n\n{HEAD}\n")
+    parser.add_argument("--out", type=Path, help="file to write (default: results/NAME.json)")
+    options = parser.parse_args()
+    out = options.out or RESULTS / ("simulation.json" if options.export else "all.json")
+    record = {**circumstances(options.rounds), "rows": []}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if wanted.export:
-            parts = simulated(wanted.export, folder, wanted.rounds, wanted.object)
+        if options.export:
+            parts = simulated(options.export, folder, options.rounds, options.object)
         else:
-            parts = rows(folder, wanted.rounds, not wanted.skip_largest, wanted.object)
+            parts = rows(folder, options.rounds, not options.skip_largest, options.object)
         for part in parts:
             sys.stdout.writelines(f"{row}\n" for row in part)
             sys.stdout.flush()
+            record["rows"] += [asdict(row) for row in part]
+    out.parent.mkdir(exist_ok=True)
+    out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 import povray
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from timing import Figure, Row, Spent, Work, at_least, at_most, spent_in_turns, told
+from timing import Figure, Row, Spent, Work, at_least, at_most, measured, spent_in_turns
 
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
@@ -50,7 +50,7 @@ def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> l
     what = f"both photographs, {subject.name}"
     if not povray.installed():
         ours, _ = spent_in_turns(works, rounds)
-        return [at_most(what, ours.seconds, 5, "s"), Row("POV-Ray", "not installed")]
+        return [at_most(what, ours.seconds, 5, "s"), Row("POV-Ray", (), note="not installed")]
     for at in made.reflectors:
         povray.write_scene(folder / f"{at.camera_id}.pov", at, grey)
     ours, greys, theirs = spent_in_turns(
@@ -58,13 +58,13 @@ def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> l
     )
     return [
         at_most(what, ours.seconds, 5, "s"),
-        told(BOTH, ours.cpu, "s"),
-        told("- the object grey", greys.seconds, "s"),
-        told(BOTH, greys.cpu, "s"),
-        told("POV-Ray's, the object grey", theirs.seconds, "s"),
-        told(BOTH, theirs.cpu, "s"),
+        measured(BOTH, ours.cpu, "s"),
+        measured("- the object grey", greys.seconds, "s"),
+        measured(BOTH, greys.cpu, "s"),
+        measured("POV-Ray's, the object grey", theirs.seconds, "s"),
+        measured(BOTH, theirs.cpu, "s"),
         at_least("POV-Ray's to ours, grey", theirs.seconds.over(greys.seconds), 5, "times"),
-        told(BOTH, theirs.cpu.over(greys.cpu), "times"),
+        measured(BOTH, theirs.cpu.over(greys.cpu), "times"),
         at_least("pixels with the object, or without, alike", likeness(folder), 99.5, "%"),
     ]
 
@@ -88,17 +88,17 @@ def views(capture: Path, rounds: int) -> list[Row]:
         *_views(*spent[:3]),
         *_tree(spent[0], spent[3:], every),
         at_most(f"refocused, 640 x 480, {len(pinholes())} pinholes", lens.seconds, 5, "s"),
-        told(BOTH, lens.cpu, "s"),
+        measured(BOTH, lens.cpu, "s"),
     ]
 
 
 def _views(nearest: Spent, blend: Spent, first: Spent) -> list[Row]:
     return [
         at_most("view, 640 x 480, nearest rays", nearest.seconds, 0.1, "s"),
-        told(BOTH, nearest.cpu, "s"),
-        told("- the first of an open light field", first.seconds, "s"),
-        told("view, 640 x 480, blend", blend.seconds, "s"),
-        told(BOTH, blend.cpu, "s"),
+        measured(BOTH, nearest.cpu, "s"),
+        measured("- the first of an open light field", first.seconds, "s"),
+        measured("view, 640 x 480, blend", blend.seconds, "s"),
+        measured(BOTH, blend.cpu, "s"),
     ]
 
 
@@ -108,12 +108,12 @@ def _tree(view: Spent, stages: Sequence[Spent], every: Every) -> list[Row]:
     whole = Figure(tuple(np.sum(values, axis=0).tolist()))
     cpu = stages[2].cpu.over(view.cpu)
     return [
-        told(f"tree: {every.count / 1e6:.1f} million rays as points", points, "s"),
-        told("tree: building", building, "s"),
-        told(f"tree: asking for {len(every.wanted)} rays, {THREADS} threads", asking, "s"),
+        measured(f"tree: {every.count / 1e6:.1f} million rays as points", points, "s"),
+        measured("tree: building", building, "s"),
+        measured(f"tree: asking for {len(every.wanted)} rays, {THREADS} threads", asking, "s"),
         at_least("tree to view", whole.over(view.seconds), 10, "times"),
-        told("- the asking alone", asking.over(view.seconds), "times"),
-        told("- the asking alone, seconds of both cores", cpu, "times"),
+        measured("- the asking alone", asking.over(view.seconds), "times"),
+        measured("- the asking alone, seconds of both cores", cpu, "times"),
     ]
 
 

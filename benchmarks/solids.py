@@ -10,7 +10,7 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Pnt
 from OCP.TopTools import TopTools_ListOfShape
-from timing import Figure, Row, at_most, in_turns, told
+from timing import Figure, Row, at_most, in_turns, measured
 
 from tbcad.cad.brep import Solid
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
@@ -34,13 +34,13 @@ def solids(rounds: int) -> list[Row]:
     works = [partial(shells, made), partial(united, meshed), *fuses]
     ours, union, *kernel = in_turns(works, rounds)
     return [
-        told("cells, both solids, kernel's check", ours, "s"),
-        told(f"manifold3d's union, {len(half)} spheres of one half", union, "s"),
-        told("cells, both solids, check to manifold3d", ours.over(union), "times"),
+        measured("cells, both solids, kernel's check", ours, "s"),
+        measured(f"manifold3d's union, {len(half)} spheres of one half", union, "s"),
+        measured("cells, both solids, check to manifold3d", ours.over(union), "times"),
         # Load by others slows manifold3d, on two cores, more than us on one: least is fairest.
-        at_most("- least of each", Figure((ours.least / union.least,)), 0.75, "times"),
+        at_most("- least of each", Figure((ours.minimum / union.minimum,)), 0.75, "times"),
         *(
-            told(f"the kernel's union, {count} of the spheres", figure, "s")
+            measured(f"the kernel's union, {count} of the spheres", figure, "s")
             for count, figure in zip(FUSED, kernel, strict=True)
         ),
     ]
@@ -53,7 +53,7 @@ def radii(rounds: int) -> list[Row]:
     return [
         at_most("radius solve, n = 18", small, 2, "s"),
         *(
-            told(f"radius solve, n = {n}", figure, "s")
+            measured(f"radius solve, n = {n}", figure, "s")
             for n, figure in zip((36, 60), large, strict=True)
         ),
     ]

@@ -1,4 +1,4 @@
-"""Clocks and table rows. What is compared is run in turns, so that all of it meets the same load.
+"""Clocks and table rows. Works that are compared run in turns, so that all meet the same load.
 
 Nothing here is a limit that a test enforces: seconds depend on the machine and on what else runs.
 """
@@ -25,7 +25,7 @@ class Figure:
         return statistics.median(self.values)
 
     @property
-    def least(self) -> float:
+    def minimum(self) -> float:
         return min(self.values)
 
     def over(self, other: Figure) -> Figure:
@@ -44,33 +44,52 @@ class Figure:
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table; where there is a limit, `holds` says whether the median keeps it."""
+    """A line of the table.
+
+    Attributes:
+        what: is measured.
+        values: one a round.
+        unit: of the values.
+        limit: of the median; None where there is none.
+        bound: "at most" or "at least", for the limit.
+        note: in place of values that could not be measured.
+    """
 
     what: str
-    measured: str
-    limit: str = ""
-    holds: bool | None = None
+    values: tuple[float, ...]
+    unit: str = ""
+    limit: float | None = None
+    bound: str = "at most"
+    note: str = ""
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the median keeps the limit; None without a limit."""
+        if self.limit is None:
+            return None
+        median = Figure(self.values).median
+        return median <= self.limit if self.bound == "at most" else median >= self.limit
 
     def __str__(self) -> str:
+        value = f"{Figure(self.values)} {self.unit}".rstrip() if self.values else self.note
+        limit = "" if self.limit is None else f"{self.bound} {self.limit:g} {self.unit}".rstrip()
         verdict = {None: "", True: "yes", False: "NO"}[self.holds]
-        return f"| {self.what} | {self.measured} | {self.limit} | {verdict} |"
+        return f"| {self.what} | {value} | {limit} | {verdict} |"
 
 
-def told(what: str, figure: Figure, unit: str = "") -> Row:
+def measured(what: str, figure: Figure, unit: str = "") -> Row:
     """A figure without a limit."""
-    return Row(what, f"{figure} {unit}".rstrip())
+    return Row(what, figure.values, unit)
 
 
 def at_most(what: str, figure: Figure, limit: float, unit: str = "") -> Row:
     """A figure whose median must not be above a limit."""
-    bound = f"at most {limit:g} {unit}".rstrip()
-    return Row(what, f"{figure} {unit}".rstrip(), bound, figure.median <= limit)
+    return Row(what, figure.values, unit, limit)
 
 
 def at_least(what: str, figure: Figure, limit: float, unit: str = "") -> Row:
     """A figure whose median must not be below a limit."""
-    bound = f"at least {limit:g} {unit}".rstrip()
-    return Row(what, f"{figure} {unit}".rstrip(), bound, figure.median >= limit)
+    return Row(what, figure.values, unit, limit, "at least")
 
 
 @dataclass(frozen=True)

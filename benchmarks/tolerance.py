@@ -15,7 +15,7 @@ from tbcad_verify.record.record import read_export as read_record
 from tbcad_verify.shell import coverage as proof
 from tbcad_verify.shell.optics import set_up
 from tbcad_verify.shell.recover import recover
-from timing import Figure, Row, at_least, at_most, in_turns, told
+from timing import Figure, Row, at_least, at_most, in_turns, measured
 
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
@@ -56,16 +56,19 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
     ]
     slow, apart = _meshes(made, draw(ERRORS, SEED, range(meshed), len(a)), folder, (a, b))
     ratio = Figure(tuple(slow / (one / COUNTS[-1]) for one in fast[-1].values))
-    rows = [told(f"{n} machines, each", one, "ms") for n, one in zip(COUNTS, each, strict=True)]
+    rows = [
+        measured(f"{n} simulated builds, each", one, "ms")
+        for n, one in zip(COUNTS, each, strict=True)
+    ]
     return [
         *rows,
-        at_most("1,000 machines of 1,657 virtual cameras", fast[-1], 60, "s"),
-        at_most("... a machine, against one of 100", each[-1].over(each[0]), 1.2, "times"),
-        told(
-            f"a machine meshed, written, read and measured, mean of {meshed}", Figure((slow,)), "s"
+        at_most("1,000 simulated builds of 1,657 virtual cameras", fast[-1], 60, "s"),
+        at_most("- a build, to one of 100", each[-1].over(each[0]), 1.2, "times"),
+        measured(
+            f"a build meshed, written, read and measured, mean of {meshed}", Figure((slow,)), "s"
         ),
-        at_least("... against the fast model", ratio, 100, "times"),
-        at_most("... largest difference in coverage", Figure((apart,)), 0.05, "mm"),
+        at_least("- to the fast model", ratio, 100, "times"),
+        at_most("- largest difference in coverage", Figure((apart,)), 0.05, "mm"),
     ]
 
 
@@ -111,7 +114,7 @@ def _cells(half: MirrorArray, draws: Draws, k: int) -> Cells:
 
 
 def _measured(record: Export) -> np.ndarray:
-    """Coverage of every virtual camera by the proof: mirrors recovered, Embree for what hides."""
+    """Coverage of every virtual camera by the verification."""
     meshes = [mesh_from_facets(parse(read(record.folder, part.stl))) for part in record.parts]
     found = [
         recover(one, record.cameras[part.camera].pinhole, record.target_mm / 2)

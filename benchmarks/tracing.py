@@ -26,7 +26,7 @@ from tbcad_verify.record.record import Camera, read_export
 from tbcad_verify.shell import light
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover
-from timing import Row, at_least, in_turns, told
+from timing import Row, at_least, in_turns, measured
 
 Singles = NDArray[np.float32]
 Calls = list[tuple[Singles, Singles]]
@@ -59,12 +59,14 @@ def tracing(export: Path, rounds: int) -> list[Row]:
     few, many = count(first) / 1e6, count(both) / 1e6
     unit = "million rays/s"
     return [
-        told("proof: every pixel's ray, hit in float64", hits.rate(few), unit),
-        told(f"Embree alone, {THREADS} threads, these {few:.1f} million", raw_hits.rate(few), unit),
-        at_least("proof to Embree", raw_hits.over(hits), 0.5, "times"),
-        told("proof: the whole stage, reflected rays too", sensor.rate(many), unit),
-        told(f"Embree alone, these {many:.1f} million", raw_sensor.rate(many), unit),
-        at_least("proof to Embree", raw_sensor.over(sensor), 0.7, "times"),
+        measured("verification: every pixel's ray, hit in float64", hits.rate(few), unit),
+        measured(
+            f"Embree alone, {THREADS} threads, these {few:.1f} million", raw_hits.rate(few), unit
+        ),
+        at_least("verification to Embree", raw_hits.over(hits), 0.5, "times"),
+        measured("verification: the whole stage, reflected rays too", sensor.rate(many), unit),
+        measured(f"Embree alone, these {many:.1f} million", raw_sensor.rate(many), unit),
+        at_least("verification to Embree", raw_sensor.over(sensor), 0.7, "times"),
     ]
 
 

@@ -47,8 +47,8 @@ def build(
     radius_rule: Annotated[
         RadiusRule | None,
         typer.Option(
-            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 and 2 of "
-            "the paper; flat: planar mirrors."
+            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 "
+            "and 2 of the paper; flat: planar mirrors."
         ),
     ] = None,
     settings: Settings = None,

@@ -30,7 +30,7 @@ PIPED_WIDTH = 160
 study = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="Reproduce a study of the paper: CSV files, notes and a plot, next to the paper's figures.",
+    help="Reproduce a study of the paper: tables, notes and a plot, next to the paper's figures.",
 )
 app.add_typer(study, name="study")
 
