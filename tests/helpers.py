@@ -19,6 +19,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.brep import Solid
 from tbcad.cad.mesh import Mesh
+from tbcad.cad.solids import meshed
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.shell.envelope import Envelope, envelope
 from tbcad.shell.files import object_distances
@@ -73,6 +74,12 @@ def area(shape: TopoDS_Shape) -> float:
     properties = GProp_GProps()
     BRepGProp.SurfaceProperties_s(shape, properties)
     return float(properties.Mass())
+
+
+def as_trimesh(shape: TopoDS_Shape, tolerance: float = 0.02) -> trimesh.Trimesh:
+    """A shape meshed to a chord error, mm."""
+    mesh = meshed(shape, tolerance)
+    return trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:

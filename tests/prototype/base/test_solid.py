@@ -10,7 +10,6 @@ import trimesh
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.Geom import Geom_SphericalSurface
-from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
@@ -22,7 +21,6 @@ from tbcad.cad.solids import (
     cylinder,
     faces,
     fused,
-    meshed,
     one_solid,
     plane_faces,
     volume,
@@ -45,6 +43,7 @@ from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tests.helpers import as_trimesh
 
 UP = np.array([0.0, 0.0, 1.0])
 KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
@@ -70,11 +69,6 @@ def part(numbers: BaseLayout) -> PlacedSolid:
 @pytest.fixture(scope="module")
 def mesh(part: PlacedSolid) -> trimesh.Trimesh:
     return as_trimesh(part.shape)
-
-
-def as_trimesh(shape: TopoDS_Shape, tolerance: float = 0.02) -> trimesh.Trimesh:
-    found = meshed(shape, tolerance)
-    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
 
 
 def in_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
+from tests.helpers import as_trimesh
 
 KEYS = BaseSpec(bed_mm=(160.0, 160.0, 160.0))
 Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
@@ -38,12 +39,7 @@ Cut = tuple[BaseLayout, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 def cut_up(numbers: BaseLayout) -> Cut:
     plan = split_base(numbers)
     parts = carrier_parts(numbers, plan)
-    return numbers, plan, parts, [as_trimesh(part) for part in parts]
-
-
-def as_trimesh(part: PlacedSolid) -> trimesh.Trimesh:
-    found = meshed(part.shape, 0.02)
-    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    return numbers, plan, parts, [as_trimesh(part.shape) for part in parts]
 
 
 @pytest.fixture(scope="module")

@@ -29,6 +29,7 @@ from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tests.helpers import as_trimesh
 
 LISTS = load_parts()
 DRIVE = load_drives(LISTS)[0]
@@ -72,11 +73,6 @@ def solids(numbers: FrameLayout) -> dict[str, PlacedSolid]:
 @pytest.fixture(scope="module")
 def things(numbers: FrameLayout) -> dict[str, TopoDS_Shape]:
     return dict(bought(numbers))
-
-
-def as_trimesh(shape: TopoDS_Shape, tolerance: float = 0.02) -> trimesh.Trimesh:
-    found = meshed(shape, tolerance)
-    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
 
 
 def cylinders(shape: TopoDS_Shape) -> list[tuple[np.ndarray, np.ndarray, float]]:

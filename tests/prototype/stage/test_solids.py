@@ -8,7 +8,6 @@ import pytest
 import trimesh
 
 from tbcad.cad.brep import Solid
-from tbcad.cad.solids import meshed
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorDesign
@@ -24,6 +23,7 @@ from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tests.helpers import as_trimesh
 
 LISTS = load_parts()
 CAPTURE = 30.0
@@ -53,19 +53,14 @@ def solids(numbers: StageLayout) -> dict[str, PlacedSolid]:
 
 @pytest.fixture(scope="module")
 def crown(solids: dict[str, PlacedSolid]) -> trimesh.Trimesh:
-    return as_trimesh(solids["stage_crown"])
-
-
-def as_trimesh(part: PlacedSolid, tolerance: float = 0.01) -> trimesh.Trimesh:
-    found = meshed(part.shape, tolerance)
-    return trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    return as_trimesh(solids["stage_crown"].shape, 0.01)
 
 
 class TestSolids:
     def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
         assert list(solids) == ["stage_disc", "stage_crown", "stage_post"]
         for part in solids.values():
-            mesh = as_trimesh(part)
+            mesh = as_trimesh(part.shape, 0.01)
             assert mesh.is_watertight
             assert mesh.is_winding_consistent
             assert mesh.body_count == 1
@@ -127,7 +122,7 @@ class TestSolids:
         self, solids: dict[str, PlacedSolid], space: Room
     ) -> None:
         for part in solids.values():
-            mesh = as_trimesh(part)
+            mesh = as_trimesh(part.shape, 0.01)
             points, _ = trimesh.sample.sample_surface(mesh, 20_000, seed=2)
             outside = points[norm(points) > CAPTURE]
             if len(outside):

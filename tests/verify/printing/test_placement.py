@@ -19,7 +19,7 @@ from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import place, pose_text
 from tbcad_verify.printing.profile import Profile, load
 from tbcad_verify.printing.rotating_callipers import best_turn
-from tbcad_verify.report.checks import passed
+from tbcad_verify.report.checks import all_passed
 
 from tests.verify.printing.printing_meshes import (
     box,
@@ -258,4 +258,4 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     assert row["wall_mm"] is None
     assert row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
-    assert not passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))
+    assert not all_passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))

@@ -78,8 +78,10 @@ def test_absent_is_skipped_with_a_word(export: Path, programs: Path, program: st
     install_good(programs)
     (programs / program).unlink()
     name = program.removesuffix("cmd").removesuffix("-slicer")
-    for check in ask(export):
-        assert (check.passed, check.name) == (True, check.name)
+    checks = ask(export)
+    assert [(check.name, check.file, check.unit) for check in checks] == NAMES
+    assert all(check.passed for check in checks)
+    for check in checks:
         if check.name.startswith(name):
             assert is_skipped(check)
             assert (check.measured, check.limit) == (None, None)
