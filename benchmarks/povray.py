@@ -15,10 +15,10 @@ import numpy as np
 from PIL import Image
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.compiled import THREADS
+from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.scene.object import GREY, SceneObject
+from tbcad.simulate.scene.ray_casting import LAMP_LIGHT, LAMPS, SKY_LIGHT
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT
 from tbcad.types import Floats
 
 PROGRAM = "povray"

@@ -16,18 +16,18 @@ from timing import Figure, Row, Spent, Work, at_least, at_most, measured, spent_
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.compiled import THREADS
-from tbcad.simulate.picture_files import write_stills
+from tbcad.simulate.image_files import write_images
+from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import GREY, SceneObject, built_in, load
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.object import GREY, SceneObject, built_in_object, load_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.shading import Scene, scene_of
-from tbcad.simulate.scene.viewpoint import directions, viewpoint
-from tbcad.simulate.views.refocus import Focus, pinholes, refocus
+from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import Focus, lens_pinholes, refocus
 from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.tiles import Tiles
-from tbcad.simulate.views.two_plane import Slab, slab_along
+from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Floats
 
 Cameras = Sequence[Reflector]
@@ -41,11 +41,11 @@ BOTH = "- seconds of both cores together"
 def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> list[Row]:
     """Both cameras' pictures as PNG files, ours and POV-Ray's."""
     made = read_export(export)
-    subject = load(file, made.capture_mm) if file else built_in(made.capture_mm)
+    subject = load_object(file, made.capture_mm) if file else built_in_object(made.capture_mm)
     grey = plain(subject)
     works = [
-        partial(photographed, made.reflectors, scene_of(subject), folder),
-        partial(photographed, made.reflectors, scene_of(grey), folder),
+        partial(photographed, made.reflectors, prepared_scene(subject), folder),
+        partial(photographed, made.reflectors, prepared_scene(grey), folder),
     ]
     what = f"both photographs, {subject.name}"
     if not povray.installed():
@@ -72,12 +72,12 @@ def photographs(export: Path, folder: Path, rounds: int, file: Path | None) -> l
 def views(capture: Path, rounds: int) -> list[Row]:
     """Views of one light field, the nearest ray by a tree, and refocusing."""
     with LightField.open(capture) as source:
-        tiles, at = Tiles(source), viewpoint(*PLACE, source.capture_mm)
+        tiles, at = MirrorTiles(source), camera_around_object(*PLACE, source.capture_mm)
         every = all_rays(source, at)
         works: list[Work] = [
             partial(synthesise, tiles, at),
             partial(synthesise, tiles, at, "blend"),
-            lambda: synthesise(Tiles(source), at),
+            lambda: synthesise(MirrorTiles(source), at),
             every.points,
             partial(cKDTree, every.points()),
             partial(cKDTree(every.points()).query, every.wanted, workers=THREADS),
@@ -87,7 +87,7 @@ def views(capture: Path, rounds: int) -> list[Row]:
     return [
         *_views(*spent[:3]),
         *_tree(spent[0], spent[3:], every),
-        at_most(f"refocused, 640 x 480, {len(pinholes())} pinholes", lens.seconds, 5, "s"),
+        at_most(f"refocused, 640 x 480, {len(lens_pinholes())} pinholes", lens.seconds, 5, "s"),
         measured(BOTH, lens.cpu, "s"),
     ]
 
@@ -128,7 +128,7 @@ class Every:
         wanted: points of the slab, (k, 4).
     """
 
-    slab: Slab
+    slab: TwoPlane
     origin: NDArray[np.float32]
     direction: NDArray[np.float32]
     wanted: Floats
@@ -149,8 +149,8 @@ def all_rays(source: LightField, at: Camera) -> Every:
     for frame in source.frames.values():
         on = frame.planes["mirror"][:] > 0
         parts.append([frame.planes[name][:][on] for name in ("origin", "direction")])
-    slab = slab_along(at.forward, at.right, source.capture_mm)
-    way = directions(at).reshape(-1, 3)
+    slab = two_plane_along(at.forward, at.right, source.capture_mm)
+    way = view_directions(at).reshape(-1, 3)
     way = way[np.linalg.norm(np.cross(at.pinhole, way), axis=1) <= source.capture_mm / 2]
     wanted = slab.points(np.broadcast_to(at.pinhole, way.shape), way)
     origin, direction = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -166,9 +166,9 @@ def plain(subject: SceneObject) -> SceneObject:
 def photographed(cameras: Cameras, scene: Scene, folder: Path) -> None:
     """Both pictures, written one after the other."""
     for at in cameras:
-        bands = photograph(at.camera, exact(at), scene)
+        bands = photograph(at.camera, exact_tracer(at), scene)
         picture = np.concatenate([band.colour for band in bands])
-        write_stills({folder / f"ours_{at.camera_id}.png": picture})
+        write_images({folder / f"ours_{at.camera_id}.png": picture})
 
 
 def rendered(cameras: Cameras, folder: Path) -> None:

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
     from tbcad_verify.run.verify import Options as VerifyOptions
 
+    from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.capture.source import Captured as CameraBands
-    from tbcad.simulate.capture.source import Geometry
     from tbcad.simulate.scene.object import SceneObject
     from tbcad.tolerance.analysis import Analysis
     from tbcad.tolerance.analysis import Options as AnalysisOptions
@@ -281,7 +280,7 @@ def capture(
     Raises:
         InputError: export or object cannot be read, or the folder cannot be replaced.
     """
-    from tbcad.simulate.capture.light_field import LightField, in_memory
+    from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 
     taken = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
     if out is not None:
@@ -289,7 +288,7 @@ def capture(
         return LightField.read(Path(out))
     progress("photographs and light field")
     bands = {at.camera_id: (at, bands()) for at, bands in taken.cameras}
-    return in_memory(bands, taken.capture_mm, taken.facts)
+    return light_field_in_memory(bands, taken.capture_mm, taken.facts)
 
 
 @dataclass(frozen=True)
@@ -303,7 +302,7 @@ class Photographs:
         facts: how they are taken: design, n, geometry, samples.
     """
 
-    cameras: "CameraBands"
+    cameras: "CameraPhotographs"
     subject: "SceneObject"
     capture_mm: float
     facts: dict[str, Any]
@@ -320,16 +319,16 @@ def photograph(
     detail: Progress,
 ) -> Photographs:
     """Prepare both photographs; arguments as for `capture`."""
-    from tbcad.simulate.capture.source import cameras
+    from tbcad.simulate.capture.geometry import camera_photographs
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import chosen
-    from tbcad.simulate.scene.shading import scene_of
+    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.scene.ray_casting import prepared_scene
 
     progress("object and scene")
     export = read_export(Path(exports))
     path = None if object_file is None else Path(object_file)
-    subject = chosen(path, export.capture_mm, fit, paint)
-    taken = cameras(export, scene_of(subject), geometry, samples, detail)
+    subject = load_or_built_in(path, export.capture_mm, fit, paint)
+    taken = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
     facts = {
         "object": subject.name,
         "design": export.spec.name,
@@ -380,7 +379,7 @@ def analyse(
         InputError: export or process cannot be read, or mirrors are planar.
     """
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import chosen
+    from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.tolerance.analysis import Options
     from tbcad.tolerance.analysis import analyse as analyse_export
     from tbcad.tolerance.process.process import load_process
@@ -389,5 +388,7 @@ def analyse(
     made_by = load_process(process, list(_texts(settings)))
     progress("record of the export")
     export = read_export(Path(exports))
-    subject = chosen(None if object_file is None else Path(object_file), export.capture_mm)
+    subject = load_or_built_in(
+        None if object_file is None else Path(object_file), export.capture_mm
+    )
     return analyse_export(export, made_by, subject, asked, progress, detail)

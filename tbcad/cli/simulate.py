@@ -29,9 +29,9 @@ from tbcad.screen import stages
 
 if TYPE_CHECKING:
     from tbcad.optics.camera import Camera
+    from tbcad.simulate.capture.geometry import Geometry
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.capture.source import Geometry
-    from tbcad.simulate.scene.shading import Scene
+    from tbcad.simulate.scene.ray_casting import Scene
     from tbcad.types import Bytes
 
 MOST_SAMPLES = 8
@@ -120,13 +120,13 @@ def view(
     PSNR and SSIM.
     """
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.picture_files import check_place
-    from tbcad.simulate.scene.ground_truth import pinhole_picture, whole
-    from tbcad.simulate.scene.shading import depth_of
+    from tbcad.simulate.image_files import check_image_path
+    from tbcad.simulate.scene.ground_truth import pinhole_picture, to_bytes
+    from tbcad.simulate.scene.ray_casting import depth_along_rays
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import synthesise
-    from tbcad.simulate.views.tiles import Tiles
 
-    check_place(out)
+    check_image_path(out)
     with stages(3) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
@@ -135,11 +135,11 @@ def view(
         if surface is Surface.OBJECT:
             if scene is None:
                 raise InputError(f"{capture_folder} has no object: use --surface plane")
-            depth = depth_of(scene)
+            depth = depth_along_rays(scene)
         screen.stage("view")
-        picture = synthesise(Tiles(source), at, method.value, depth).image
+        picture = synthesise(MirrorTiles(source), at, method.value, depth).image
         screen.stage("truth")
-        truth = None if scene is None else whole(pinhole_picture(scene, at))
+        truth = None if scene is None else to_bytes(pinhole_picture(scene, at))
     _show(out, picture, truth, (method.value, "ray-traced"))
     return 0
 
@@ -179,27 +179,27 @@ def refocus(
     For a simulated capture also writes the ray-traced picture of a real lens and a comparison.
     """
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.picture_files import ANIMATED, check_place, write_animation
-    from tbcad.simulate.scene.ground_truth import lens_picture, whole
+    from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
+    from tbcad.simulate.scene.ground_truth import lens_picture, to_bytes
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.refocus import Focus, refocus_sweep
     from tbcad.simulate.views.refocus import refocus as refocused
-    from tbcad.simulate.views.tiles import Tiles
 
-    check_place(out)
+    check_image_path(out)
     if sweep is not None:
-        check_place(sweep, ANIMATED)
+        check_image_path(sweep, ANIMATED_SUFFIXES)
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
         lens = Focus(aperture, focus)
         lens.check(at, source.capture_mm)
-        tiles, scene = Tiles(source), _scene(capture_folder)
+        tiles, scene = MirrorTiles(source), _scene(capture_folder)
         screen.stage("69 pinholes")
         picture = refocused(tiles, at, lens).image
         screen.stage("real lens")
         truth = None
         if scene is not None:
-            truth = whole(lens_picture(scene, at, lens, truth_samples, screen.detail))
+            truth = to_bytes(lens_picture(scene, at, lens, truth_samples, screen.detail))
         if sweep is not None:
             screen.stage("sweep")
             write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, screen.detail))
@@ -217,37 +217,41 @@ def _viewpoint(
 ) -> "Camera":
     from math import radians
 
-    from tbcad.simulate.scene.viewpoint import viewpoint
+    from tbcad.simulate.scene.viewpoint import camera_around_object
 
     azimuth, elevation, distance = place
     if fov is not None and not 0 < fov < WIDEST_DEG:
         raise InputError(f"--fov {fov:g} is no angle of view: allowed is above 0, below 170")
     wide = None if fov is None else radians(fov)
-    return viewpoint(radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide)
+    return camera_around_object(
+        radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide
+    )
 
 
 def _scene(folder: Path) -> "Scene | None":
     """The object of a simulated capture; None where there is none, as with real photographs."""
     from tbcad.simulate.capture.files import OBJECT, read_object
-    from tbcad.simulate.scene.shading import scene_of
+    from tbcad.simulate.scene.ray_casting import prepared_scene
 
     if not (folder / OBJECT).is_file():
         return None
-    return scene_of(read_object(folder))
+    return prepared_scene(read_object(folder))
 
 
 def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]) -> None:
     """Write the picture, and a comparison with the ground truth where it is known."""
-    from tbcad.simulate.picture_files import beside, difference, write_stills
-    from tbcad.simulate.quality import likeness
+    from tbcad.simulate.image_files import difference, side_by_side, write_images
+    from tbcad.simulate.image_quality import image_quality
 
     if truth is None:
-        write_stills({out: picture})
+        write_images({out: picture})
         typer.echo(f"{out}: written, without ground truth: the capture names no object")
         return
     files = [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
-    sheet = beside({names[0]: picture, names[1]: truth, "difference": difference(truth, picture)})
-    write_stills({out: picture, files[0]: truth, files[1]: sheet})
-    found = likeness(truth, picture)
+    sheet = side_by_side(
+        {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
+    )
+    write_images({out: picture, files[0]: truth, files[1]: sheet})
+    found = image_quality(truth, picture)
     typer.echo(f"PSNR {found.psnr_db:.2f} dB, SSIM {found.ssim:.4f} against the {names[1]} picture")
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

@@ -22,7 +22,7 @@ from tbcad.cli.options import (
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.simulate.study.record import Study
+    from tbcad.simulate.study.study import Study
     from tbcad.spec.design import Spec
 
 PIPED_WIDTH = 160
@@ -71,13 +71,13 @@ def resolution_command(
     scheduler: Scheduler = None,
 ) -> int:
     """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
-    from tbcad.simulate.study.pixels import sensor_of
-    from tbcad.simulate.study.resolution import default_sensors, ratio_of, resolution
-    from tbcad.simulate.study.sweep import numbers
+    from tbcad.simulate.study.pixels import parse_sensor
+    from tbcad.simulate.study.resolution import default_sensors, parse_ratio, resolution
+    from tbcad.simulate.study.sweep import n_range
 
-    ns = numbers(first, last)
-    given = tuple(sensor_of(text) for text in dict.fromkeys(sensors or ()))
-    wanted = tuple(ratio_of(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
+    ns = n_range(first, last)
+    given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
+    wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
     return _run(
         design,
         settings,
@@ -99,9 +99,9 @@ def capture_area_command(
 ) -> int:
     """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
     from tbcad.simulate.study.capture_area import capture_area
-    from tbcad.simulate.study.sweep import numbers
+    from tbcad.simulate.study.sweep import n_range
 
-    ns = numbers(first, last)
+    ns = n_range(first, last)
     return _run(
         design, settings, out, lambda spec, progress: capture_area(spec, ns, progress, scheduler)
     )
@@ -127,10 +127,12 @@ def depth_command(
     wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
 ) -> int:
     """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
-    from tbcad.simulate.study.depth import Optics, depth
+    from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 
-    optics = Optics(blur_px, pixel_um, wide_open).checked()
-    return _run(design, settings, out, lambda spec, progress: depth(spec, optics, progress))
+    optics = LensOptions(blur_px, pixel_um, wide_open).checked()
+    return _run(
+        design, settings, out, lambda spec, progress: depth_of_field(spec, optics, progress)
+    )
 
 
 @study.command("ssim")
@@ -146,21 +148,21 @@ def ssim_command(
     distance: Distance = 640.0,
 ) -> int:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
-    from tbcad.simulate.scene.object import chosen
-    from tbcad.simulate.study.pixels import sensor_of
+    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.study.pixels import parse_sensor
     from tbcad.simulate.study.resolution import default_sensors
     from tbcad.simulate.study.ssim import ssim
-    from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
+    from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
 
-    given = tuple(sensor_of(text) for text in dict.fromkeys(sensors or ()))
-    places = round_of(ELEVATIONS_DEG, azimuths, distance)
+    given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     return _run(
         design,
         settings,
         out,
         lambda spec, progress: ssim(
             spec,
-            chosen(object_file, spec.optics.capture_diameter_mm, paint=paint.value),
+            load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint.value),
             given or default_sensors(spec),
             places,
             method.value,
@@ -184,15 +186,18 @@ def prototype_command(
 ) -> int:
     """Compare views from the prototype's merged photographs with those of the full shell."""
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import chosen
-    from tbcad.simulate.study.prototype_vs_shell import stand_in
-    from tbcad.simulate.study.views import ELEVATIONS_DEG, round_of
+    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.study.prototype_vs_shell import prototype_vs_shell
+    from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
 
-    places = round_of(ELEVATIONS_DEG, azimuths, distance)
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
-    subject = chosen(object_file, export.capture_mm, paint=paint.value)
+    subject = load_or_built_in(object_file, export.capture_mm, paint=paint.value)
     return _write(
-        out, lambda progress: stand_in(export, subject, places, method.value, samples, progress)
+        out,
+        lambda progress: prototype_vs_shell(
+            export, subject, places, method.value, samples, progress
+        ),
     )
 
 
@@ -211,14 +216,14 @@ def _run(
 
 def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
-    from tbcad.simulate.study.record import check_target, write
+    from tbcad.simulate.study.study import check_study_folder, write_study
 
-    check_target(out)
+    check_study_folder(out)
     with stages(2) as screen:
         screen.stage("study: mirrors and rays")
         result = work(screen.detail)
         screen.stage("study: files")
-        files = write(result, out)
+        files = write_study(result, out)
     _show(result)
     typer.echo(f"{out}: {', '.join(file.name for file in files)}")
     return 0

@@ -46,12 +46,12 @@ def tolerance(
     Writes tolerance.json, tables, notes and plots.
     """
     from tbcad.api import analyse
-    from tbcad.simulate.study.record import check_target, write
+    from tbcad.simulate.study.study import check_study_folder, write_study
     from tbcad.tolerance.analysis import Options
     from tbcad.tolerance.report import json_text, study, summary_text
 
     options = Options(builds, seed, share, calibrated_mrad / 1000, scheduler).checked()
-    check_target(out)
+    check_study_folder(out)
     with stages(6) as screen:
         analysis = analyse(
             folder,
@@ -62,7 +62,7 @@ def tolerance(
             progress=screen.stage,
             detail=screen.detail,
         )
-        files = write(study(analysis), out, {"tolerance.json": json_text(analysis).encode()})
+        files = write_study(study(analysis), out, {"tolerance.json": json_text(analysis).encode()})
     typer.echo(summary_text(analysis))
     typer.echo(f"{out}: {', '.join(file.name for file in files)}")
     return 0

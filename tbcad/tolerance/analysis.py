@@ -13,9 +13,9 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.object import SceneObject
+from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.simulate.scene.shading import scene_of
-from tbcad.simulate.study.views import round_of, truths
+from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
 from tbcad.tolerance.margin import Margin, check_share, margin
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, Result, Yield, simulate, yielded
 from tbcad.tolerance.montecarlo.draws import Errors, draw
@@ -243,9 +243,9 @@ def _choice(
 def _sharpness(
     export: Exported, made: Errors, subject: SceneObject, wishes: Options, detail: Progress
 ) -> Sharpness:
-    scene, m = scene_of(subject), len(export.reflectors[0])
-    views = round_of(*VIEWPOINTS).views(export.capture_mm)
-    wanted = Wanted(export.capture_mm, views, truths(scene, views, detail))
+    scene, m = prepared_scene(subject), len(export.reflectors[0])
+    views = viewpoints_around(*VIEWPOINTS).views(export.capture_mm)
+    wanted = Wanted(export.capture_mm, views, ground_truths(scene, views, detail))
     machines = draw(made, wishes.seed, range(PICTURED), m)
     return sharpness(
         export.reflectors, machines, scene, wanted, wishes.left, wishes.seed, "nearest", detail

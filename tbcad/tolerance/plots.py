@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.simulate.study.plot import Panel, Series
+from tbcad.simulate.study.plots import Panel, Series
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.montecarlo.coverage import virtual
 from tbcad.types import Floats

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.simulate.study.record import Study
+from tbcad.simulate.study.study import Study
 from tbcad.simulate.study.tables import Cell, Table
 from tbcad.tolerance.analysis import TRIED, Analysis
 from tbcad.tolerance.montecarlo.builds import Yield, yielded

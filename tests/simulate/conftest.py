@@ -7,13 +7,13 @@ import pytest
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.simulate.capture.light_field import LightField, in_memory
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.exported import Exported, read_export
-from tbcad.simulate.scene.object import built_in
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.spec.design import load_spec
 from tests.prototype_exports import write_export
 
@@ -46,13 +46,14 @@ def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
 
 @pytest.fixture(scope="session")
 def knot() -> Scene:
-    return scene_of(built_in(CAPTURE_MM))
+    return prepared_scene(built_in_object(CAPTURE_MM))
 
 
 @pytest.fixture(scope="session")
 def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField:
-    return in_memory(
-        {at.camera_id: (at, photograph(at.camera, exact(at), knot)) for at in cameras}, CAPTURE_MM
+    return light_field_in_memory(
+        {at.camera_id: (at, photograph(at.camera, exact_tracer(at), knot)) for at in cameras},
+        CAPTURE_MM,
     )
 
 

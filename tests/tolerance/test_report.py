@@ -13,7 +13,7 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.record import contents_of
+from tbcad.simulate.study.study import study_files
 from tbcad.simulate.study.tables import SUMMARY
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.analysis import Analysis, Options, ProcessOption, PrototypeYield
@@ -78,7 +78,7 @@ def stands(plain: float, known: float, offset: float = 2.0) -> PrototypeYield:
 
 
 def rows_of(found: Analysis, name: str) -> list[dict[str, str]]:
-    text = contents_of(study(found))[f"tolerance-{name}.csv"].decode()
+    text = study_files(study(found))[f"tolerance-{name}.csv"].decode()
     return list(csv.DictReader(io.StringIO(text)))
 
 
@@ -208,7 +208,7 @@ class TestJson:
 
     def test_same_bytes(self, found: Analysis) -> None:
         assert json_text(found) == json_text(replace(found))
-        one, two = contents_of(study(found)), contents_of(study(found))
+        one, two = study_files(study(found)), study_files(study(found))
         assert one == two
         assert one["tolerance.png"].startswith(b"\x89PNG")
 

@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate import picture_files
+from tbcad.simulate import image_files
 from tbcad.simulate.capture import light_field
-from tbcad.simulate.capture.source import Captured
+from tbcad.simulate.capture.geometry import CameraPhotographs
 from tbcad.simulate.scene.object import SceneObject
 
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
-LARGEST_OBJECT = 4 << 30  # bytes, unpacked
+MAX_OBJECT_BYTES = 4 << 30  # bytes, unpacked
 
 
 def write_capture(
-    folder: Path, captured: Captured, subject: SceneObject, capture_mm: float, facts: dict[str, Any]
+    folder: Path,
+    captured: CameraPhotographs,
+    subject: SceneObject,
+    capture_mm: float,
+    facts: dict[str, Any],
 ) -> dict[str, Any]:
     """Write all files of a capture into a folder, and return its record.
 
@@ -32,11 +36,11 @@ def write_capture(
         facts: how the capture is made.
     """
     record: dict[str, Any] = {"schema": SCHEMA, "object": subject.name, **facts, "cameras": {}}
-    with light_field.writing(folder / light_field.NAME, capture_mm, record) as store:
+    with light_field.create_light_field(folder / light_field.NAME, capture_mm, record) as store:
         for at, bands in captured:
-            picture, counts = light_field.write(store, at, bands())
+            picture, counts = light_field.write_camera(store, at, bands())
             file = folder / f"camera_{at.camera_id}.png"
-            picture_files.write_stills({file: picture})
+            image_files.write_images({file: picture})
             record["cameras"][at.camera_id] = {"picture": file.name, **counts}
     write_object(folder / OBJECT, subject)
     text = json.dumps(record, indent=1) + "\n"
@@ -62,7 +66,7 @@ def read_object(folder: Path) -> SceneObject:
         raise InputError(f"{path} is not there: without it there is no ground truth")
     try:
         with zipfile.ZipFile(path) as packed:
-            if sum(entry.file_size for entry in packed.infolist()) > LARGEST_OBJECT:
+            if sum(entry.file_size for entry in packed.infolist()) > MAX_OBJECT_BYTES:
                 raise InputError(f"{path} unpacks to over 4 GiB: capture again")
         with np.load(path, allow_pickle=False) as arrays:
             return _subject({name: arrays[name] for name in arrays.files})

@@ -32,21 +32,21 @@ from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.photograph import BAND_ROWS, Band
-from tbcad.simulate.compiled import in_threads
+from tbcad.simulate.parallel import in_threads
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
 CHUNK = (BAND_ROWS, 256)
-LEVEL = 1  # of compression: higher ones save 2 % at most
-PLANES: dict[str, tuple[tuple[int, ...], str]] = {
+COMPRESSION_LEVEL = 1  # of compression: higher ones save 2 % at most
+PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "colour": ((3,), "u1"),
     "mirror": ((), "u2"),
     "origin": ((3,), "f4"),
     "direction": ((3,), "f4"),
 }
-MIRRORS = ("u", "apex", "normal", "curvature", "boxes")
+MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,9 @@ class LightField:
 
 
 @contextmanager
-def writing(path: Path, capture_mm: float, facts: Mapping[str, Any]) -> Iterator[h5py.File]:
+def create_light_field(
+    path: Path, capture_mm: float, facts: Mapping[str, Any]
+) -> Iterator[h5py.File]:
     """Make a file; `write` fills it camera by camera."""
     with h5py.File(path, "w", libver=("v110", "v110")) as store:
         store.attrs["schema"] = SCHEMA
@@ -140,7 +142,7 @@ def writing(path: Path, capture_mm: float, facts: Mapping[str, Any]) -> Iterator
         yield store
 
 
-def write(
+def write_camera(
     store: h5py.File, at: Reflector, bands: Iterable[Band]
 ) -> tuple[NDArray[np.uint8], dict[str, int]]:
     """Write one camera's bands as they come, each a row of chunks.
@@ -156,9 +158,14 @@ def write(
     chunk = (min(CHUNK[0], shape[0]), min(CHUNK[1], shape[1]))
     planes = {
         name: group.create_dataset(
-            name, shape + last, kind, chunks=chunk + last, shuffle=True, compression=LEVEL
+            name,
+            shape + last,
+            kind,
+            chunks=chunk + last,
+            shuffle=True,
+            compression=COMPRESSION_LEVEL,
         )
-        for name, (last, kind) in PLANES.items()
+        for name, (last, kind) in PIXEL_ARRAYS.items()
     }
     picture = np.zeros((*shape, 3), dtype=np.uint8)
     counts = {"pixels_on_mirrors": 0, "pixels_that_see_the_capture_sphere": 0}
@@ -174,9 +181,9 @@ def write(
 
 def _write_chunks(planes: Mapping[str, h5py.Dataset], band: Band) -> None:
     """Write a band, a row of chunks, as HDF5 would, but compress in threads: it does in one."""
-    arrays = arrays_of(band)
+    arrays = band_arrays(band)
     width, step = band.colour.shape[1], planes["colour"].chunks[1]
-    places = [(name, first) for name in PLANES for first in range(0, width, step)]
+    places = [(name, first) for name in PIXEL_ARRAYS for first in range(0, width, step)]
 
     def packed(place: tuple[str, int]) -> bytes:
         name, first = place
@@ -192,20 +199,20 @@ def _packed(part: NDArray[Any], shape: tuple[int, ...]) -> bytes:
     whole = np.zeros(shape, dtype=part.dtype)
     whole[: part.shape[0], : part.shape[1]] = part
     shuffled = whole.reshape(-1, 1).view(np.uint8).T
-    return zlib.compress(shuffled.tobytes(), LEVEL)
+    return zlib.compress(shuffled.tobytes(), COMPRESSION_LEVEL)
 
 
-def arrays_of(band: Band) -> dict[str, NDArray[Any]]:
+def band_arrays(band: Band) -> dict[str, NDArray[Any]]:
     """The arrays of a band as the file has them."""
     rays = band.rays
     raw = (band.colour, rays.mirror, rays.origin, rays.direction)
     return {
         name: np.asarray(values, dtype=kind)
-        for (name, (_, kind)), values in zip(PLANES.items(), raw, strict=True)
+        for (name, (_, kind)), values in zip(PIXEL_ARRAYS.items(), raw, strict=True)
     }
 
 
-def in_memory(
+def light_field_in_memory(
     captured: Mapping[str, tuple[Reflector, Iterable[Band]]],
     capture_mm: float,
     facts: Mapping[str, Any] = MappingProxyType({}),
@@ -213,8 +220,8 @@ def in_memory(
     """A light field that is in no file."""
     frames = {}
     for camera, (at, bands) in captured.items():
-        parts = [arrays_of(band) for band in bands]
-        planes = {name: np.concatenate([part[name] for part in parts]) for name in PLANES}
+        parts = [band_arrays(band) for band in bands]
+        planes = {name: np.concatenate([part[name] for part in parts]) for name in PIXEL_ARRAYS}
         frames[camera] = Frame(at.camera, at.u, at.mirrors, at.boxes(), planes)
     return LightField(frames, capture_mm, dict(facts))
 
@@ -229,7 +236,7 @@ def _write_view(group: h5py.Group, view: Camera) -> None:
 def _write_mirrors(group: h5py.Group, at: Reflector) -> None:
     mirrors = at.mirrors
     columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature, at.boxes())
-    for name, values in zip(MIRRORS, columns, strict=True):
+    for name, values in zip(MIRROR_ARRAYS, columns, strict=True):
         group.create_dataset(name, data=values)
 
 
@@ -280,9 +287,9 @@ def _inside(group: h5py.Group, name: str) -> h5py.Dataset:
 
 
 def _frame(group: h5py.Group) -> Frame:
-    planes = {name: _inside(group, name) for name in PLANES}
+    planes = {name: _inside(group, name) for name in PIXEL_ARRAYS}
     height, width = planes["mirror"].shape
-    for name, (last, kind) in PLANES.items():
+    for name, (last, kind) in PIXEL_ARRAYS.items():
         if planes[name].shape != (height, width, *last) or planes[name].dtype != np.dtype(kind):
             raise ValueError(f"array {name} of {group.name} has another shape or kind")
     attributes = group.attrs
@@ -291,7 +298,7 @@ def _frame(group: h5py.Group) -> Frame:
     )
     hfov = float(_numbers(attributes["hfov_rad"], ()))
     table = _group(group, "mirrors")
-    columns = {name: _inside(table, name)[:] for name in MIRRORS}
+    columns = {name: _inside(table, name)[:] for name in MIRROR_ARRAYS}
     m = len(columns["curvature"])
     u, apex, normal = (_numbers(columns[name], (m, 3)) for name in ("u", "apex", "normal"))
     mirrors = Surfaces(apex, normal, _numbers(columns["curvature"], (m,)))

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.compiled import THREADS, in_threads
-from tbcad.simulate.scene.rays import Rays, unit_directions
-from tbcad.simulate.scene.shading import Scene, look
+from tbcad.simulate.parallel import THREADS, in_threads
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.simulate.scene.rays import ReflectedRays, unit_directions
 from tbcad.types import Bytes, Progress
 
 Colours = NDArray[np.float32]
 Shift = tuple[float, float]
-Tracer = Callable[[range, Shift], Rays]
+Tracer = Callable[[range, Shift], ReflectedRays]
 
 BAND_ROWS = 64  # also the height of a chunk of the light field's file
 CENTRE: Shift = (0.0, 0.0)
@@ -32,7 +32,7 @@ class Band:
     """
 
     rows: range
-    rays: Rays
+    rays: ReflectedRays
     colour: Bytes
 
 
@@ -65,12 +65,12 @@ def row_bands(height: int) -> list[range]:
 def _band(view: Camera, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
     rays, colour = _through(view, trace, scene, rows, CENTRE)
     if samples > 1:
-        taken = (_through(view, trace, scene, rows, shift)[1] for shift in shifts(samples))
+        taken = (_through(view, trace, scene, rows, shift)[1] for shift in subpixel_shifts(samples))
         colour = sum(taken, np.zeros_like(colour)) / np.float32(samples**2)
     return Band(rows, rays, np.rint(colour).astype(np.uint8))
 
 
-def shifts(samples: int) -> list[Shift]:
+def subpixel_shifts(samples: int) -> list[Shift]:
     """Places of samples x samples rays in a pixel, from its centre."""
     places = ((np.arange(samples) + 0.5) / samples - 0.5).tolist()
     return [(x, y) for y in places for x in places]
@@ -78,20 +78,20 @@ def shifts(samples: int) -> list[Shift]:
 
 def _through(
     view: Camera, trace: Tracer, scene: Scene, rows: range, shift: Shift
-) -> tuple[Rays, Colours]:
+) -> tuple[ReflectedRays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
-    seen = look(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    seen = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
     colour = seen.colour.reshape(*rays.mirror.shape, 3)
     return _hidden(view, rays, colour, scene, rows, shift), colour
 
 
 def _hidden(
-    view: Camera, rays: Rays, colour: Colours, scene: Scene, rows: range, shift: Shift
-) -> Rays:
+    view: Camera, rays: ReflectedRays, colour: Colours, scene: Scene, rows: range, shift: Shift
+) -> ReflectedRays:
     """Paint the object where the camera sees it directly, and take the rays away there."""
     way = unit_directions(view, rows, shift).reshape(-1, 3)
-    direct = look(scene, np.broadcast_to(view.pinhole, way.shape), way)
+    direct = cast_rays(scene, np.broadcast_to(view.pinhole, way.shape), way)
     met = np.flatnonzero(np.isfinite(direct.depth))
     if len(met) == 0:
         return rays

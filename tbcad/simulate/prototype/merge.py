@@ -17,22 +17,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-from tbcad.simulate.capture.light_field import LightField, in_memory
-from tbcad.simulate.capture.photograph import CENTRE, Band, Shift, Tracer, row_bands, shifts
-from tbcad.simulate.compiled import THREADS, in_threads
-from tbcad.simulate.prototype.photograph import resampled
-from tbcad.simulate.prototype.run import Run, stand_ins
-from tbcad.simulate.prototype.sight import (
-    Sight,
-    directions,
-    in_balls,
-    in_front,
-    places_of,
-    sight,
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.capture.photograph import (
+    CENTRE,
+    Band,
+    Shift,
+    Tracer,
+    row_bands,
+    subpixel_shifts,
 )
-from tbcad.simulate.scene.rays import Rays, exact, pixel_directions
-from tbcad.simulate.scene.reflector import MARGIN_PX, pixels_of
-from tbcad.simulate.scene.shading import Scene
+from tbcad.simulate.parallel import THREADS, in_threads
+from tbcad.simulate.prototype.ball_rays import (
+    BallHits,
+    image_points,
+    object_in_front,
+    pixel_rays,
+    reflected_colours,
+    trace_balls,
+)
+from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector
+from tbcad.simulate.prototype.stop_photograph import resampled_photograph
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.reflector import MARGIN_PX, project_points
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
 Colours = NDArray[np.float32]
@@ -43,7 +50,7 @@ NOWHERE = -1
 
 
 @dataclass(frozen=True)
-class Merging:
+class MergePlan:
     """A run ready to be merged; each array has what is on no mirror first, then the mirrors.
 
     What is on no mirror is taken from the first photograph as it is, and shows no ball.
@@ -58,7 +65,7 @@ class Merging:
         ball: that stands in, from 1, (1 + m,).
     """
 
-    run: Run
+    run: PrototypeRun
     shell: Tracer
     boxes: Ints
     turn: Floats
@@ -67,7 +74,7 @@ class Merging:
 
 
 @dataclass(frozen=True)
-class Part:
+class MergedPixels:
     """n pixels of the merged picture.
 
     Attributes:
@@ -78,13 +85,13 @@ class Part:
     """
 
     mirror: Ints
-    seen: Sight
+    seen: BallHits
     front: Bools
     direct: Colours
 
 
-def light_field(
-    both: tuple[Run, Run],
+def merged_light_field(
+    both: tuple[PrototypeRun, PrototypeRun],
     scene: Scene,
     capture_mm: float,
     resample: Resample = "photograph",
@@ -96,14 +103,14 @@ def light_field(
     The other arguments are those of `merge`.
     """
     captured = {
-        run.at.camera_id: (stand_ins(run), merge(run, scene, resample, samples, progress))
+        run.at.camera_id: (ball_reflector(run), merge_run(run, scene, resample, samples, progress))
         for run in both
     }
-    return in_memory(captured, capture_mm)
+    return light_field_in_memory(captured, capture_mm)
 
 
-def merge(
-    run: Run,
+def merge_run(
+    run: PrototypeRun,
     scene: Scene,
     resample: Resample = "photograph",
     samples: int = 1,
@@ -132,10 +139,10 @@ def merge(
         yield from in_threads(work, every[first : first + 2 * THREADS])
 
 
-def _ready(run: Run, scene: Scene) -> Merging:
-    return Merging(
+def _ready(run: PrototypeRun, scene: Scene) -> MergePlan:
+    return MergePlan(
         run,
-        exact(run.at),
+        exact_tracer(run.at),
         np.vstack([_object_box(run, scene), run.at.boxes()]),
         np.concatenate([np.eye(3)[None], run.turn]),
         np.append(0, run.stop),
@@ -143,20 +150,20 @@ def _ready(run: Run, scene: Scene) -> Merging:
     )
 
 
-def _object_box(run: Run, scene: Scene) -> Ints:
+def _object_box(run: PrototypeRun, scene: Scene) -> Ints:
     """Columns and rows that hold the object as the camera sees it directly, (4,)."""
     view = run.at.camera
     corners = scene.radius * np.array(list(product((-1.0, 1.0), repeat=3)))
     size = np.array([view.width_px, view.height_px])
     if ((corners - view.pinhole) @ view.forward <= 0).any():
         return np.array([0, size[0], 0, size[1]])
-    place = pixels_of(view, corners)
+    place = project_points(view, corners)
     low, high = np.floor(place.min(axis=0)), np.ceil(place.max(axis=0)) + 1
     ends = np.clip([low - MARGIN_PX, high + MARGIN_PX], 0, size)
     return np.asarray(ends.T.ravel(), dtype=np.int64)
 
 
-def _resampled(ready: Merging, scene: Scene, samples: int, progress: Progress) -> Bytes:
+def _resampled(ready: MergePlan, scene: Scene, samples: int, progress: Progress) -> Bytes:
     """The merged picture (h, w, 3), stop after stop."""
     mirror = np.concatenate(
         in_threads(partial(_mirrors, ready), row_bands(ready.run.at.camera.height_px))
@@ -169,12 +176,12 @@ def _resampled(ready: Merging, scene: Scene, samples: int, progress: Progress) -
     return picture
 
 
-def _mirrors(ready: Merging, rows: range) -> Numbers:
+def _mirrors(ready: MergePlan, rows: range) -> Numbers:
     return ready.shell(rows, CENTRE).mirror.astype(np.uint16)
 
 
 def _fill(
-    ready: Merging, scene: Scene, samples: int, mirror: Numbers, picture: Bytes, stop: int
+    ready: MergePlan, scene: Scene, samples: int, mirror: Numbers, picture: Bytes, stop: int
 ) -> None:
     """Paint the pixels of a stop's mirrors; those of other stops are others."""
     at, view = ready.run.at.camera, ready.run.view
@@ -182,11 +189,11 @@ def _fill(
     parts = [_inside(mirror, ready.boxes[number], number) for number in served.tolist()]
     pixel = np.concatenate(parts)
     turn = ready.turn[np.repeat(served, [len(part) for part in parts])]
-    way = np.einsum("nx,nxy->ny", directions(at, pixel.astype(np.float64)), turn)
-    place = places_of(view, way)
+    way = np.einsum("nx,nxy->ny", pixel_rays(at, pixel.astype(np.float64)), turn)
+    place = image_points(view, way)
     good = np.isfinite(place[:, 0])
     column, row = pixel[good].T
-    picture[row, column] = resampled(ready.run, scene, stop, samples, place[good])
+    picture[row, column] = resampled_photograph(ready.run, scene, stop, samples, place[good])
 
 
 def _inside(mirror: Numbers, box: Ints, number: int) -> Ints:
@@ -196,7 +203,7 @@ def _inside(mirror: Numbers, box: Ints, number: int) -> Ints:
     return np.column_stack([column + x0, row + y0])
 
 
-def _band(ready: Merging, scene: Scene, samples: int, picture: Bytes | None, rows: range) -> Band:
+def _band(ready: MergePlan, scene: Scene, samples: int, picture: Bytes | None, rows: range) -> Band:
     part = _part(ready, scene, rows, CENTRE)
     shape = (len(rows), ready.run.at.camera.width_px)
     if picture is None:
@@ -204,7 +211,7 @@ def _band(ready: Merging, scene: Scene, samples: int, picture: Bytes | None, row
     else:
         shown = (part.seen.ball > 0) | part.front
         colour = picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None]
-    rays = Rays(
+    rays = ReflectedRays(
         part.mirror.astype(np.int32).reshape(shape),
         part.seen.origin.reshape(*shape, 3),
         part.seen.direction.reshape(*shape, 3),
@@ -213,24 +220,24 @@ def _band(ready: Merging, scene: Scene, samples: int, picture: Bytes | None, row
     return Band(rows, rays.without(gone.reshape(shape)), colour.reshape(*shape, 3))
 
 
-def _traced(ready: Merging, scene: Scene, samples: int, rows: range) -> Bytes:
+def _traced(ready: MergePlan, scene: Scene, samples: int, rows: range) -> Bytes:
     """Colours (n, 3) along the turned directions themselves."""
     total = np.zeros((len(rows) * ready.run.at.camera.width_px, 3), dtype=np.float32)
-    for shift in shifts(samples):
+    for shift in subpixel_shifts(samples):
         part = _part(ready, scene, rows, shift)
-        total += np.where(part.front[:, None], part.direct, in_balls(scene, part.seen))
+        total += np.where(part.front[:, None], part.direct, reflected_colours(scene, part.seen))
     return np.asarray(np.rint(total / np.float32(samples**2)), dtype=np.uint8)
 
 
-def _part(ready: Merging, scene: Scene, rows: range, shift: Shift) -> Part:
+def _part(ready: MergePlan, scene: Scene, rows: range, shift: Shift) -> MergedPixels:
     """The pixels of a band, each turned with its mirror's window."""
     run = ready.run
     mirror = ready.shell(rows, shift).mirror.ravel().astype(np.int64)
     straight = unit(pixel_directions(run.at.camera, rows, shift).reshape(-1, 3))
     way = np.einsum("nx,nxy->ny", straight, ready.turn[mirror])
-    seen = sight(run, way, ready.stop[mirror])
-    taken = np.isfinite(places_of(run.view, way)[:, 0])
+    seen = trace_balls(run, way, ready.stop[mirror])
+    taken = np.isfinite(image_points(run.view, way)[:, 0])
     own = taken & (seen.ball == ready.ball[mirror])
-    front, direct = in_front(scene, run.view, way, seen.reach)
+    front, direct = object_in_front(scene, run.view, way, seen.reach)
     seen = replace(seen, ball=np.where(own, seen.ball, 0))
-    return Part(mirror, seen, front & taken, direct)
+    return MergedPixels(mirror, seen, front & taken, direct)

@@ -22,7 +22,7 @@ from tbcad.types import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Run:
+class PrototypeRun:
     """A run of s stops that stands in for the m mirrors of one of the shell's cameras.
 
     All in the frame of the object.
@@ -52,13 +52,15 @@ class Run:
         return len(self.balls)
 
 
-def runs(reflectors: tuple[Reflector, Reflector], plan: Plan) -> tuple[Run, Run]:
+def prototype_runs(
+    reflectors: tuple[Reflector, Reflector], plan: Plan
+) -> tuple[PrototypeRun, PrototypeRun]:
     """Both runs: that for camera a's mirrors, and that for camera b's, the object turned."""
     a, b = reflectors
     return _run(a, a.camera, plan, 0, np.ones(3)), _run(b, a.camera, plan, 1, HALF_TURN)
 
 
-def stand_ins(run: Run) -> SubstitutedReflector:
+def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     """What a light field records of a run: the shell's camera and cells, with balls for mirrors.
 
     `u` are the directions of the balls: where the virtual cameras really were.
@@ -69,14 +71,14 @@ def stand_ins(run: Run) -> SubstitutedReflector:
     )
 
 
-def _run(at: Reflector, view: Camera, plan: Plan, half: int, turn: Floats) -> Run:
+def _run(at: Reflector, view: Camera, plan: Plan, half: int, turn: Floats) -> PrototypeRun:
     ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * turn
     place = (ball, plan.angle[stop])
     apex, normal = (_at(points * turn, frame, *place) for points in (plan.apex, plan.normal))
     seen_from = _carried(view, turn)
     windows = _turns(at.mirrors.apex, apex, frame, seen_from.pinhole)
     still = np.broadcast_to(np.eye(3), windows.shape)
-    return Run(
+    return PrototypeRun(
         at=at,
         view=seen_from,
         balls=_everywhere(plan, frame, turn),

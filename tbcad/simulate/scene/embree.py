@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def committed(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any:
+def embree_scene(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any:
     """A scene of facets, ready for queries from several threads, which release the lock.
 
     Args:

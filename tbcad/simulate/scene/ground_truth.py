@@ -4,24 +4,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.capture.photograph import shifts
-from tbcad.simulate.compiled import in_threads
-from tbcad.simulate.scene.shading import Scene, look
-from tbcad.simulate.scene.viewpoint import directions
-from tbcad.simulate.views.refocus import Focus, rays_through
+from tbcad.simulate.capture.photograph import subpixel_shifts
+from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.views.refocus import Focus, lens_rays
 from tbcad.types import Floats, Progress
 
 Colours = NDArray[np.float32]
 
-RAYS_A_PIECE = 1 << 15
+RAYS_PER_CHUNK = 1 << 15
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
     """The picture (h, w, 3), 0 to 255, of a pinhole camera, samples x samples rays a pixel."""
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
-    for shift in shifts(samples):
-        way = directions(view, shift)
+    for shift in subpixel_shifts(samples):
+        way = view_directions(view, shift)
         total += _seen(scene, np.broadcast_to(view.pinhole, way.shape), way)
     return total / np.float32(samples**2)
 
@@ -45,11 +45,11 @@ def lens_picture(
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     for k, (point, shift) in enumerate(zip(_disc(samples), _square(samples), strict=True)):
         progress(f"ray {k + 1} of {samples}")
-        total += _seen(scene, *rays_through(view, focus, point * focus.aperture_mm / 2, shift))
+        total += _seen(scene, *lens_rays(view, focus, point * focus.aperture_mm / 2, shift))
     return total / np.float32(samples)
 
 
-def whole(picture: Colours) -> NDArray[np.uint8]:
+def to_bytes(picture: Colours) -> NDArray[np.uint8]:
     """A picture in whole numbers."""
     return np.rint(picture).astype(np.uint8)
 
@@ -72,6 +72,6 @@ def _square(count: int) -> list[tuple[float, float]]:
 def _seen(scene: Scene, origin: Floats, way: Floats) -> Colours:
     """Colours (h, w, 3) along rays (h, w, 3)."""
     flat, start = way.reshape(-1, 3), origin.reshape(-1, 3)
-    pieces = [slice(k, k + RAYS_A_PIECE) for k in range(0, len(flat), RAYS_A_PIECE)]
-    found = in_threads(lambda part: look(scene, start[part], flat[part]).colour, pieces)
+    pieces = [slice(k, k + RAYS_PER_CHUNK) for k in range(0, len(flat), RAYS_PER_CHUNK)]
+    found = in_threads(lambda part: cast_rays(scene, start[part], flat[part]).colour, pieces)
     return np.concatenate(found).reshape(way.shape)

@@ -11,8 +11,8 @@ from tbcad.types import Bytes, Floats, Ints
 
 Paint = Literal["own", "pattern", "plain"]
 
-LARGEST_FILE = 1 << 30  # bytes
-MOST_FACETS = 20_000_000
+MAX_FILE_BYTES = 1 << 30  # bytes
+MAX_FACETS = 20_000_000
 # Larger than the capture sphere by less than rounding in a file: not too large.
 ROUNDING = 1e-6
 GREY = 0.8
@@ -51,7 +51,9 @@ class SceneObject:
         return float(np.linalg.norm(self.points, axis=1).max())
 
 
-def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own") -> SceneObject:
+def load_object(
+    path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own"
+) -> SceneObject:
     """Read a triangle mesh in millimetres, z up, about the origin.
 
     Args:
@@ -79,14 +81,14 @@ def load(path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own")
     return made
 
 
-def chosen(
+def load_or_built_in(
     path: Path | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
 ) -> SceneObject:
     """The object of a file, as `load` reads it, or without one the built-in one."""
-    return load(path, capture_mm, fit, paint) if path else built_in(capture_mm)
+    return load_object(path, capture_mm, fit, paint) if path else built_in_object(capture_mm)
 
 
-def built_in(capture_mm: float) -> SceneObject:
+def built_in_object(capture_mm: float) -> SceneObject:
     """A trefoil knot with a hue that runs along it: it hides parts of itself from every side."""
     t, s = (np.linspace(0, 2 * np.pi, k, endpoint=False) for k in KNOT_FACETS)
     middle = _knot(t)
@@ -148,7 +150,7 @@ def _read(path: Path) -> Any:
 
     if not path.is_file():
         raise InputError(f"{path} is no file: name a triangle mesh (PLY, STL, OBJ, GLB ...)")
-    if path.stat().st_size > LARGEST_FILE:
+    if path.stat().st_size > MAX_FILE_BYTES:
         raise InputError(f"{path} is over 1 GiB: reduce the mesh first")
     try:
         return trimesh.load_mesh(path, process=False)
@@ -162,8 +164,8 @@ def _check(path: Path, points: Floats, faces: Ints) -> None:
         raise InputError(f"{path} is empty: name a mesh with facets")
     if len(faces) == 0:
         raise InputError(f"{path} has points but no facets: name a triangle mesh")
-    if len(faces) > MOST_FACETS:
-        raise InputError(f"{path} has {len(faces)} facets, allowed are {MOST_FACETS}: reduce it")
+    if len(faces) > MAX_FACETS:
+        raise InputError(f"{path} has {len(faces)} facets, allowed are {MAX_FACETS}: reduce it")
     if not np.isfinite(points).all():
         raise InputError(f"{path} has points that are not finite: repair the mesh")
 

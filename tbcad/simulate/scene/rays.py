@@ -8,21 +8,21 @@ from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.compiled import compiled
-from tbcad.simulate.scene.reflector import Reflector, pitch
+from tbcad.simulate.parallel import compiled
+from tbcad.simulate.scene.reflector import Reflector, pixel_pitch
 from tbcad.types import Floats, Ints
 
-Numbers = NDArray[np.int32]
+MirrorNumbers = NDArray[np.int32]
 Shift = tuple[float, float]
 
-HERE = np.zeros(3)
+AT_PINHOLE = np.zeros(3)
 
 # A point on the edge of two cells lies on both spheres but for rounding.
 ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True)
-class Rays:
+class ReflectedRays:
     """Rays after the mirrors, of a band of h rows and w columns.
 
     Attributes:
@@ -32,7 +32,7 @@ class Rays:
         direction: unit vectors after the mirror, (h, w, 3); zero where there is none.
     """
 
-    mirror: Numbers
+    mirror: MirrorNumbers
     origin: Floats
     direction: Floats
 
@@ -43,12 +43,12 @@ class Rays:
         meets: NDArray[np.bool_] = (self.mirror > 0) & (along < 0) & (away <= radius**2)
         return meets
 
-    def without(self, gone: NDArray[np.bool_]) -> "Rays":
+    def without(self, gone: NDArray[np.bool_]) -> "ReflectedRays":
         """These rays but for some pixels (h, w)."""
         if not gone.any():
             return self
         none = gone[..., None]
-        return Rays(
+        return ReflectedRays(
             np.where(gone, np.int32(0), self.mirror),
             np.where(none, 0.0, self.origin),
             np.where(none, 0.0, self.direction),
@@ -69,7 +69,11 @@ def pixel_directions(view: Camera, rows: range, shift: Shift = (0.0, 0.0)) -> Fl
 
 
 def unit_directions(
-    view: Camera, rows: range, shift: Shift = (0.0, 0.0), depth: float = 1.0, aside: Floats = HERE
+    view: Camera,
+    rows: range,
+    shift: Shift = (0.0, 0.0),
+    depth: float = 1.0,
+    aside: Floats = AT_PINHOLE,
 ) -> Floats:
     """Unit vectors (h, w, 3) toward what pixels see at a depth, from a place beside the pinhole.
 
@@ -85,7 +89,7 @@ def unit_directions(
 
 def _lattice(view: Camera, rows: range, shift: Shift) -> tuple[Floats, Floats]:
     """Directions to columns (w, 3), and what rows add to them (h, 3)."""
-    width = pitch(view)
+    width = pixel_pitch(view)
     across = (np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]) * width
     downward = (np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]) * width
     down = np.cross(view.forward, view.right)
@@ -105,7 +109,7 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
     return result
 
 
-def exact(at: Reflector) -> Callable[[range, Shift], Rays]:
+def exact_tracer(at: Reflector) -> Callable[[range, Shift], ReflectedRays]:
     """What gives the rays of rows of a camera's picture off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
@@ -113,22 +117,24 @@ def exact(at: Reflector) -> Callable[[range, Shift], Rays]:
     """
     boxes, beside, table = at.boxes(), at.beside_edge(), _table(at.mirrors)
 
-    def trace(rows: range, shift: Shift) -> Rays:
+    def trace(rows: range, shift: Shift) -> ReflectedRays:
         way = pixel_directions(at.camera, rows, shift)
         near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
         in_band = boxes - np.array([0, 0, rows.start, rows.start])
         mirror = _first(at.camera.pinhole, way, table, near, in_band, at.side, at.foot)
-        rays = reflected(at.camera.pinhole, way, at.mirrors, mirror)
+        rays = reflect_pixels(at.camera.pinhole, way, at.mirrors, mirror)
         return rays.without(_covered(table, beside, mirror, rays.origin))
 
     return trace
 
 
-def reflected(pinhole: Floats, way: Floats, mirrors: Surfaces, mirror: Numbers) -> Rays:
+def reflect_pixels(
+    pinhole: Floats, way: Floats, mirrors: Surfaces, mirror: MirrorNumbers
+) -> ReflectedRays:
     """Rays along (h, w, 3) from the pinhole after mirrors of given numbers (h, w)."""
     origin, direction = np.zeros_like(way), np.zeros_like(way)
     _reflect(pinhole, way, _table(mirrors), mirror, origin, direction)
-    return Rays(mirror, origin, direction)
+    return ReflectedRays(mirror, origin, direction)
 
 
 def _table(mirrors: Surfaces) -> Floats:
@@ -144,7 +150,7 @@ def _first(
     boxes: Ints,
     side: float,
     foot: float,
-) -> Numbers:
+) -> MirrorNumbers:
     """The surface that each ray of the band enters first, from 1, out of those near it.
 
     On the ray x = pinhole + t d the surface's f (tbcad.optics.surfaces) is A t^2 + B t + C; the
@@ -176,7 +182,9 @@ def _first(
 
 
 @compiled
-def _covered(table: Floats, beside: Ints, mirror: Numbers, point: Floats) -> NDArray[np.bool_]:
+def _covered(
+    table: Floats, beside: Ints, mirror: MirrorNumbers, point: Floats
+) -> NDArray[np.bool_]:
     """Which points (h, w, 3) on numbered mirrors lie inside the sphere of one beside the edge."""
     inside = np.zeros(mirror.shape, dtype=np.bool_)
     for y in range(mirror.shape[0]):
@@ -200,7 +208,7 @@ def _reflect(
     pinhole: Floats,
     way: Floats,
     table: Floats,
-    mirror: Numbers,
+    mirror: MirrorNumbers,
     origin: Floats,
     direction: Floats,
 ) -> None:

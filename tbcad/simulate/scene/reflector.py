@@ -55,7 +55,9 @@ class Reflector:
         """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4)."""
         arcs, m = self.cells.arcs, len(self)
         which = np.broadcast_to(np.arange(len(arcs))[:, None], (len(arcs), len(ARC_SAMPLES)))
-        places = pixels_of(self.camera, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape)))
+        places = project_points(
+            self.camera, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape))
+        )
         low, high = np.full((m, 2), np.inf), np.full((m, 2), -np.inf)
         for faces in (arcs.left, arcs.right):
             mine = faces < m
@@ -107,16 +109,16 @@ def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
     return a, b
 
 
-def pixels_of(view: Camera, points: Floats) -> Floats:
+def project_points(view: Camera, points: Floats) -> Floats:
     """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
     ray = points - view.pinhole
     across = np.stack([view.right, np.cross(view.forward, view.right)])
     plane = (ray @ across.T) / (ray @ view.forward)[..., None]
     size = np.array([view.width_px, view.height_px])
-    result: Floats = plane / pitch(view) + (size - 1) / 2
+    result: Floats = plane / pixel_pitch(view) + (size - 1) / 2
     return result
 
 
-def pitch(view: Camera) -> float:
+def pixel_pitch(view: Camera) -> float:
     """Width of a pixel at unit distance."""
     return float(2 * view.half_sizes[0] / view.width_px)

@@ -8,10 +8,10 @@ from tbcad.simulate.scene.rays import unit_directions
 from tbcad.types import Floats
 
 # Room about the capture sphere in a picture.
-ROOM = 1.05
+FRAME_MARGIN = 1.05
 
 
-def viewpoint(
+def camera_around_object(
     azimuth: float,
     elevation: float,
     distance: float,
@@ -57,10 +57,10 @@ def _axes(azimuth: float, elevation: float) -> tuple[Floats, Floats]:
 
 
 def _fitting(sine: float, size: tuple[int, int]) -> float:
-    half = ROOM * np.tan(np.arcsin(sine)) * size[0] / min(size)
+    half = FRAME_MARGIN * np.tan(np.arcsin(sine)) * size[0] / min(size)
     return float(2 * np.arctan(half))
 
 
-def directions(view: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+def view_directions(view: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
     """Unit directions (h, w, 3) of all pixels."""
     return unit_directions(view, range(view.height_px), shift)

@@ -7,9 +7,9 @@ import numpy as np
 from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.pixels import virtual_cameras
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import Attempt, attempt, over, varied
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.sweep import DesignAttempt, for_each_n, spec_with, try_design
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
 from tbcad.spec.design import Spec
 from tbcad.types import Progress
@@ -40,19 +40,19 @@ def capture_area(
     scheduler: str | None = None,
 ) -> Study:
     """The study: coverage of flat and convex mirrors for every n."""
-    rows = over(partial(_of, spec), ns, progress, scheduler)
+    rows = for_each_n(partial(_of, spec), ns, progress, scheduler)
     table = Table("capture-area", COLUMNS, joined(rows), NOTES)
     summary = Table("capture-area-summary", SUMMARY, _summary(table))
     return Study("capture-area", summary, (table,), (_panel(table, spec),))
 
 
 def _of(spec: Spec, n: int) -> list[Cell]:
-    return _row(varied(spec, n=n))
+    return _row(spec_with(spec, n=n))
 
 
 def _row(spec: Spec) -> list[Cell]:
     wanted, n = spec.optics.capture_diameter_mm, spec.optics.n
-    tried = {rule: attempt(varied(spec, rule=rule)) for rule in RULES}
+    tried = {rule: try_design(spec_with(spec, rule=rule)) for rule in RULES}
     made = next((one.made for one in tried.values() if one.made), None)
     closed = None if made is None else _closed(made.halves[0])
     cameras = None if made is None else virtual_cameras(made.halves[0])
@@ -66,7 +66,7 @@ def _closed(half: MirrorArray) -> float:
     return float(2 * half.ellipsoid.camera_distance * np.sin(half.theta0.min()))
 
 
-def _measured(tried: Attempt, wanted: float) -> tuple[Cell, ...]:
+def _measured(tried: DesignAttempt, wanted: float) -> tuple[Cell, ...]:
     """Least, median, how many fall short (by more than rounding), and why there is none."""
     if tried.made is None:
         return None, None, None, tried.reason

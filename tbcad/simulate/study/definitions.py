@@ -4,8 +4,8 @@ import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, numbered_directions
 from tbcad.simulate.study.paper import claimed
-from tbcad.simulate.study.pixels import Sensor, counts, virtual_cameras
-from tbcad.simulate.study.sweep import attempt, varied
+from tbcad.simulate.study.pixels import Sensor, count_pixels, virtual_cameras
+from tbcad.simulate.study.sweep import spec_with, try_design
 from tbcad.simulate.study.tables import Cell, Table
 from tbcad.spec.design import Spec
 
@@ -28,7 +28,7 @@ def definitions(spec: Spec) -> Table:
     """Every reading of both figures for one design."""
     rows = _directions(spec)
     for name, rule, margin in RADII:
-        rows += _pixels(varied(spec, rule=rule, margin_mm=margin), name)
+        rows += _pixels(spec_with(spec, rule=rule, margin_mm=margin), name)
     return Table("resolution-definitions", COLUMNS, tuple(rows), NOTES)
 
 
@@ -46,7 +46,7 @@ def _directions(spec: Spec) -> list[tuple[Cell, ...]]:
 
 
 def _pixels(spec: Spec, radii: str) -> list[tuple[Cell, ...]]:
-    tried = attempt(spec)
+    tried = try_design(spec)
     if tried.made is None:
         return [("no design", radii, spec.optics.n, None, None, None, tried.reason)]
     found = _readings(spec, tried.made.halves[0])
@@ -55,7 +55,7 @@ def _pixels(spec: Spec, radii: str) -> list[tuple[Cell, ...]]:
 
 def _readings(spec: Spec, half: MirrorArray) -> dict[str, float]:
     sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
-    counted = counts(half, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    counted = count_pixels(half, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
     cameras = virtual_cameras(half)
     seen, on = float(counted.seen.sum()), float(counted.on.sum())
     return {

@@ -3,9 +3,9 @@
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import varied
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.sweep import spec_with
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
@@ -32,7 +32,7 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
     halves = {}
     for rule in RULES:
         progress(f"radii by rule {rule}")
-        halves[rule] = design(varied(spec, rule=rule)).halves[0]
+        halves[rule] = design(spec_with(spec, rule=rule)).halves[0]
     mirrors = Table("elevation", COLUMNS, _rows(halves, spec), NOTES)
     found = tuple(row for rule in RULES for row in _correlations(rule, halves[rule]))
     correlated = Table("elevation-correlation", CORRELATION, found)

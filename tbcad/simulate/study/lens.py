@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-AIRY = 2.44  # diameter of the Airy disc in wavelengths times F-number
+AIRY_FACTOR = 2.44  # diameter of the Airy disc in wavelengths times F-number
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Lens:
 
 
 @dataclass(frozen=True)
-class Range:
+class DepthRange:
     """Depths along the lens's axis that are to be sharp together, mm."""
 
     near: float
@@ -42,7 +42,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Stop:
+class ApertureStop:
     """What a stop does.
 
     Attributes:
@@ -77,12 +77,12 @@ def lens_for(
     return Lens(pixel, width_px * pixel / (2 * math.tan(hfov / 2)), wide_open, wavelength)
 
 
-def focal_length(lens: Lens, over: Range) -> float:
+def focal_length(lens: Lens, over: DepthRange) -> float:
     """Focal length with which the lens is in focus on the range: 1/f = 1/image + 1/focus, mm."""
     return 1 / (1 / lens.image + 1 / over.focus)
 
 
-def blur_limited(lens: Lens, over: Range, blur_px: float) -> float:
+def blur_limited(lens: Lens, over: DepthRange, blur_px: float) -> float:
     """Largest pupil whose blur circle is so many pixels at most, mm.
 
     A point at depth s before a lens in focus at D has a blur circle of pupil * image *
@@ -91,34 +91,34 @@ def blur_limited(lens: Lens, over: Range, blur_px: float) -> float:
     return min(2 * blur_px * lens.pixel / (lens.image * over.spread), _open(lens, over))
 
 
-def sharpest(lens: Lens, over: Range) -> float:
+def sharpest(lens: Lens, over: DepthRange) -> float:
     """Pupil with which blur circle and Airy disc together are least: there they are equal, mm.
 
     The blur is pupil * image * spread / 2, the disc 2.44 wavelength * image / pupil.
     """
-    return min(math.sqrt(2 * AIRY * lens.wavelength / over.spread), _open(lens, over))
+    return min(math.sqrt(2 * AIRY_FACTOR * lens.wavelength / over.spread), _open(lens, over))
 
 
-def _open(lens: Lens, over: Range) -> float:
+def _open(lens: Lens, over: DepthRange) -> float:
     return focal_length(lens, over) / lens.wide_open
 
 
-def stop(lens: Lens, over: Range, pupil: float) -> Stop:
+def aperture_stop(lens: Lens, over: DepthRange, pupil: float) -> ApertureStop:
     """What a pupil (mm) does to a range."""
-    return Stop(
+    return ApertureStop(
         pupil=pupil,
         f_number=focal_length(lens, over) / pupil,
         blur_px=pupil * lens.image * over.spread / 2 / lens.pixel,
-        airy_px=AIRY * lens.wavelength * lens.image / pupil / lens.pixel,
+        airy_px=AIRY_FACTOR * lens.wavelength * lens.image / pupil / lens.pixel,
         light=(pupil / _open(lens, over)) ** 2,
     )
 
 
-def stops(lens: Lens, over: Range, blur_px: float) -> dict[str, Stop]:
+def aperture_stops(lens: Lens, over: DepthRange, blur_px: float) -> dict[str, ApertureStop]:
     """The three stops that matter, by name."""
     pupils = {
         "wide open": _open(lens, over),
         "blur limited": blur_limited(lens, over, blur_px),
         "sharpest": sharpest(lens, over),
     }
-    return {name: stop(lens, over, pupil) for name, pupil in pupils.items()}
+    return {name: aperture_stop(lens, over, pupil) for name, pupil in pupils.items()}

@@ -10,13 +10,13 @@ from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.camera import fitted_camera
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 # Beyond this, one ray stands for a block of pixels: the paper's largest sensor, 8320 x 6208,
 # counted with 2080 x 1552 rays differs from all its pixels by less than 5e-5 of the count.
-MOST_RAYS = 4_000_000
+MAX_RAYS = 4_000_000
 LEAST_SIDE, LARGEST_SIDE = 16, 32_768
 
 
@@ -37,7 +37,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Counts:
+class PixelCounts:
     """Pixels of one camera's picture, over its m mirrors.
 
     Attributes:
@@ -53,7 +53,7 @@ class Counts:
     rays: int
 
 
-def sensor_of(text: str) -> Sensor:
+def parse_sensor(text: str) -> Sensor:
     """A sensor from text like 2080x1552.
 
     Raises:
@@ -70,9 +70,9 @@ def sensor_of(text: str) -> Sensor:
     )
 
 
-def counts(
-    half: MirrorArray, sensors: tuple[Sensor, ...], radius: float, most_rays: int = MOST_RAYS
-) -> list[Counts]:
+def count_pixels(
+    half: MirrorArray, sensors: tuple[Sensor, ...], radius: float, most_rays: int = MAX_RAYS
+) -> list[PixelCounts]:
     """Count the pixels of a camera with each sensor, the lens and mirrors as they are.
 
     Args:
@@ -82,7 +82,7 @@ def counts(
         most_rays: larger sensors are sampled by one ray for each square block of pixels, so that
             sensors of one shape may share their rays.
     """
-    traced: dict[tuple[int, int, float], Counts] = {}
+    traced: dict[tuple[int, int, float], PixelCounts] = {}
     found = []
     for sensor in sensors:
         width, height = _sampled(sensor, most_rays)
@@ -90,7 +90,7 @@ def counts(
         if key not in traced:
             traced[key] = _counted(half, sensor, (width, height), radius)
         one, scale = traced[key], (sensor.width_px / width) ** 2
-        found.append(Counts(one.on * scale, one.seen * scale, one.fill, one.rays))
+        found.append(PixelCounts(one.on * scale, one.seen * scale, one.fill, one.rays))
     return found
 
 
@@ -99,7 +99,9 @@ def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
     return -(-sensor.width_px // step), -(-sensor.height_px // step)
 
 
-def _counted(half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius: float) -> Counts:
+def _counted(
+    half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius: float
+) -> PixelCounts:
     """Counts of the rays themselves, through the middles of so many columns and rows."""
     corners = half.cells.corners
     full = fitted_camera(
@@ -107,12 +109,12 @@ def _counted(half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius
     )
     view = replace(full, width_px=sampled[0], height_px=sampled[1])
     on, seen = _traced(Reflector(half.camera_id, view, half.u, half.cells), radius)
-    return Counts(on, seen, full.fill(corners), sampled[0] * sampled[1])
+    return PixelCounts(on, seen, full.fill(corners), sampled[0] * sampled[1])
 
 
 def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
     """Rays on each mirror and those that go on to the capture sphere, each (m,)."""
-    trace, height, m = exact(at), at.camera.height_px, len(at)
+    trace, height, m = exact_tracer(at), at.camera.height_px, len(at)
     on, seen = np.zeros(m + 1), np.zeros(m + 1)
     for rows in row_bands(height):
         rays = trace(rows, CENTRE)

@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from tbcad.simulate.capture.light_field import in_memory
-from tbcad.simulate.capture.source import Geometry, cameras
+from tbcad.simulate.capture.geometry import Geometry, camera_photographs
+from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.shading import Scene, scene_of
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
-from tbcad.simulate.study.views import Round, scores, truths
+from tbcad.simulate.study.viewpoints import Viewpoints, ground_truths, view_quality
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method
-from tbcad.simulate.views.tiles import Tiles
 from tbcad.types import Floats, Progress
 
 COLUMNS = (
@@ -34,7 +34,7 @@ NOTES = (
 
 
 @dataclass(frozen=True)
-class Difference:
+class PairedDifference:
     """Paired differences of two series of views.
 
     Attributes:
@@ -53,21 +53,21 @@ class Difference:
         return self.low > 0 or self.high < 0
 
 
-def paired(one: Floats, other: Floats) -> Difference:
+def paired_difference(one: Floats, other: Floats) -> PairedDifference:
     """The other's values (v,) less the one's, and the interval of their mean (Student's t)."""
     apart = other - one
     mean = float(apart.mean())
     if len(apart) < 2:
-        return Difference(mean, -np.inf, np.inf)
+        return PairedDifference(mean, -np.inf, np.inf)
     error = float(apart.std(ddof=1) / np.sqrt(len(apart)))
     half = float(student.ppf((1 + LEVEL) / 2, len(apart) - 1)) * error
-    return Difference(mean, mean - half, mean + half)
+    return PairedDifference(mean, mean - half, mean + half)
 
 
-def stand_in(
+def prototype_vs_shell(
     export: Exported,
     subject: SceneObject,
-    places: Round,
+    places: Viewpoints,
     method: Method,
     samples: int = 3,
     progress: Progress = lambda _: None,
@@ -85,11 +85,11 @@ def stand_in(
     Raises:
         InputError: there is no prototype in the export.
     """
-    scene, views = scene_of(subject), places.views(export.capture_mm)
-    pictures = truths(scene, views, progress)
+    scene, views = prepared_scene(subject), places.views(export.capture_mm)
+    pictures = ground_truths(scene, views, progress)
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
     one, other = (
-        scores(_tiles(export, scene, kind, samples, progress), scene, views, pictures, method,
+        view_quality(_tiles(export, scene, kind, samples, progress), scene, views, pictures, method,
                progress)
         for kind in kinds
     )  # fmt: skip
@@ -105,15 +105,16 @@ def stand_in(
 
 def _tiles(
     export: Exported, scene: Scene, kind: Geometry, samples: int, progress: Progress
-) -> Tiles:
+) -> MirrorTiles:
     captured = {
-        at.camera_id: (at, bands()) for at, bands in cameras(export, scene, kind, samples, progress)
+        at.camera_id: (at, bands())
+        for at, bands in camera_photographs(export, scene, kind, samples, progress)
     }
-    return Tiles(in_memory(captured, export.capture_mm))
+    return MirrorTiles(light_field_in_memory(captured, export.capture_mm))
 
 
 def _summary(one: Floats, other: Floats) -> tuple[tuple[Cell, ...], ...]:
-    apart = paired(one[:, 1], other[:, 1])
+    apart = paired_difference(one[:, 1], other[:, 1])
     verdict = "significant" if apart.significant else "not significant"
     return (
         ("mean SSIM of the shell's views", "", float(one[:, 1].mean()), None, WHERE),
@@ -127,7 +128,7 @@ def _summary(one: Floats, other: Floats) -> tuple[tuple[Cell, ...], ...]:
     )
 
 
-def _panels(places: Round, one: Floats, other: Floats) -> tuple[Panel, ...]:
+def _panels(places: Viewpoints, one: Floats, other: Floats) -> tuple[Panel, ...]:
     elevation = places.elevation_deg
     pairs = (
         Series("shell", elevation - 0.7, one[:, 1], "C0."),

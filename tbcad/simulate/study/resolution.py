@@ -9,10 +9,10 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.definitions import definitions
 from tbcad.simulate.study.paper import claimed, claims
-from tbcad.simulate.study.pixels import Counts, Sensor, counts, virtual_cameras
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import attempt, over, varied
+from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels, virtual_cameras
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.sweep import for_each_n, spec_with, try_design
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
@@ -75,7 +75,7 @@ class Balance:
     nearest: int
 
 
-def ratio_of(text: str) -> Ratio:
+def parse_ratio(text: str) -> Ratio:
     """A ratio from text like 1:4.
 
     Raises:
@@ -142,7 +142,7 @@ def resolution(
         progress: told how far it has come.
         scheduler: address of a Dask scheduler; None for this machine's cores.
     """
-    found = over(partial(_of, spec, sensors), ns, progress, scheduler)
+    found = for_each_n(partial(_of, spec, sensors), ns, progress, scheduler)
     swept = Table("resolution", COLUMNS, joined(row for rows in found for row in rows), NOTES)
     balanced = Table(
         "resolution-balance",
@@ -158,23 +158,23 @@ def resolution(
 
 
 def _of(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[tuple[Cell, ...]]:
-    return _rows(varied(spec, n=n), sensors)
+    return _rows(spec_with(spec, n=n), sensors)
 
 
 def _rows(spec: Spec, sensors: tuple[Sensor, ...]) -> list[tuple[Cell, ...]]:
     """One n: a row for every sensor, or what a refusal says."""
-    tried, n = attempt(spec), spec.optics.n
+    tried, n = try_design(spec), spec.optics.n
     if tried.made is None:
         return [(n, s.width_px, s.height_px, *[None] * 7, tried.reason) for s in sensors]
     half, radius = tried.made.halves[0], spec.optics.capture_diameter_mm / 2
-    counted = counts(half, sensors, radius)
+    counted = count_pixels(half, sensors, radius)
     return [
         (n, s.width_px, s.height_px, *_cells(half, one), "")
         for s, one in zip(sensors, counted, strict=True)
     ]
 
 
-def _cells(half: MirrorArray, counted: Counts) -> tuple[Cell, ...]:
+def _cells(half: MirrorArray, counted: PixelCounts) -> tuple[Cell, ...]:
     cameras = virtual_cameras(half)
     # Both cameras' pictures are mirror images, pixel by pixel.
     seeing, on = (2 * float(x.sum()) for x in (counted.seen, counted.on))

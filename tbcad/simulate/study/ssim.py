@@ -8,20 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import linregress
 
-from tbcad.simulate.capture.light_field import NAME, LightField, write, writing
+from tbcad.simulate.capture.light_field import NAME, LightField, create_light_field, write_camera
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.scene.shading import Scene, scene_of
 from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import attempt, varied
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.sweep import spec_with, try_design
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
-from tbcad.simulate.study.views import Round, scores, truths
+from tbcad.simulate.study.viewpoints import Viewpoints, ground_truths, view_quality
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method
-from tbcad.simulate.views.tiles import Tiles
 from tbcad.spec.design import Spec
 from tbcad.types import Bytes, Floats, Progress
 
@@ -46,14 +46,14 @@ NOTES = (
 
 
 @dataclass(frozen=True)
-class Case:
+class SensorCase:
     """A sensor and the subdivision that goes with it."""
 
     sensor: Sensor
     n: int
 
 
-def cases(spec: Spec, sensors: tuple[Sensor, ...]) -> tuple[Case, ...]:
+def sensor_cases(spec: Spec, sensors: tuple[Sensor, ...]) -> tuple[SensorCase, ...]:
     """Sensors with their own n: mirrors grow with n^2, and are to grow with the pixels' root."""
     camera = spec.camera
     one = camera.width_px * camera.height_px
@@ -62,14 +62,14 @@ def cases(spec: Spec, sensors: tuple[Sensor, ...]) -> tuple[Case, ...]:
         times = float(sensor.width_px * sensor.height_px / one)
         return max(1, round(spec.optics.n * float(times**0.25)))
 
-    return tuple(Case(sensor, own(sensor)) for sensor in sensors)
+    return tuple(SensorCase(sensor, own(sensor)) for sensor in sensors)
 
 
 def ssim(
     spec: Spec,
     subject: SceneObject,
     sensors: tuple[Sensor, ...],
-    places: Round,
+    places: Viewpoints,
     method: Method,
     progress: Progress = lambda _: None,
 ) -> Study:
@@ -83,10 +83,10 @@ def ssim(
         method: how views are made.
         progress: told how far it has come.
     """
-    scene, views = scene_of(subject), places.views(spec.optics.capture_diameter_mm)
-    pictures = truths(scene, views, progress)
+    scene, views = prepared_scene(subject), places.views(spec.optics.capture_diameter_mm)
+    pictures = ground_truths(scene, views, progress)
     rows: list[tuple[Cell, ...]] = []
-    for case in cases(spec, sensors):
+    for case in sensor_cases(spec, sensors):
         rows += _rows(spec, case, scene, (places, pictures), method, progress)
     table = Table("ssim", COLUMNS, tuple(rows), (f"Object: {subject.name}; {method}.", *NOTES))
     means = Table("ssim-means", MEANS, _means(table, sensors))
@@ -97,17 +97,17 @@ def ssim(
 
 def _rows(
     spec: Spec,
-    case: Case,
+    case: SensorCase,
     scene: Scene,
-    wanted: tuple[Round, list[Bytes]],
+    wanted: tuple[Viewpoints, list[Bytes]],
     method: Method,
     progress: Progress,
 ) -> list[tuple[Cell, ...]]:
     places, pictures = wanted
     head = (case.sensor.width_px, case.sensor.height_px, case.n)
     keys = {"width_px": case.sensor.width_px, "height_px": case.sensor.height_px}
-    tried = attempt(
-        varied(spec, n=case.n).model_copy(update={"camera": spec.camera.model_copy(update=keys)})
+    tried = try_design(
+        spec_with(spec, n=case.n).model_copy(update={"camera": spec.camera.model_copy(update=keys)})
     )
     angles = zip(places.elevation_deg.tolist(), places.azimuth_deg.tolist(), strict=True)
     if tried.made is None:
@@ -116,11 +116,11 @@ def _rows(
     # A light field of the largest sensor is larger than memory should be: it goes to a file.
     with tempfile.TemporaryDirectory(prefix="tbcad-study-") as folder:
         file = Path(folder) / NAME
-        with writing(file, spec.optics.capture_diameter_mm, {}) as store:
+        with create_light_field(file, spec.optics.capture_diameter_mm, {}) as store:
             for at in reflectors(tried.made):
-                write(store, at, photograph(at.camera, exact(at), scene, 1, progress))
+                write_camera(store, at, photograph(at.camera, exact_tracer(at), scene, 1, progress))
         with LightField.open(file) as source:
-            found = scores(Tiles(source), scene, views, pictures, method, progress)
+            found = view_quality(MirrorTiles(source), scene, views, pictures, method, progress)
     return [(*head, *angle, *pair, "") for angle, pair in zip(angles, found.tolist(), strict=True)]
 
 

@@ -13,11 +13,11 @@ from tbcad.types import Progress
 
 Result = TypeVar("Result")
 
-LARGEST_N = 60
+MAX_N = 60
 
 
 @dataclass(frozen=True)
-class Attempt:
+class DesignAttempt:
     """A design, or why there is none.
 
     Attributes:
@@ -29,15 +29,15 @@ class Attempt:
     reason: str = ""
 
 
-def attempt(spec: Spec) -> Attempt:
+def try_design(spec: Spec) -> DesignAttempt:
     """The design of a spec, or why there is none: a study goes on without it."""
     try:
-        return Attempt(design(spec))
+        return DesignAttempt(design(spec))
     except SpecError as error:
-        return Attempt(None, str(error))
+        return DesignAttempt(None, str(error))
 
 
-def varied(
+def spec_with(
     spec: Spec, n: int | None = None, rule: str | None = None, margin_mm: float | None = None
 ) -> Spec:
     """The spec with another subdivision, radius rule or margin."""
@@ -50,21 +50,21 @@ def _with(section: Any, **keys: object) -> Any:
     return section.model_copy(update={k: v for k, v in keys.items() if v is not None})
 
 
-def numbers(first: int, last: int) -> range:
+def n_range(first: int, last: int) -> range:
     """The subdivisions of a sweep, both ends included.
 
     Raises:
         InputError: there are none, or no design may have them.
     """
-    if not 1 <= first <= last <= LARGEST_N:
+    if not 1 <= first <= last <= MAX_N:
         raise InputError(
-            f"n from {first} to {last}: allowed is 1 to {LARGEST_N}, the first no more than the "
+            f"n from {first} to {last}: allowed is 1 to {MAX_N}, the first no more than the "
             "last: change --from or --to"
         )
     return range(first, last + 1)
 
 
-def over(
+def for_each_n(
     work: Callable[[int], Result],
     ns: range,
     progress: Progress,

@@ -10,14 +10,14 @@ between each other, and together they are finer than one of them.
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.compiled import compiled, in_threads
+from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
-    SPARSE,
-    Sheaf,
-    candidates,
-    distance,
+    SAMPLED_RAY_STEP,
+    RayBundle,
+    candidate_mirrors,
     greedy_descent,
-    pieces,
+    ray_chunks,
+    squared_distance,
 )
 from tbcad.types import Bytes, Floats, Ints
 
@@ -27,8 +27,8 @@ CAMERAS = 6
 SIGMA_PX = 0.2
 
 
-def blend(
-    sheaf: Sheaf, wanted: Floats, depth: Floats, limit: float
+def blend_cameras(
+    sheaf: RayBundle, wanted: Floats, depth: Floats, limit: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Colours of wanted rays, and which were seen.
 
@@ -46,7 +46,7 @@ def blend(
         arrays = sheaf.points, sheaf.tiles, sheaf.meeting, sheaf.colour
         return _blend(*arrays, wanted[part], depth[part], limit)
 
-    result = np.concatenate([np.zeros((0, 4)), *in_threads(mixed, pieces(len(wanted)))])
+    result = np.concatenate([np.zeros((0, 4)), *in_threads(mixed, ray_chunks(len(wanted)))])
     return result[:, :3], result[:, 3] > 0
 
 
@@ -60,7 +60,7 @@ def _blend(
     depth: Floats,
     limit: float,
 ) -> Floats:
-    near = candidates(meeting, wanted, limit, SPARSE)
+    near = candidate_mirrors(meeting, wanted, limit, SAMPLED_RAY_STEP)
     last = tiles[:, 3].copy()
     result = np.zeros((len(wanted), 4))
     chosen, angle = np.empty(CAMERAS + 1, dtype=np.int64), np.empty(CAMERAS + 1)
@@ -73,7 +73,7 @@ def _blend(
             if k < 0 or weight <= 0:
                 continue
             last[k] = greedy_descent(points, tiles[k], last[k], ray, z, 0.0)
-            if distance(points, last[k], ray, z, 0.0) <= limit**2:
+            if squared_distance(points, last[k], ray, z, 0.0) <= limit**2:
                 _lend(points, tiles[k], colour, last[k], ray, z, weight, result[i])
         if result[i, 3] > 0:
             for c in range(3):
@@ -128,7 +128,7 @@ def _lend(
     for y in range(max(row - 1, 0), min(row + 2, height)):
         for x in range(max(column - 1, 0), min(column + 2, width)):
             other = first + y * width + x
-            away = distance(points, other, ray, depth, 0.0)
+            away = squared_distance(points, other, ray, depth, 0.0)
             if np.isnan(away):
                 continue
             share = weight * np.exp(-away / width_of_bell)
@@ -151,6 +151,6 @@ def _pitch(points: Floats, tile: Ints, pixel: int, depth: float) -> float:
         (width, row + 1 < height),
     ):
         if there and not np.isnan(points[pixel + step, 0]):
-            total += distance(points, pixel + step, own, depth, 0.0)
+            total += squared_distance(points, pixel + step, own, depth, 0.0)
             count += 1
     return total / count if count > 0 else 1.0

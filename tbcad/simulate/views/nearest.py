@@ -5,33 +5,35 @@ tests/simulate/test_nearest.py compares with a four-dimensional k-d tree over al
 
 import numpy as np
 
-from tbcad.simulate.compiled import compiled, in_threads
+from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
-    SPARSE,
-    Sheaf,
-    candidates,
-    distance,
+    SAMPLED_RAY_STEP,
+    RayBundle,
+    candidate_mirrors,
     greedy_descent,
-    pieces,
+    ray_chunks,
+    squared_distance,
 )
 from tbcad.types import Floats, Ints
 
 # Wanted rays in a row that are so near to each other that a few mirrors do for all of them.
-RUN = 64
+RAYS_PER_RUN = 64
 
 
-def nearest(sheaf: Sheaf, wanted: Floats, limit: float) -> Ints:
+def nearest_rays(sheaf: RayBundle, wanted: Floats, limit: float) -> Ints:
     """Packed pixel (n,) nearest to each wanted point (n, 4) of the slab; -1 beyond a limit, mm."""
 
     def found(part: slice) -> Ints:
         return _nearest(sheaf.points, sheaf.tiles, sheaf.meeting, wanted[part], limit)
 
-    return np.concatenate([np.zeros(0, dtype=np.int64), *in_threads(found, pieces(len(wanted)))])
+    return np.concatenate(
+        [np.zeros(0, dtype=np.int64), *in_threads(found, ray_chunks(len(wanted)))]
+    )
 
 
 @compiled
 def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit: float) -> Ints:
-    about = candidates(meeting, wanted, limit, SPARSE)
+    about = candidate_mirrors(meeting, wanted, limit, SAMPLED_RAY_STEP)
     near, likely = about, -1
     last = tiles[:, 3].copy()
     # How near each mirror came, or may have come, when last asked, and how far the wanted rays have
@@ -40,8 +42,8 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
     found = np.full(len(wanted), -1, dtype=np.int64)
     for i in range(len(wanted)):
         ray = wanted[i]
-        if i % RUN == 0:
-            near = about[candidates(meeting[about], wanted[i : i + RUN], limit, 4)]
+        if i % RAYS_PER_RUN == 0:
+            near = about[candidate_mirrors(meeting[about], wanted[i : i + RAYS_PER_RUN], limit, 4)]
         if i > 0:
             step = 0.0
             for j in range(4):
@@ -57,7 +59,7 @@ def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit
                 came[k] = least + way
                 continue
             last[k] = greedy_descent(points, tiles[k], last[k], ray, 0.0, 1.0)
-            away = np.sqrt(distance(points, last[k], ray, 0.0, 1.0))
+            away = np.sqrt(squared_distance(points, last[k], ray, 0.0, 1.0))
             came[k] = away + way
             if away < best:
                 best, found[i] = away, last[k]

@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.compiled import compiled
-from tbcad.simulate.views.tiles import Packed
-from tbcad.simulate.views.two_plane import Slab
+from tbcad.simulate.parallel import compiled
+from tbcad.simulate.views.mirror_tiles import PackedTiles
+from tbcad.simulate.views.two_plane import TwoPlane
 from tbcad.types import Floats, Ints
 
 # Wanted rays that go through the loops together: neighbours, so that few mirrors are near.
-RAYS_A_PIECE = 1 << 11
+RAYS_PER_CHUNK = 1 << 11
 # One wanted ray of so many tells which mirrors are near a piece of them.
-SPARSE = 31
+SAMPLED_RAY_STEP = 31
 
 
 @dataclass(frozen=True)
-class Sheaf:
+class RayBundle:
     """Packed rays of k mirrors as points of one slab.
 
     Attributes:
@@ -41,22 +41,22 @@ class Sheaf:
     colour: NDArray[np.uint8]
 
 
-def sheaf_of(slab: Slab, packed: Packed) -> Sheaf:
+def ray_bundle(slab: TwoPlane, packed: PackedTiles) -> RayBundle:
     """Rays of tiles in a slab."""
     points = slab.points(packed.origin, packed.direction, packed.valid)
     place = slab.place(packed.pinhole) / [1, 1, slab.scale]
     start = np.where(np.isnan(points[packed.middle, 0]), -1, packed.middle)
     tiles = np.column_stack([packed.first, packed.shape, start])
-    return Sheaf(points, tiles, np.column_stack([place, packed.spread]), packed.colour)
+    return RayBundle(points, tiles, np.column_stack([place, packed.spread]), packed.colour)
 
 
-def pieces(count: int) -> list[slice]:
+def ray_chunks(count: int) -> list[slice]:
     """Slices of so many wanted rays that go through the loops together."""
-    return [slice(k, k + RAYS_A_PIECE) for k in range(0, count, RAYS_A_PIECE)]
+    return [slice(k, k + RAYS_PER_CHUNK) for k in range(0, count, RAYS_PER_CHUNK)]
 
 
 @compiled
-def candidates(meeting: Floats, wanted: Floats, limit: float, step: int) -> Ints:
+def candidate_mirrors(meeting: Floats, wanted: Floats, limit: float, step: int) -> Ints:
     """Mirrors (c,) whose rays may be within a limit of wanted ones that are neighbours.
 
     Args:
@@ -82,7 +82,9 @@ def candidates(meeting: Floats, wanted: Floats, limit: float, step: int) -> Ints
 
 
 @compiled
-def distance(points: Floats, pixel: int, wanted: Floats, depth: float, slopes: float) -> float:
+def squared_distance(
+    points: Floats, pixel: int, wanted: Floats, depth: float, slopes: float
+) -> float:
     """Squared distance of a pixel's ray from a wanted one; NaN where there is no ray.
 
     At a depth (over s) and, with that weight, of their slopes: depth 0 and weight 1 make it the
@@ -100,7 +102,7 @@ def greedy_descent(
 ) -> int:
     """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""
     first, height, width = tile[0], tile[1], tile[2]
-    best = distance(points, start, wanted, depth, slopes)
+    best = squared_distance(points, start, wanted, depth, slopes)
     pixel = start
     while True:
         y, x = divmod(pixel - first, width)
@@ -108,7 +110,7 @@ def greedy_descent(
         for row in range(max(y - 1, 0), min(y + 2, height)):
             for column in range(max(x - 1, 0), min(x + 2, width)):
                 other = first + row * width + column
-                away = distance(points, other, wanted, depth, slopes)
+                away = squared_distance(points, other, wanted, depth, slopes)
                 if away < best:  # never so for NaN
                     best, moved = away, other
         if moved == pixel:

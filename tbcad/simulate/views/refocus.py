@@ -7,11 +7,18 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.simulate.compiled import THREADS, in_threads
+from tbcad.simulate.parallel import THREADS, in_threads
 from tbcad.simulate.scene.rays import unit_directions
-from tbcad.simulate.views.synthesis import Colours, Picture, Rays, colours, gather, reach
-from tbcad.simulate.views.tiles import Tiles
-from tbcad.simulate.views.two_plane import slab_along
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import (
+    Colours,
+    Rays,
+    SynthesisedView,
+    nearby_rays,
+    ray_colours,
+    search_radius,
+)
+from tbcad.simulate.views.two_plane import two_plane_along
 from tbcad.types import Bools, Floats, Progress
 
 # The paper's 69 pinholes: so many points of a square lattice lie within this radius in its steps.
@@ -46,7 +53,7 @@ class Focus:
             )
 
 
-def pinholes() -> Floats:
+def lens_pinholes() -> Floats:
     """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them."""
     reach = int(np.sqrt(LATTICE_RADIUS2))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
@@ -55,7 +62,7 @@ def pinholes() -> Floats:
     return places
 
 
-def rays_through(
+def lens_rays(
     view: Camera, focus: Focus, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
 ) -> Rays:
     """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
@@ -76,7 +83,7 @@ def rays_through(
     return np.broadcast_to(start, way.shape), way
 
 
-def refocus(tiles: Tiles, view: Camera, focus: Focus) -> Picture:
+def refocus(tiles: MirrorTiles, view: Camera, focus: Focus) -> SynthesisedView:
     """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
     Args:
@@ -87,17 +94,17 @@ def refocus(tiles: Tiles, view: Camera, focus: Focus) -> Picture:
     Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
     the mean is of the others.
     """
-    points = pinholes() * focus.aperture_mm / 2
-    slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
+    points = lens_pinholes() * focus.aperture_mm / 2
+    slab = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     edge = [_meeting(tiles, view, focus, place) for place in _outermost(points)]
     corners = [np.concatenate(part) for part in zip(*(rays for rays, _ in edge), strict=True)]
-    near = gather(tiles, slab, (corners[0], corners[1]), reach(tiles))
+    near = nearby_rays(tiles, slab, (corners[0], corners[1]), search_radius(tiles))
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
 
     def one(place: Floats) -> tuple[Bools, Colours, Bools]:
         rays, meets = _meeting(tiles, view, focus, place)
-        return meets, *colours(near, rays)
+        return meets, *ray_colours(near, rays)
 
     for first in range(0, len(points), 2 * THREADS):
         for meets, found, seen in in_threads(one, points[first : first + 2 * THREADS]):
@@ -105,11 +112,15 @@ def refocus(tiles: Tiles, view: Camera, focus: Focus) -> Picture:
             count += ~meets
             count[meets] += seen
     mean = total / np.maximum(count, 1)[..., None]
-    return Picture(mean.astype(np.float32), count > 0)
+    return SynthesisedView(mean.astype(np.float32), count > 0)
 
 
 def refocus_sweep(
-    tiles: Tiles, view: Camera, aperture_mm: float, count: int, progress: Progress = lambda _: None
+    tiles: MirrorTiles,
+    view: Camera,
+    aperture_mm: float,
+    count: int,
+    progress: Progress = lambda _: None,
 ) -> list[NDArray[np.uint8]]:
     """Pictures (h, w, 3) focused on planes from the back of the capture sphere to its front."""
     half = tiles.source.capture_mm / 2
@@ -120,9 +131,9 @@ def refocus_sweep(
     return pictures
 
 
-def _meeting(tiles: Tiles, view: Camera, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
+def _meeting(tiles: MirrorTiles, view: Camera, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
     """Rays from a place on the lens that meet the capture sphere (n, 3), and which, (h, w)."""
-    origin, way = rays_through(view, focus, place)
+    origin, way = lens_rays(view, focus, place)
     start = origin[0, 0]
     along = np.einsum("hwx,x->hw", way, start)  # BLAS rounds by its own number of threads
     meets: Bools = start @ start - along**2 <= (tiles.source.capture_mm / 2) ** 2

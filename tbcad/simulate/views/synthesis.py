@@ -8,28 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.compiled import compiled
-from tbcad.simulate.scene.viewpoint import directions
-from tbcad.simulate.views.blend import blend
-from tbcad.simulate.views.nearest import nearest
-from tbcad.simulate.views.ray_bundle import Sheaf, candidates, sheaf_of
-from tbcad.simulate.views.tiles import Tiles
-from tbcad.simulate.views.two_plane import Slab, slab_along
+from tbcad.simulate.parallel import compiled
+from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.views.blend import blend_cameras
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.nearest import nearest_rays
+from tbcad.simulate.views.ray_bundle import RayBundle, candidate_mirrors, ray_bundle
+from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Bools, Floats
 
 Colours = NDArray[np.float32]
 Method = Literal["nearest", "blend"]
 Rays = tuple[Floats, Floats]
 """Origins and unit directions, (n, 3) each."""
-Depth = Callable[[Floats, Floats], Floats]
+DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
 
 # One wanted ray of so many tells which mirrors are near.
-SPARSE = 601
+VIEW_RAY_STEP = 601
 
 
 @dataclass(frozen=True)
-class Picture:
+class SynthesisedView:
     """A picture made from a light field.
 
     Attributes:
@@ -47,8 +47,8 @@ class Picture:
 
 
 def synthesise(
-    tiles: Tiles, view: Camera, method: Method = "nearest", depth: Depth | None = None
-) -> Picture:
+    tiles: MirrorTiles, view: Camera, method: Method = "nearest", depth: DepthFunction | None = None
+) -> SynthesisedView:
     """The picture that a pinhole camera would see.
 
     Args:
@@ -58,21 +58,23 @@ def synthesise(
         depth: the surface that a blend takes the object for; without, the plane through the
             origin that faces the camera.
     """
-    way = directions(view)
+    way = view_directions(view)
     meets = _meets(view.pinhole, way, tiles.source.capture_mm / 2)
     origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
-    slab = slab_along(view.forward, view.right, tiles.source.capture_mm)
+    slab = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     rays = (origin, way[meets])
-    found, seen = colours(gather(tiles, slab, rays, reach(tiles)), rays, method, depth)
+    found, seen = ray_colours(
+        nearby_rays(tiles, slab, rays, search_radius(tiles)), rays, method, depth
+    )
     if not seen.all():
         rest = (origin[~seen], rays[1][~seen])
-        wide = gather(tiles, slab, rest, horizon(tiles))
-        found[~seen], seen[~seen] = colours(wide, rest, method, depth)
+        wide = nearby_rays(tiles, slab, rest, horizon_search_radius(tiles))
+        found[~seen], seen[~seen] = ray_colours(wide, rest, method, depth)
     colour = np.zeros(way.shape, dtype=np.float32)
     colour[meets] = found
     every = ~meets
     every[meets] = seen
-    return Picture(colour, every)
+    return SynthesisedView(colour, every)
 
 
 @compiled
@@ -89,7 +91,7 @@ def _meets(pinhole: Floats, way: Floats, radius: float) -> Bools:
 
 
 @dataclass(frozen=True)
-class Gathered:
+class NearbyRays:
     """The captured rays that may be near some wanted ones.
 
     Attributes:
@@ -98,34 +100,34 @@ class Gathered:
         limit: how far from a wanted ray a captured one may be, mm.
     """
 
-    slab: Slab
-    sheaf: Sheaf | None
+    slab: TwoPlane
+    sheaf: RayBundle | None
     limit: float
 
 
-def gather(tiles: Tiles, slab: Slab, rays: Rays, limit: float) -> Gathered:
+def nearby_rays(tiles: MirrorTiles, slab: TwoPlane, rays: Rays, limit: float) -> NearbyRays:
     """The captured rays that may be within a limit (mm) of wanted ones."""
     packed = tiles.packed(_near(tiles, slab, slab.points(*rays), limit))
-    return Gathered(slab, None if packed is None else sheaf_of(slab, packed), limit)
+    return NearbyRays(slab, None if packed is None else ray_bundle(slab, packed), limit)
 
 
-def colours(
-    near: Gathered, rays: Rays, method: Method = "nearest", depth: Depth | None = None
+def ray_colours(
+    near: NearbyRays, rays: Rays, method: Method = "nearest", depth: DepthFunction | None = None
 ) -> tuple[Colours, Bools]:
     """Colours (n, 3) of wanted rays, and which of them were seen, (n,)."""
     wanted = near.slab.points(*rays)
     if near.sheaf is None:
         return np.zeros((len(wanted), 3), dtype=np.float32), np.zeros(len(wanted), dtype=bool)
     if method == "nearest":
-        found = nearest(near.sheaf, wanted, near.limit)
+        found = nearest_rays(near.sheaf, wanted, near.limit)
         seen = found >= 0
         return np.where(seen[:, None], near.sheaf.colour[found], np.float32(0)), seen
     at = _depths(near.slab, rays, depth) / near.slab.scale
-    mixed, seen = blend(near.sheaf, wanted, at, near.limit)
+    mixed, seen = blend_cameras(near.sheaf, wanted, at, near.limit)
     return mixed.astype(np.float32), seen
 
 
-def reach(tiles: Tiles) -> float:
+def search_radius(tiles: MirrorTiles) -> float:
     """How far from a wanted ray a captured one is at most, in the slab, mm.
 
     As far as neighbouring virtual cameras are apart, evenly spread over the hemisphere, and
@@ -138,7 +140,7 @@ def reach(tiles: Tiles) -> float:
     return float(angle * capture / 2 / np.sqrt(3) + pixel)
 
 
-def horizon(tiles: Tiles) -> float:
+def horizon_search_radius(tiles: MirrorTiles) -> float:
     """The same for rays from the horizon, which may pass a capture radius below all mirrors, mm.
 
     A ray that passes the meeting point of a mirror's rays at distance e, at depth L, is
@@ -149,7 +151,7 @@ def horizon(tiles: Tiles) -> float:
     return radius / float(np.sqrt(1 + 3 * (depth / radius) ** 2))
 
 
-def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.int64]:
+def _near(tiles: MirrorTiles, slab: TwoPlane, wanted: Floats, limit: float) -> NDArray[np.int64]:
     """Mirrors (k,) whose rays may be within the limit of wanted ones (n, 4), by their apices."""
     place = slab.place(tiles.apex) / [1, 1, slab.scale]
     behind = np.flatnonzero(place[:, 2] < 0)
@@ -157,10 +159,10 @@ def _near(tiles: Tiles, slab: Slab, wanted: Floats, limit: float) -> NDArray[np.
     if len(kept) == 0:
         return behind[:0]
     meeting = np.column_stack([place[behind], tiles.width[behind]])
-    return behind[candidates(meeting, kept, limit, SPARSE)]
+    return behind[candidate_mirrors(meeting, kept, limit, VIEW_RAY_STEP)]
 
 
-def _depths(slab: Slab, rays: Rays, depth: Depth | None) -> Floats:
+def _depths(slab: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:
     """Where rays meet the surface, along the slab's direction, mm; on the plane where they miss."""
     origin, direction = rays
     if depth is None:

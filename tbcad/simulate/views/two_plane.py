@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.compiled import compiled, in_threads
+from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.types import Floats
 
 # A ray at more than this to the direction has no place in its slab.
-LEAST_COSINE = 0.2
-RAYS_A_PIECE = 1 << 17
+MIN_COSINE = 0.2
+RAYS_PER_CHUNK = 1 << 17
 
 
 @dataclass(frozen=True)
-class Slab:
+class TwoPlane:
     """A direction to look along.
 
     Attributes:
@@ -54,7 +54,9 @@ class Slab:
             marks = there if valid is None else valid[part]
             _points(axes, self.scale, starts[part], ways[part], marks, result[part])
 
-        in_threads(some, [slice(k, k + RAYS_A_PIECE) for k in range(0, len(ways), RAYS_A_PIECE)])
+        in_threads(
+            some, [slice(k, k + RAYS_PER_CHUNK) for k in range(0, len(ways), RAYS_PER_CHUNK)]
+        )
         return result
 
     def place(self, points: Floats) -> Floats:
@@ -62,10 +64,10 @@ class Slab:
         return np.asarray(points @ self.axes.T)
 
 
-def slab_along(forward: Floats, right: Floats, capture_mm: float) -> Slab:
+def two_plane_along(forward: Floats, right: Floats, capture_mm: float) -> TwoPlane:
     """The slab of a view along `forward`, whose rows run along `right`."""
     axes = np.stack([right, np.cross(forward, right), forward])
-    return Slab(axes, capture_mm / 2 / np.sqrt(3))
+    return TwoPlane(axes, capture_mm / 2 / np.sqrt(3))
 
 
 @compiled
@@ -85,7 +87,7 @@ def _points(
         for j in range(3):
             depth += axes[2, j] * origin[i, j]
             speed += axes[2, j] * direction[i, j]
-        if speed < LEAST_COSINE:
+        if speed < MIN_COSINE:
             result[i] = np.nan
             continue
         for k in range(2):

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tbcad.simulate.compiled import in_threads
+from tbcad.simulate.parallel import in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel

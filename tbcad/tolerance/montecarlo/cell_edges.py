@@ -18,7 +18,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.simulate.compiled import compiled
+from tbcad.simulate.parallel import compiled
 from tbcad.types import Bools, Floats, Ints
 
 # Samples of each edge, first over all of it, then about the least; a parabola does the rest.

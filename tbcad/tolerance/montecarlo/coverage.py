@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.simulate.scene.reflector import pitch
+from tbcad.simulate.scene.reflector import pixel_pitch
 from tbcad.tolerance.montecarlo.cell_edges import trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, places, tables
@@ -37,7 +37,7 @@ def seen(half: EdgeModel, draws: Draws) -> Seen:
         found[machine] = trace_cell_edges(
             table, near.pair, near.offset, near.face, near.reach, half.halved, place, half.screen
         )
-    area = np.abs(found[..., 2]) * (draws.focal[:, None] / pitch(half.view)) ** 2
+    area = np.abs(found[..., 2]) * (draws.focal[:, None] / pixel_pitch(half.view)) ** 2
     return Seen(2 * np.sqrt(found[..., 0]), found[..., 1].astype(np.int64), area)
 
 

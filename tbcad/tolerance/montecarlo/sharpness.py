@@ -11,14 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.capture.light_field import Frame, LightField, in_memory
+from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
-from tbcad.simulate.scene.shading import Scene
-from tbcad.simulate.study.views import scores
+from tbcad.simulate.study.viewpoints import view_quality
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method
-from tbcad.simulate.views.tiles import Tiles
 from tbcad.tolerance.montecarlo.draws import Draws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -138,8 +138,8 @@ def _view(view: Camera, draws: Draws, machine: int) -> Camera:
 
 
 def _captured(cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float) -> LightField:
-    both = {at.camera_id: (at, photograph(at.camera, exact(at), scene)) for at in cameras}
-    return in_memory(both, capture_mm)
+    both = {at.camera_id: (at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras}
+    return light_field_in_memory(both, capture_mm)
 
 
 def _with_rays(taken: LightField, known: LightField) -> LightField:
@@ -177,5 +177,7 @@ def _turned(frame: Frame, left: float, generator: np.random.Generator) -> dict[s
 
 def _ssim(source: LightField, scene: Scene, wanted: Wanted, method: Method) -> Floats:
     """SSIM of each view, (v,)."""
-    found = scores(Tiles(source), scene, wanted.views, wanted.truths, method, lambda _: None)
+    found = view_quality(
+        MirrorTiles(source), scene, wanted.views, wanted.truths, method, lambda _: None
+    )
     return found[:, 1]

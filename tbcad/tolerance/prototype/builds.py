@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.simulate.compiled import in_threads
+from tbcad.simulate.parallel import in_threads
 from tbcad.tolerance.montecarlo.builds import Covered, batches, joined
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.prototype.draws import draw

@@ -4,7 +4,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.simulate.compiled import compiled
+from tbcad.simulate.parallel import compiled
 from tbcad.types import Floats, Ints
 
 # Steps to the point of a ball that shows the object's middle, and what of a cosine may be left.

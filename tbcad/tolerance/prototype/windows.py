@@ -17,7 +17,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.trace import reflected
 from tbcad.optics.windows import cell_windows, rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.prototype.run import Run, runs
+from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw
@@ -78,14 +78,14 @@ class Designed:
 
 def designed(reflectors: tuple[Reflector, Reflector], plan: Plan) -> Designed:
     """What the fast model needs of both cameras and the plan."""
-    a, b = runs(reflectors, plan)
+    a, b = prototype_runs(reflectors, plan)
     view = reflectors[0].camera
     axes = np.stack([view.right, np.cross(view.forward, view.right), view.forward])
     both = _windowed(a, axes), _windowed(b, axes * HALF_TURN)
     return Designed(view.pinhole, axes, plan, both, _virtual(*both))
 
 
-def _windowed(run: Run, axes: Floats) -> Windowed:
+def _windowed(run: PrototypeRun, axes: Floats) -> Windowed:
     sides, m = cell_windows(run.at.cells, run.view.pinhole), len(run.at)
     order = np.argsort(sides.mirror, kind="stable")
     mirror = sides.mirror[order]

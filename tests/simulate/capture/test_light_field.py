@@ -7,19 +7,25 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.simulate.capture.light_field import PLANES, SCHEMA, LightField, write, writing
+from tbcad.simulate.capture.light_field import (
+    PIXEL_ARRAYS,
+    SCHEMA,
+    LightField,
+    create_light_field,
+    write_camera,
+)
 from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.shading import Scene
 
 Cameras = tuple[Reflector, Reflector]
 
 
 def written(path: Path, cameras: Cameras, scene: Scene) -> Path:
-    with writing(path, 60.0, {"object": "knot"}) as store:
+    with create_light_field(path, 60.0, {"object": "knot"}) as store:
         for at in cameras:
-            write(store, at, photograph(at.camera, exact(at), scene))
+            write_camera(store, at, photograph(at.camera, exact_tracer(at), scene))
     return path
 
 
@@ -35,7 +41,7 @@ def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: Light
         assert len(source) == len(light_field)
         for at, frame in zip(cameras, source.frames.values(), strict=True):
             memory = light_field.frames[at.camera_id]
-            for name in PLANES:
+            for name in PIXEL_ARRAYS:
                 assert np.array_equal(frame.planes[name][:], memory.planes[name])
             assert np.array_equal(frame.u, at.u)
             assert np.array_equal(frame.boxes, at.boxes())
@@ -75,7 +81,7 @@ def test_compressed_and_the_same_each_time(
 ) -> None:
     again = written(tmp_path / "again.h5", cameras, knot)
     assert again.read_bytes() == file.read_bytes()
-    raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PLANES.values())
+    raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PIXEL_ARRAYS.values())
     assert file.stat().st_size < 0.8 * 2 * 416 * 310 * raw
 
 

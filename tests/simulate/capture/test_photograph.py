@@ -8,20 +8,20 @@ import trimesh
 
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.simulate.capture.photograph import Tracer, photograph, shifts
+from tbcad.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
 from tbcad.simulate.scene.exported import Exported
-from tbcad.simulate.scene.facets import on_mesh, read_shells
-from tbcad.simulate.scene.object import built_in
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.shading import Scene, look, scene_of
+from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tests.helpers import mesh_of
 
 Cameras = tuple[Reflector, Reflector]
 
 
 def picture(at: Reflector, scene: Scene, samples: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    bands = list(photograph(at.camera, exact(at), scene, samples))
+    bands = list(photograph(at.camera, exact_tracer(at), scene, samples))
     return (
         np.concatenate([band.colour for band in bands]),
         np.concatenate([band.rays.mirror for band in bands]),
@@ -31,8 +31,8 @@ def picture(at: Reflector, scene: Scene, samples: int = 1) -> tuple[np.ndarray, 
 def test_a_pixel_sees_what_its_ray_sees(cameras: Cameras, knot: Scene) -> None:
     at = cameras[0]
     colour, mirror = picture(at, knot)
-    rays = exact(at)(range(at.camera.height_px), (0.0, 0.0))
-    seen = look(knot, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    rays = exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0))
+    seen = cast_rays(knot, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
     on = mirror.ravel() > 0
     assert np.array_equal(np.rint(seen.colour[on]), colour.reshape(-1, 3)[on])
     assert colour.reshape(-1, 3)[on].any(axis=1).sum() > 1000
@@ -61,7 +61,7 @@ def test_anti_aliasing_is_the_mean_of_finer_pixels(cameras: Cameras, knot: Scene
         np.concatenate(
             [band.colour for band in photograph(at.camera, _shifted(at, shift), knot)]
         ).astype(float)
-        for shift in shifts(2)
+        for shift in subpixel_shifts(2)
     ]
     smooth, mirror = picture(at, knot, 2)
     on = mirror > 0
@@ -72,19 +72,24 @@ def test_anti_aliasing_is_the_mean_of_finer_pixels(cameras: Cameras, knot: Scene
 
 
 def _shifted(at: Reflector, shift: tuple[float, float]) -> Tracer:
-    trace = exact(at)
+    trace = exact_tracer(at)
     return lambda rows, _: trace(rows, shift)
 
 
 def test_places_in_a_pixel_are_even() -> None:
-    assert shifts(1) == [(0.0, 0.0)]
-    assert sorted(shifts(2)) == [(-0.25, -0.25), (-0.25, 0.25), (0.25, -0.25), (0.25, 0.25)]
-    assert np.mean(shifts(5), axis=0) == pytest.approx([0, 0])
+    assert subpixel_shifts(1) == [(0.0, 0.0)]
+    assert sorted(subpixel_shifts(2)) == [
+        (-0.25, -0.25),
+        (-0.25, 0.25),
+        (0.25, -0.25),
+        (0.25, 0.25),
+    ]
+    assert np.mean(subpixel_shifts(5), axis=0) == pytest.approx([0, 0])
 
 
 def test_progress_is_told(cameras: Cameras, knot: Scene) -> None:
     said: list[str] = []
-    list(photograph(cameras[0].camera, exact(cameras[0]), knot, 1, said.append))
+    list(photograph(cameras[0].camera, exact_tracer(cameras[0]), knot, 1, said.append))
     assert said[0] == "row 0 of 310"
     assert len(said) > 1
 
@@ -101,10 +106,10 @@ def with_meshes(
 
 
 def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
-    shells = read_shells(with_meshes)
+    shells = read_shell_meshes(with_meshes)
     for at in with_meshes.reflectors:
         rows = range(at.camera.height_px)
-        one, other = exact(at)(rows, (0.0, 0.0)), on_mesh(shells, at)(rows, (0.0, 0.0))
+        one, other = exact_tracer(at)(rows, (0.0, 0.0)), mesh_tracer(shells, at)(rows, (0.0, 0.0))
         same = one.mirror == other.mirror
         assert same.mean() > 0.999  # but for pixel centres on an edge
         both = same & (one.mirror > 0)
@@ -114,7 +119,7 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
         assert 200 * np.linalg.norm(turned, axis=1).max() < 2e-3  # mm at the object
         pictures = [
             np.concatenate([band.colour for band in photograph(at.camera, trace, knot)]).astype(int)
-            for trace in (exact(at), on_mesh(shells, at))
+            for trace in (exact_tracer(at), mesh_tracer(shells, at))
         ]
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
 
@@ -122,7 +127,7 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
 def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: MirrorDesign) -> None:
     """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
     corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
-    shells = read_shells(with_meshes)
+    shells = read_shell_meshes(with_meshes)
     owner = shells.mirror[: len(corners)]
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.bincount(
@@ -132,7 +137,7 @@ def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: MirrorD
 
 
 def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:
-    small = scene_of(built_in(30.0))
+    small = prepared_scene(built_in_object(30.0))
     large_seen, small_seen = (
         (picture(cameras[0], scene)[0].any(axis=2)).sum() for scene in (knot, small)
     )

@@ -10,36 +10,36 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import tbcad.simulate.compiled
+import tbcad.simulate.parallel
 import tbcad.simulate.prototype.merge
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.simulate.capture.light_field import LightField, write, writing
+from tbcad.simulate.capture.light_field import LightField, create_light_field, write_camera
 from tbcad.simulate.capture.photograph import CENTRE, Band
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
-from tbcad.simulate.prototype.merge import light_field, merge
-from tbcad.simulate.prototype.photograph import photograph, resampled
+from tbcad.simulate.prototype.ball_rays import image_points, pixel_rays, trace_balls
+from tbcad.simulate.prototype.merge import merge_run, merged_light_field
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
-from tbcad.simulate.prototype.run import Run, runs, stand_ins
-from tbcad.simulate.prototype.sight import directions, places_of, sight
+from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector, prototype_runs
+from tbcad.simulate.prototype.stop_photograph import resampled_photograph, stop_photograph
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import built_in
-from tbcad.simulate.scene.rays import exact
-from tbcad.simulate.scene.reflector import Reflector, pixels_of
-from tbcad.simulate.scene.shading import Scene, scene_of
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import Reflector, project_points
 from tbcad.spec.design import load_spec
 from tests.prototype_exports import plan_of
 from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 
 SPEC = load_spec(None, OPTIONS)
-Both = tuple[Run, Run]
+Both = tuple[PrototypeRun, PrototypeRun]
 Rows = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
 def both(made: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Both:
-    return runs(cameras, plan_of(made))
+    return prototype_runs(cameras, plan_of(made))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def scene(knot: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def merged(both: Both, scene: Scene) -> LightField:
-    return light_field(both, scene, CAPTURE_MM)
+    return merged_light_field(both, scene, CAPTURE_MM)
 
 
 def ideal(made: PrototypeLayout, angle: float) -> Plan:
@@ -64,14 +64,14 @@ def ideal(made: PrototypeLayout, angle: float) -> Plan:
     return Plan(frame, apex, normal, radius, centre, radius, True, np.array([angle]), ball, stop)
 
 
-def misses(run: Run, mirror: np.ndarray, way: np.ndarray) -> np.ndarray:
+def misses(run: PrototypeRun, mirror: np.ndarray, way: np.ndarray) -> np.ndarray:
     """Distances from the origin of rays of mirrors' windows after their balls, caps whole.
 
     Infinite where a ray meets something else.
     """
     whole = np.concatenate([run.balls[..., :4], run.balls[..., :4]], axis=2)
     turned = np.einsum("nx,nxy->ny", way, run.turn[mirror])
-    seen = sight(replace(run, balls=whole), turned, run.stop[mirror])
+    seen = trace_balls(replace(run, balls=whole), turned, run.stop[mirror])
     away = norm(np.cross(seen.origin, seen.direction))
     return np.where(seen.ball == run.ball[mirror] + 1, away, np.inf)
 
@@ -84,7 +84,7 @@ class TestGeometry:
         for run in both:
             way = unit(run.at.mirrors.apex - run.view.pinhole)
             turned = np.einsum("nx,nxy->ny", way, run.turn)
-            seen = sight(run, turned, run.stop)
+            seen = trace_balls(run, turned, run.stop)
             assert (seen.ball == run.ball + 1).all()
             assert np.abs(seen.origin - run.stands.apex).max() < 1e-9
             assert np.abs(seen.direction + unit(run.stands.apex)).max() < 1e-9
@@ -128,7 +128,7 @@ class TestGeometry:
     def test_left_where_they_are(
         self, made: PrototypeLayout, cameras: tuple[Reflector, ...]
     ) -> None:
-        still = runs(cameras, replace(plan_of(made), moved=False))
+        still = prototype_runs(cameras, replace(plan_of(made), moved=False))
         assert (still[0].turn == np.eye(3)).all()
 
     def test_a_caps_body_hides_and_shows_nothing(self, both: Both) -> None:
@@ -140,7 +140,7 @@ class TestGeometry:
         edge, rim = np.arctan2(2.697, 8.6875), np.arcsin(3 / 10)
         angle = np.array([0, 0.9 * edge, 0.99 * rim, 1.01 * rim])
         way = np.column_stack([np.sin(angle), np.zeros(4), np.cos(angle)])
-        seen = sight(run, way, np.zeros(4, dtype=np.int64))
+        seen = trace_balls(run, way, np.zeros(4, dtype=np.int64))
         assert edge < 0.99 * rim
         assert seen.ball.tolist() == [1, 1, 0, 0]
         assert np.isfinite(seen.reach).tolist() == [True, True, True, False]
@@ -151,39 +151,39 @@ class TestGeometry:
     def test_places(self, both: Both) -> None:
         view = both[1].view
         places = np.array([[0.0, 0.0], [415.0, 309.0], [12.25, 200.5]])
-        assert places_of(view, directions(view, places)) == pytest.approx(places, abs=1e-9)
-        outside = directions(view, np.array([[-0.1, 5.0], [5.0, 309.1]]))
-        assert np.isnan(places_of(view, np.vstack([outside, -view.forward]))).all()
+        assert image_points(view, pixel_rays(view, places)) == pytest.approx(places, abs=1e-9)
+        outside = pixel_rays(view, np.array([[-0.1, 5.0], [5.0, 309.1]]))
+        assert np.isnan(image_points(view, np.vstack([outside, -view.forward]))).all()
 
 
 class TestPhotographs:
     def test_the_second_run_sees_the_object_turned(self, both: Both, scene: Scene) -> None:
         """Camera a before an object that was really turned takes the same photograph."""
         subject = replace(scene.subject, points=scene.subject.points * HALF_TURN)
-        turned = replace(scene_of(subject), shade=scene.shade)
-        second, first = photograph(both[1], scene, 3), photograph(both[0], turned, 3)
+        turned = replace(prepared_scene(subject), shade=scene.shade)
+        second, first = stop_photograph(both[1], scene, 3), stop_photograph(both[0], turned, 3)
         assert second.any()
         assert (np.abs(second.astype(int) - first) > 1).any(axis=2).mean() < 1e-3
-        straight = photograph(both[0], scene, 3)
+        straight = stop_photograph(both[0], scene, 3)
         assert (np.abs(second.astype(int) - straight) > 1).any(axis=2).mean() > 1e-2
 
     def test_between_pixels(self, both: Both, scene: Scene) -> None:
-        whole = photograph(both[0], scene, 2, samples=2).astype(float)
+        whole = stop_photograph(both[0], scene, 2, samples=2).astype(float)
         row, column = np.argwhere(whole.sum(axis=2) > 0)[::7].T
         row, column = np.minimum(row, 308), np.minimum(column, 414)
         places = np.column_stack([column, row]).astype(float)
-        assert (resampled(both[0], scene, 2, 2, places) == whole[row, column]).all()
+        assert (resampled_photograph(both[0], scene, 2, 2, places) == whole[row, column]).all()
         right, under = whole[row, column + 1], whole[row + 1, column]
         middle = 0.75 * whole[row, column] + 0.25 * right
-        found = resampled(both[0], scene, 2, 2, places + np.array([0.25, 0]))
+        found = resampled_photograph(both[0], scene, 2, 2, places + np.array([0.25, 0]))
         assert np.abs(found - middle).max() <= 0.5
-        found = resampled(both[0], scene, 2, 2, places + np.array([0, 0.5]))
+        found = resampled_photograph(both[0], scene, 2, 2, places + np.array([0, 0.5]))
         assert np.abs(found - (whole[row, column] + under) / 2).max() <= 0.5
 
     def test_the_last_pixel(self, both: Both, scene: Scene) -> None:
         last = np.array([[415.0, 309.0]])
-        whole = photograph(both[0], scene, 0)
-        assert (resampled(both[0], scene, 0, 1, last) == whole[-1, -1]).all()
+        whole = stop_photograph(both[0], scene, 0)
+        assert (resampled_photograph(both[0], scene, 0, 1, last) == whole[-1, -1]).all()
 
 
 class TestMerged:
@@ -197,15 +197,17 @@ class TestMerged:
         size_mm: float,
     ) -> None:
         """Also where the object, if it is too large, hides mirrors."""
-        scene = scene_of(built_in(size_mm))
-        found = light_field(runs(cameras, ideal(made, 0.7)), scene, CAPTURE_MM, resample)  # type: ignore[arg-type]
+        scene = prepared_scene(built_in_object(size_mm))
+        found = merged_light_field(
+            prototype_runs(cameras, ideal(made, 0.7)), scene, CAPTURE_MM, resample
+        )  # type: ignore[arg-type]
         for at in cameras:
-            shell = list(shell_photograph(at.camera, exact(at), scene))
+            shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
             mirror, picture = joined(shell, "mirror"), np.concatenate([b.colour for b in shell])
             # At the very edge between two cells rounding decides.
             same = planes["mirror"] == mirror
-            free = sum((exact(at)(band.rows, CENTRE).mirror > 0).sum() for band in shell)
+            free = sum((exact_tracer(at)(band.rows, CENTRE).mirror > 0).sum() for band in shell)
             assert ((mirror > 0).sum() < free) == (size_mm > CAPTURE_MM)
             assert same.mean() > 1 - 1e-4
             for name in ("origin", "direction"):
@@ -242,7 +244,7 @@ class TestMerged:
         """As many rays into the capture sphere as the design's areas promise, within rounding."""
         kept = sum(capture_rays(frame.planes).sum() for frame in merged.frames.values())
         shell = sum(
-            capture_rays({k: getattr(exact(at)(range(310), (0, 0)), k) for k in RAYS}).sum()
+            capture_rays({k: getattr(exact_tracer(at)(range(310), (0, 0)), k) for k in RAYS}).sum()
             for at in cameras
         )
         assert shell == pytest.approx(2 * made.fit.pixels_shell.sum(), rel=0.01)
@@ -251,7 +253,7 @@ class TestMerged:
     def test_photographs_are_close_to_exact_rays(
         self, merged: LightField, both: Both, scene: Scene
     ) -> None:
-        sharp = light_field(both, scene, CAPTURE_MM, "exact")
+        sharp = merged_light_field(both, scene, CAPTURE_MM, "exact")
         for camera, frame in merged.frames.items():
             other = sharp.frames[camera]
             for name in RAYS:
@@ -266,12 +268,12 @@ class TestMerged:
         wide = both[0].view
         narrow = replace(both[0], view=replace(wide, hfov=0.8 * wide.hfov))
         for resample in ("exact", "photograph"):
-            bands = list(merge(narrow, scene, resample))  # type: ignore[arg-type]
+            bands = list(merge_run(narrow, scene, resample))  # type: ignore[arg-type]
             mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
-            place = pixels_of(narrow.view, origin[mirror > 0])
+            place = project_points(narrow.view, origin[mirror > 0])
             assert (place >= -1e-6).all()
             assert (place <= np.array([415, 309]) + 1e-6).all()
-            free = exact(both[0].at)(range(310), CENTRE).mirror
+            free = exact_tracer(both[0].at)(range(310), CENTRE).mirror
             lost = (mirror == 0) & (free > 0)
             assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
             assert not np.concatenate([band.colour for band in bands])[lost].any()
@@ -279,7 +281,7 @@ class TestMerged:
     def test_samples_smooth(self, both: Both, scene: Scene) -> None:
         for resample in ("exact", "photograph"):
             one, many = (
-                np.concatenate([b.colour for b in merge(both[0], scene, resample, n)])
+                np.concatenate([b.colour for b in merge_run(both[0], scene, resample, n)])
                 for n in (1, 3)
             )
             rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
@@ -288,17 +290,19 @@ class TestMerged:
     def test_same_bytes_on_one_thread(
         self, merged: LightField, both: Both, scene: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(tbcad.simulate.compiled, "THREADS", 1)
+        monkeypatch.setattr(tbcad.simulate.parallel, "THREADS", 1)
         monkeypatch.setattr(tbcad.simulate.prototype.merge, "THREADS", 1)
-        again = light_field(both, scene, CAPTURE_MM)
+        again = merged_light_field(both, scene, CAPTURE_MM)
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
                 assert (plane == again.frames[camera].planes[name]).all()
 
     def test_as_a_file(self, merged: LightField, both: Both, scene: Scene, tmp_path: Path) -> None:
-        with writing(tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}) as store:
+        with create_light_field(
+            tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}
+        ) as store:
             for run in both:
-                write(store, stand_ins(run), merge(run, scene))
+                write_camera(store, ball_reflector(run), merge_run(run, scene))
         with LightField.open(tmp_path / "field.h5") as found:
             for run in both:
                 frame, other = found.frames[run.at.camera_id], merged.frames[run.at.camera_id]
@@ -309,7 +313,7 @@ class TestMerged:
 
     def test_progress(self, both: Both, scene: Scene) -> None:
         told: list[str] = []
-        list(merge(both[0], scene, progress=told.append))
+        list(merge_run(both[0], scene, progress=told.append))
         assert told[0] == f"stop 1 of {len(both[0])}"
         assert any(one.startswith("row ") for one in told)
 

@@ -10,7 +10,7 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.simulate.scene.exported import Exported, read_export
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 
 Document = dict[str, Any]
@@ -23,7 +23,7 @@ def test_the_record_gives_the_designs_rays(
     assert exported.spec.optics.n == 6
     for read, made in zip(exported.reflectors, cameras, strict=True):
         rows = range(150, 200)
-        one, other = (exact(at)(rows, (0.0, 0.0)) for at in (read, made))
+        one, other = (exact_tracer(at)(rows, (0.0, 0.0)) for at in (read, made))
         assert np.array_equal(one.mirror, other.mirror)
         assert one.direction == pytest.approx(other.direction, abs=1e-12)
 

@@ -9,8 +9,15 @@ from PIL import Image
 
 from tbcad.errors import InputError
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.object import SceneObject, built_in, load, pattern
-from tbcad.simulate.scene.shading import LAMP_LIGHT, LAMPS, SKY_LIGHT, Seen, look, scene_of
+from tbcad.simulate.scene.object import SceneObject, built_in_object, load_object, pattern
+from tbcad.simulate.scene.ray_casting import (
+    LAMP_LIGHT,
+    LAMPS,
+    SKY_LIGHT,
+    RayHits,
+    cast_rays,
+    prepared_scene,
+)
 
 CAPTURE_MM = 60.0
 
@@ -19,10 +26,10 @@ def box(size: float = 20.0) -> trimesh.Trimesh:
     return trimesh.creation.box((size, size, size))
 
 
-def from_above(subject: SceneObject, x: float, y: float) -> Seen:
+def from_above(subject: SceneObject, x: float, y: float) -> RayHits:
     """What a ray sees that falls on the object along -z."""
-    scene = scene_of(subject)
-    return look(scene, np.array([[x, y, 100.0]]), np.array([[0.0, 0.0, -1.0]]))
+    scene = prepared_scene(subject)
+    return cast_rays(scene, np.array([[x, y, 100.0]]), np.array([[0.0, 0.0, -1.0]]))
 
 
 def light_on_top(normal: np.ndarray) -> float:
@@ -33,7 +40,7 @@ def light_on_top(normal: np.ndarray) -> float:
 def test_kinds_of_files(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"box.{kind}"
     box().export(path)
-    subject = load(path, CAPTURE_MM)
+    subject = load_object(path, CAPTURE_MM)
     assert subject.patterned
     assert subject.radius == pytest.approx(10 * np.sqrt(3))
     assert from_above(subject, 1, 2).depth == pytest.approx([90])
@@ -43,7 +50,7 @@ def test_vertex_colours_are_shown(tmp_path: Path) -> None:
     mesh = box()
     mesh.visual.vertex_colors = np.tile([200, 100, 50, 255], (8, 1)).astype(np.uint8)
     mesh.export(tmp_path / "box.ply")
-    subject = load(tmp_path / "box.ply", CAPTURE_MM)
+    subject = load_object(tmp_path / "box.ply", CAPTURE_MM)
     colour = from_above(subject, 0.5, 0.25).colour[0]
     assert colour / colour[0] == pytest.approx([1, 0.5, 0.25], abs=1e-3)
 
@@ -55,7 +62,7 @@ def test_flat_top_is_lit_by_lamberts_law(tmp_path: Path) -> None:
     )
     mesh.visual.vertex_colors = np.tile([255, 0, 0, 255], (4, 1)).astype(np.uint8)
     mesh.export(tmp_path / "square.ply")
-    seen = from_above(load(tmp_path / "square.ply", CAPTURE_MM), 3, 4)
+    seen = from_above(load_object(tmp_path / "square.ply", CAPTURE_MM), 3, 4)
     up = np.array([0.0, 0.0, 1.0])
     assert seen.colour[0] == pytest.approx([255 * min(light_on_top(up), 1), 0, 0], abs=0.1)
 
@@ -70,7 +77,7 @@ def test_texture_is_shown(tmp_path: Path) -> None:
     corners = [[0, 0], [1, 0], [1, 1], [0, 1]]
     mesh.visual = trimesh.visual.TextureVisuals(uv=corners, image=Image.fromarray(picture))
     mesh.export(tmp_path / "square.glb")
-    subject = load(tmp_path / "square.glb", CAPTURE_MM)
+    subject = load_object(tmp_path / "square.glb", CAPTURE_MM)
     assert subject.texture is not None
     left, right = (from_above(subject, x, 1).colour[0] for x in (-5, 5))
     assert left[0] > 100 > left[1] == 0
@@ -85,15 +92,15 @@ def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
     (inside / "a.obj").write_text(
         "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
     )
-    assert load(inside / "a.obj", CAPTURE_MM).texture is None
+    assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
 
 
 def test_pattern_can_be_asked_for(tmp_path: Path) -> None:
     mesh = box()
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
     mesh.export(tmp_path / "box.ply")
-    assert not load(tmp_path / "box.ply", CAPTURE_MM).patterned
-    subject = load(tmp_path / "box.ply", CAPTURE_MM, paint="pattern")
+    assert not load_object(tmp_path / "box.ply", CAPTURE_MM).patterned
+    subject = load_object(tmp_path / "box.ply", CAPTURE_MM, paint="pattern")
     assert subject.patterned
     colour = from_above(subject, 1, 2).colour[0] / 255
     shown = pattern(np.array([[1.0, 2.0, 10.0 - 1e-9]]))[0]
@@ -102,7 +109,7 @@ def test_pattern_can_be_asked_for(tmp_path: Path) -> None:
 
 def test_plain_grey_can_be_asked_for(tmp_path: Path) -> None:
     box().export(tmp_path / "box.stl")
-    subject = load(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
+    subject = load_object(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
     colours = from_above(subject, 1, 2).colour[0]
     assert not subject.patterned
     assert np.ptp(colours) == 0 < colours[0]
@@ -111,8 +118,8 @@ def test_plain_grey_can_be_asked_for(tmp_path: Path) -> None:
 def test_too_large_names_the_size(tmp_path: Path) -> None:
     box(50).export(tmp_path / "box.stl")
     with pytest.raises(InputError, match=r"50 x 50 x 50 mm and reaches 43\.3 mm .* 30"):
-        load(tmp_path / "box.stl", CAPTURE_MM)
-    assert load(tmp_path / "box.stl", CAPTURE_MM, fit=True).radius == pytest.approx(30)
+        load_object(tmp_path / "box.stl", CAPTURE_MM)
+    assert load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True).radius == pytest.approx(30)
 
 
 def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
@@ -120,8 +127,8 @@ def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
     mesh.apply_translation([40, 0, 0])
     mesh.export(tmp_path / "box.stl")
     with pytest.raises(InputError, match="does not fit the capture sphere"):
-        load(tmp_path / "box.stl", CAPTURE_MM)
-    fitted = load(tmp_path / "box.stl", CAPTURE_MM, fit=True)
+        load_object(tmp_path / "box.stl", CAPTURE_MM)
+    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True)
     assert fitted.points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-3)
 
 
@@ -144,19 +151,19 @@ property float z\nelement face {f}\nproperty list uchar int vertex_indices\nend_
 def test_bad_meshes(tmp_path: Path, name: str, text: str, wrong: str) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=wrong) as error:
-        load(tmp_path / name, CAPTURE_MM)
+        load_object(tmp_path / name, CAPTURE_MM)
     assert "\n" not in str(error.value)
 
 
 def test_no_such_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no file"):
-        load(tmp_path / "absent.ply", CAPTURE_MM)
+        load_object(tmp_path / "absent.ply", CAPTURE_MM)
     with pytest.raises(InputError, match="is no file"):
-        load(tmp_path, CAPTURE_MM)
+        load_object(tmp_path, CAPTURE_MM)
 
 
 def test_built_in_object_is_a_closed_body_of_many_colours() -> None:
-    subject = built_in(CAPTURE_MM)
+    subject = built_in_object(CAPTURE_MM)
     mesh = trimesh.Trimesh(subject.points, subject.faces)
     assert mesh.is_watertight
     assert mesh.volume > 0
@@ -168,7 +175,7 @@ def test_built_in_object_is_a_closed_body_of_many_colours() -> None:
 
 
 def test_an_object_is_kept_with_a_capture(tmp_path: Path) -> None:
-    subject = built_in(CAPTURE_MM)
+    subject = built_in_object(CAPTURE_MM)
     write_object(tmp_path / "object.npz", subject)
     first = (tmp_path / "object.npz").read_bytes()
     back = read_object(tmp_path)
@@ -181,7 +188,7 @@ def test_an_object_is_kept_with_a_capture(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("change", ["cut", "faces", "shape", "pickle"])
 def test_damaged_objects(tmp_path: Path, change: str) -> None:
-    subject = built_in(CAPTURE_MM)
+    subject = built_in_object(CAPTURE_MM)
     path = tmp_path / "object.npz"
     write_object(path, subject)
     with np.load(path) as read:

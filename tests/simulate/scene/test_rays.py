@@ -6,15 +6,15 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import design
 from tbcad.optics.trace import miss_distances
-from tbcad.simulate.scene.rays import Rays, exact, pixel_directions
-from tbcad.simulate.scene.reflector import Reflector, pixels_of, reflectors
+from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
 from tbcad.spec.design import load_spec
 
 Cameras = tuple[Reflector, Reflector]
 
 
-def every_row(at: Reflector) -> Rays:
-    return exact(at)(range(at.camera.height_px), (0.0, 0.0))
+def every_row(at: Reflector) -> ReflectedRays:
+    return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0))
 
 
 def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,7 +110,7 @@ def test_every_mirror_shows_the_whole_capture_sphere_of_its_record(cameras: Came
 
 def test_bands_and_shifts_are_parts_of_one_picture(cameras: Cameras) -> None:
     at = cameras[0]
-    whole, trace = every_row(at), exact(at)
+    whole, trace = every_row(at), exact_tracer(at)
     part = trace(range(100, 140), (0.0, 0.0))
     assert np.array_equal(part.mirror, whole.mirror[100:140])
     assert np.array_equal(part.direction, whole.direction[100:140])
@@ -141,6 +141,6 @@ def test_planar_mirrors() -> None:
 def test_pixels_of_points_undo_directions(cameras: Cameras) -> None:
     view = cameras[0].camera
     way = pixel_directions(view, range(5, 9))
-    place = pixels_of(view, view.pinhole + 7 * way)
+    place = project_points(view, view.pinhole + 7 * way)
     assert place[..., 0] == pytest.approx(np.broadcast_to(np.arange(view.width_px), (4, 416)))
     assert place[:, 0, 1] == pytest.approx([5, 6, 7, 8])

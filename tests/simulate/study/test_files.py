@@ -13,16 +13,16 @@ from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.mirrors import radii
 from tbcad.mirrors.array import design
-from tbcad.simulate import compiled
+from tbcad.simulate import parallel
 from tbcad.simulate.study.capture_area import capture_area
-from tbcad.simulate.study.depth import Optics, depth
+from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 from tbcad.simulate.study.elevation import correlation, elevation
 from tbcad.simulate.study.paper import claims
 from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.plot import Panel, Series, picture
-from tbcad.simulate.study.record import Study, check_target, contents_of, write
+from tbcad.simulate.study.plots import Panel, Series, plot_png
 from tbcad.simulate.study.resolution import Ratio, resolution
-from tbcad.simulate.study.sweep import numbers
+from tbcad.simulate.study.study import Study, check_study_folder, study_files, write_study
+from tbcad.simulate.study.sweep import n_range
 from tbcad.simulate.study.tables import SUMMARY, Table, csv_text
 from tbcad.spec.design import load_spec
 
@@ -70,9 +70,9 @@ def test_resolution_finds_what_its_rows_say() -> None:
 def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
     files = []
     for threads in (1, 3):
-        monkeypatch.setattr(compiled, "THREADS", threads)
+        monkeypatch.setattr(parallel, "THREADS", threads)
         monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
-        files.append(contents_of(small_resolution()))
+        files.append(study_files(small_resolution()))
     assert files[0] == files[1]
     assert len(files[0]) == 6
 
@@ -101,7 +101,7 @@ def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPat
     study = resolution(spec, range(9, 10), (Sensor(208, 155),), (Ratio(1, 1),))
     assert study.tables[0].rows[0][3:10] == (None,) * 7
     assert "no radius gives" in str(study.tables[0].rows[0][10])
-    assert len(contents_of(study)) == 6
+    assert len(study_files(study)) == 6
 
 
 def test_elevation_of_the_paper_design() -> None:
@@ -131,7 +131,7 @@ def test_elevation_of_few_mirrors() -> None:
 
 
 def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
-    study = depth(load_spec(None, ["n=4"]), Optics())
+    study = depth_of_field(load_spec(None, ["n=4"]), LensOptions())
     flat = row_of(study.summary, "quantity", "camera to farthest image, flat radii")
     assert flat["tbcad"] == pytest.approx(2 * math.sqrt(15000) + 30, rel=1e-12)
     assert (flat["paper"], flat["where"]) == (250, "section 6")
@@ -157,45 +157,45 @@ def test_csv_keeps_every_digit() -> None:
 def test_pictures_repeat_whatever_the_user_has_set() -> None:
     line = Series("line", np.arange(1.0, 5), np.array([1, 2, np.nan, 400.0]))
     panels = (Panel("one", "x", "y", (line,), "y"), Panel("two", "x", "y", (line,)))
-    first = picture(panels)
+    first = plot_png(panels)
     with matplotlib.rc_context({"figure.facecolor": "red", "font.size": 20.0}):
-        assert picture(panels) == first
-    assert picture(panels[:1]) != first
+        assert plot_png(panels) == first
+    assert plot_png(panels[:1]) != first
     assert first.startswith(b"\x89PNG")
 
 
 def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
     out = tmp_path / "new" / "studies"
     study = elevation(load_spec(None, ["n=4"]))
-    files = write(study, out)
+    files = write_study(study, out)
     (out / "mine.txt").write_text("mine")
     (out / "elevation.csv").write_text("old")
-    assert write(study, out) == files
+    assert write_study(study, out) == files
     assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
-    assert (out / "elevation.csv").read_bytes() == contents_of(study)["elevation.csv"]
+    assert (out / "elevation.csv").read_bytes() == study_files(study)["elevation.csv"]
 
 
 def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
     study = elevation(load_spec(None, ["n=4"]))
     (tmp_path / "elevation.png").mkdir()
     with pytest.raises(InputError, match="cannot be written"):
-        write(study, tmp_path)
+        write_study(study, tmp_path)
     assert not [path for path in tmp_path.iterdir() if path.name.endswith(".new")]
 
 
 def test_folder_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="is a file"):
-        check_target(tmp_path / "file" / "studies")
-    check_target(tmp_path / "not" / "yet")
+        check_study_folder(tmp_path / "file" / "studies")
+    check_study_folder(tmp_path / "not" / "yet")
     assert not (tmp_path / "not").exists()
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 5), (5, 4), (2, 61)])
 def test_sweeps_that_cannot_be(first: int, last: int) -> None:
     with pytest.raises(InputError, match="--from or --to"):
-        numbers(first, last)
-    assert list(numbers(2, 4)) == [2, 3, 4]
+        n_range(first, last)
+    assert list(n_range(2, 4)) == [2, 3, 4]
 
 
 def test_claims_say_where_they_stand() -> None:

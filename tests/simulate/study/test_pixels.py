@@ -7,9 +7,9 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.simulate.scene.reflector import Reflector, pixels_of, reflectors
-from tbcad.simulate.study.pixels import Sensor, _traced, counts, sensor_of, virtual_cameras
-from tbcad.simulate.study.resolution import Ratio, balance, ratio_of
+from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
+from tbcad.simulate.study.pixels import Sensor, _traced, count_pixels, parse_sensor, virtual_cameras
+from tbcad.simulate.study.resolution import Ratio, balance, parse_ratio
 from tbcad.spec.design import load_spec
 
 # The paper's lens does not hold the few large mirrors of a small n.
@@ -27,7 +27,7 @@ def window(at: Reflector, mirror: int) -> float:
     steps, total = np.linspace(0, 1, 200), 0.0
     for side in sides[offsets[mirror] : offsets[mirror + 1]]:
         t = steps if side % 2 == 0 else steps[::-1]
-        point = pixels_of(at.camera, at.cells.arcs.at(np.full(len(t), side // 2), t))
+        point = project_points(at.camera, at.cells.arcs.at(np.full(len(t), side // 2), t))
         for (x0, y0), (x1, y1) in pairwise(point):
             total += (x0 * y1 - x1 * y0) / 2
     return abs(total)
@@ -36,7 +36,7 @@ def window(at: Reflector, mirror: int) -> float:
 def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: MirrorDesign) -> None:
     """Pixels counted one by one against the area within the cell's arcs."""
     at = reflectors(wide)[0]
-    on = counts(wide.halves[0], (Sensor(832, 620),), 30.0)[0].on
+    on = count_pixels(wide.halves[0], (Sensor(832, 620),), 30.0)[0].on
     area = np.array([window(at, i) for i in range(len(at))])
     assert np.abs(on - area).max() < 3 * np.sqrt(area.max())  # pixels along its edge
     assert on.sum() == pytest.approx(area.sum(), rel=5e-4)
@@ -51,9 +51,9 @@ def test_both_cameras_have_the_same_pixels(wide: MirrorDesign) -> None:
 def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> None:
     half = wide.halves[0]
     sensor = (Sensor(416, 310),)
-    assert counts(half, sensor, 0.0)[0].seen.sum() == 0
-    most = counts(half, sensor, 300.0)[0]  # all mirrors are inside
-    some = counts(half, sensor, 30.0)[0]
+    assert count_pixels(half, sensor, 0.0)[0].seen.sum() == 0
+    most = count_pixels(half, sensor, 300.0)[0]  # all mirrors are inside
+    some = count_pixels(half, sensor, 30.0)[0]
     assert (some.seen <= some.on).all()
     assert 0.3 < some.seen.sum() / some.on.sum() < 0.9
     assert np.array_equal(some.on, most.on)
@@ -63,7 +63,8 @@ def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> Non
 def test_share_that_sees_the_sphere_follows_its_size(wide: MirrorDesign) -> None:
     """A mirror shows a small sphere in an area that grows with the square of its radius."""
     seen = [
-        counts(wide.halves[0], (Sensor(1664, 1240),), r)[0].seen.sum() for r in (5.0, 10.0, 20.0)
+        count_pixels(wide.halves[0], (Sensor(1664, 1240),), r)[0].seen.sum()
+        for r in (5.0, 10.0, 20.0)
     ]
     assert seen[1] / seen[0] == pytest.approx(4, rel=0.02)
     assert seen[2] / seen[1] == pytest.approx(4, rel=0.05)
@@ -71,8 +72,8 @@ def test_share_that_sees_the_sphere_follows_its_size(wide: MirrorDesign) -> None
 
 def test_rays_for_blocks_of_pixels_give_the_same_count(wide: MirrorDesign) -> None:
     half, sensor = wide.halves[0], Sensor(1664, 1240)
-    every = counts(half, (sensor,), 30.0)[0]
-    some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]
+    every = count_pixels(half, (sensor,), 30.0)[0]
+    some = count_pixels(half, (sensor,), 30.0, most_rays=600_000)[0]
     assert every.rays == 1664 * 1240
     assert some.rays == 832 * 620
     assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
@@ -81,8 +82,8 @@ def test_rays_for_blocks_of_pixels_give_the_same_count(wide: MirrorDesign) -> No
 
 def test_sides_that_do_not_divide_are_sampled_too(wide: MirrorDesign) -> None:
     half, sensor = wide.halves[0], Sensor(1663, 1239)
-    every = counts(half, (sensor,), 30.0)[0]
-    some = counts(half, (sensor,), 30.0, most_rays=600_000)[0]
+    every = count_pixels(half, (sensor,), 30.0)[0]
+    some = count_pixels(half, (sensor,), 30.0, most_rays=600_000)[0]
     assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
     assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
 
@@ -121,17 +122,17 @@ def test_balance_passes_over_designs_that_were_refused() -> None:
 
 
 def test_texts() -> None:
-    assert sensor_of("8320x6208") == Sensor(8320, 6208)
-    assert ratio_of("1:4") == Ratio(1, 4)
+    assert parse_sensor("8320x6208") == Sensor(8320, 6208)
+    assert parse_ratio("1:4") == Ratio(1, 4)
 
 
 @pytest.mark.parametrize("text", ["", "2080", "2080x", "15x1552", "2080x99999", "-1x20", "ax20"])
 def test_no_sensors(text: str) -> None:
     with pytest.raises(InputError, match="2080x1552"):
-        sensor_of(text)
+        parse_sensor(text)
 
 
 @pytest.mark.parametrize("text", ["", "1", "1:0", "-1:1", "nan:1", "1:inf", "a:b", "1:2:3"])
 def test_no_ratios(text: str) -> None:
     with pytest.raises(InputError, match="1:4"):
-        ratio_of(text)
+        parse_ratio(text)

@@ -8,18 +8,18 @@ from scipy.spatial import cKDTree
 
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.scene.viewpoint import directions, viewpoint
-from tbcad.simulate.views.nearest import nearest
-from tbcad.simulate.views.synthesis import Rays, gather, reach
-from tbcad.simulate.views.tiles import Tiles, meeting
-from tbcad.simulate.views.two_plane import Slab, slab_along
+from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.mirror_tiles import MirrorTiles, convergence_point
+from tbcad.simulate.views.nearest import nearest_rays
+from tbcad.simulate.views.synthesis import Rays, nearby_rays, search_radius
+from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 
 CAPTURE_MM = 60.0
 
 
 @pytest.fixture(scope="module")
-def tiles(light_field: LightField) -> Tiles:
-    return Tiles(light_field)
+def tiles(light_field: LightField) -> MirrorTiles:
+    return MirrorTiles(light_field)
 
 
 def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -32,9 +32,9 @@ def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return origin, direction, colour
 
 
-def wanted_by(view: Camera) -> tuple[Slab, Rays]:
-    slab = slab_along(view.forward, view.right, CAPTURE_MM)
-    way = directions(view).reshape(-1, 3)
+def wanted_by(view: Camera) -> tuple[TwoPlane, Rays]:
+    slab = two_plane_along(view.forward, view.right, CAPTURE_MM)
+    way = view_directions(view).reshape(-1, 3)
     meets = np.linalg.norm(np.cross(view.pinhole, way), axis=1) < CAPTURE_MM / 2
     way = way[meets]
     return slab, (np.broadcast_to(view.pinhole, way.shape), way)
@@ -47,17 +47,19 @@ def wanted_by(view: Camera) -> tuple[Slab, Rays]:
 )
 @settings(max_examples=12, deadline=None)
 def test_equals_the_tree(
-    light_field: LightField, tiles: Tiles, azimuth: float, elevation: float, distance: float
+    light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
 ) -> None:
-    view = viewpoint(np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120))
+    view = camera_around_object(
+        np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120)
+    )
     slab, rays = wanted_by(view)
     wanted = slab.points(*rays)
     origin, direction, _ = every_ray(light_field)
     points = slab.points(origin, direction)
     away, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(wanted)
-    near = gather(tiles, slab, rays, reach(tiles))
+    near = nearby_rays(tiles, slab, rays, search_radius(tiles))
     assert near.sheaf is not None
-    found = nearest(near.sheaf, wanted, near.limit)
+    found = nearest_rays(near.sheaf, wanted, near.limit)
     # At the limit itself a mirror may be left out: one wanted ray in a few says which are near.
     within = found >= 0
     assert (away[within] <= near.limit).all()
@@ -70,7 +72,7 @@ def test_equals_the_tree(
 def test_distance_in_the_slab_is_that_of_the_rays_in_the_capture_sphere() -> None:
     """Root mean square over the depth -R ... R, by quadrature."""
     rng = np.random.default_rng(4)
-    slab = slab_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
+    slab = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
     origin = rng.normal(size=(2, 3)) * [20, 20, 5] + [0, 0, 100]
     way = rng.normal(size=(2, 3)) * [0.2, 0.2, 0] + [0, 0, -1]
     a, b = slab.points(origin, way / np.linalg.norm(way, axis=1)[:, None])
@@ -81,7 +83,7 @@ def test_distance_in_the_slab_is_that_of_the_rays_in_the_capture_sphere() -> Non
 
 
 def test_rays_that_are_too_oblique_have_no_place() -> None:
-    slab = slab_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
+    slab = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
     points = slab.points(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     assert np.isnan(points).all()
 
@@ -91,16 +93,16 @@ def test_meeting_point_of_rays() -> None:
     rng = np.random.default_rng(1)
     way = rng.normal(size=(50, 3))
     way /= np.linalg.norm(way, axis=1)[:, None]
-    point, spread = meeting(np.array([1.0, 2, 3]) + 5 * way, way)
+    point, spread = convergence_point(np.array([1.0, 2, 3]) + 5 * way, way)
     assert point == pytest.approx([1, 2, 3])
     assert spread == pytest.approx(0, abs=1e-6)
     sides = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
-    point, spread = meeting(sides, np.array([[0.0, 0, 1], [0, 0, 1]]))
+    point, spread = convergence_point(sides, np.array([[0.0, 0, 1], [0, 0, 1]]))
     assert point == pytest.approx([0, 0, 0])
     assert spread == pytest.approx(1)
 
 
-def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: Tiles) -> None:
+def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: MirrorTiles) -> None:
     """A view whose rays are captured ones gives their colours back."""
     frame = light_field.frames["a"]
     number = 10
@@ -108,9 +110,9 @@ def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: Tiles
     origin, direction, colour = (
         frame.planes[name][:][on] for name in ("origin", "direction", "colour")
     )
-    slab = slab_along(-frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM)
+    slab = two_plane_along(-frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM)
     wanted = slab.points(origin, direction)
-    near = gather(tiles, slab, (origin, direction), reach(tiles))
+    near = nearby_rays(tiles, slab, (origin, direction), search_radius(tiles))
     assert near.sheaf is not None
-    found = nearest(near.sheaf, wanted, near.limit)
+    found = nearest_rays(near.sheaf, wanted, near.limit)
     assert np.array_equal(near.sheaf.colour[found], colour)

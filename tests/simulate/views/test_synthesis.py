@@ -6,46 +6,48 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.quality import likeness
-from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture, whole
-from tbcad.simulate.scene.shading import Scene, depth_of
-from tbcad.simulate.scene.viewpoint import directions, viewpoint
-from tbcad.simulate.views.refocus import Focus, pinholes, rays_through, refocus, refocus_sweep
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture, to_bytes
+from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
+from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import Focus, lens_pinholes, lens_rays, refocus, refocus_sweep
 from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.tiles import Tiles
 
 SIZE = (160, 120)
 
 
 @pytest.fixture(scope="module")
-def tiles(light_field: LightField) -> Tiles:
-    return Tiles(light_field)
+def tiles(light_field: LightField) -> MirrorTiles:
+    return MirrorTiles(light_field)
 
 
 def view_from(azimuth: float, elevation: float, distance: float = 640.0) -> Camera:
-    return viewpoint(np.radians(azimuth), np.radians(elevation), distance, 60.0, SIZE)
+    return camera_around_object(np.radians(azimuth), np.radians(elevation), distance, 60.0, SIZE)
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(20.0, 20.0), (200.0, 60.0), (90.0, 85.0)])
 def test_views_resemble_the_truth_and_blends_more_so(
-    tiles: Tiles, knot: Scene, azimuth: float, elevation: float
+    tiles: MirrorTiles, knot: Scene, azimuth: float, elevation: float
 ) -> None:
     view = view_from(azimuth, elevation)
-    truth = whole(pinhole_picture(knot, view))
-    plain = likeness(truth, synthesise(tiles, view).image)
-    blended = likeness(truth, synthesise(tiles, view, "blend", depth_of(knot)).image)
-    turned = likeness(truth, whole(pinhole_picture(knot, view_from(azimuth + 20, elevation))))
+    truth = to_bytes(pinhole_picture(knot, view))
+    plain = image_quality(truth, synthesise(tiles, view).image)
+    blended = image_quality(truth, synthesise(tiles, view, "blend", depth_along_rays(knot)).image)
+    turned = image_quality(
+        truth, to_bytes(pinhole_picture(knot, view_from(azimuth + 20, elevation)))
+    )
     assert plain.psnr_db > turned.psnr_db
     assert plain.ssim > turned.ssim
     assert blended.psnr_db > plain.psnr_db
 
 
-def test_the_same_whatever_the_workers(tiles: Tiles, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_whatever_the_workers(tiles: MirrorTiles, monkeypatch: pytest.MonkeyPatch) -> None:
     view = view_from(50, 30)
     before = synthesise(tiles, view, "blend").colour
     focus = Focus(200, 0)
     mean = refocus(tiles, view, focus).colour
-    monkeypatch.setattr("tbcad.simulate.compiled.THREADS", 1)
+    monkeypatch.setattr("tbcad.simulate.parallel.THREADS", 1)
     monkeypatch.setattr("tbcad.simulate.views.refocus.THREADS", 1)
     assert np.array_equal(synthesise(tiles, view, "blend").colour, before)
     assert np.array_equal(refocus(tiles, view, focus).colour, mean)
@@ -54,38 +56,38 @@ def test_the_same_whatever_the_workers(tiles: Tiles, monkeypatch: pytest.MonkeyP
 def test_what_no_mirror_saw_is_not_seen(light_field: LightField) -> None:
     """With camera b's half alone, camera a's side is dark."""
     half = LightField({"b": light_field.frames["b"]}, 60.0, {})
-    picture = synthesise(Tiles(half), view_from(0, 10))
+    picture = synthesise(MirrorTiles(half), view_from(0, 10))
     middle = picture.seen[50:70, 70:90]
     assert not middle.any()
     assert not picture.colour[50:70, 70:90].any()
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 90.0])
-def test_views_from_the_horizon_have_no_holes(tiles: Tiles, azimuth: float) -> None:
+def test_views_from_the_horizon_have_no_holes(tiles: MirrorTiles, azimuth: float) -> None:
     """Half of their rays come from below all mirrors: the nearest captured ones stand in."""
     for method in ("nearest", "blend"):
         assert synthesise(tiles, view_from(azimuth, 0), method).seen.all()
 
 
-def test_refocus_is_a_lens(tiles: Tiles, knot: Scene) -> None:
+def test_refocus_is_a_lens(tiles: MirrorTiles, knot: Scene) -> None:
     """Nearer to a real lens of that focus than to one of another, or to a pinhole."""
     view, focus = view_from(30, 45), Focus(250, 0)
     picture = refocus(tiles, view, focus).image
-    alike = likeness(whole(lens_picture(knot, view, focus, 64)), picture)
-    elsewhere = likeness(whole(lens_picture(knot, view, Focus(250, 25), 64)), picture)
-    sharp = likeness(whole(pinhole_picture(knot, view)), picture)
+    alike = image_quality(to_bytes(lens_picture(knot, view, focus, 64)), picture)
+    elsewhere = image_quality(to_bytes(lens_picture(knot, view, Focus(250, 25), 64)), picture)
+    sharp = image_quality(to_bytes(pinhole_picture(knot, view)), picture)
     assert alike.psnr_db > max(elsewhere.psnr_db, sharp.psnr_db) + 3
 
 
 def test_a_lens_without_width_is_a_pinhole(knot: Scene) -> None:
     view = view_from(10, 50)
     narrow = lens_picture(knot, view, Focus(1e-6, 0), 16)
-    assert likeness(whole(pinhole_picture(knot, view)), whole(narrow)).psnr_db > 35
+    assert image_quality(to_bytes(pinhole_picture(knot, view)), to_bytes(narrow)).psnr_db > 35
 
 
 def test_the_papers_69_pinholes() -> None:
     """Section 4.3: 69 cameras over the aperture; symmetric, on the disc, evenly apart."""
-    places = pinholes()
+    places = lens_pinholes()
     assert len(places) == 69
     assert np.linalg.norm(places, axis=1).max() == pytest.approx(1)
     assert {tuple(place) for place in -places} == {tuple(place) for place in places}
@@ -93,9 +95,9 @@ def test_the_papers_69_pinholes() -> None:
 
 def test_rays_through_the_lens_meet_on_the_sharp_plane() -> None:
     view, focus = view_from(70, 25), Focus(300, 12.0)
-    middle = rays_through(view, focus, np.zeros(2))
-    assert middle[1] == pytest.approx(directions(view))
-    edge = rays_through(view, focus, np.array([100.0, -80.0]))
+    middle = lens_rays(view, focus, np.zeros(2))
+    assert middle[1] == pytest.approx(view_directions(view))
+    edge = lens_rays(view, focus, np.array([100.0, -80.0]))
     toward = -view.forward
     at = [
         origin + ((12.0 - origin @ toward) / (way @ toward))[..., None] * way
@@ -104,7 +106,7 @@ def test_rays_through_the_lens_meet_on_the_sharp_plane() -> None:
     assert at[0] == pytest.approx(at[1], abs=1e-9)
 
 
-def test_a_sweep_goes_through_the_object(tiles: Tiles) -> None:
+def test_a_sweep_goes_through_the_object(tiles: MirrorTiles) -> None:
     view = view_from(30, 45)
     said: list[str] = []
     frames = refocus_sweep(tiles, view, 250, 3, said.append)

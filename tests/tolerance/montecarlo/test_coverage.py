@@ -8,8 +8,8 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.simulate.scene.rays import exact
-from tbcad.simulate.scene.reflector import pixels_of, reflectors
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import project_points, reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, seen, virtual
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
@@ -37,7 +37,7 @@ def test_pixels_are_those_that_are_counted(small_design: MirrorDesign) -> None:
     a, _ = reflectors(small_design)
     half = nominal(a)
     area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
-    numbers = exact(a)(range(a.camera.height_px), (0.0, 0.0)).mirror
+    numbers = exact_tracer(a)(range(a.camera.height_px), (0.0, 0.0)).mirror
     count = np.bincount(numbers.ravel(), minlength=len(half) + 1)[1:]
     box = a.boxes()
     inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < a.camera.width_px)
@@ -54,7 +54,7 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
         half, (offsets, sides) = nominal(at), at.cells.rings
         t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
         t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
-        edge = pixels_of(
+        edge = project_points(
             at.camera, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
         )
         area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]

@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.camera import Camera
-from tbcad.simulate.scene.object import built_in
-from tbcad.simulate.scene.rays import exact, reflected
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.simulate.scene.shading import Scene, scene_of
-from tbcad.simulate.scene.viewpoint import viewpoint
-from tbcad.simulate.study.views import truths
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.study.viewpoints import ground_truths
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.coverage import seen
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
@@ -48,14 +48,16 @@ def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return scene_of(built_in(CAPTURE_MM))
+    return prepared_scene(built_in_object(CAPTURE_MM))
 
 
 @pytest.fixture(scope="module")
 def wanted(scene: Scene) -> Wanted:
     places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
-    views: list[Camera] = [viewpoint(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places]
-    return Wanted(CAPTURE_MM, views, truths(scene, views, lambda _: None))
+    views: list[Camera] = [
+        camera_around_object(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places
+    ]
+    return Wanted(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
 
 
 def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
@@ -63,7 +65,7 @@ def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 
 
 
 def numbers(at: Reflector) -> np.ndarray:
-    return exact(at)(range(at.camera.height_px), (0.0, 0.0)).mirror
+    return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0)).mirror
 
 
 class WholeFrame(AsMade):
@@ -148,7 +150,7 @@ class TestActual:
             old, new = (_axes(view) for view in (at.camera, made.camera))
             way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
-            rays = reflected(made.camera.pinhole, way[None], made.mirrors, mirror)
+            rays = reflect_pixels(made.camera.pinhole, way[None], made.mirrors, mirror)
             missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
             offset = pointing(nominal(at), drawn).offset[0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)

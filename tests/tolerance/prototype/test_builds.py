@@ -12,7 +12,7 @@ from tbcad.optics.ball_light import ball_miss_distances
 from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.prototype.run import Run, runs
+from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import load_spec
 from tbcad.tolerance.montecarlo.draws import Error, Errors
@@ -62,8 +62,8 @@ def at(little: MirrorDesign, plan: Plan) -> Designed:
 
 
 @pytest.fixture(scope="module")
-def both(little: MirrorDesign, plan: Plan) -> tuple[Run, Run]:
-    return runs(reflectors(little), plan)
+def both(little: MirrorDesign, plan: Plan) -> tuple[PrototypeRun, PrototypeRun]:
+    return prototype_runs(reflectors(little), plan)
 
 
 def machines(at: Designed, count: int, **errors: Error) -> PrototypeDraws:
@@ -71,7 +71,7 @@ def machines(at: Designed, count: int, **errors: Error) -> PrototypeDraws:
 
 
 @pytest.fixture(scope="module")
-def pictures(both: tuple[Run, Run]) -> list[Picture]:
+def pictures(both: tuple[PrototypeRun, PrototypeRun]) -> list[Picture]:
     """Mirror of each side of both runs' windows, and where the sides are in the picture."""
     result = []
     for run, turn in zip(both, (np.ones(3), HALF_TURN), strict=True):
@@ -85,7 +85,7 @@ def pictures(both: tuple[Run, Run]) -> list[Picture]:
 
 def slow(
     at: Designed,
-    both: tuple[Run, Run],
+    both: tuple[PrototypeRun, PrototypeRun],
     pictures: list[Picture],
     draws: PrototypeDraws,
     machine: int = 0,
@@ -105,7 +105,7 @@ def slow(
 
 
 def balls(
-    at: Designed, run: Run, draws: PrototypeDraws, machine: int, half: int
+    at: Designed, run: PrototypeRun, draws: PrototypeDraws, machine: int, half: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centre and radius of the ball in each window."""
     frame, centre = at.plan.frame, np.empty((len(run.at), 3))
@@ -137,7 +137,11 @@ class TestCoverage:
 
     @pytest.mark.parametrize("kind", SPREAD)
     def test_each_error_against_the_slow_model(
-        self, at: Designed, both: tuple[Run, Run], pictures: list[Picture], kind: str
+        self,
+        at: Designed,
+        both: tuple[PrototypeRun, PrototypeRun],
+        pictures: list[Picture],
+        kind: str,
     ) -> None:
         draws = machines(at, 1, **{kind: SPREAD[kind]})
         diameter, _ = seen(at, draws)
@@ -146,7 +150,7 @@ class TestCoverage:
         assert diameter[0] == pytest.approx(slow(at, both, pictures, draws), abs=SAMPLED_MM)
 
     def test_all_errors_together_against_the_slow_model(
-        self, at: Designed, both: tuple[Run, Run], pictures: list[Picture]
+        self, at: Designed, both: tuple[PrototypeRun, PrototypeRun], pictures: list[Picture]
     ) -> None:
         draws = machines(at, 2, **SPREAD)
         diameter, _ = seen(at, draws)

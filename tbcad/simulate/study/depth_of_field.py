@@ -6,13 +6,20 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray
-from tbcad.simulate.study.images import FANS, PLACES, Images, images
-from tbcad.simulate.study.lens import Lens, Range, focal_length, lens_for, stop, stops
+from tbcad.simulate.study.lens import (
+    DepthRange,
+    Lens,
+    aperture_stop,
+    aperture_stops,
+    focal_length,
+    lens_for,
+)
 from tbcad.simulate.study.paper import claimed, claims
-from tbcad.simulate.study.plot import Panel, Series
-from tbcad.simulate.study.record import Study
-from tbcad.simulate.study.sweep import attempt, varied
+from tbcad.simulate.study.plots import Panel, Series
+from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.sweep import spec_with, try_design
 from tbcad.simulate.study.tables import SUMMARY, Cell, Table
+from tbcad.simulate.study.virtual_images import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
@@ -69,7 +76,7 @@ FARTHEST_STOP = 8  # of the plot, in F-numbers of the lens wide open
 
 
 @dataclass(frozen=True)
-class Optics:
+class LensOptions:
     """What the user may say of the lens.
 
     Attributes:
@@ -82,7 +89,7 @@ class Optics:
     pixel_um: float = 3.45
     wide_open: float = 2.8
 
-    def checked(self) -> "Optics":
+    def checked(self) -> "LensOptions":
         """These, when all are above 0 to 1000.
 
         Raises:
@@ -95,19 +102,19 @@ class Optics:
         return self
 
 
-def depth(spec: Spec, optics: Optics, progress: Progress = lambda _: None) -> Study:
+def depth_of_field(spec: Spec, optics: LensOptions, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
     radius, lens = spec.optics.capture_diameter_mm / 2, _lens(spec, optics.checked())
-    found: dict[str, tuple[MirrorArray, Images]] = {}
+    found: dict[str, tuple[MirrorArray, VirtualImages]] = {}
     reasons = []
     for rule in RULES:
         progress(f"radii by rule {rule}")
-        tried = attempt(varied(spec, rule=rule))
+        tried = try_design(spec_with(spec, rule=rule))
         if tried.made is None:
             reasons.append(f"No figures of {rule} radii: {tried.reason}")
             continue
         half = tried.made.halves[0]
-        found[rule] = (half, images(half, radius))
+        found[rule] = (half, virtual_images(half, radius))
     rows = tuple(row for rule, (half, at) in found.items() for row in _rows(rule, half, at))
     mirrors = Table("depth-of-field", COLUMNS, rows, (*NOTES, *reasons))
     stopped = Table("depth-of-field-stops", STOPS, _stop_rows(found, lens, optics), LENS_NOTES)
@@ -115,12 +122,12 @@ def depth(spec: Spec, optics: Optics, progress: Progress = lambda _: None) -> St
     return Study("depth-of-field", summary, (mirrors, stopped), _panels(found, lens))
 
 
-def _lens(spec: Spec, optics: Optics) -> Lens:
+def _lens(spec: Spec, optics: LensOptions) -> Lens:
     camera, pixel = spec.camera, optics.pixel_um / 1000
     return lens_for(np.radians(camera.hfov_deg), camera.width_px, pixel, optics.wide_open)
 
 
-def _rows(rule: str, half: MirrorArray, at: Images) -> list[tuple[Cell, ...]]:
+def _rows(rule: str, half: MirrorArray, at: VirtualImages) -> list[tuple[Cell, ...]]:
     numbers = np.column_stack(
         [
             np.degrees(half.polar),
@@ -135,32 +142,32 @@ def _rows(rule: str, half: MirrorArray, at: Images) -> list[tuple[Cell, ...]]:
     return [(name, rule, *row) for name, row in zip(half.ids, values, strict=True)]
 
 
-def span(values: Floats) -> Range:
+def span(values: Floats) -> DepthRange:
     """From the least to the largest of some depths."""
-    return Range(float(values.min()), float(values.max()))
+    return DepthRange(float(values.min()), float(values.max()))
 
 
-def _ranges(found: dict[str, tuple[MirrorArray, Images]]) -> dict[str, Range]:
+def _ranges(found: dict[str, tuple[MirrorArray, VirtualImages]]) -> dict[str, DepthRange]:
     ranges = {f"{rule} radii, along the axis": span(at.depth) for rule, (_, at) in found.items()}
     ranges |= {f"{rule} radii, distances": span(at.distance) for rule, (_, at) in found.items()}
-    paper = Range(claimed("depth_near"), claimed("depth_far"))
+    paper = DepthRange(claimed("depth_near"), claimed("depth_far"))
     return ranges | {"the paper's distances": paper}
 
 
 def _stop_rows(
-    found: dict[str, tuple[MirrorArray, Images]], lens: Lens, optics: Optics
+    found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens, optics: LensOptions
 ) -> tuple[tuple[Cell, ...], ...]:
     rows: list[tuple[Cell, ...]] = []
     for name, over in _ranges(found).items():
         head = (name, over.near, over.far, over.focus, focal_length(lens, over))
-        for kind, at in stops(lens, over, optics.blur_px).items():
+        for kind, at in aperture_stops(lens, over, optics.blur_px).items():
             figures = (at.pupil, at.f_number, at.blur_px, at.airy_px, at.total_px)
             rows.append((*head, kind, *figures, at.light, at.stops_lost))
     return tuple(rows)
 
 
 def _summary(
-    found: dict[str, tuple[MirrorArray, Images]], stopped: Table
+    found: dict[str, tuple[MirrorArray, VirtualImages]], stopped: Table
 ) -> tuple[tuple[Cell, ...], ...]:
     near, far = claims()["depth_near"], claims()["depth_far"]
     rows: list[tuple[Cell, ...]] = []
@@ -181,7 +188,7 @@ def _summary(
     return tuple(rows)
 
 
-def _panels(found: dict[str, tuple[MirrorArray, Images]], lens: Lens) -> tuple[Panel, ...]:
+def _panels(found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens) -> tuple[Panel, ...]:
     series = [
         Series(
             label, np.degrees(found[rule][0].polar), found[rule][1].distance[:, place, fan], mark
@@ -203,12 +210,12 @@ def _panels(found: dict[str, tuple[MirrorArray, Images]], lens: Lens) -> tuple[P
     return Panel(*what, tuple(series)), _blur_panel(found, lens)
 
 
-def _blur_panel(found: dict[str, tuple[MirrorArray, Images]], lens: Lens) -> Panel:
+def _blur_panel(found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens) -> Panel:
     series: list[Series] = []
     ranges = {name: over for name, over in _ranges(found).items() if name in DRAWN}
     for k, (name, over) in enumerate(ranges.items()):
         numbers = np.linspace(lens.wide_open, FARTHEST_STOP * lens.wide_open, 60)
-        at = [stop(lens, over, focal_length(lens, over) / f) for f in numbers]
+        at = [aperture_stop(lens, over, focal_length(lens, over) / f) for f in numbers]
         blur, total = (
             np.array(x) for x in zip(*((s.blur_px, s.total_px) for s in at), strict=True)
         )

@@ -11,14 +11,14 @@ from PIL import Image, ImageDraw, ImageFont
 from tbcad.errors import InputError
 from tbcad.types import Bytes
 
-STILLS = (".png",)
-ANIMATED = (".gif", ".webp", ".png")
+STILL_SUFFIXES = (".png",)
+ANIMATED_SUFFIXES = (".gif", ".webp", ".png")
 LABEL_PX = 22
 GAP_PX = 4
 FRAME_MS = 120
 
 
-def check_place(file: Path, suffixes: Sequence[str] = STILLS) -> None:
+def check_image_path(file: Path, suffixes: Sequence[str] = STILL_SUFFIXES) -> None:
     """Refuse a file that could not be written, before long work.
 
     Raises:
@@ -32,7 +32,7 @@ def check_place(file: Path, suffixes: Sequence[str] = STILLS) -> None:
         raise InputError(f"{file} is a folder: choose another name")
 
 
-def write_stills(pictures: Mapping[Path, Bytes]) -> None:
+def write_images(pictures: Mapping[Path, Bytes]) -> None:
     """Write pictures (h, w, 3), each replaced as a whole, none before all are made."""
     _written({file: _encoder(picture) for file, picture in pictures.items()})
 
@@ -51,7 +51,7 @@ def write_animation(file: Path, frames: Sequence[Bytes]) -> None:
     _written({file: save})
 
 
-def beside(pictures: Mapping[str, Bytes]) -> Bytes:
+def side_by_side(pictures: Mapping[str, Bytes]) -> Bytes:
     """Pictures of one size in a row, each under its name."""
     height, width = next(iter(pictures.values())).shape[:2]
     count = len(pictures)

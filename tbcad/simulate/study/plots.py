@@ -56,7 +56,7 @@ class Panel:
     names: tuple[str, ...] = ()
 
 
-def picture(panels: tuple[Panel, ...]) -> bytes:
+def plot_png(panels: tuple[Panel, ...]) -> bytes:
     """Panels side by side as a PNG file; the same panels give the same bytes."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.compiled import compiled
-from tbcad.simulate.scene.embree import committed
+from tbcad.simulate.parallel import compiled
+from tbcad.simulate.scene.embree import embree_scene
 from tbcad.simulate.scene.object import SceneObject, pattern
 from tbcad.types import Bytes, Floats, Ints
 
@@ -38,7 +38,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Seen:
+class RayHits:
     """What n rays see.
 
     Attributes:
@@ -50,21 +50,21 @@ class Seen:
     depth: Floats
 
 
-def scene_of(subject: SceneObject) -> Scene:
+def prepared_scene(subject: SceneObject) -> Scene:
     """Put an object into Embree and light it."""
-    embree = committed(subject.points, subject.faces)
+    embree = embree_scene(subject.points, subject.faces)
     lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
     sky = SKY_LIGHT * (0.75 + 0.25 * subject.normals[:, 2])
     return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
 
 
-def look(scene: Scene, origin: Floats, direction: Floats) -> Seen:
+def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     """What rays from origins (n, 3) along unit directions (n, 3) see."""
     colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
     depth = np.full(len(origin), np.inf)
     near = _near(origin, direction, scene.radius)
     if len(near) == 0:
-        return Seen(colour, depth)
+        return RayHits(colour, depth)
     found = scene.embree.run(
         origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
     )
@@ -72,20 +72,20 @@ def look(scene: Scene, origin: Floats, direction: Floats) -> Seen:
     rows, facet = near[hit], found["primID"][hit].astype(np.int64)
     weight = _weights(found["u"][hit], found["v"][hit])
     depth[rows] = found["tfar"][hit]
-    colour[rows] = 255 * shaded(scene, facet, weight)
-    return Seen(colour, depth)
+    colour[rows] = 255 * shaded_colours(scene, facet, weight)
+    return RayHits(colour, depth)
 
 
-def depth_of(scene: Scene) -> Callable[[Floats, Floats], Floats]:
+def depth_along_rays(scene: Scene) -> Callable[[Floats, Floats], Floats]:
     """What gives the distance along rays to the object, mm, infinite where there is none."""
 
     def depth(origin: Floats, direction: Floats) -> Floats:
-        return look(scene, origin, direction).depth
+        return cast_rays(scene, origin, direction).depth
 
     return depth
 
 
-def shaded(scene: Scene, facet: Ints, weight: Floats) -> Floats:
+def shaded_colours(scene: Scene, facet: Ints, weight: Floats) -> Floats:
     """Colours (n, 3), 0 to 1, at barycentric weights (n, 3) on facets (n,)."""
     subject = scene.subject
     light = (scene.shade[subject.faces[facet]] * weight).sum(axis=1)

@@ -9,17 +9,17 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.simulate.capture.photograph import BAND_ROWS, shifts
-from tbcad.simulate.compiled import in_threads
-from tbcad.simulate.prototype.run import Run
-from tbcad.simulate.prototype.sight import colours, directions
-from tbcad.simulate.scene.shading import Scene
+from tbcad.simulate.capture.photograph import BAND_ROWS, subpixel_shifts
+from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.prototype.ball_rays import camera_colours, pixel_rays
+from tbcad.simulate.prototype.run import PrototypeRun
+from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.types import Bytes, Floats, Ints
 
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
-def photograph(run: Run, scene: Scene, stop: int, samples: int = 1) -> Bytes:
+def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: int = 1) -> Bytes:
     """The whole photograph of a stop, numbered from 0, (h, w, 3).
 
     Args:
@@ -35,7 +35,9 @@ def photograph(run: Run, scene: Scene, stop: int, samples: int = 1) -> Bytes:
     return np.concatenate(made).reshape(height, width, 3)
 
 
-def resampled(run: Run, scene: Scene, stop: int, samples: int, places: Floats) -> Bytes:
+def resampled_photograph(
+    run: PrototypeRun, scene: Scene, stop: int, samples: int, places: Floats
+) -> Bytes:
     """The photograph of a stop at columns and rows (n, 2) between its pixels' centres, (n, 3).
 
     Bilinear between the four nearest pixels, which are whole numbers as in a file.
@@ -52,12 +54,12 @@ def resampled(run: Run, scene: Scene, stop: int, samples: int, places: Floats) -
     return np.asarray(np.rint(between), dtype=np.uint8)
 
 
-def _pixels(run: Run, scene: Scene, stop: int, samples: int, pixels: Ints) -> Bytes:
+def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: int, pixels: Ints) -> Bytes:
     """Pixels (n,) of a photograph, counted row by row, (n, 3)."""
     row, column = np.divmod(pixels, run.view.width_px)
     centres = np.column_stack([column, row]).astype(np.float64)
     stops = np.full(len(pixels), stop)
     total = np.zeros((len(pixels), 3), dtype=np.float32)
-    for shift in shifts(samples):
-        total += colours(run, scene, directions(run.view, centres + shift), stops)
+    for shift in subpixel_shifts(samples):
+        total += camera_colours(run, scene, pixel_rays(run.view, centres + shift), stops)
     return np.asarray(np.rint(total / np.float32(samples**2)), dtype=np.uint8)

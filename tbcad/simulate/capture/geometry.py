@@ -5,23 +5,23 @@ from functools import partial
 from typing import Literal
 
 from tbcad.simulate.capture.photograph import Band, Tracer, photograph
-from tbcad.simulate.prototype.merge import merge
+from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
-from tbcad.simulate.prototype.run import runs, stand_ins
+from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
 from tbcad.simulate.scene.exported import Exported
-from tbcad.simulate.scene.facets import on_mesh, read_shells
-from tbcad.simulate.scene.rays import exact
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.shading import Scene
+from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.types import Progress
 
 Geometry = Literal["spheres", "mesh", "prototype"]
-Captured = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
+CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
 
 
-def cameras(
+def camera_photographs(
     export: Exported, scene: Scene, geometry: Geometry, samples: int, progress: Progress
-) -> Captured:
+) -> CameraPhotographs:
     """Both cameras, each with what takes its photograph.
 
     Args:
@@ -36,15 +36,15 @@ def cameras(
         InputError: files of that geometry are missing or broken.
     """
     if geometry == "prototype":
-        both = runs(export.reflectors, read_plan(export))
+        both = prototype_runs(export.reflectors, read_plan(export))
         return [
-            (stand_ins(run), partial(merge, run, scene, "photograph", samples, progress))
+            (ball_reflector(run), partial(merge_run, run, scene, "photograph", samples, progress))
             for run in both
         ]
-    shells = read_shells(export) if geometry == "mesh" else None
+    shells = read_shell_meshes(export) if geometry == "mesh" else None
 
     def tracer(at: Reflector) -> Tracer:
-        return on_mesh(shells, at) if shells else exact(at)
+        return mesh_tracer(shells, at) if shells else exact_tracer(at)
 
     return [
         (at, partial(photograph, at.camera, tracer(at), scene, samples, progress))

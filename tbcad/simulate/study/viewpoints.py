@@ -6,20 +6,20 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.simulate.quality import likeness
-from tbcad.simulate.scene.ground_truth import pinhole_picture, whole
-from tbcad.simulate.scene.shading import Scene, depth_of
-from tbcad.simulate.scene.viewpoint import viewpoint
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.ground_truth import pinhole_picture, to_bytes
+from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method, synthesise
-from tbcad.simulate.views.tiles import Tiles
 from tbcad.types import Bytes, Floats, Progress
 
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
-MOST_AZIMUTHS = 360
+MAX_AZIMUTHS = 360
 
 
 @dataclass(frozen=True)
-class Round:
+class Viewpoints:
     """Viewpoints at some elevations, evenly all round at each.
 
     Attributes:
@@ -36,37 +36,39 @@ class Round:
         """The cameras, 640 x 480, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
         return [
-            viewpoint(a, e, self.distance_mm, capture_mm)
+            camera_around_object(a, e, self.distance_mm, capture_mm)
             for a, e in zip(azimuth, elevation, strict=True)
         ]
 
 
-def round_of(elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float) -> Round:
+def viewpoints_around(
+    elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float
+) -> Viewpoints:
     """Viewpoints at elevations, so many evenly all round at each.
 
     Raises:
         InputError: there are none or too many.
     """
-    if not 1 <= azimuths <= MOST_AZIMUTHS:
+    if not 1 <= azimuths <= MAX_AZIMUTHS:
         raise InputError(
-            f"--azimuths {azimuths}: allowed is 1 to {MOST_AZIMUTHS} viewpoints all round"
+            f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints all round"
         )
     turns = np.arange(azimuths) * 360.0 / azimuths
     elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, turns, indexing="ij"))
-    return Round(elevation, azimuth, distance_mm)
+    return Viewpoints(elevation, azimuth, distance_mm)
 
 
-def truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
+def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
     """What a real camera would see from each viewpoint, (h, w, 3)."""
     pictures = []
     for k, view in enumerate(views):
         progress(f"truth {k + 1} of {len(views)}")
-        pictures.append(whole(pinhole_picture(scene, view)))
+        pictures.append(to_bytes(pinhole_picture(scene, view)))
     return pictures
 
 
-def scores(
-    tiles: Tiles,
+def view_quality(
+    tiles: MirrorTiles,
     scene: Scene,
     views: list[Camera],
     pictures: list[Bytes],
@@ -83,10 +85,10 @@ def scores(
         method: how the views are made.
         progress: told how far it has come.
     """
-    depth = depth_of(scene) if method == "blend" else None
+    depth = depth_along_rays(scene) if method == "blend" else None
     found = []
     for k, (view, truth) in enumerate(zip(views, pictures, strict=True)):
         progress(f"view {k + 1} of {len(views)}")
-        alike = likeness(truth, synthesise(tiles, view, method, depth).image)
+        alike = image_quality(truth, synthesise(tiles, view, method, depth).image)
         found.append((alike.psnr_db, alike.ssim))
     return np.array(found)

@@ -13,7 +13,7 @@ FANS = ("tangential", "sagittal")
 
 
 @dataclass(frozen=True)
-class Images:
+class VirtualImages:
     """Images of the object on the mirrors' principal rays, over m mirrors.
 
     A principal ray runs from the camera over the apex to the centre of the capture sphere.
@@ -32,7 +32,9 @@ class Images:
     depth: Floats
 
 
-def behind(curvature: Floats, incidence: Floats, distance: Floats) -> tuple[Floats, Floats]:
+def image_distances(
+    curvature: Floats, incidence: Floats, distance: Floats
+) -> tuple[Floats, Floats]:
     """Distances of the tangential and the sagittal image behind convex mirrors, mm, each (...).
 
     Coddington's equations for a mirror of curvature k = 1 / r, with distances counted from the
@@ -51,14 +53,14 @@ def behind(curvature: Floats, incidence: Floats, distance: Floats) -> tuple[Floa
     return tangential, sagittal
 
 
-def images(half: MirrorArray, radius: float) -> Images:
+def virtual_images(half: MirrorArray, radius: float) -> VirtualImages:
     """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
     mirrors, pinhole = half.mirrors, half.camera.pinhole
     toward = mirrors.apex - pinhole
     to_mirror, way = norm(toward), unit(toward)
     incidence = np.arccos(np.clip(-dot(way, mirrors.normal), -1, 1))
     objects = norm(mirrors.apex)[:, None] + radius * np.array([-1.0, 0.0, 1.0])
-    image = behind(mirrors.curvature[:, None], incidence[:, None], objects)
+    image = image_distances(mirrors.curvature[:, None], incidence[:, None], objects)
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
     along = way @ half.camera.forward
-    return Images(to_mirror, incidence, distance, distance * along[:, None, None])
+    return VirtualImages(to_mirror, incidence, distance, distance * along[:, None, None])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.simulate.study.plot import Panel, picture
+from tbcad.simulate.study.plots import Panel, plot_png
 from tbcad.simulate.study.tables import Table, csv_text
 
 
@@ -30,7 +30,7 @@ class Study:
     panels: tuple[Panel, ...]
 
 
-def check_target(out: Path) -> None:
+def check_study_folder(out: Path) -> None:
     """Check, before any work, that files can be written into a folder, which need not exist.
 
     Raises:
@@ -45,7 +45,7 @@ def check_target(out: Path) -> None:
             raise PermissionError(errno.EACCES, "no right to write there")
 
 
-def write(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> list[Path]:
+def write_study(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> list[Path]:
     """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
 
     All are written in full before the first takes its name.
@@ -53,7 +53,7 @@ def write(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> l
     Raises:
         InputError: the folder cannot be written.
     """
-    contents = contents_of(study) | dict(more or {})
+    contents = study_files(study) | dict(more or {})
     with _in_words(out), ExitStack() as undo:
         out.mkdir(parents=True, exist_ok=True)
         new = [(_beside(out / name, data, undo), out / name) for name, data in contents.items()]
@@ -62,13 +62,13 @@ def write(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> l
     return [path for _, path in new]
 
 
-def contents_of(study: Study) -> dict[str, bytes]:
+def study_files(study: Study) -> dict[str, bytes]:
     """The files of a study by name: the same study gives the same bytes."""
     tables = (study.summary, *study.tables)
     files = {f"{table.name}.csv": csv_text(table).encode() for table in tables}
     notes = [note for table in tables for note in table.notes]
     files[f"{study.name}-notes.txt"] = "".join(f"{note}\n" for note in notes).encode()
-    files[f"{study.name}.png"] = picture(study.panels)
+    files[f"{study.name}.png"] = plot_png(study.panels)
     return files
 
 

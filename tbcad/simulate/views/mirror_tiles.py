@@ -14,7 +14,7 @@ NEIGHBOURS = 6
 
 
 @dataclass(frozen=True)
-class Tile:
+class MirrorTile:
     """What one mirror shows.
 
     Attributes:
@@ -37,7 +37,7 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedTiles:
     """Tiles of k mirrors in one list of n pixels, row by row.
 
     Attributes:
@@ -64,7 +64,7 @@ class Packed:
 
 
 @dataclass
-class Tiles:
+class MirrorTiles:
     """Tiles of a light field, each read once.
 
     Attributes:
@@ -78,7 +78,7 @@ class Tiles:
     u: Floats = field(init=False)
     apex: Floats = field(init=False)
     width: Floats = field(init=False)
-    _read: dict[int, Tile | None] = field(init=False, default_factory=dict)
+    _read: dict[int, MirrorTile | None] = field(init=False, default_factory=dict)
     _places: list[tuple[Frame, int]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -89,14 +89,14 @@ class Tiles:
         self.width = np.concatenate([_widths(frame.mirrors.apex) for frame in frames])
         self._places = [(frame, i) for frame in frames for i in range(len(frame.u))]
 
-    def packed(self, mirrors: Ints) -> Packed | None:
+    def packed(self, mirrors: Ints) -> PackedTiles | None:
         """Tiles of some mirrors, without those that show nothing; None if none shows anything."""
         tiles = [tile for tile in map(self._tile, mirrors.tolist()) if tile is not None]
         if not tiles:
             return None
         shape = np.array([tile.valid.shape for tile in tiles])
         first = np.concatenate([[0], np.cumsum(shape.prod(axis=1))[:-1]])
-        return Packed(
+        return PackedTiles(
             first,
             shape,
             np.concatenate([tile.valid.ravel() for tile in tiles]),
@@ -108,7 +108,7 @@ class Tiles:
             first + np.array([tile.middle for tile in tiles]),
         )
 
-    def _tile(self, mirror: int) -> Tile | None:
+    def _tile(self, mirror: int) -> MirrorTile | None:
         if mirror not in self._read:
             self._read[mirror] = _tile(*self._places[mirror])
         return self._read[mirror]
@@ -125,7 +125,7 @@ def _widths(apex: Floats) -> Floats:
     return result
 
 
-def _tile(frame: Frame, index: int) -> Tile | None:
+def _tile(frame: Frame, index: int) -> MirrorTile | None:
     x0, x1, y0, y1 = frame.boxes[index].tolist()
     part = frame.read(slice(y0, y1), slice(x0, x1))
     valid = part["mirror"] == index + 1
@@ -135,9 +135,9 @@ def _tile(frame: Frame, index: int) -> Tile | None:
     cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     valid = valid[cut]
     origin, direction = part["origin"][cut], part["direction"][cut]
-    pinhole, spread = meeting(origin[valid], direction[valid])
+    pinhole, spread = convergence_point(origin[valid], direction[valid])
     middle = _middle(valid)
-    return Tile(valid, part["colour"][cut], origin, direction, pinhole, spread, middle)
+    return MirrorTile(valid, part["colour"][cut], origin, direction, pinhole, spread, middle)
 
 
 def _middle(valid: NDArray[np.bool_]) -> int:
@@ -147,7 +147,7 @@ def _middle(valid: NDArray[np.bool_]) -> int:
     return int((rows * width + columns)[away.argmin()])
 
 
-def meeting(origin: NDArray[Any], direction: NDArray[Any]) -> tuple[Floats, float]:
+def convergence_point(origin: NDArray[Any], direction: NDArray[Any]) -> tuple[Floats, float]:
     """Point (3,) with the least squared distance to rays (n, 3), and the largest distance, mm."""
     d = direction.astype(np.float64)
     o = origin.astype(np.float64)

@@ -8,7 +8,7 @@ from tbcad.types import Bytes
 
 
 @dataclass(frozen=True)
-class Likeness:
+class ImageQuality:
     """A picture against the truth.
 
     Attributes:
@@ -20,7 +20,7 @@ class Likeness:
     ssim: float
 
 
-def likeness(truth: Bytes, picture: Bytes) -> Likeness:
+def image_quality(truth: Bytes, picture: Bytes) -> ImageQuality:
     """PSNR and SSIM of pictures (h, w, 3) over the whole frame, background included.
 
     SSIM as Z. Wang and others, IEEE Trans. Image Processing 13(4), 2004, section III: a Gaussian
@@ -39,4 +39,4 @@ def likeness(truth: Bytes, picture: Bytes) -> Likeness:
         sigma=1.5,
         use_sample_covariance=False,
     )
-    return Likeness(psnr, float(ssim))
+    return ImageQuality(psnr, float(ssim))

@@ -18,23 +18,23 @@ from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.scene.embree import committed
+from tbcad.simulate.scene.embree import embree_scene
 from tbcad.simulate.scene.exported import AGAIN, Exported
-from tbcad.simulate.scene.rays import Numbers, Rays, pixel_directions, reflected
+from tbcad.simulate.scene.rays import MirrorNumbers, ReflectedRays, pixel_directions, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats, Ints
 
-LARGEST_FILE = 4 << 30  # bytes
+MAX_FILE_BYTES = 4 << 30  # bytes
 # Mirrors whose apices are nearest to a facet, out of which the one it lies on is found.
-LIKELY = 8
+CANDIDATE_MIRRORS = 8
 # Corners of a facet lie on its mirror but for what float32 in the file leaves.
-OFF_MM = 1e-3
+ON_MIRROR_MM = 1e-3
 # Facets of a mirror lie along it within a few degrees, walls at its rim nearly across.
-LEAST_COSINE = 0.9
+MIN_FACET_COSINE = 0.9
 
 
 @dataclass(frozen=True)
-class Shells:
+class ShellMeshes:
     """Both shells' facets.
 
     Attributes:
@@ -44,12 +44,12 @@ class Shells:
         surfaces: of camera a's and of camera b's mirrors, recovered from the facets, coat on.
     """
 
-    mirror: Numbers
+    mirror: MirrorNumbers
     embree: Any
     surfaces: tuple[Surfaces, Surfaces]
 
 
-def read_shells(export: Exported) -> Shells:
+def read_shell_meshes(export: Exported) -> ShellMeshes:
     """Read both shells' STL files.
 
     Raises:
@@ -65,28 +65,30 @@ def read_shells(export: Exported) -> Shells:
             raise InputError(f"{path} has no facets of {len(lost)} mirrors of the record: {AGAIN}")
         corners.append(facets)
         owners.append(sign * (owner + 1))
-        surfaces.append(recovered(at.mirrors, facets, owner).offset(coat))
+        surfaces.append(fitted_surfaces(at.mirrors, facets, owner).offset(coat))
     mirror = np.concatenate(owners).astype(np.int32)
-    return Shells(mirror, committed(np.concatenate(corners)), (surfaces[0], surfaces[1]))
+    return ShellMeshes(mirror, embree_scene(np.concatenate(corners)), (surfaces[0], surfaces[1]))
 
 
-def on_mesh(shells: Shells, at: Reflector) -> Callable[[range, tuple[float, float]], Rays]:
+def mesh_tracer(
+    shells: ShellMeshes, at: Reflector
+) -> Callable[[range, tuple[float, float]], ReflectedRays]:
     """What gives the rays of rows of a camera's picture off the mirrors of the mesh."""
     sign, surfaces = (1, shells.surfaces[0]) if at.camera_id == "a" else (-1, shells.surfaces[1])
 
-    def trace(rows: range, shift: tuple[float, float]) -> Rays:
+    def trace(rows: range, shift: tuple[float, float]) -> ReflectedRays:
         way = pixel_directions(at.camera, rows, shift)
         start = np.empty((way.shape[0] * way.shape[1], 3), dtype=np.float32)
         start[:] = at.camera.pinhole
         facet = np.asarray(shells.embree.run(start, way.reshape(-1, 3).astype(np.float32)))
         mirror = np.where(facet >= 0, np.maximum(sign * shells.mirror[facet], 0), 0)
         numbers = mirror.reshape(way.shape[:2]).astype(np.int32)
-        return reflected(at.camera.pinhole, way, surfaces, numbers)
+        return reflect_pixels(at.camera.pinhole, way, surfaces, numbers)
 
     return trace
 
 
-def recovered(meant: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
+def fitted_surfaces(meant: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
     """The surfaces (m,) that fit the corners (f, 3, 3) of facets of owners (f,) best; -1: none.
 
     In a frame with z along the meant normal, at the meant apex, a surface is
@@ -125,7 +127,7 @@ def _facets(path: Path) -> Floats:
 
     if not path.is_file():
         raise InputError(f"{path} is not there: build the shell too, or leave --mesh out")
-    if path.stat().st_size > LARGEST_FILE:
+    if path.stat().st_size > MAX_FILE_BYTES:
         raise InputError(f"{path} is over 4 GiB: {AGAIN}")
     try:
         corners = np.asarray(trimesh.load_mesh(path, process=False).triangles, dtype=np.float64)
@@ -138,12 +140,14 @@ def _facets(path: Path) -> Floats:
 
 def _owners(bare: Surfaces, corners: Floats) -> Ints:
     """The mirror (f,) on whose surface all corners (f, 3, 3) of a facet lie; -1 for none."""
-    _, near = cKDTree(bare.apex).query(corners.mean(axis=1), k=min(LIKELY, len(bare)), workers=-1)
+    _, near = cKDTree(bare.apex).query(
+        corners.mean(axis=1), k=min(CANDIDATE_MIRRORS, len(bare)), workers=-1
+    )
     owner = np.full(len(corners), -1)
     for likely in near.reshape(len(corners), -1).T:
         left = np.flatnonzero(owner < 0)
         i = np.repeat(likely[left, None], 3, axis=1)
-        on = np.abs(bare.value(i, corners[left])).max(axis=1) < OFF_MM
+        on = np.abs(bare.value(i, corners[left])).max(axis=1) < ON_MIRROR_MM
         owner[left[on]] = likely[left[on]]
     owner[~_along(bare, corners, owner)] = -1
     return owner
@@ -154,5 +158,5 @@ def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal = bare.gradient(owner, corners.mean(axis=1))
     size = np.linalg.norm(area, axis=1) * np.linalg.norm(normal, axis=1)
-    along: NDArray[np.bool_] = np.abs((area * normal).sum(axis=1)) > LEAST_COSINE * size
+    along: NDArray[np.bool_] = np.abs((area * normal).sum(axis=1)) > MIN_FACET_COSINE * size
     return along

@@ -7,15 +7,15 @@ import pytest
 from PIL import Image, ImageSequence
 
 from tbcad.errors import InputError
-from tbcad.simulate.picture_files import (
-    ANIMATED,
-    beside,
-    check_place,
+from tbcad.simulate.image_files import (
+    ANIMATED_SUFFIXES,
+    check_image_path,
     difference,
+    side_by_side,
     write_animation,
-    write_stills,
+    write_images,
 )
-from tbcad.simulate.quality import likeness
+from tbcad.simulate.image_quality import image_quality
 
 RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
 
@@ -23,13 +23,13 @@ RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0
 def test_stills_are_read_back_and_repeat(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
     files = [tmp_path / "one.png", tmp_path / "two.png"]
-    write_stills({files[0]: noise, files[1]: noise})
+    write_images({files[0]: noise, files[1]: noise})
     assert np.array_equal(np.asarray(Image.open(files[0])), noise)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "two.png"]
 
 
-@pytest.mark.parametrize("suffix", ANIMATED)
+@pytest.mark.parametrize("suffix", ANIMATED_SUFFIXES)
 def test_films_go_there_and_back(tmp_path: Path, suffix: str) -> None:
     frames = [np.full((24, 32, 3), level, dtype=np.uint8) for level in (0, 80, 160, 240)]
     file = tmp_path / f"film{suffix}"
@@ -40,7 +40,7 @@ def test_films_go_there_and_back(tmp_path: Path, suffix: str) -> None:
 
 
 def test_pictures_beside_each_other() -> None:
-    sheet = beside({"red": RED, "blue": BLUE})
+    sheet = side_by_side({"red": RED, "blue": BLUE})
     assert (sheet[-1, 0] == [255, 0, 0]).all()
     assert (sheet[-1, -1] == [0, 0, 255]).all()
     assert sheet.shape[1] > 64
@@ -55,21 +55,21 @@ def test_difference_has_no_sign() -> None:
 def test_places_that_cannot_be(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(InputError, match=name):
-        check_place(tmp_path / name)
+        check_image_path(tmp_path / name)
 
 
 def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
     old = tmp_path / "b.png"
-    write_stills({old: RED})
+    write_images({old: RED})
     before = old.read_bytes()
     with pytest.raises((InputError, TypeError)):
-        write_stills({old: BLUE, tmp_path / "c.png": np.zeros((3, 3, 7), dtype=np.uint8)})
+        write_images({old: BLUE, tmp_path / "c.png": np.zeros((3, 3, 7), dtype=np.uint8)})
     assert old.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
 
 
 def test_equal_pictures_are_alike() -> None:
-    same = likeness(RED, RED)
+    same = image_quality(RED, RED)
     assert same.ssim == pytest.approx(1)
     assert same.psnr_db == float("inf")
 
@@ -77,8 +77,8 @@ def test_equal_pictures_are_alike() -> None:
 def test_psnr_in_closed_form() -> None:
     """An error of 10 everywhere: 10 log10(255^2 / 100)."""
     grey = np.full((24, 32, 3), 100, dtype=np.uint8)
-    assert likeness(grey, grey + np.uint8(10)).psnr_db == pytest.approx(28.1308, abs=1e-4)
-    assert likeness(grey, grey + np.uint8(10)).ssim < 1
+    assert image_quality(grey, grey + np.uint8(10)).psnr_db == pytest.approx(28.1308, abs=1e-4)
+    assert image_quality(grey, grey + np.uint8(10)).ssim < 1
 
 
 def test_ssim_of_even_pictures_in_closed_form() -> None:
@@ -86,4 +86,4 @@ def test_ssim_of_even_pictures_in_closed_form() -> None:
     one, other = (np.full((24, 32, 3), level, dtype=np.uint8) for level in (100, 140))
     c1 = (0.01 * 255) ** 2
     expected = (2 * 100 * 140 + c1) / (100**2 + 140**2 + c1)
-    assert likeness(one, other).ssim == pytest.approx(expected)
+    assert image_quality(one, other).ssim == pytest.approx(expected)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
-from tbcad.simulate.compiled import compiled
-from tbcad.simulate.prototype.run import Run
-from tbcad.simulate.scene.reflector import pitch
-from tbcad.simulate.scene.shading import Scene, look
+from tbcad.simulate.parallel import compiled
+from tbcad.simulate.prototype.run import PrototypeRun
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.simulate.scene.reflector import pixel_pitch
 from tbcad.types import Bools, Floats, Ints
 
 Colours = NDArray[np.float32]
@@ -24,7 +24,7 @@ EDGE_PX = 1e-6
 
 
 @dataclass(frozen=True)
-class Sight:
+class BallHits:
     """What n rays from the camera meet.
 
     Attributes:
@@ -40,49 +40,51 @@ class Sight:
     reach: Floats
 
 
-def sight(run: Run, way: Floats, stop: Ints) -> Sight:
+def trace_balls(run: PrototypeRun, way: Floats, stop: Ints) -> BallHits:
     """What unit directions (n, 3) from the pinhole meet at stops (n,)."""
     ball, reach = np.zeros(len(way), dtype=np.int64), np.full(len(way), np.inf)
     origin, direction = np.zeros_like(way), np.zeros_like(way)
     _reflect(run.view.pinhole, way, stop, run.balls, ball, reach, origin, direction)
-    return Sight(ball, origin, direction, reach)
+    return BallHits(ball, origin, direction, reach)
 
 
-def in_balls(scene: Scene, seen: Sight) -> Colours:
+def reflected_colours(scene: Scene, seen: BallHits) -> Colours:
     """Colours (n, 3) of the object's images in the balls, 0 to 255."""
     colour = np.zeros((len(seen.ball), 3), dtype=np.float32)
     on = np.flatnonzero(seen.ball)
-    colour[on] = look(scene, seen.origin[on], seen.direction[on]).colour
+    colour[on] = cast_rays(scene, seen.origin[on], seen.direction[on]).colour
     return colour
 
 
-def in_front(scene: Scene, view: Camera, way: Floats, reach: Floats) -> tuple[Bools, Colours]:
+def object_in_front(
+    scene: Scene, view: Camera, way: Floats, reach: Floats
+) -> tuple[Bools, Colours]:
     """Where (n,) the object stands nearer than a reach (n,), mm, and its colours there (n, 3)."""
-    direct = look(scene, np.broadcast_to(view.pinhole, way.shape), way)
+    direct = cast_rays(scene, np.broadcast_to(view.pinhole, way.shape), way)
     front = np.isfinite(direct.depth) & (direct.depth < reach)
     return front, direct.colour
 
 
-def colours(run: Run, scene: Scene, way: Floats, stop: Ints) -> Colours:
+def camera_colours(run: PrototypeRun, scene: Scene, way: Floats, stop: Ints) -> Colours:
     """What the camera records along unit directions (n, 3) at stops (n,), 0 to 255."""
-    seen = sight(run, way, stop)
-    front, direct = in_front(scene, run.view, way, seen.reach)
-    return np.where(front[:, None], direct, in_balls(scene, seen))
+    seen = trace_balls(run, way, stop)
+    front, direct = object_in_front(scene, run.view, way, seen.reach)
+    return np.where(front[:, None], direct, reflected_colours(scene, seen))
 
 
-def directions(view: Camera, places: Floats) -> Floats:
+def pixel_rays(view: Camera, places: Floats) -> Floats:
     """Unit directions (n, 3) through columns and rows (n, 2); whole numbers are pixel centres."""
     size = np.array([view.width_px, view.height_px])
-    across, downward = (places - (size - 1) / 2).T * pitch(view)
+    across, downward = (places - (size - 1) / 2).T * pixel_pitch(view)
     down = np.cross(view.forward, view.right)
     return unit(view.forward + across[:, None] * view.right + downward[:, None] * down)
 
 
-def places_of(view: Camera, way: Floats) -> Floats:
+def image_points(view: Camera, way: Floats) -> Floats:
     """Column and row (n, 2) where directions (n, 3) appear; NaN outside of the pixels' centres."""
     axes = np.stack([view.right, np.cross(view.forward, view.right), view.forward])
     last = np.array([view.width_px - 1.0, view.height_px - 1.0])
-    return _places(way, axes, pitch(view), last)
+    return _places(way, axes, pixel_pitch(view), last)
 
 
 @compiled

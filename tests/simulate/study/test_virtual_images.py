@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.simulate.study.images import behind, images
+from tbcad.simulate.study.virtual_images import image_distances, virtual_images
 from tbcad.spec.design import load_spec
 from tbcad.types import Floats
 
@@ -42,7 +42,9 @@ def test_coddington_agrees_with_traced_fans(
     curvature: float, incidence_deg: float, distance: float
 ) -> None:
     incidence = np.radians(incidence_deg)
-    tangential, sagittal = behind(np.array(curvature), np.array(incidence), np.array(distance))
+    tangential, sagittal = image_distances(
+        np.array(curvature), np.array(incidence), np.array(distance)
+    )
     across, along = np.array([0.0, FAN]), np.array([FAN, 0.0])
     assert traced(curvature, incidence, distance, along) == pytest.approx(tangential, rel=1e-4)
     assert traced(curvature, incidence, distance, across) == pytest.approx(sagittal, rel=1e-4)
@@ -50,7 +52,7 @@ def test_coddington_agrees_with_traced_fans(
 
 def test_one_image_on_the_axis() -> None:
     """1/s' = 1/s + 2/r at normal incidence: an object at r has its image at r / 3."""
-    tangential, sagittal = behind(np.array(1 / 30), np.array(0.0), np.array(30.0))
+    tangential, sagittal = image_distances(np.array(1 / 30), np.array(0.0), np.array(30.0))
     assert tangential == pytest.approx(10, rel=1e-15)
     assert sagittal == pytest.approx(10, rel=1e-15)
 
@@ -58,7 +60,7 @@ def test_one_image_on_the_axis() -> None:
 def test_flat_mirrors_show_the_object_at_twice_the_semi_major_axis() -> None:
     """The ellipsoid's two distances sum to 2a: images lie at 2a - R, 2a, 2a + R in both fans."""
     half = half_of("n=6", "radius_rule=flat")
-    at = images(half, 30.0)
+    at = virtual_images(half, 30.0)
     twice = 2 * np.sqrt(100**2 + 100**2 / 2)
     expected = np.broadcast_to(twice + np.array([-30.0, 0, 30])[:, None], (len(half), 3, 2))
     assert at.distance == pytest.approx(expected, rel=1e-12)
@@ -67,7 +69,7 @@ def test_flat_mirrors_show_the_object_at_twice_the_semi_major_axis() -> None:
 def test_depth_is_what_the_camera_measures_along_its_axis() -> None:
     """The image point itself, from apex and ray, seen from the pinhole."""
     half = half_of("n=4")
-    at = images(half, 30.0)
+    at = virtual_images(half, 30.0)
     pinhole = half.camera.pinhole
     way = (half.mirrors.apex - pinhole) / at.to_mirror[:, None]
     point = pinhole + at.distance[:, 1, 0][:, None] * way
@@ -77,5 +79,5 @@ def test_depth_is_what_the_camera_measures_along_its_axis() -> None:
 
 def test_incidence_is_that_of_the_paper_design(paper_half: MirrorArray) -> None:
     """16 ... 35 degrees at the apices, measured before (DESIGN.md section 3)."""
-    incidence = np.degrees(images(paper_half, 30.0).incidence)
+    incidence = np.degrees(virtual_images(paper_half, 30.0).incidence)
     assert (round(incidence.min()), round(incidence.max())) == (16, 35)
