@@ -72,8 +72,7 @@ def _bend(
 ) -> tuple[Floats, Floats]:
     """Angles over edges, rad, and how far they tilt a unit of vertex error, rad/mm."""
     other = mesh.twin[half]
-    start = _corner(mesh, half, 0)
-    edge = _corner(mesh, half, 1) - start
+    start, edge = half_edge_vectors(mesh, half)
     length = norm(edge)
     n, m = np.take(normal, half // 3, axis=1), np.take(normal, other // 3, axis=1)
     angle = np.arctan2(dot(cross(n, m), edge) / length, dot(n, m))
@@ -112,6 +111,12 @@ def segment_mesh(mesh: Mesh, edges: Edges) -> Segmentation:
     smooth = edges.half[~creases(edges)]
     count, label = connected_groups(len(mesh.faces), smooth // 3, mesh.twin[smooth] // 3)
     return Segmentation(label, count)
+
+
+def half_edge_vectors(mesh: Mesh, half: NDArray[np.integer]) -> tuple[Floats, Floats]:
+    """Where half-edges start, (3, E) mm, and the vectors along them, (3, E) mm."""
+    start = _corner(mesh, half, 0)
+    return start, _corner(mesh, half, 1) - start
 
 
 def _corner(mesh: Mesh, half: NDArray[np.integer], step: int) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
-from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges
+from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges, half_edge_vectors
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.printing.circles import fit_circles, widest_gaps
 from tbcad_verify.types import Bools, Floats, Ints
@@ -118,8 +118,7 @@ def _straight(mesh: Mesh, half: Ints, bend: Floats, label: Groups, count: int) -
     """
     mine = label[half // 3] >= 0
     half, bend = half[mine], bend[mine]
-    start, end = mesh.faces.ravel()[half], np.roll(mesh.faces, -1, axis=1).ravel()[half]
-    edge = np.take(mesh.points, end, axis=0).T - np.take(mesh.points, start, axis=0).T
+    edge = half_edge_vectors(mesh, half)[1]
     tensor = _outer(edge, bend / norm(edge), label[half // 3], count)
     return np.ascontiguousarray(np.linalg.eigh(tensor)[1][:, :, 2].T)
 

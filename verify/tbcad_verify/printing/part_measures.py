@@ -9,7 +9,7 @@ import numpy as np
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.segments import Edges, measure_edges
+from tbcad_verify.mesh.segments import Edges, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.holes import RoundHoles, round_holes
 from tbcad_verify.printing.orientations import PartHull, part_hull
@@ -90,7 +90,5 @@ def measure(mesh: Mesh, status: str, lump: MassProperties) -> PartMeasures:
 
 def _corners(mesh: Mesh, edges: Edges) -> InnerEdges:
     inner = edges.angle < -edges.noise
-    start = mesh.faces.ravel()[edges.half[inner]]
-    end = np.roll(mesh.faces, -1, axis=1).ravel()[edges.half[inner]]
-    edge = np.take(mesh.points, end, axis=0).T - np.take(mesh.points, start, axis=0).T
-    return InnerEdges(-edges.angle[inner], norm(edge))
+    vectors = half_edge_vectors(mesh, edges.half[inner])[1]
+    return InnerEdges(-edges.angle[inner], norm(vectors))

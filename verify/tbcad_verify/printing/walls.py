@@ -10,7 +10,7 @@ import numpy as np
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.rays import RayScene, distances_to_planes, first_hits, in_threads
-from tbcad_verify.mesh.segments import Edges, rounding
+from tbcad_verify.mesh.segments import Edges, half_edge_vectors, rounding
 from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -161,8 +161,7 @@ def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterat
     """Facets beside a groove look past the thinnest place below it; its bottom does not."""
     half = edges.half[edges.angle < -(GROOVE_RAD + edges.noise)]
     half = half[sound[half // 3] & sound[mesh.twin[half] // 3]]
-    start = np.take(mesh.points, mesh.faces.ravel()[half], axis=0).T
-    edge = np.take(mesh.points, np.roll(mesh.faces, -1, axis=1).ravel()[half], axis=0).T - start
+    start, edge = half_edge_vectors(mesh, half)
     size = _steps(norm(edge), step)
     inward = -unit(unit(mesh.area[:, half // 3]) + unit(mesh.area[:, mesh.twin[half] // 3]))
     for k in LATTICES[::-1]:

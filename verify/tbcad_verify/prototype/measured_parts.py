@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties, mass_properties
 from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes, mesh_from_facets
-from tbcad_verify.mesh.segments import Edges, count_folds, measure_edges
+from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype_record import Printed
@@ -124,9 +124,7 @@ def joined_meshes(bodies: list[MeasuredPart]) -> tuple[Mesh, NDArray[np.intp]]:
 
 
 def _bend(mesh: Mesh, edges: Edges) -> float:
-    start = mesh.faces.ravel()[edges.half]
-    end = np.roll(mesh.faces, -1, axis=1).ravel()[edges.half]
-    length = norm((mesh.points[end] - mesh.points[start]).T)
+    length = norm(half_edge_vectors(mesh, edges.half)[1])
     return float((length * np.abs(edges.angle)).sum())
 
 

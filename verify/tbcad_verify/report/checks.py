@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -67,6 +68,16 @@ def unknown(check: CheckName, reason: str) -> Check:
     return Check(check[0], check[1], None, None, None, check[2], reason)
 
 
+def check_names(units: Mapping[str, str], file: str) -> list[CheckName]:
+    """Name, file and unit of every check of one file.
+
+    Args:
+        units: unit of each check, by name.
+        file: where, inside the export.
+    """
+    return [(name, file, unit) for name, unit in units.items()]
+
+
 class Unknown(Exception):
     """Something cannot be found out because something before it was not; the message says why."""
 
@@ -77,6 +88,19 @@ def guarded(checks: Sequence[CheckName], work: Callable[[], Sequence[Check]]) ->
         return list(work())
     except Exception as error:
         return [unknown(check, reason_of(error)) for check in checks]
+
+
+def guarded_each(
+    names: Sequence[CheckName], jobs: Sequence[Callable[..., Check]], *arguments: object
+) -> list[Check]:
+    """One check for each job, called with its name and the arguments; one that breaks is unknown."""
+    results = [
+        attempt(partial(job, name, *arguments)) for name, job in zip(names, jobs, strict=True)
+    ]
+    return [
+        unknown(name, reason) if check is None else check
+        for name, (check, reason) in zip(names, results, strict=True)
+    ]
 
 
 def reason_of(error: Exception) -> str:
