@@ -1,4 +1,4 @@
-"""Ways to choose the balls, and what each of them costs."""
+"""What each rule for choosing the balls costs."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,8 @@ from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.selection import (
-    SAME_MM,
+    COVERAGE_ROUNDING_MM,
     BallCandidates,
-    Balls,
     ball_candidates,
     ball_fit,
     choose_balls,
@@ -19,25 +18,25 @@ from tbcad.spec.prototype import PrototypeSpec
 
 @dataclass(frozen=True)
 class BallAlternative:
-    """What one way to choose the balls costs.
+    """What one rule for choosing the balls costs.
 
     Attributes:
-        name: of the way.
-        kept: share of the shell's pixels that is kept.
-        pixels: that are kept, of all mirrors of camera a together.
-        least_coverage: within the moved cells, mm.
-        short: number of mirrors that show less than the target there.
-        mass_g: of the balls.
-        made: number of caps.
+        name: name of the rule.
+        kept_share: share of the shell's pixels that is kept.
+        pixels: pixels that are kept, of all mirrors of camera a together.
+        min_coverage: minimum coverage diameter within the moved cells, mm.
+        below_target: number of mirrors whose coverage there is below the target.
+        mass_g: mass of the balls.
+        caps: number of caps.
     """
 
     name: str
-    kept: float
+    kept_share: float
     pixels: float
-    least_coverage: float
-    short: int
+    min_coverage: float
+    below_target: int
     mass_g: float
-    made: int
+    caps: int
 
 
 SELECTION_RULES = {
@@ -51,21 +50,25 @@ SELECTION_RULES = {
 def ball_alternatives(
     spec: Spec, half: MirrorArray, groups: MirrorGroups, catalogue: Catalogue
 ) -> list[BallAlternative]:
-    """What each way to choose the balls costs, for groups of camera a's mirrors."""
-    here = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
-    keys = [(name, spec.prototype.model_copy(update=way)) for name, way in SELECTION_RULES.items()]
-    return [_choice(name, here, choose_balls(here, way, catalogue), way) for name, way in keys]
+    """What each rule costs, for groups of camera a's mirrors."""
+    candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    return [
+        _alternative(name, candidates, spec.prototype.model_copy(update=rule), catalogue)
+        for name, rule in SELECTION_RULES.items()
+    ]
 
 
-def _choice(name: str, here: BallCandidates, balls: Balls, keys: PrototypeSpec) -> BallAlternative:
-    found = ball_fit(here, balls, keys)
-    short = found.coverage < here.target - SAME_MM
+def _alternative(
+    name: str, candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue
+) -> BallAlternative:
+    balls = choose_balls(candidates, spec, catalogue)
+    fit = ball_fit(candidates, balls, spec)
     return BallAlternative(
         name,
-        found.kept,
-        float(found.pixels.sum()),
-        float(found.coverage.min()),
-        int(short.sum()),
+        fit.kept_share,
+        float(fit.pixels.sum()),
+        float(fit.coverage.min()),
+        int((fit.coverage < candidates.target - COVERAGE_ROUNDING_MM).sum()),
         float(balls.mass_g.sum()),
         int(balls.cap.sum()),
     )

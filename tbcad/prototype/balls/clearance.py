@@ -1,6 +1,6 @@
 """What each ball must keep clear of: other balls, their light, the post and the camera.
 
-Every one of these becomes an angle about the axis, in closed form (optics/swing.py).
+Each becomes an angle about the axis, in closed form (geometry/round_cones.py).
 """
 
 from collections.abc import Iterable
@@ -16,18 +16,20 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Floats
 
-# Kept on top of every least angle, radians: far more than the solver's rounding and far less than
-# matters, so that no two balls come closer than they may.
+# Added to each minimum angle, radians: far more than the solver's rounding and far less than
+# matters, so that balls keep their distance in spite of that rounding.
 SOLVER_MARGIN = 1e-4
+# Minimum distance of a ball from the axis, mm, against division by zero.
+NEAR_AXIS_MM = 1e-9
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Something that does not turn with the base.
+    """Something that does not rotate with the base.
 
     Attributes:
         cone: its hull, (1,).
-        azimuth: of the half-plane it lies in, radians in (0, 2 pi).
+        azimuth: of the half-plane that contains it, radians in (0, 2 pi).
     """
 
     cone: RoundCones
@@ -35,51 +37,50 @@ class Obstacle:
 
 
 def min_separations(
-    balls: Balls, keys: PrototypeSpec, pinhole: float, capture: float
+    balls: Balls, spec: PrototypeSpec, pinhole: float, capture: float
 ) -> tuple[Floats, Floats]:
-    """Least differences of azimuth so that no balls touch, and so that light passes, (k, k) each.
+    """Minimum differences of azimuth so that no balls touch, and so that light passes, (k, k) each.
 
     Args:
         balls: in the frame at azimuth zero.
-        keys: the wall between balls and the margin of the light.
+        spec: with the wall between balls and the margin of the light.
         pinhole: distance of the pinhole along the axis, mm.
         capture: radius of the capture sphere, mm.
     """
     centre, radius = balls.body_centre[:, :2], balls.body_radius
-    touch = contact_angle(centre, radius, spheres(centre, radius).grown(keys.ball_wall_mm))
+    touching = contact_angle(centre, radius, spheres(centre, radius).grown(spec.ball_wall_mm))
     to_object, to_camera = light_hulls(balls.outline, pinhole, capture)
-    dark = np.maximum(
-        contact_angle(centre, radius, to_object.grown(keys.light_margin_mm)),
-        contact_angle(centre, radius, to_camera.grown(keys.light_margin_mm)),
+    blocking = np.maximum(
+        contact_angle(centre, radius, to_object.grown(spec.light_margin_mm)),
+        contact_angle(centre, radius, to_camera.grown(spec.light_margin_mm)),
     )
-    # Of a pair each must leave the other's light alone.
-    return _between(touch), _between(np.maximum(dark, dark.T))
+    # Neither ball of a pair may block the other's light.
+    return _with_margin(touching), _with_margin(np.maximum(blocking, blocking.T))
 
 
-def _between(angle: Floats) -> Floats:
+def _with_margin(angle: Floats) -> Floats:
     result = np.where(angle > 0, angle + SOLVER_MARGIN, 0.0)
     np.fill_diagonal(result, 0.0)
     return result
 
 
-def obstacles(keys: PrototypeSpec, frame: Floats, view: Camera, length: float) -> list[Obstacle]:
+def obstacles(spec: PrototypeSpec, frame: Floats, view: Camera, length: float) -> list[Obstacle]:
     """The post below the object and the camera's body behind its pinhole.
 
     Args:
-        keys: their sizes.
+        spec: with their sizes; a diameter of zero leaves one out.
         frame: rows of the ellipsoid's frame, (3, 3).
         view: the camera.
         length: of the post, to beyond all balls, mm.
     """
-    post = _obstacle(np.zeros(3), frame @ [0.0, 0.0, -length], keys.post_diameter_mm / 2)
+    post = _capsule(np.zeros(3), frame @ [0.0, 0.0, -length], spec.post_diameter_mm / 2)
     start = frame @ view.pinhole
-    end = start - keys.camera_length_mm * (frame @ view.forward)
-    camera = _obstacle(start, end, keys.camera_diameter_mm / 2)
-    sizes = (keys.post_diameter_mm, keys.camera_diameter_mm)
-    return [thing for thing, size in zip((post, camera), sizes, strict=True) if size > 0]
+    end = start - spec.camera_length_mm * (frame @ view.forward)
+    camera = _capsule(start, end, spec.camera_diameter_mm / 2)
+    return [thing for thing in (post, camera) if thing.cone.start_radius[0] > 0]
 
 
-def _obstacle(start: Floats, end: Floats, radius: float) -> Obstacle:
+def _capsule(start: Floats, end: Floats, radius: float) -> Obstacle:
     """A capsule from a point on the axis to another point."""
     azimuth = float(np.arctan2(end[2], end[1])) % (2 * np.pi)
     first, second = (np.array([[point[0], np.hypot(*point[1:])]]) for point in (start, end))
@@ -88,16 +89,16 @@ def _obstacle(start: Floats, end: Floats, radius: float) -> Obstacle:
 
 
 def allowed_azimuths(
-    balls: Balls, keys: PrototypeSpec, things: Iterable[Obstacle]
+    balls: Balls, spec: PrototypeSpec, obstacles: Iterable[Obstacle]
 ) -> tuple[Floats, Floats]:
-    """Least and largest azimuth (k,) of each ball such that it meets nothing in between.
+    """Minimum and maximum azimuth (k,) of each ball between which it is clear of all obstacles.
 
     Raises:
-        SpecError: when a ball meets something at every azimuth.
+        SpecError: when a ball meets an obstacle at every azimuth.
     """
-    floor, ceiling = np.full(len(balls), -np.pi), np.full(len(balls), np.pi)
-    for thing in things:
-        cone = thing.cone.grown(keys.ball_wall_mm)
+    lowest, highest = np.full(len(balls), -np.pi), np.full(len(balls), np.pi)
+    for obstacle in obstacles:
+        cone = obstacle.cone.grown(spec.ball_wall_mm)
         half = contact_angle(balls.body_centre[:, :2], balls.body_radius, cone)[0]
         if half.max() >= np.pi:
             raise SpecError(
@@ -105,13 +106,13 @@ def allowed_azimuths(
                 "the base: make prototype.post_diameter_mm or prototype.camera_diameter_mm smaller"
             )
         met = half > 0
-        ceiling[met] = np.minimum(ceiling, thing.azimuth - half)[met]
-        floor[met] = np.maximum(floor, thing.azimuth - 2 * np.pi + half)[met]
-    return floor, ceiling
+        highest[met] = np.minimum(highest, obstacle.azimuth - half)[met]
+        lowest[met] = np.maximum(lowest, obstacle.azimuth - 2 * np.pi + half)[met]
+    return lowest, highest
 
 
 def seat_half_angles(balls: Balls, wall: float) -> Floats:
     """Angle at the axis between a ball's centre and the edge of its seat, radians, (k,)."""
-    share = (balls.body_radius + wall) / np.maximum(balls.body_centre[:, 1], 1e-9)
-    angle: Floats = np.arcsin(np.minimum(share, 1))
+    out = np.maximum(balls.body_centre[:, 1], NEAR_AXIS_MM)
+    angle: Floats = np.arcsin(np.minimum((balls.body_radius + wall) / out, 1))
     return angle

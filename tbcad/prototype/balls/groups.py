@@ -8,22 +8,22 @@ from scipy.cluster.vq import ClusterError, kmeans2
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
-ROUNDS = 200
-# Mirrors nearer to each other than this, in degrees of polar angle, are the same to k-means.
+MAX_ITERATIONS = 200
+# Mirrors closer together than this, in degrees of polar angle, are the same to k-means.
 SAME_DEG = 1e-6
 
 
 @dataclass(frozen=True)
 class MirrorGroups:
-    """Groups of m mirrors by rising polar angle, over k groups.
+    """Groups of m mirrors by rising polar angle, k of them.
 
     Attributes:
-        of: group of each mirror, (m,).
+        group_of: group of each mirror, (m,).
         polar: mean polar angle of each group, radians, (k,).
         radius: mean radius, mm, (k,).
     """
 
-    of: Ints
+    group_of: Ints
     polar: Floats
     radius: Floats
 
@@ -31,77 +31,79 @@ class MirrorGroups:
         """Number of groups."""
         return len(self.polar)
 
-    def least(self, values: Floats) -> Floats:
-        """Least value (k,) of each group, of values (m,)."""
+    def minimum(self, values: Floats) -> Floats:
+        """Minimum (k,) in each group of values (m,)."""
         result = np.full(len(self), np.inf)
-        np.minimum.at(result, self.of, values)
+        np.minimum.at(result, self.group_of, values)
         return result
 
     def mean(self, values: Floats) -> Floats:
-        """Mean value (k,) of each group, of values (m,)."""
-        result: Floats = np.bincount(self.of, values, len(self)) / np.bincount(self.of)
-        return result
+        """Mean (k,) in each group of values (m,)."""
+        return _means(self.group_of, values, len(self))
+
+
+def _means(group_of: Ints, values: Floats, k: int) -> Floats:
+    means: Floats = np.bincount(group_of, values, k) / np.bincount(group_of)
+    return means
 
 
 def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) -> MirrorGroups:
     """Group mirrors by k-means (the paper, section 5.1).
 
-    The start is spread evenly over polar angle instead of drawn at random: the same every time,
-    and of the local optima one with nearly the least worst error of direction.
+    The starting points are spread evenly over polar angle instead of drawn at random: the result
+    is the same every time, and its largest error of direction is nearly the minimum.
 
     Args:
-        polar: radians, (m,).
-        radius: mm, (m,).
+        polar: polar angles, radians, (m,).
+        radius: radii, mm, (m,).
         k: number of groups.
         radius_weight_deg: degrees of polar angle that 1 mm of radius counts as.
 
     Raises:
         SpecError: when there are fewer mirrors than groups, or too few that differ.
     """
-    places = _places(polar, radius, radius_weight_deg)
-    start = _start(places, k)
+    features = _features(polar, radius, radius_weight_deg)
+    start = _start(features, k)
     try:
-        _, of = kmeans2(places, start, iter=ROUNDS, minit="matrix", missing="raise")
+        _, found = kmeans2(features, start, iter=MAX_ITERATIONS, minit="matrix", missing="raise")
     except ClusterError:
         raise SpecError(f"k-means leaves a group empty: make prototype.k less than {k}") from None
-    return ordered(np.asarray(of, dtype=np.int64), polar, radius, k)
+    group_of = _by_polar_angle(np.asarray(found, dtype=np.int64), polar, k)
+    return MirrorGroups(group_of, _means(group_of, polar, k), _means(group_of, radius, k))
 
 
-def ordered(of: Ints, polar: Floats, radius: Floats, k: int) -> MirrorGroups:
+def _by_polar_angle(group_of: Ints, polar: Floats, k: int) -> Ints:
     """Groups (m,) renumbered by rising mean polar angle."""
-    loose = MirrorGroups(of, np.zeros(k), np.zeros(k))
-    order = np.argsort(loose.mean(polar), kind="stable")
     rank = np.empty(k, dtype=np.int64)
-    rank[order] = np.arange(k)
-    named = MirrorGroups(rank[of], np.zeros(k), np.zeros(k))
-    return MirrorGroups(named.of, named.mean(polar), named.mean(radius))
+    rank[np.argsort(_means(group_of, polar, k), kind="stable")] = np.arange(k)
+    return rank[group_of]
 
 
 def max_groups(polar: Floats, radius: Floats, radius_weight_deg: float) -> int:
-    """Number of mirrors that differ, beyond which no grouping goes; arguments as of clusters."""
-    return len(_different(_places(polar, radius, radius_weight_deg)))
+    """Number of mirrors that differ, the maximum of k; arguments as of group_mirrors."""
+    return len(_distinct(_features(polar, radius, radius_weight_deg)))
 
 
-def _places(polar: Floats, radius: Floats, radius_weight_deg: float) -> Floats:
+def _features(polar: Floats, radius: Floats, radius_weight_deg: float) -> Floats:
     return np.column_stack([np.degrees(polar), radius_weight_deg * radius])
 
 
-def _different(places: Floats) -> Floats:
-    result: Floats = np.unique(np.round(places / SAME_DEG) * SAME_DEG, axis=0)
+def _distinct(features: Floats) -> Floats:
+    result: Floats = np.unique(np.round(features / SAME_DEG) * SAME_DEG, axis=0)
     return result
 
 
-def _start(places: Floats, k: int) -> Floats:
-    """Of the mirrors that differ, k with polar angles spread as evenly as they allow, (k, 2)."""
-    different = _different(places)
-    if k > len(different):
+def _start(features: Floats, k: int) -> Floats:
+    """Of the mirrors that differ, k with polar angles spread as evenly as possible, (k, 2)."""
+    distinct = _distinct(features)
+    if k > len(distinct):
         raise SpecError(
-            f"prototype.k is {k}, but camera a has {len(places)} mirrors, of which "
-            f"{len(different)} differ in radius or polar angle: make it {len(different)} or less"
+            f"prototype.k is {k}, but camera a has {len(features)} mirrors, of which "
+            f"{len(distinct)} differ in radius or polar angle: make it {len(distinct)} or less"
         )
-    low, high = different[[0, -1], 0]
-    wanted = low + (high - low) * (np.arange(k) + 0.5) / k
-    nearest = np.searchsorted(different[:, 0], wanted) - np.arange(k)
-    chosen = np.clip(np.maximum.accumulate(nearest), 0, len(different) - k) + np.arange(k)
-    result: Floats = different[chosen]
+    low, high = distinct[[0, -1], 0]
+    even = low + (high - low) * (np.arange(k) + 0.5) / k
+    nearest = np.searchsorted(distinct[:, 0], even) - np.arange(k)
+    chosen = np.clip(np.maximum.accumulate(nearest), 0, len(distinct) - k) + np.arange(k)
+    result: Floats = distinct[chosen]
     return result

@@ -7,7 +7,6 @@ import numpy as np
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics.ball_light import turned
-from tbcad.prototype.balls import selection as ball
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
 from tbcad.prototype.balls.clearance import (
     allowed_azimuths,
@@ -22,7 +21,14 @@ from tbcad.prototype.balls.placement import (
     greedy_placement,
     min_swing_placement,
 )
-from tbcad.prototype.balls.selection import BallCandidates, BallFit, Balls
+from tbcad.prototype.balls.selection import (
+    BallCandidates,
+    BallFit,
+    Balls,
+    ball_candidates,
+    ball_fit,
+    choose_balls,
+)
 from tbcad.prototype.balls.stops import (
     StopPlan,
     StopRequests,
@@ -35,26 +41,26 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MOST_BALLS, PrototypeSpec
 from tbcad.types import Floats, Ints
 
-# The post is taken to reach this many semi-major axes down, beyond all balls.
+# Length of the post in semi-major axes: it reaches down beyond all balls.
 POST_LENGTHS = 3
 
 
 @dataclass(frozen=True)
 class PrototypeLayout:
-    """Balls on a base that turns about the ellipsoid's axis, over k balls and m mirrors.
+    """Balls on a base that turns about the ellipsoid's axis, k balls for m mirrors.
 
-    At base angle b ball j stands at azimuth placement.azimuth[j] + b; positions are in the frame
-    of the shell (z up), the same as those of the mirrors.
+    At base angle b ball j is at azimuth placement.azimuth[j] + b; positions are in the frame of
+    the shell (z up), as are those of the mirrors.
 
     Attributes:
         half: camera a and its mirrors.
-        grade: what the balls' grade promises.
+        grade: deviations that the balls' grade allows.
         groups: mirrors that share a ball.
         balls: in the half-plane of azimuth zero.
-        fit: how well they stand in for the mirrors.
-        task: what their azimuths must keep.
+        fit: how well they replace the mirrors.
+        problem: limits of their azimuths.
         placement: azimuths of the balls on the base, swing.
-        greedy: a plain layout of the same balls, for comparison.
+        greedy_placement: a plain layout of the same balls, for comparison.
         stops: the plan of rotation.
         twin: mirror of camera b, by number, whose direction mirror i shows when the object is
             turned by 180 degrees about z, (m,).
@@ -65,9 +71,9 @@ class PrototypeLayout:
     groups: MirrorGroups
     balls: Balls
     fit: BallFit
-    task: PlacementProblem
+    problem: PlacementProblem
     placement: Placement
-    greedy: Placement
+    greedy_placement: Placement
     stops: StopPlan
     twin: Ints
 
@@ -75,25 +81,25 @@ class PrototypeLayout:
         """Number of balls."""
         return len(self.balls)
 
-    def at(self, points: Floats, angle: float = 0.0) -> Floats:
+    def on_base(self, points: Floats, angle: float = 0.0) -> Floats:
         """Points (k, 3) given at azimuth zero, one a ball, on the base at an angle, mm."""
         return turned(points, self.placement.azimuth + angle) @ self.half.ellipsoid.frame()
 
     def apices(self, angle: float = 0.0) -> Floats:
         """Apices of the balls with the base at an angle (radians), mm, (k, 3)."""
-        return self.at(self.balls.at.apex, angle)
+        return self.on_base(self.balls.poses.apex, angle)
 
     def normals(self, angle: float = 0.0) -> Floats:
         """Inward unit normals at the apices, (k, 3)."""
-        return self.at(self.balls.at.normal, angle)
+        return self.on_base(self.balls.poses.normal, angle)
 
     def centres(self, angle: float = 0.0) -> Floats:
         """Centres of the reflecting spheres, mm, (k, 3)."""
-        return self.at(self.balls.centre, angle)
+        return self.on_base(self.balls.centre, angle)
 
     def body_centres(self, angle: float = 0.0) -> Floats:
         """Centres of the spheres that sit in the seats, mm, (k, 3); a ball's own, if no cap."""
-        return self.at(self.balls.body_centre, angle)
+        return self.on_base(self.balls.body_centre, angle)
 
     @property
     def mass_g(self) -> float:
@@ -111,17 +117,17 @@ class PlannedPicture:
     """One photograph for one mirror.
 
     Attributes:
-        turn: of the object about z, radians: 0 for camera a's mirrors, pi for camera b's.
+        object_angle: of the object about z, radians: 0 for camera a's mirrors, pi for camera b's.
         stop: number of the stop, from 0.
         angle: of the base, radians.
-        ball: that stands in, from 0.
+        ball: that replaces the mirror, from 0.
         mirror: its id.
         azimuth_error: radians.
         polar_error: radians.
         error: of direction, radians.
     """
 
-    turn: float
+    object_angle: float
     stop: int
     angle: float
     ball: int
@@ -135,50 +141,51 @@ def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
     Raises:
-        SpecError: when no balls do, or they cannot be placed; it says what to change.
+        SpecError: when there is no such layout; it says what to change.
     """
-    keys, half = spec.prototype, _curved(design.halves[0])
+    half = _curved(design.halves[0])
     _check_half_turn(spec)
-    here, balls = _stand(spec, half)
-    wanted = stop_requests(here.groups, half.azimuth, float(np.radians(keys.stop_error_deg)))
-    task = _task(spec, half, balls, wanted)
-    placed = min_swing_placement(task)
-    azimuth = azimuths_for_fewer_stops(task, wanted, placed.azimuth)
+    candidates, balls = _balls(spec, half)
+    groups, stop_error = candidates.groups, float(np.radians(spec.prototype.stop_error_deg))
+    requests = stop_requests(groups, half.azimuth, stop_error)
+    problem = _placement_problem(spec, half, balls, requests)
+    placement = min_swing_placement(problem)
+    azimuth = azimuths_for_fewer_stops(problem, requests, placement.azimuth)
     return PrototypeLayout(
         half=half,
-        grade=load_grades()[keys.grade],
-        groups=here.groups,
+        grade=load_grades()[spec.prototype.grade],
+        groups=groups,
         balls=balls,
-        fit=ball.ball_fit(here, balls, keys),
-        task=task,
-        placement=replace(placed, azimuth=azimuth, outermost=task.outermost(azimuth)),
-        greedy=greedy_placement(task),
-        stops=plan_stops(here.groups, half.polar, wanted, azimuth),
+        fit=ball_fit(candidates, balls, spec.prototype),
+        problem=problem,
+        placement=replace(placement, azimuth=azimuth, outermost=problem.outermost(azimuth)),
+        greedy_placement=greedy_placement(problem),
+        stops=plan_stops(groups, half.polar, requests, azimuth),
         twin=_twins(half),
     )
 
 
-def planned_pictures(made: PrototypeLayout) -> list[PlannedPicture]:
+def planned_pictures(prototype: PrototypeLayout) -> list[PlannedPicture]:
     """All photographs in order: camera a's mirrors, then camera b's with the object turned.
 
     The base goes through its stops twice, both times upward, so that play in the drive has no
     effect. One stop shows several mirrors, so several entries share a photograph.
     """
-    stops = made.stops
-    order = np.lexsort((np.arange(len(made.half)), stops.stop)).tolist()
-    names = made.half.ids, [f"b{i + 1:04d}" for i in made.twin.tolist()]
+    stops, half = prototype.stops, prototype.half
+    order = np.lexsort((np.arange(len(half)), stops.stop)).tolist()
+    names = half.ids, [f"b{i + 1:04d}" for i in prototype.twin.tolist()]
     return [
         PlannedPicture(
-            turn,
+            object_angle,
             int(stops.stop[i]),
             float(stops.angle[stops.stop[i]]),
-            int(made.fit.ball[i]),
+            int(prototype.fit.ball[i]),
             ids[i],
             float(stops.azimuth_error[i]),
             float(stops.polar_error[i]),
             float(stops.error[i]),
         )
-        for turn, ids in zip((0.0, np.pi), names, strict=True)
+        for object_angle, ids in zip((0.0, np.pi), names, strict=True)
         for i in order
     ]
 
@@ -201,59 +208,65 @@ def _curved(half: MirrorArray) -> MirrorArray:
     return half
 
 
-def _stand(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
-    """The groups and their balls, for the number of them that the spec gives or asks for."""
-    keys = spec.prototype
-    catalogue = load_catalogue(keys.catalogues).available(keys.grade, keys.largest_ball_mm)
-    if keys.k != "auto":
-        return _grouped(spec, half, keys.k, catalogue)
-    radius, weight = half.mirrors.radius, keys.radius_weight_deg
-    most = min(max_groups(half.polar, radius, weight), MOST_BALLS)
-    for k in range(1, most + 1):
-        if _near(keys, half, k):
-            here, balls = _grouped(spec, half, k, catalogue)
-            if 100 * (1 - ball.ball_fit(here, balls, keys).kept) <= keys.auto_lost_percent:
-                return here, balls
+def _balls(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
+    """Groups and their balls, as many as the spec gives or the fewest within its limits."""
+    limits = spec.prototype
+    catalogue = load_catalogue(limits.catalogues)
+    catalogue = catalogue.available(limits.grade, limits.largest_ball_mm)
+    if limits.k != "auto":
+        return _balls_for_groups(spec, half, limits.k, catalogue)
+    distinct = max_groups(half.polar, half.mirrors.radius, limits.radius_weight_deg)
+    max_k = min(distinct, MOST_BALLS)
+    for k in range(1, max_k + 1):
+        if _directions_within_limits(limits, half, k):
+            candidates, balls = _balls_for_groups(spec, half, k, catalogue)
+            lost = 1 - ball_fit(candidates, balls, limits).kept_share
+            if 100 * lost <= limits.auto_lost_percent:
+                return candidates, balls
     raise SpecError(
-        f"no number of balls up to {most} keeps prototype.auto_direction_max_deg, "
+        f"no number of balls up to {max_k} keeps prototype.auto_direction_max_deg, "
         "auto_direction_median_deg and auto_lost_percent: raise these, or set prototype.k"
     )
 
 
-def _near(keys: PrototypeSpec, half: MirrorArray, k: int) -> bool:
-    """Whether the errors of direction of k groups are within the limits, before all else."""
-    groups = group_mirrors(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
-    error = np.degrees(np.abs(groups.polar[groups.of] - half.polar))
+def _groups(spec: PrototypeSpec, half: MirrorArray, k: int) -> MirrorGroups:
+    return group_mirrors(half.polar, half.mirrors.radius, k, spec.radius_weight_deg)
+
+
+def _directions_within_limits(spec: PrototypeSpec, half: MirrorArray, k: int) -> bool:
+    """Whether the polar errors of k groups are within the limits; this needs no balls."""
+    groups = _groups(spec, half, k)
+    error = np.degrees(np.abs(groups.polar[groups.group_of] - half.polar))
     return bool(
-        error.max() <= keys.auto_direction_max_deg
-        and np.median(error) <= keys.auto_direction_median_deg
+        error.max() <= spec.auto_direction_max_deg
+        and np.median(error) <= spec.auto_direction_median_deg
     )
 
 
-def _grouped(
+def _balls_for_groups(
     spec: Spec, half: MirrorArray, k: int, catalogue: Catalogue
 ) -> tuple[BallCandidates, Balls]:
-    keys = spec.prototype
-    groups = group_mirrors(half.polar, half.mirrors.radius, k, keys.radius_weight_deg)
-    here = ball.ball_candidates(half, groups, spec.optics.capture_diameter_mm)
-    return here, ball.choose_balls(here, keys, catalogue)
+    groups = _groups(spec.prototype, half, k)
+    candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    return candidates, choose_balls(candidates, spec.prototype, catalogue)
 
 
-def _task(spec: Spec, half: MirrorArray, balls: Balls, wanted: StopRequests) -> PlacementProblem:
-    keys, ellipsoid = spec.prototype, half.ellipsoid
+def _placement_problem(
+    spec: Spec, half: MirrorArray, balls: Balls, requests: StopRequests
+) -> PlacementProblem:
+    limits, ellipsoid = spec.prototype, half.ellipsoid
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, spec.optics.capture_diameter_mm / 2
     length = POST_LENGTHS * ellipsoid.semi_major
-    floor, ceiling = allowed_azimuths(
-        balls, keys, obstacles(keys, ellipsoid.frame(), half.camera, length)
-    )
+    fixed = obstacles(limits, ellipsoid.frame(), half.camera, length)
+    lowest, highest = allowed_azimuths(balls, limits, fixed)
     return PlacementProblem(
-        apart=np.maximum(*min_separations(balls, keys, pinhole, capture)),
-        low=wanted.low(len(balls)),
-        high=wanted.high(len(balls)),
-        floor=floor,
-        ceiling=ceiling,
-        edge=seat_half_angles(balls, keys.ball_wall_mm),
-        most=float(np.radians(keys.max_swing_deg)),
+        min_separation=np.maximum(*min_separations(balls, limits, pinhole, capture)),
+        served_low=requests.low(len(balls)),
+        served_high=requests.high(len(balls)),
+        min_azimuth=lowest,
+        max_azimuth=highest,
+        seat_half_angle=seat_half_angles(balls, limits.ball_wall_mm),
+        max_swing=float(np.radians(limits.max_swing_deg)),
     )
 
 
@@ -263,7 +276,6 @@ def _twins(half: MirrorArray) -> Ints:
     Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's
     mirror with the number of (x, -y, z).
     """
-    turned_by = half.u * FLIP_X[[1, 0, 2]]
-    near = half.u @ turned_by.T
-    result: Ints = near.argmax(axis=0)
+    image = half.u * FLIP_X[[1, 0, 2]]
+    result: Ints = (half.u @ image.T).argmax(axis=0)
     return result

@@ -1,9 +1,9 @@
-"""Where the balls stand on the base: azimuths with which it swings least.
+"""Azimuths of the balls on the base with which the base swings least.
 
 Camera, object and ellipsoid look the same from every azimuth. So whether one ball touches another,
-or stands in its light, depends only on the difference of their azimuths, and it must not be less
-than one angle for each pair. What is left is to choose which of the two goes first in each pair:
-a mixed integer linear program.
+or blocks its light, depends only on the difference of their azimuths, which must be at least one
+angle for each pair. What remains is to choose which of the two goes first in each pair: a mixed
+integer linear program.
 """
 
 from dataclasses import dataclass
@@ -15,54 +15,66 @@ from scipy.sparse import coo_array
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
-# Nodes of the search, not seconds, so that every machine finds the same.
-NODES = 2000
-# The solver keeps what it is told to about 1e-6, radians here; clearance.BETWEEN is far more.
+# Nodes of the search, not seconds, so that every computer finds the same.
+MAX_NODES = 2000
+# The solver keeps constraints to about 1e-6, radians here; clearance.SOLVER_MARGIN is far more.
 SLACK = 1e-5
-STEP = np.radians(0.25)  # by which the greedy layout's half swing grows
+GREEDY_STEP = np.radians(0.25)  # by which the greedy layout's half swing grows
+# Azimuths are rounded to so many decimals: the solver's last digits differ between computers.
+DECIMALS = 9
+ROUNDING = 1e-12  # of a difference of two azimuths, radians
 
 
 @dataclass(frozen=True)
 class PlacementProblem:
-    """What azimuths must keep, over k balls, radians.
+    """Limits of the azimuths of k balls, radians.
 
     Attributes:
-        apart: least difference of two balls' azimuths, (k, k); zero where any will do.
-        low: least azimuth at which the ball must stand in for a mirror, (k,).
-        high: largest one, (k,).
-        floor: azimuth the ball must never go below, (k,).
-        ceiling: azimuth it must never go above, (k,).
-        edge: angle from a ball's centre to the edge of its seat, seen from the axis, (k,).
-        most: largest swing allowed.
+        min_separation: minimum difference of two balls' azimuths, (k, k); zero where any will do.
+        served_low: minimum azimuth at which the ball replaces a mirror, (k,).
+        served_high: maximum azimuth at which the ball replaces a mirror, (k,).
+        min_azimuth: azimuth the ball must never go below, (k,).
+        max_azimuth: azimuth it must never go above, (k,).
+        seat_half_angle: from a ball's centre to the edge of its seat, seen from the axis, (k,).
+        max_swing: maximum angle that the base may turn through.
     """
 
-    apart: Floats
-    low: Floats
-    high: Floats
-    floor: Floats
-    ceiling: Floats
-    edge: Floats
-    most: float
+    min_separation: Floats
+    served_low: Floats
+    served_high: Floats
+    min_azimuth: Floats
+    max_azimuth: Floats
+    seat_half_angle: Floats
+    max_swing: float
 
     def __len__(self) -> int:
         """Number of balls."""
-        return len(self.low)
+        return len(self.served_low)
 
-    def reach(self, azimuth: Floats) -> float:
+    def half_swing(self, azimuth: Floats) -> float:
         """Half the swing that azimuths (k,) need, the base turning as far to either side."""
-        return float(max((self.high - azimuth).max(), (azimuth - self.low).max()))
+        return float(max((self.served_high - azimuth).max(), (azimuth - self.served_low).max()))
 
     def outermost(self, azimuth: Floats) -> float:
         """Largest azimuth to either side that the edge of any ball's seat reaches."""
-        return float((np.abs(azimuth) + self.edge).max() + self.reach(azimuth))
+        return float((np.abs(azimuth) + self.seat_half_angle).max() + self.half_swing(azimuth))
 
-    def kept(self, azimuth: Floats) -> bool:
-        """Whether azimuths (k,) keep all of it."""
-        away = np.abs(azimuth[:, None] - azimuth)
-        reach = self.reach(azimuth)
-        inside = np.minimum(azimuth - reach - self.floor, self.ceiling - azimuth - reach) >= -SLACK
+    def window(self, half_swing: float) -> tuple[Floats, Floats]:
+        """Azimuths (k,) between which each ball must be, for half a swing."""
+        low = np.maximum(self.served_high - half_swing, self.min_azimuth + half_swing)
+        return low, np.minimum(self.served_low + half_swing, self.max_azimuth - half_swing)
+
+    def satisfied_by(self, azimuth: Floats) -> bool:
+        """Whether azimuths (k,) keep all limits."""
+        separation = np.abs(azimuth[:, None] - azimuth)
+        half_swing = self.half_swing(azimuth)
+        room = np.minimum(
+            azimuth - half_swing - self.min_azimuth, self.max_azimuth - azimuth - half_swing
+        )
         return bool(
-            inside.all() and (away >= self.apart - SLACK).all() and 2 * reach <= self.most + SLACK
+            (room >= -SLACK).all()
+            and (separation >= self.min_separation - SLACK).all()
+            and 2 * half_swing <= self.max_swing + SLACK
         )
 
 
@@ -73,177 +85,176 @@ class Placement:
     Attributes:
         azimuth: (k,).
         swing: angle that the base turns through, half of it to either side.
-        bound: swing below which no azimuths are possible, as far as was proved.
+        swing_bound: lower bound of the swing of any azimuths, as far as the search showed.
         outermost: largest azimuth, to either side of zero, that the edge of a seat ever reaches.
     """
 
     azimuth: Floats
     swing: float
-    bound: float
+    swing_bound: float
     outermost: float
 
 
-def greedy_placement(task: PlacementProblem) -> Placement:
-    """Balls one after the other, the widest group first, each as near to azimuth 0 as it can.
+def greedy_placement(problem: PlacementProblem) -> Placement:
+    """Balls one after the other, the widest group first, each as near to azimuth 0 as possible.
 
-    Where post or camera rule that out: those with least room first, for a swing that grows until
-    all find a place. For comparison, and as the first bound of the program.
+    Where post or camera rule that out: those with the least room first, for a swing that grows
+    until all find a place. For comparison, and as the first bound of the program.
     """
-    width, anywhere = task.high - task.low, np.full(len(task), np.inf)
-    plain = _filled(task, -anywhere, anywhere, -width)
-    assert plain is not None  # beyond all other balls there is always room
+    width = problem.served_high - problem.served_low
+    anywhere = np.full(len(problem), np.inf)
+    azimuth = _placed_in_order(problem, -anywhere, anywhere, -width)
+    assert azimuth is not None  # beyond all other balls there is always room
     # Turned as a whole so that the base swings as far to either side.
-    plain += ((task.high - plain).max() - (plain - task.low).max()) / 2
-    if task.kept(plain):
-        return _placement(task, plain, 0.0)
-    for reach in np.arange(width.max() / 2, task.most / 2 + STEP, STEP):
-        low, high = _windows(task, float(reach))
-        azimuth = _filled(task, low, high, high - low)
-        if azimuth is not None and task.kept(azimuth):
-            return _placement(task, azimuth, 0.0)
-    return _placement(task, plain, 0.0)
+    azimuth += ((problem.served_high - azimuth).max() - (azimuth - problem.served_low).max()) / 2
+    if problem.satisfied_by(azimuth):
+        return _placement(problem, azimuth, 0.0)
+    for half in np.arange(width.max() / 2, problem.max_swing / 2 + GREEDY_STEP, GREEDY_STEP):
+        low, high = problem.window(float(half))
+        inside = _placed_in_order(problem, low, high, high - low)
+        if inside is not None and problem.satisfied_by(inside):
+            return _placement(problem, inside, 0.0)
+    return _placement(problem, azimuth, 0.0)
 
 
-def _windows(task: PlacementProblem, reach: float) -> tuple[Floats, Floats]:
-    """Azimuths (k,) between which each ball must stand for half a swing."""
-    low = np.maximum(task.high - reach, task.floor + reach)
-    return low, np.minimum(task.low + reach, task.ceiling - reach)
-
-
-def _filled(task: PlacementProblem, low: Floats, high: Floats, rank: Floats) -> Floats | None:
-    """Azimuths (k,) found in one go by rising rank; None when a ball has no place left."""
-    azimuth = np.zeros(len(task))
+def _placed_in_order(
+    problem: PlacementProblem, low: Floats, high: Floats, rank: Floats
+) -> Floats | None:
+    """Azimuths (k,) between limits, set by rising rank; None when a ball has no place left."""
+    azimuth = np.zeros(len(problem))
     placed: list[int] = []
-    for ball in np.lexsort((np.arange(len(task)), np.round(rank, 9))).tolist():
-        gap = task.apart[ball, placed]
-        ends = np.concatenate([azimuth[placed] + gap, azimuth[placed] - gap])
-        near = np.concatenate([np.clip([0.0], low[ball], max(low[ball], high[ball])), ends])
-        near = near[(near >= low[ball]) & (near <= high[ball])]
-        near = near[(np.abs(near[:, None] - azimuth[placed]) >= gap - 1e-12).all(axis=1)]
-        if not len(near):
+    for ball in np.lexsort((np.arange(len(problem)), np.round(rank, DECIMALS))).tolist():
+        gap = problem.min_separation[ball, placed]
+        start = np.clip([0.0], low[ball], max(low[ball], high[ball]))
+        tried = np.concatenate([start, azimuth[placed] + gap, azimuth[placed] - gap])
+        tried = tried[(tried >= low[ball]) & (tried <= high[ball])]
+        separation = np.abs(tried[:, None] - azimuth[placed])
+        tried = tried[(separation >= gap - ROUNDING).all(axis=1)]
+        if not len(tried):
             return None
-        azimuth[ball] = near[np.lexsort((near, np.round(np.abs(near), 9)))[0]]
+        azimuth[ball] = tried[np.lexsort((tried, np.round(np.abs(tried), DECIMALS)))[0]]
         placed.append(ball)
     return azimuth
 
 
-def min_swing_placement(task: PlacementProblem) -> Placement:
-    """Azimuths with the least swing, and of those with that swing the least outermost azimuth.
+def min_swing_placement(problem: PlacementProblem) -> Placement:
+    """Azimuths with the minimum swing, and of those the ones with the minimum outermost azimuth.
 
-    The search stops at NODES nodes with the best found.
+    The search stops at MAX_NODES nodes with the best found.
 
     Raises:
         SpecError: when there are none.
     """
-    first = greedy_placement(task)
-    found = _least_swing(task, first)
-    if found is None:
-        raise SpecError(_not_placed(task))
-    azimuth, bound = found
-    closer = _solved(task, task.reach(azimuth) + SLACK, outermost=True)
+    solution = _min_swing(problem, greedy_placement(problem))
+    if solution is None:
+        raise SpecError(_no_placement_message(problem))
+    azimuth, bound = solution
+    closer = _solved(problem, problem.half_swing(azimuth) + SLACK, outermost=True)
     options = [azimuth] if closer is None else [azimuth, closer[0]]
-    return _placement(task, min(options, key=task.outermost), 2 * bound)
+    return _placement(problem, min(options, key=problem.outermost), 2 * bound)
 
 
-def _least_swing(task: PlacementProblem, first: Placement) -> tuple[Floats, float] | None:
+def _min_swing(problem: PlacementProblem, greedy: Placement) -> tuple[Floats, float] | None:
     """Azimuths (k,) and the bound on half the swing; None when there are none.
 
-    A tight first bound makes the search short, so the greedy layout's is tried although the post
+    A tight first limit makes the search short, so the greedy layout's is tried although the post
     or the camera may rule that layout itself out.
     """
-    most = min(task.most, 2 * np.pi) / 2
-    tight = min(first.swing / 2 + SLACK, most)
-    for limit in (tight, most):
-        if found := _solved(task, limit, outermost=False):
-            return found
-        if task.kept(first.azimuth):
-            return first.azimuth, 0.0
+    widest = min(problem.max_swing, 2 * np.pi) / 2
+    tight = min(greedy.swing / 2 + SLACK, widest)
+    for limit in (tight, widest):
+        if solution := _solved(problem, limit, outermost=False):
+            return solution
+        if problem.satisfied_by(greedy.azimuth):
+            return greedy.azimuth, 0.0
     return None
 
 
-def _placement(task: PlacementProblem, azimuth: Floats, bound: float) -> Placement:
-    return Placement(azimuth, 2 * task.reach(azimuth), bound, task.outermost(azimuth))
+def _placement(problem: PlacementProblem, azimuth: Floats, bound: float) -> Placement:
+    swing = 2 * problem.half_swing(azimuth)
+    return Placement(azimuth, swing, bound, problem.outermost(azimuth))
 
 
-def _not_placed(task: PlacementProblem) -> str:
+def _no_placement_message(problem: PlacementProblem) -> str:
     return (
-        f"found no place for {len(task)} balls on one base within a swing of "
-        f"{np.degrees(task.most):.0f} degrees, clear of each other, the post and the camera: make "
-        "prototype.k, prototype.ball_wall_mm, prototype.largest_ball_mm or "
+        f"found no place for {len(problem)} balls on one base within a swing of "
+        f"{np.degrees(problem.max_swing):.0f} degrees, clear of each other, the post and the "
+        "camera: make prototype.k, prototype.ball_wall_mm, prototype.largest_ball_mm or "
         "prototype.post_diameter_mm smaller, or prototype.max_swing_deg larger"
     )
 
 
-def _solved(task: PlacementProblem, most: float, outermost: bool) -> tuple[Floats, float] | None:
+def _solved(
+    problem: PlacementProblem, max_half_swing: float, outermost: bool
+) -> tuple[Floats, float] | None:
     """Azimuths (k,) and a bound on the objective: half the swing, or the outermost azimuth.
 
-    Variables: k azimuths, half the swing, the outermost azimuth, and for each pair that must stay
-    apart 1 where the first has the larger azimuth.
+    Variables: k azimuths, half the swing, the outermost azimuth, and for each pair with a minimum
+    separation 1 where the first has the larger azimuth.
     """
-    k = len(task)
-    first, second = np.nonzero(np.triu(task.apart, 1))
-    lowest, highest = task.high - most, task.low + most
-    if np.any(lowest > highest):
+    k = len(problem)
+    first, second = np.nonzero(np.triu(problem.min_separation, 1))
+    low, high = problem.served_high - max_half_swing, problem.served_low + max_half_swing
+    if np.any(low > high):
         return None
-    matrix, least = _rows(task, first, second, highest, lowest)
-    goal = np.zeros(matrix.shape[1])
-    goal[k + outermost] = 1
+    matrix, minimum = _constraints(problem, first, second, low, high)
+    objective = np.zeros(matrix.shape[1])
+    objective[k + outermost] = 1
     pairs = np.zeros(len(first))
     answer = milp(
-        goal,
-        constraints=LinearConstraint(matrix, least, np.inf),
+        objective,
+        constraints=LinearConstraint(matrix, minimum, np.inf),
         bounds=Bounds(
-            np.concatenate([lowest, [0, 0], pairs]),
-            np.concatenate([highest, [most, np.inf], pairs + 1]),
+            np.concatenate([low, [0, 0], pairs]),
+            np.concatenate([high, [max_half_swing, np.inf], pairs + 1]),
         ),
         integrality=np.concatenate([np.zeros(k + 2), pairs + 1]),
-        options={"node_limit": NODES, "mip_rel_gap": 0.0},
+        options={"node_limit": MAX_NODES, "mip_rel_gap": 0.0},
     )
-    if answer.x is None or not task.kept(azimuth := _settled(answer.x[:k])):
+    if answer.x is None:
         return None
-    bound = answer.mip_dual_bound  # none when there is nothing whole to choose
+    azimuth = np.round(answer.x[:k], DECIMALS) + 0.0  # no negative zeros
+    if not problem.satisfied_by(azimuth):
+        return None
+    bound = answer.mip_dual_bound  # None without integer variables
     return azimuth, float(answer.fun if bound is None else bound)
 
 
-def _settled(azimuth: Floats) -> Floats:
-    """Azimuths without the solver's last digits, which may differ between machines."""
-    result: Floats = np.round(azimuth, 9) + 0.0
-    return result
-
-
-def _rows(
-    task: PlacementProblem, first: Ints, second: Ints, highest: Floats, lowest: Floats
+def _constraints(
+    problem: PlacementProblem, first: Ints, second: Ints, low: Floats, high: Floats
 ) -> tuple[coo_array, Floats]:
-    """All constraints as rows (matrix, least value)."""
-    k, ball, pair = len(task), np.arange(len(task)), np.arange(len(first))
-    half, far, order = np.full(k, k), np.full(k, k + 1), k + 2 + pair
-    gap = task.apart[first, second]
-    loose = gap + np.maximum(highest[first] - lowest[second], highest[second] - lowest[first])
+    """All constraints as rows: matrix and minimum of each row's product with the variables."""
+    k, ball, pair = len(problem), np.arange(len(problem)), np.arange(len(first))
+    half_swing, outermost, order = np.full(k, k), np.full(k, k + 1), k + 2 + pair
+    gap = problem.min_separation[first, second]
+    # With this much added or taken away a pair's row holds for all azimuths.
+    loose = gap + np.maximum(high[first] - low[second], high[second] - low[first])
     one, each = np.ones(k), np.ones(len(first))
     blocks = [
         # The swing reaches both ends of each group.
-        ([(ball, one), (half, one)], task.high),
-        ([(ball, -one), (half, one)], -task.low),
-        # No ball leaves what is free.
-        ([(ball, -one), (half, -one)], -task.ceiling),
-        ([(ball, one), (half, -one)], task.floor),
-        # The outermost edge.
-        ([(ball, -one), (half, -one), (far, one)], task.edge),
-        ([(ball, one), (half, -one), (far, one)], task.edge),
-        # Of each pair one goes first; the other row is then loose.
+        ([(ball, one), (half_swing, one)], problem.served_high),
+        ([(ball, -one), (half_swing, one)], -problem.served_low),
+        # No ball leaves its allowed azimuths.
+        ([(ball, -one), (half_swing, -one)], -problem.max_azimuth),
+        ([(ball, one), (half_swing, -one)], problem.min_azimuth),
+        # The outermost edge, to either side.
+        ([(ball, -one), (half_swing, -one), (outermost, one)], problem.seat_half_angle),
+        ([(ball, one), (half_swing, -one), (outermost, one)], problem.seat_half_angle),
+        # Of each pair one ball goes first; the other ball's row is then loose.
         ([(first, each), (second, -each), (order, -loose)], gap - loose),
         ([(first, -each), (second, each), (order, loose)], gap),
     ]
-    return _matrix(blocks, k + 2 + len(first)), np.concatenate([least for _, least in blocks])
+    return _matrix(blocks, k + 2 + len(first)), np.concatenate([minimum for _, minimum in blocks])
 
 
 def _matrix(blocks: list[tuple[list[tuple[Ints, Floats]], Floats]], columns: int) -> coo_array:
+    """The rows of all blocks below each other; a block is terms (column, factor) and minima."""
     rows, cells, values, start = [], [], [], 0
-    for terms, least in blocks:
-        for column, value in terms:
-            rows.append(start + np.arange(len(least)))
+    for terms, minimum in blocks:
+        for column, factor in terms:
+            rows.append(start + np.arange(len(minimum)))
             cells.append(column)
-            values.append(value)
-        start += len(least)
+            values.append(factor)
+        start += len(minimum)
     places = (np.concatenate(rows), np.concatenate(cells))
     return coo_array((np.concatenate(values), places), shape=(start, columns))

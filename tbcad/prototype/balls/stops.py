@@ -1,7 +1,7 @@
 """The plan of rotation: the fewest stops of the base at which every mirror gets its ball.
 
-Base angle b brings ball k to azimuth alpha_k + b, so mirror i asks for b = phi_i - alpha_k. It may
-be off by an angle that keeps its error of direction within the spec's limit, which gives each
+Base angle b brings ball k to azimuth alpha_k + b, so mirror i requests b = phi_i - alpha_k. The
+angle may deviate as far as the error of direction stays within the spec's limit, which gives each
 mirror an interval of base angles. The fewest stops that hit all intervals are found exactly by
 going through their upper ends in order.
 """
@@ -14,19 +14,20 @@ from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.placement import PlacementProblem
 from tbcad.types import Floats, Ints
 
-# Azimuths tried for a ball are this many to its tolerance; the balls are gone through this often.
-TRIES = 4
-ROUNDS = 3
+TRIES_PER_TOLERANCE = 4  # azimuths tried for a ball within its tolerance
+ROUNDS = 3  # how often all balls are gone through
+DECIMALS = 9  # to which distances of azimuths are compared, radians
+MIN_SINE = 1e-12  # of a polar angle, against division by zero
 
 
 @dataclass(frozen=True)
 class StopRequests:
-    """Base angles at which each of m mirrors may be served, apart from its ball's azimuth.
+    """Base angles at which each of m mirrors may be served, relative to its ball's azimuth.
 
     Attributes:
-        ball: that stands in, (m,).
+        ball: that replaces the mirror, (m,).
         azimuth: of the mirror, radians, (m,).
-        tolerance: by which the ball may be beside it, radians, (m,).
+        tolerance: maximum difference of the ball's azimuth from the mirror's, radians, (m,).
     """
 
     ball: Ints
@@ -34,21 +35,27 @@ class StopRequests:
     tolerance: Floats
 
     def low(self, k: int) -> Floats:
-        """Least azimuth (k,) at which each of k balls must stand, tolerance used."""
-        result = np.full(k, np.inf)
-        np.minimum.at(result, self.ball, self.azimuth + self.tolerance)
-        return result
+        """Minimum azimuth (k,) that each of k balls must reach, tolerance used."""
+        return _extremes(np.minimum, self.azimuth + self.tolerance, self.ball, k)
 
     def high(self, k: int) -> Floats:
-        """Largest azimuth (k,) at which each of k balls must stand, tolerance used."""
-        result = np.full(k, -np.inf)
-        np.maximum.at(result, self.ball, self.azimuth - self.tolerance)
-        return result
+        """Maximum azimuth (k,) that each of k balls must reach, tolerance used."""
+        return _extremes(np.maximum, self.azimuth - self.tolerance, self.ball, k)
+
+    def base_angles(self, azimuth: Floats) -> Floats:
+        """Base angles (m,) that balls at azimuths (k,) serve the mirrors at without error."""
+        angle: Floats = self.azimuth - azimuth[self.ball]
+        return angle
+
+    def intervals(self, azimuth: Floats) -> tuple[Floats, Floats]:
+        """Minimum and maximum base angles (m,) at which each mirror may be served."""
+        angle = self.base_angles(azimuth)
+        return angle - self.tolerance, angle + self.tolerance
 
 
 @dataclass(frozen=True)
 class StopPlan:
-    """Stops of the base in ascending order, over s stops and m mirrors.
+    """Stops of the base in ascending order, s stops and m mirrors.
 
     Attributes:
         angle: base angle at each stop, radians, (s,).
@@ -69,134 +76,129 @@ class StopPlan:
         return len(self.angle)
 
     def mirrors(self, stop: int) -> Ints:
-        """Mirrors that the balls stand in for at a stop."""
+        """Mirrors that the balls replace at a stop."""
         return np.flatnonzero(self.stop == stop)
 
 
 def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRequests:
-    """What the mirrors ask for.
+    """The base angles that the mirrors request.
 
     Args:
         groups: of the m mirrors.
         azimuth: of the mirrors, radians, (m,).
-        error: of direction that a shared stop may cause, radians.
+        error: maximum error of direction that a shared stop may cause, radians.
     """
-    share = np.sin(error / 2) / np.maximum(np.sin(groups.polar), 1e-12)
+    share = np.sin(error / 2) / np.maximum(np.sin(groups.polar), MIN_SINE)
     tolerance = 2 * np.arcsin(np.minimum(share, 1))
-    return StopRequests(groups.of, azimuth, tolerance[groups.of])
+    return StopRequests(groups.group_of, azimuth, tolerance[groups.group_of])
 
 
 def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     """The fewest points that hit all intervals [low, high] (m,).
 
     Returns:
-        The largest place for each point, ascending, (s,), and the point that hits each interval.
+        The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
     """
-    order = np.argsort(high, kind="stable")
     points: list[float] = []
     which = np.empty(len(high), dtype=np.int64)
     last = -np.inf
-    for i, (start, end) in zip(
-        order.tolist(), zip(low[order].tolist(), high[order].tolist(), strict=True), strict=True
-    ):
-        if start > last:
-            last = end
-            points.append(end)
+    for i in np.argsort(high, kind="stable").tolist():
+        if low[i] > last:
+            last = float(high[i])
+            points.append(last)
         which[i] = len(points) - 1
     return np.array(points), which
 
 
 def azimuths_for_fewer_stops(
-    task: PlacementProblem, wanted: StopRequests, azimuth: Floats
+    problem: PlacementProblem, requests: StopRequests, azimuth: Floats
 ) -> Floats:
-    """Azimuths (k,) moved where they are free to, so that fewer stops do; the swing stays.
+    """Azimuths (k,) moved where they are free to, so that fewer stops are needed.
 
     Ball after ball, each is tried at small steps over all that the others, the swing and the
-    outermost azimuth leave it.
+    outermost azimuth leave it; swing and outermost azimuth do not grow.
     """
-    reach, far = task.reach(azimuth), task.outermost(azimuth)
+    limits = problem.half_swing(azimuth), problem.outermost(azimuth)
     azimuth = azimuth.copy()
-    step = np.zeros(len(task))
-    np.maximum.at(step, wanted.ball, wanted.tolerance / TRIES)
+    step = np.zeros(len(problem))
+    np.maximum.at(step, requests.ball, requests.tolerance / TRIES_PER_TOLERANCE)
     for _ in range(ROUNDS):
         before = azimuth.copy()
-        for ball in range(len(task)):
-            tried = _tried(task, azimuth, ball, step[ball], (reach, far))
-            counts = np.array([_count(wanted, azimuth, ball, place) for place in tried.tolist()])
-            best = np.lexsort((tried, np.round(np.abs(tried - azimuth[ball]), 9), counts))[0]
-            azimuth[ball] = tried[best]
+        for ball in range(len(problem)):
+            tried = _free_azimuths(problem, azimuth, ball, step[ball], limits)
+            counts = np.array([_count(requests, azimuth, ball, one) for one in tried.tolist()])
+            moved = np.round(np.abs(tried - azimuth[ball]), DECIMALS)
+            azimuth[ball] = tried[np.lexsort((tried, moved, counts))[0]]
         if np.array_equal(before, azimuth):
             break
     return azimuth
 
 
-def _tried(
-    task: PlacementProblem, azimuth: Floats, ball: int, step: float, limits: tuple[float, float]
+def _free_azimuths(
+    problem: PlacementProblem,
+    azimuth: Floats,
+    ball: int,
+    step: float,
+    limits: tuple[float, float],
 ) -> Floats:
     """Azimuths that a ball may have while the others stay, its present one first."""
-    reach, far = limits
-    room = far - reach - task.edge[ball]
-    low = max(task.high[ball] - reach, task.floor[ball] + reach, -room)
-    high = min(task.low[ball] + reach, task.ceiling[ball] - reach, room)
+    half_swing, outermost = limits
+    room = outermost - half_swing - problem.seat_half_angle[ball]
+    window_low, window_high = problem.window(half_swing)
+    low, high = max(window_low[ball], -room), min(window_high[ball], room)
     tried = np.concatenate([azimuth[[ball]], np.arange(low, high, step)])
-    away = np.abs(tried[:, None] - np.delete(azimuth, ball))
-    clear = (away >= np.delete(task.apart[ball], ball)).all(axis=1)
+    separation = np.abs(tried[:, None] - np.delete(azimuth, ball))
+    clear = (separation >= np.delete(problem.min_separation[ball], ball)).all(axis=1)
     clear[0] = True
     result: Floats = tried[clear]
     return result
 
 
-def _count(wanted: StopRequests, azimuth: Floats, ball: int, place: float) -> int:
+def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) -> int:
+    """Number of stops with one ball moved to another azimuth."""
     moved = azimuth.copy()
-    moved[ball] = place
-    return len(min_stabbing_points(*_intervals(wanted, moved))[0])
-
-
-def _intervals(wanted: StopRequests, azimuth: Floats) -> tuple[Floats, Floats]:
-    """Base angles (m,) between which each mirror may be served."""
-    angle = wanted.azimuth - azimuth[wanted.ball]
-    return angle - wanted.tolerance, angle + wanted.tolerance
+    moved[ball] = moved_to
+    return len(min_stabbing_points(*requests.intervals(moved))[0])
 
 
 def plan_stops(
-    groups: MirrorGroups, polar: Floats, wanted: StopRequests, azimuth: Floats
+    groups: MirrorGroups, polar: Floats, requests: StopRequests, azimuth: Floats
 ) -> StopPlan:
-    """The stops for balls at azimuths (k,), each mirror at the one that suits it best.
+    """The stops for balls at azimuths (k,), each mirror at the one with the smallest error.
 
     Args:
         groups: of the mirrors.
         polar: of the mirrors, radians, (m,).
-        wanted: what they ask for.
+        requests: of the mirrors.
         azimuth: of the balls on the base, radians, (k,).
     """
-    exact = wanted.azimuth - azimuth[wanted.ball]
-    angle = _middles(exact, *_intervals(wanted, azimuth))
+    exact = requests.base_angles(azimuth)
+    angle = _stop_angles(exact, *requests.intervals(azimuth))
     stop = np.abs(angle - exact[:, None]).argmin(axis=1)
-    across, along = angle[stop] - exact, groups.polar[groups.of] - polar
-    return StopPlan(
-        angle, stop, across, along, angle_between(polar, groups.polar[groups.of], across)
-    )
+    azimuth_error, ball_polar = angle[stop] - exact, groups.polar[groups.group_of]
+    error = angle_between(polar, ball_polar, azimuth_error)
+    return StopPlan(angle, stop, azimuth_error, ball_polar - polar, error)
 
 
-def _middles(exact: Floats, low: Floats, high: Floats) -> Floats:
-    """The fewest stops, each in the middle of what its mirrors ask for, as far as they allow.
+def _stop_angles(exact: Floats, low: Floats, high: Floats) -> Floats:
+    """The fewest stops, each as near as allowed to the middle of the angles its mirrors request.
 
-    No stop lies outside of the swing that the first and the last mirror need.
+    No stop is outside of the swing that the first and the last mirror need.
     """
     _, which = min_stabbing_points(low, high)
-    ends = [_each(np.minimum, exact, which), _each(np.maximum, exact, which)]
-    least = np.maximum(_each(np.maximum, low, which), high.min())
-    most = np.minimum(_each(np.minimum, high, which), low.max())
-    most = np.maximum(least, most)  # equal but for rounding where one stop suits all
-    angle: Floats = np.clip((ends[0] + ends[1]) / 2, least, most)
+    count = int(which.max()) + 1
+    first, last = (_extremes(by, exact, which, count) for by in (np.minimum, np.maximum))
+    minimum = np.maximum(_extremes(np.maximum, low, which, count), high.min())
+    maximum = np.minimum(_extremes(np.minimum, high, which, count), low.max())
+    maximum = np.maximum(minimum, maximum)  # equal but for rounding where one stop suits all
+    angle: Floats = np.clip((first + last) / 2, minimum, maximum)
     return angle
 
 
-def _each(extreme: np.ufunc, values: Floats, which: Ints) -> Floats:
-    """Least or greatest of the values (m,) at each point."""
-    start = -np.inf if extreme is np.maximum else np.inf
-    result = np.full(int(which.max()) + 1, start)
-    extreme.at(result, which, values)
+def _extremes(extreme: np.ufunc, values: Floats, group_of: Ints, count: int) -> Floats:
+    """Minimum or maximum (count,) in each group of values (m,)."""
+    result = np.full(count, np.inf if extreme is np.minimum else -np.inf)
+    extreme.at(result, group_of, values)
     return result
 
 

@@ -65,7 +65,7 @@ def _pose(made: PrototypeLayout) -> Floats:
         [
             balls.radius,
             balls.body_radius,
-            np.degrees(balls.at.polar),
+            np.degrees(balls.poses.polar),
             np.degrees(made.placement.azimuth),
             made.apices(),
             made.normals(),
@@ -85,8 +85,8 @@ def _shown(made: PrototypeLayout) -> Floats:
         [
             np.bincount(fit.ball, fit.pixels, k),
             np.bincount(fit.ball, fit.pixels_shell, k),
-            made.groups.least(fit.coverage),
-            made.groups.least(fit.coverage_fixed),
+            made.groups.minimum(fit.coverage),
+            made.groups.minimum(fit.coverage_fixed),
             error,
         ]
     )

@@ -62,9 +62,9 @@ def run(made: PrototypeLayout, motion: MotionSpec) -> Run:
 
 def free(made: PrototypeLayout) -> tuple[float, float]:
     """Base angles between which post, camera and the largest swing leave the balls, radians."""
-    task, azimuth = made.task, made.placement.azimuth
-    low = max(float((task.floor - azimuth).max()), -task.most / 2)
-    return low, min(float((task.ceiling - azimuth).min()), task.most / 2)
+    problem, azimuth = made.problem, made.placement.azimuth
+    low = max(float((problem.min_azimuth - azimuth).max()), -problem.max_swing / 2)
+    return low, min(float((problem.max_azimuth - azimuth).min()), problem.max_swing / 2)
 
 
 def program(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str]:

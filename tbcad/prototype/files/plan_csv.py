@@ -43,7 +43,7 @@ def write_stops(path: Path, records: list[Row]) -> None:
 
 def _row(order: int, one: PlannedPicture) -> Row:
     values = (
-        *(order, round(float(np.degrees(one.turn))), one.stop + 1, _degrees(one.angle)),
+        *(order, round(float(np.degrees(one.object_angle))), one.stop + 1, _degrees(one.angle)),
         *(one.ball + 1, one.mirror),
         *(_degrees(one.polar_error), _degrees(one.azimuth_error), _degrees(one.error)),
     )

@@ -88,11 +88,11 @@ def _choices(made: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
         {
             "way": one.name,
             "pixels": one.pixels,
-            "pixels_kept": one.kept,
-            "coverage_mm": one.least_coverage,
-            "mirrors_short": one.short,
+            "pixels_kept": one.kept_share,
+            "coverage_mm": one.min_coverage,
+            "mirrors_short": one.below_target,
             "balls_mass_g": one.mass_g,
-            "caps": one.made,
+            "caps": one.caps,
         }
         for one in found
     ]

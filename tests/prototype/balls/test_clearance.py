@@ -25,17 +25,17 @@ K = 12
 def balls(paper_half: MirrorArray) -> Balls:
     """As large as stock has them, so that they stand in each other's light too."""
     groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
-    here = ball_candidates(paper_half, groups, 60.0)
+    candidates = ball_candidates(paper_half, groups, 60.0)
     catalogue = load_catalogue(["metric"])
     stock = np.full(K, len(catalogue) - 1)
-    return balls_with_radii(here, np.full(K, 30.0), stock, catalogue, 2.0)
+    return balls_with_radii(candidates, np.full(K, 30.0), stock, catalogue, 2.0)
 
 
 def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the light's segments (s, 3) at ball j, at azimuth zero."""
     camera = np.array([pinhole, 0.0, 0.0])
     share = np.linspace(0, 1, 15)[:, None, None]
-    inner = balls.at.apex[j] + share * (balls.outline[j] - balls.at.apex[j])
+    inner = balls.poses.apex[j] + share * (balls.outline[j] - balls.poses.apex[j])
     normal = unit(inner.reshape(-1, 3) - balls.centre[j])
     point = balls.centre[j] + balls.radius[j] * normal
     out = reflected(camera, point, normal)

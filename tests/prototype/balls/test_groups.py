@@ -17,7 +17,7 @@ def test_one_group_is_the_mean(paper_half: MirrorArray) -> None:
 def test_by_polar_angle_alone_groups_are_bands(paper_half: MirrorArray) -> None:
     groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, 16, 0.0)
     order = np.argsort(paper_half.polar, kind="stable")
-    assert (np.diff(groups.of[order]) >= 0).all()
+    assert (np.diff(groups.group_of[order]) >= 0).all()
     assert (np.diff(groups.polar) > 0).all()
 
 
@@ -27,13 +27,13 @@ def test_every_mirror_is_in_the_nearest_group(paper_half: MirrorArray) -> None:
     groups = group_mirrors(paper_half.polar, radius, 16, 0.25)
     away = (polar[:, None] - np.degrees(groups.polar)) ** 2
     away += (0.25 * (radius[:, None] - groups.radius)) ** 2
-    assert (away.argmin(axis=1) == groups.of).all()
+    assert (away.argmin(axis=1) == groups.group_of).all()
 
 
 def test_worst_direction_is_nearly_the_least_possible(paper_half: MirrorArray) -> None:
     """16 even bands over 90 degrees would be off by 2.81 at most."""
     groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, 16, 0.25)
-    error = np.degrees(np.abs(groups.polar[groups.of] - paper_half.polar))
+    error = np.degrees(np.abs(groups.polar[groups.group_of] - paper_half.polar))
     assert error.max() < 3.2
 
 
@@ -55,5 +55,7 @@ def test_no_group_is_empty_or_it_is_said(data: st.DataObject) -> None:
     except SpecError as error:
         assert "prototype.k" in str(error)  # noqa: PT017
         return
-    assert set(groups.of.tolist()) == set(range(k))
-    assert groups.least(polar) == pytest.approx([polar[groups.of == j].min() for j in range(k)])
+    assert set(groups.group_of.tolist()) == set(range(k))
+    assert groups.minimum(polar) == pytest.approx(
+        [polar[groups.group_of == j].min() for j in range(k)]
+    )

@@ -11,7 +11,7 @@ from tbcad.optics.trace import reflected
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
 from tbcad.prototype.balls.selection import (
-    SAME_MM,
+    COVERAGE_ROUNDING_MM,
     BallCandidates,
     ball_candidates,
     ball_fit,
@@ -43,7 +43,7 @@ def small(made: MirrorDesign, *options: str) -> PrototypeLayout:
 class TestBalls:
     def test_all_mirrors_show_the_whole_target(self, made: PrototypeLayout) -> None:
         assert made.fit.coverage.min() > 60
-        assert made.fit.possible.all()
+        assert made.fit.coverable.all()
 
     def test_the_next_larger_ball_would_not(
         self, made: PrototypeLayout, here: BallCandidates
@@ -54,7 +54,7 @@ class TestBalls:
             made.balls.radius + 0.11,
             catalogue.diameter[np.minimum(stock + 1, len(catalogue) - 1)] / 2,
         )
-        assert (made.groups.least(here.coverage(larger, moved=True)) < 60).all()
+        assert (made.groups.minimum(here.coverage(larger, moved=True)) < 60).all()
 
     def test_groups_beyond_stock_get_caps(self, made: PrototypeLayout) -> None:
         beyond = made.balls.radius > 30
@@ -65,7 +65,7 @@ class TestBalls:
 
     def test_a_caps_edge_lies_on_its_front_and_on_its_ball(self, made: PrototypeLayout) -> None:
         balls, cap = made.balls, made.balls.cap
-        edge = balls.in_use[cap] + KEYS.cap_rim_mm
+        edge = balls.used_radius[cap] + KEYS.cap_rim_mm
         drop = balls.radius[cap] - np.sqrt(balls.radius[cap] ** 2 - edge**2)
         on_ball = np.hypot(edge, balls.body_depth[cap] - drop)
         assert on_ball == pytest.approx(balls.body_radius[cap])
@@ -96,19 +96,19 @@ class TestBalls:
         keys = KEYS.model_copy(update={"picture": "fixed"})
         balls = choose_balls(here, keys, made.balls.catalogue)
         found = ball_fit(here, balls, keys)
-        assert not found.possible.all()
-        assert (found.coverage_fixed[found.possible] >= 60 - SAME_MM).all()
-        assert found.kept < 0.05
+        assert not found.coverable.all()
+        assert (found.coverage_fixed[found.coverable] >= 60 - COVERAGE_ROUNDING_MM).all()
+        assert found.kept_share < 0.05
 
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, made = small_design.spec, small(small_design)
         found = {
             c.name: c for c in ball_alternatives(spec, made.half, made.groups, made.balls.catalogue)
         }
-        assert found["cover, with caps"].kept == pytest.approx(made.fit.kept)
-        assert found["cover, with caps"].short == 0
-        assert found["cover, balls only"].kept < found["cover, with caps"].kept
-        assert found["nearest, with caps"].short > 10
+        assert found["cover, with caps"].kept_share == pytest.approx(made.fit.kept_share)
+        assert found["cover, with caps"].below_target == 0
+        assert found["cover, balls only"].kept_share < found["cover, with caps"].kept_share
+        assert found["nearest, with caps"].below_target > 10
 
 
 class TestPlaces:
@@ -134,7 +134,7 @@ class TestPlaces:
         outline, balls = made.balls.outline, made.balls
         camera, frame = made.half.camera.pinhole, made.half.ellipsoid.frame()
         for share in (0.0, 0.5, 1.0):
-            inner = balls.at.apex[:, None] + share * (outline - balls.at.apex[:, None])
+            inner = balls.poses.apex[:, None] + share * (outline - balls.poses.apex[:, None])
             centre = balls.centre[:, None]
             normal = unit(inner - centre)
             point = centre + balls.radius[:, None, None] * normal
@@ -167,8 +167,8 @@ class TestPlaces:
             assert (body - made.balls.body_radius - 30).min() > KEYS.ball_wall_mm - 1e-3
 
     def test_swing_is_proved_least_and_less_than_greedy(self, made: PrototypeLayout) -> None:
-        assert made.placement.bound == pytest.approx(made.placement.swing, abs=1e-3)
-        assert made.placement.swing < made.greedy.swing - DEGREE
+        assert made.placement.swing_bound == pytest.approx(made.placement.swing, abs=1e-3)
+        assert made.placement.swing < made.greedy_placement.swing - DEGREE
         assert made.placement.swing / DEGREE < 205
 
     def test_outermost_is_that_of_the_edges(self, made: PrototypeLayout) -> None:
@@ -215,7 +215,7 @@ class TestStops:
         angle = wanted.azimuth - made.placement.azimuth[wanted.ball]
         points, _ = min_stabbing_points(angle - wanted.tolerance, angle + wanted.tolerance)
         assert len(points) == len(made.stops)
-        other = plan_stops(made.groups, made.half.polar, wanted, made.greedy.azimuth)
+        other = plan_stops(made.groups, made.half.polar, wanted, made.greedy_placement.azimuth)
         assert len(made.stops) <= len(other)
 
     def test_other_half_with_the_object_turned(
@@ -227,7 +227,7 @@ class TestStops:
         shots = planned_pictures(made)
         assert len(shots) == 2 * 847
         assert {shot.mirror for shot in shots} == {*made.half.ids, *b.ids}
-        assert [shot.turn for shot in shots] == [0.0] * 847 + [np.pi] * 847
+        assert [shot.object_angle for shot in shots] == [0.0] * 847 + [np.pi] * 847
         first = [shot.stop for shot in shots[:847]]
         assert first == sorted(first)
 
@@ -251,7 +251,7 @@ class TestAsked:
             return bool(
                 error.max() <= keys.auto_direction_max_deg
                 and np.median(error) <= keys.auto_direction_median_deg
-                and 100 * (1 - found.fit.kept) <= keys.auto_lost_percent
+                and 100 * (1 - found.fit.kept_share) <= keys.auto_lost_percent
             )
 
         assert within(len(auto))
@@ -271,8 +271,8 @@ class TestAsked:
 
     def test_no_post_gives_more_room(self, small_design: MirrorDesign) -> None:
         task = small(small_design, "post_diameter_mm=0", "camera_diameter_mm=0").task
-        assert (task.ceiling == np.pi).all()
-        assert (task.floor == -np.pi).all()
+        assert (task.max_azimuth == np.pi).all()
+        assert (task.min_azimuth == -np.pi).all()
 
 
 class TestRefused:

@@ -210,7 +210,7 @@ class TestRefused:
 
     def test_pads_in_the_way_of_other_balls(self, made: PrototypeLayout) -> None:
         close = replace(made.placement, azimuth=made.placement.azimuth * 0)
-        small = replace(made.balls.at, apex=made.balls.at.apex * 0 + made.balls.at.apex[:1])
+        small = replace(made.balls.at, apex=made.balls.poses.apex * 0 + made.balls.poses.apex[:1])
         crowded = replace(made, placement=close, balls=replace(made.balls, at=small))
         with pytest.raises(SpecError, match="stands where another ball is put in"):
             seat_layout(KEYS, crowded)

@@ -248,7 +248,7 @@ class TestMerged:
             for at in cameras
         )
         assert shell == pytest.approx(2 * made.fit.pixels_shell.sum(), rel=0.01)
-        assert kept / shell == pytest.approx(made.fit.kept, abs=0.01)
+        assert kept / shell == pytest.approx(made.fit.kept_share, abs=0.01)
 
     def test_photographs_are_close_to_exact_rays(
         self, merged: LightField, both: Both, scene: Scene
