@@ -55,6 +55,14 @@ class MirrorArray:
     def __len__(self) -> int:
         return len(self.u)
 
+    def __repr__(self) -> str:
+        """Return camera, number of mirrors and minimum coverage."""
+        minimum = self.coverage.min()
+        return (
+            f"<MirrorArray of camera {self.camera_id}: {len(self)} mirrors, "
+            f"minimum coverage {minimum:.2f} mm>"
+        )
+
     @property
     def ids(self) -> list[str]:
         """Names of the mirrors: a0001, a0002 ...; b's mirror of the same number mirrors it."""

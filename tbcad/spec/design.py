@@ -144,7 +144,7 @@ class StepSpec(Section):
 
 
 class Spec(Section):
-    """The whole design."""
+    """A whole design: every key with its value, checked and frozen."""
 
     name: str = Field("turtleback", pattern="^[A-Za-z0-9][A-Za-z0-9 ._-]{0,79}$")
     """Name of the design, for file headers and reports."""

@@ -1,0 +1,78 @@
+"""The public interface: names, import time, reprs, docstrings, and the README's example."""
+
+import doctest
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tbcad
+from tbcad.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {"numpy", "scipy", "OCP", "build123d", "cadquery", "h5py", "numba", "pydantic", "rich"}
+
+
+def test_import_loads_no_heavy_library() -> None:
+    code = "import sys, tbcad; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not HEAVY & set(loaded)
+    assert "tbcad.api" not in loaded
+
+
+@pytest.mark.parametrize("name", tbcad.__all__)
+def test_public_names_are_there_and_documented(name: str) -> None:
+    value = getattr(tbcad, name)
+    if name != "__version__":
+        assert len(inspect.getdoc(value) or "") > 40
+    assert name in dir(tbcad)
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'desing'"):
+        _ = tbcad.desing  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", ["tbcad", "tbcad.api"])
+def test_examples_in_docstrings(name: str) -> None:
+    module = __import__(name, fromlist=["api"])
+    tried = doctest.testmod(module)
+    assert tried.failed == 0
+    assert tried.attempted > 0
+
+
+def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    example = re.search(r"<!-- test: example -->\n```python\n(.*?)```", text, re.DOTALL)
+    assert example is not None
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(example[1], names)
+    result, field = names["result"], names["field"]
+    assert isinstance(result, tbcad.Build)
+    assert result.passed
+    assert (tmp_path / "exports" / "shell_a.step").is_file()
+    assert isinstance(field, tbcad.LightField)
+    for value in (names["design"], names["half"], result, result.report, field):
+        assert len(repr(value)) < 250
+
+
+def test_python_m_tbcad_is_the_command() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "tbcad", "--version"], capture_output=True, text=True, check=False
+    )
+    assert (run.returncode, run.stdout.strip()) == (0, f"tbcad {tbcad.__version__}")
+
+
+def test_bad_input_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"n and settings go with a design file"):
+        tbcad.design(tbcad.load_spec(None), n=4)
+    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
+        tbcad.design(n=3).shell("c")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"optics\.n is 99"):
+        tbcad.design(n=99)
