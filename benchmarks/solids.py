@@ -18,7 +18,7 @@ from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.shell.envelope import envelope
 from tbcad.shell.solid import shell_solid
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 SEGMENTS = 64
 FUSED = (8, 16)

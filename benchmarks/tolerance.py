@@ -26,7 +26,7 @@ from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import object_distances, shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw

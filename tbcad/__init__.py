@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from tbcad.errors import InputError
     from tbcad.mirrors.array import MirrorArray
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.spec.design import Spec, load_spec
+    from tbcad.spec.design import Spec
+    from tbcad.spec.load import load_spec
     from tbcad.tolerance.analysis import Analysis
 
 __all__ = [
@@ -53,7 +54,7 @@ _MODULES = {
     "MirrorArray": "tbcad.mirrors.array",
     "Report": "tbcad_verify.report.report",
     "Spec": "tbcad.spec.design",
-    "load_spec": "tbcad.spec.design",
+    "load_spec": "tbcad.spec.load",
 }
 
 

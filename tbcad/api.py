@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.design import Spec
+from tbcad.spec.load import load_spec
 from tbcad.types import Progress
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import pytest
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.shell.envelope import Envelope, envelope
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 
 @pytest.fixture(scope="session")

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from tbcad.mirrors.array import design
-from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import allowed, fields, section_of
+from tbcad.spec.load import load_spec
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 PAPER = DESIGNS / "turtleback.toml"

@@ -11,7 +11,7 @@ from tbcad_verify.run.verify import verify
 
 from tbcad.mirrors.array import design
 from tbcad.mirrors.record import COLUMNS, rows
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "docs" / "sample"

@@ -85,7 +85,7 @@ def build(
     from tbcad.api import build as build_files
     from tbcad.output.folder import check_target
     from tbcad.output.parts import default_parts, parse_parts
-    from tbcad.spec.design import load_spec
+    from tbcad.spec.load import load_spec
 
     asked = parse_parts(parts) if parts is not None else None
     options = list(settings or [])

@@ -208,7 +208,7 @@ def _run(
     work: "Callable[[Spec, Callable[[str], None]], Study]",
 ) -> int:
     """Make a study of a design."""
-    from tbcad.spec.design import load_spec
+    from tbcad.spec.load import load_spec
 
     spec = load_spec(design, list(settings or []))
     return _write(out, lambda progress: work(spec, progress))

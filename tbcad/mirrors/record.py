@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.spec.design import spec_dict
+from tbcad.spec.load import spec_dict
 
 Row = dict[str, str | float | None]
 

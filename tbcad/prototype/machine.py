@@ -25,6 +25,7 @@ from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage import stage_solids as stages
 from tbcad.prototype.stage.layout import StageLayout, stage
+from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Progress
 
@@ -78,24 +79,24 @@ def machine(design: MirrorDesign, progress: Progress = lambda _: None) -> Machin
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    keys, parts = design.spec.prototype, load_parts()
+    keys, printer, parts = design.spec.prototype, design.spec.printer, load_parts()
     target = design.spec.optics.capture_diameter_mm
     progress("prototype: balls, their places, stops")
     made = prototype_layout(design.spec, design)
     numbers = base_layout(keys.base, made)
     progress("prototype: base")
-    plan = split_base(numbers)
-    turning = carrier_parts(numbers, plan)
-    density = keys.base.density_g_cm3
+    plan = split_base(numbers, printer)
+    turning = carrier_parts(numbers, plan, printer)
+    density = printer.density_g_cm3
     summed = sum_masses(numbers.frame, ball_masses(made, density), _load(turning, density))
     drive = _drive(made, summed, keys, parts)
     progress("prototype: stage and frame")
     left = room(made, numbers, target / 2, float(np.radians(keys.motion.approach_deg)))
     held = stage((keys.stage, keys.frame, keys), made, left, parts)
     round_it = frame((keys.frame, keys), made, numbers, held, drive, left, parts)
-    still = (*_stages(held, keys), *_frames(round_it, keys))
+    still = (*_stages(held, printer), *_frames(round_it, printer))
     progress("prototype: caps and coupon")
-    pieces = (*_bases(turning), *_caps(numbers, made), *still, *_tools(numbers))
+    pieces = (*_bases(turning), *_caps(numbers, made), *still, *_tools(numbers, printer))
     return Machine(made, numbers, plan, held, round_it, pieces, summed, drive, parts, target)
 
 
@@ -125,18 +126,18 @@ def _caps(numbers: BaseLayout, made: PrototypeLayout) -> Iterator[PrintedPart]:
         yield PrintedPart(part, "cap", f"stands in for ball {k + 1}, which is too large to buy", k)
 
 
-def _stages(held: StageLayout, keys: PrototypeSpec) -> Iterator[PrintedPart]:
-    for item, part in zip(held.items, stages.parts(held, keys.base), strict=True):
+def _stages(held: StageLayout, printer: PrinterSpec) -> Iterator[PrintedPart]:
+    for item, part in zip(held.items, stages.parts(held, printer), strict=True):
         yield PrintedPart(part, "stage", item.what)
 
 
-def _frames(round_it: FrameLayout, keys: PrototypeSpec) -> Iterator[PrintedPart]:
-    for item, part in zip(round_it.printed, frames.parts(round_it, keys.base), strict=True):
+def _frames(round_it: FrameLayout, printer: PrinterSpec) -> Iterator[PrintedPart]:
+    for item, part in zip(round_it.printed, frames.parts(round_it, printer), strict=True):
         yield PrintedPart(part, "frame", item.what)
 
 
-def _tools(numbers: BaseLayout) -> Iterator[PrintedPart]:
-    for part in coupon_plates(numbers):
+def _tools(numbers: BaseLayout, printer: PrinterSpec) -> Iterator[PrintedPart]:
+    for part in coupon_plates(numbers, printer):
         yield PrintedPart(
             part, "tool", "seats to try the fit of the balls before the base is printed"
         )

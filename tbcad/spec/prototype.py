@@ -1,22 +1,39 @@
-"""The section [prototype] of the design: steel balls on a base that turns."""
+"""The section [prototype] of the design: steel balls on a base that turns, and its sections."""
 
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import shown
-from tbcad.spec.motion_keys import MotionSpec
 from tbcad.spec.section import Section, as_tuple
-from tbcad.spec.stage_keys import FrameSpec, StageSpec
 
 MOST_BALLS = 1000
+LEAST_LEDS, MOST_LEDS = 4, 12
 
 GradeName: TypeAlias = Literal[
     "G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"
 ]
 Snap: TypeAlias = Literal["cover", "nearest"]
 Picture: TypeAlias = Literal["moved", "fixed"]
+Drive: TypeAlias = Literal["nema17-belt", "nema17-direct", "stage-60"]
+Hold: TypeAlias = Literal["magnet", "glue"]
+Lock: TypeAlias = Literal["set-screws", "clamp"]
+Magnets: TypeAlias = Annotated[
+    tuple[Annotated[float, Field(ge=1, le=50)], ...],
+    Field(min_length=1, max_length=20),
+    BeforeValidator(as_tuple),
+]
+Offsets: TypeAlias = Annotated[
+    tuple[Annotated[float, Field(ge=-1, le=1)], ...],
+    Field(min_length=1, max_length=9),
+    BeforeValidator(as_tuple),
+]
+Led: TypeAlias = Literal["LED-3", "LED-5"]
+
+_Coordinate: TypeAlias = Annotated[float, Field(ge=-1000, le=1000)]
+_Place: TypeAlias = Annotated[
+    tuple[_Coordinate, _Coordinate, _Coordinate], BeforeValidator(as_tuple)
+]
 
 
 def _count(value: object) -> object:
@@ -32,6 +49,163 @@ def _names(value: object) -> object:
     if isinstance(names, tuple) and names and all(isinstance(name, str) for name in names):
         return names
     raise ValueError(f'{shown(value)} is not allowed: give a list such as ["metric", "my.csv"]')
+
+
+def _places(value: object) -> object:
+    places = as_tuple(value)
+    if isinstance(places, tuple) and (not places or LEAST_LEDS <= len(places) <= MOST_LEDS):
+        return places
+    raise ValueError(
+        f"{shown(value)} is not allowed: give {LEAST_LEDS} to {MOST_LEDS} places [x, y, z], "
+        "or [] for a stage without"
+    )
+
+
+Places: TypeAlias = Annotated[tuple[_Place, ...], BeforeValidator(_places)]
+
+
+class BaseSpec(Section):
+    """The carrier with its seats, its hub, and how it is printed."""
+
+    thickness_mm: float = Field(5.0, ge=1.2, le=30)
+    """Thickness of the carrier's wall."""
+    ribs: int = Field(4, ge=2, le=12)
+    """Ribs along meridians, one at either edge."""
+    rings: int = Field(2, ge=1, le=8)
+    """Ribs round the axis, one at the end toward the camera."""
+    rib_mm: float = Field(5.0, ge=1.2, le=30)
+    """Thickness of the ribs."""
+    rib_height_mm: float = Field(8.0, ge=1, le=50)
+    """How far ribs stand out of the wall; next to the hub they are higher."""
+    light_clearance_mm: float = Field(0.5, ge=0, le=20)
+    """Least room between all light and the carrier."""
+    clearance_mm: float = Field(0.5, ge=0.1, le=5)
+    """Room between a ball and its cup everywhere but at the pads."""
+    pad_mm: float = Field(3.0, ge=0.5, le=20)
+    """Diameter of the three pads on which a ball rests; less for balls of less than 4.5 pads."""
+    pad_angle_deg: float = Field(50.0, ge=20, le=70)
+    """Angle between a pad's normal and the axis of its seat."""
+    cup_wall_mm: float = Field(2.5, ge=0.8, le=20)
+    """Wall round a cup."""
+    floor_mm: float = Field(2.0, ge=0.6, le=20)
+    """Wall below a cup's pocket."""
+    hold: Hold = "magnet"
+    """What holds a ball on its pads: a magnet below it, or glue in a well."""
+    magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
+    """Diameters of the disc magnets on sale; each ball gets the largest that fits."""
+    magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
+    """Height of the magnets."""
+    magnet_gap_mm: float = Field(0.5, ge=0.1, le=5)
+    """Gap between ball and magnet, or depth of the glue well below the ball."""
+    magnet_play_mm: float = Field(0.2, ge=0, le=1)
+    """How much wider than the magnet its pocket is."""
+    digit_mm: float = Field(6.0, ge=3, le=30)
+    """Height of the digits in relief."""
+    relief_mm: float = Field(0.6, ge=0.2, le=3)
+    """How far the digits stand out."""
+    drive: Drive = "nema17-belt"
+    """What turns the base: decides the holes in its hub."""
+    shaft_mm: float = Field(8.0, ge=3, le=25)
+    """Diameter of the shaft's bore."""
+    lock: Lock = "set-screws"
+    """What holds the shaft."""
+    insert_hole_mm: float = Field(4.0, ge=2, le=10)
+    """Diameter of the holes for M3 heat-set inserts."""
+    insert_depth_mm: float = Field(6.2, ge=2, le=20)
+    """Depth of the holes for M3 heat-set inserts."""
+    joint_mm: float = Field(8.0, ge=4, le=30)
+    """Thickness of the flanges where the base is cut to fit the bed; for inserts and dowels."""
+    joint_height_mm: float = Field(12.0, ge=8, le=50)
+    """How far these flanges stand out of the wall."""
+    screw_pitch_mm: float = Field(45.0, ge=12, le=500)
+    """Distance of the screws along a joint, about."""
+    dowel_mm: float = Field(3.0, ge=1, le=10)
+    """Diameter of the dowel pins in the joints (ISO 8734), two to each."""
+    dowel_press_mm: float = Field(0.1, ge=-0.5, le=1)
+    """How much wider than its dowel a hole is that holds it; prints come out tighter."""
+    dowel_slip_mm: float = Field(0.2, ge=0, le=1)
+    """How much wider than its dowel the hole on the other side is."""
+    coupon_offsets_mm: Offsets = (-0.1, 0.0, 0.1)
+    """How far the coupon's pads are moved away from the ball."""
+
+
+class MotionSpec(Section):
+    """How the base is driven from stop to stop, and what the controller is told."""
+
+    axis: Literal["X", "A"] = "X"
+    """Axis of the controller: X with a degree for a millimetre (GRBL 1.1 has X, Y and Z only),
+    or A in degrees (grblHAL and others)."""
+    trigger: Literal["coolant", "pause"] = "coolant"
+    """What takes a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
+    home_deg: float = Field(0.0, ge=-180, le=180)
+    """Base angle at which the program is started: at the base's mark, or after homing."""
+    approach_deg: float = Field(1.0, ge=0, le=30)
+    """How far below its first stop the base starts, so that all are reached from one side."""
+    feed_deg_min: float = Field(900.0, ge=1, le=100000)
+    """Speed of the base."""
+    acceleration_deg_s2: float = Field(50.0, gt=0, le=10000)
+    """Acceleration of the base; the motor is chosen for it."""
+    settle_s: float = Field(0.5, ge=0, le=60)
+    """Rest at a stop before a photograph."""
+    trigger_s: float = Field(0.2, gt=0, le=60)
+    """How long the relay is on."""
+    exposure_s: float = Field(1.0, ge=0, le=600)
+    """Rest after the relay, while the camera exposes and saves."""
+    microsteps: int = Field(16, ge=1, le=256)
+    """Microsteps of the motor's driver to a full step."""
+    safety: float = Field(2.0, ge=1, le=10)
+    """Holding torque of the motor over the greatest torque of gravity and acceleration: for
+    friction, and for what a stepper loses between full steps and at speed."""
+
+
+class StageSpec(Section):
+    """What the object stands on, with LEDs at known places to calibrate with."""
+
+    top_mm: float = Field(-20.0, ge=-1000, le=1000)
+    """Height of the disc that the object stands on; it must be inside the capture sphere."""
+    disc_mm: float = Field(17.0, ge=4, le=500)
+    """Diameter of that disc, which is turned by 180 degrees for the other half."""
+    led: Led = "LED-3"
+    """LEDs in the pockets."""
+    leds_mm: Places = (
+        (10.6, 7.5, -19.0),
+        (3.4, -12.6, -17.0),
+        (-3.4, 12.6, -13.5),
+        (-10.6, -7.5, -7.0),
+    )
+    """Middles of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
+    led_wall_mm: float = Field(2.0, ge=0.8, le=20)
+    """Wall round an LED's pocket."""
+    wire_mm: float = Field(2.4, ge=1, le=10)
+    """Width of the wires' channels."""
+    wall_mm: float = Field(2.7, ge=1, le=20)
+    """Wall of the post, best a multiple of the slicer's lines (six of 0.45 mm, else they overfill
+    it); less in posts of less than 18 mm."""
+
+
+class FrameSpec(Section):
+    """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
+
+    floor_mm: float = Field(-230.0, ge=-3000, le=-10)
+    """Height of the base plate's upper face."""
+    clearance_mm: float = Field(3.0, ge=0.5, le=50)
+    """Least room of all that stands still to the light and to what the base sweeps."""
+    flange_mm: float = Field(8.0, ge=3, le=30)
+    """Thickness of the brackets' flanges."""
+    web_mm: float = Field(6.0, ge=3, le=30)
+    """Thickness of the brackets' webs."""
+    uprights_mm: float = Field(80.0, ge=70, le=300)
+    """Distance of the two uprights' middles."""
+    bearing_fit_mm: float = Field(-0.05, ge=-0.5, le=0.5)
+    """How much wider than the bearings their seats are; less than 0: a press fit."""
+    belt_travel_mm: float = Field(6.0, ge=0, le=40)
+    """Length by which the motor can be moved to tighten the belt, half to either side."""
+    camera_screw_mm: float = Field(50.0, ge=10, le=1000)
+    """How far behind the pinhole the camera's tripod thread is."""
+    camera_travel_mm: float = Field(20.0, ge=0, le=200)
+    """Length by which the camera can be moved along its axis, half to either side."""
+    post_play_mm: float = Field(0.2, ge=0, le=2)
+    """How much wider than the post its clamp is."""
 
 
 class PrototypeSpec(Section):

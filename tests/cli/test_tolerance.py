@@ -13,7 +13,7 @@ from tbcad.cli import run
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import prototype_layout
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tests.prototype_exports import write_export
 
 SMALL = ["camera.width_px=208", "camera.height_px=155"]

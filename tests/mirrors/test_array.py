@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tbcad.mirrors.array import MirrorArray, design, numbered_directions
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 
 
 def half_of(*settings: str) -> MirrorArray:

@@ -12,8 +12,8 @@ from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 
 
 def first_hit(surfaces: Surfaces, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells
 from tbcad.optics.trace import coverage_diameters, miss_distances, reflected
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 

@@ -4,8 +4,8 @@ import pytest
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.shell.envelope import Envelope, envelope
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 
 
 def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Envelope) -> None:

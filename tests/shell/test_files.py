@@ -10,7 +10,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import export
 from tbcad.output.parts import SHELL
-from tbcad.spec.design import load_spec, spec_dict
+from tbcad.spec.load import load_spec, spec_dict
 from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 
 

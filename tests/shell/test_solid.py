@@ -3,7 +3,7 @@ import pytest
 from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tests.helpers import area, body_of, mesh_of, solid_of, volume
 
 

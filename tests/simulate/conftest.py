@@ -14,7 +14,7 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tests.prototype_exports import write_export
 
 OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 from pathlib import Path
 from typing import get_args
 
@@ -13,8 +14,10 @@ from pydantic import ValidationError
 
 from tbcad.errors import InputError
 from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.spec.design import FootFlangeSpec, OpticsSpec, Spec, load_spec, spec_dict
+from tbcad.spec.design import FootFlangeSpec, OpticsSpec, Spec
 from tbcad.spec.errors import SpecError, allowed, fields, nearest, section_of
+from tbcad.spec.load import load_spec, spec_dict
+from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import GradeName
 
 KEYS = {key: field for key, field in fields(Spec) if section_of(field) is None}
@@ -68,7 +71,7 @@ class TestPlainDict:
 
     def test_has_the_order_of_the_spec(self) -> None:
         assert list(spec_dict(Spec())) == [key for key in dict(fields(Spec)) if "." not in key]
-        backwards = {"optics": {"semi_minor_mm": 100.0, "n": 18}, "schema": 1, "name": "x"}
+        backwards = {"optics": {"semi_minor_mm": 100.0, "n": 18}, "schema": 2, "name": "x"}
         assert list(spec_dict(Spec.model_validate(backwards))) == list(spec_dict(Spec()))
 
 
@@ -78,7 +81,7 @@ class TestFile:
         spec = load_spec(file)
         assert (spec.name, spec.optics.n, spec.optics.capture_diameter_mm) == ("x-1", 4, 20.0)
 
-    @pytest.mark.parametrize("text", [b"", b"\xef\xbb\xbfschema = 1", b"[optics]\r\nn = 18\r\n"])
+    @pytest.mark.parametrize("text", [b"", b"\xef\xbb\xbfschema = 2", b"[optics]\r\nn = 18\r\n"])
     def test_may_be_empty_or_from_windows(self, file: Path, text: bytes) -> None:
         file.write_bytes(text)
         assert load_spec(file) == Spec()
@@ -154,6 +157,10 @@ class TestUnknownKey:
             ("[mesh]\nwall = 1", "mesh.wall", "shell.wall_mm"),
             ("[shell.seam_flange]\nbolt = 1", "shell.seam_flange.bolt", "shell.seam_flange.bolts"),
             ("schema_version = 1", "schema_version", "schema"),
+            *(
+                (f"[prototype.base]\n{key} = 1", f"prototype.base.{key}", f"printer.{key}?")
+                for key in PrinterSpec.model_fields
+            ),
         ],
     )
     def test_names_the_nearest(self, file: Path, text: str, key: str, meant: str) -> None:
@@ -193,9 +200,16 @@ class TestValue:
         assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
         assert "optics.n is 4.0, allowed is a whole number from 1 to 60" in refusal(None, "n=4.0")
 
-    @pytest.mark.parametrize("value", ["2", "true", "1.0", "'1'"])
+    @pytest.mark.parametrize("value", ["3", "true", "2.0", "'2'"])
     def test_of_another_schema(self, value: str) -> None:
-        assert "schema" in refusal(None, f"schema={value}")
+        assert re.search(
+            "schema.* allowed is (the whole number )?2", refusal(None, f"schema={value}")
+        )
+
+    def test_of_the_schema_before_the_printer(self, file: Path) -> None:
+        text = refused(file, "schema = 1\n[prototype.base]\nbed_mm = [200, 200, 200]\n")
+        assert text.startswith("schema: 1 is the version before the section [printer]: move bed_mm")
+        assert "set schema to 2" in text
 
     def test_names_the_choices(self) -> None:
         said = refusal(None, "radius_rule=exact")

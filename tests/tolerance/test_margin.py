@@ -9,8 +9,9 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.margin import MOST_MM, STEP_MM, Margin, margin, with_margin
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors

@@ -9,7 +9,7 @@ from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance import process_design
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import nominal

@@ -15,7 +15,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.study import study_files
 from tbcad.simulate.study.tables import SUMMARY
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.analysis import Analysis, Options, ProcessOption, PrototypeYield
 from tbcad.tolerance.margin import Margin
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, Yield, simulate, yielded

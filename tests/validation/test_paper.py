@@ -10,7 +10,7 @@ from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray, design, numbered_directions
 from tbcad.optics import flat
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)
 

@@ -15,7 +15,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, seen
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, axes, nominal

@@ -18,8 +18,9 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import room
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 # Bars are thinner than a pocket's floor, so that they reach into no pocket.
@@ -55,7 +56,7 @@ class CouponRow:
 Place = tuple[CouponRow, Floats]
 
 
-def coupon_plates(base: BaseLayout) -> list[PlacedSolid]:
+def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
     """Plates with a seat for each size and each offset of the pads, as few as the bed allows.
 
     Raises:
@@ -63,7 +64,7 @@ def coupon_plates(base: BaseLayout) -> list[PlacedSolid]:
         InvalidSolidError: when the kernel fails.
     """
     seats = replace(base.seats, back=base.seats.bottom + base.keys.floor_mm)
-    plates = _plates(coupon_rows(seats, base.keys), base.keys)
+    plates = _plates(coupon_rows(seats, base.keys), printer)
     return [
         PlacedSolid(name, _plate(name, seats, base.keys, rows), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
@@ -96,14 +97,14 @@ def _sign(offset: float) -> str:
     return "0" if text in ("+0", "-0") else text
 
 
-def _plates(rows: Iterable[CouponRow], keys: BaseSpec) -> Iterator[list[list[Place]]]:
+def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[list[Place]]]:
     """Rows on shelves, shelves on plates, each with its left end on the shelf's middle line."""
-    wide, deep = room(keys)[:2]
+    wide, deep = room(printer)[:2]
     shelves: list[list[Place]] = []
     y = x = depth = 0.0
     for row in rows:
         across, needed = row.size
-        _check(row, keys)
+        _check(row, printer)
         # Rows come with falling depth, so the first of a shelf decides.
         if not shelves or x + across > wide:
             y, x, depth = (y + depth if shelves else 0.0), 0.0, needed
@@ -116,12 +117,12 @@ def _plates(rows: Iterable[CouponRow], keys: BaseSpec) -> Iterator[list[list[Pla
     yield shelves
 
 
-def _check(row: CouponRow, keys: BaseSpec) -> None:
+def _check(row: CouponRow, printer: PrinterSpec) -> None:
     across, depth = row.size
-    if (np.array(row.size) > room(keys)[:2]).any():
+    if (np.array(row.size) > room(printer)[:2]).any():
         raise SpecError(
             f"the coupon's seats for {row.name} mm take {across:.0f} x {depth:.0f} mm: make "
-            "prototype.base.bed_mm larger or prototype.base.coupon_offsets_mm shorter"
+            "printer.bed_mm larger or prototype.base.coupon_offsets_mm shorter"
         )
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.spec.base_keys import BaseSpec, Drive
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import BaseSpec, Drive
 from tbcad.types import Floats
 
 WALL_MM = 3.0  # round holes that take a load

@@ -5,7 +5,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
 from tbcad.prototype.base.hub import SCREW_MM, SLIT_MM, Hub
-from tbcad.spec.base_keys import BaseSpec
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -24,8 +24,8 @@ from tbcad.prototype.base.profile import (
     trimmed,
 )
 from tbcad.prototype.base.seats import Seats, seat_layout
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 EDGE_MM = 2.0  # wall beyond the outermost bosses

@@ -4,7 +4,7 @@ from collections import Counter
 
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import joint_hardware
-from tbcad.prototype.base.split import BaseSplit, split_base
+from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
 from tbcad.spec.errors import SpecError
 
@@ -13,20 +13,20 @@ LOCKS = {"set-screws": 2, "clamp": 1}
 PLAY_MM = 1e-6
 
 
-def base_purchased_parts(base: BaseLayout, plan: BaseSplit | None = None) -> dict[str, int]:
+def base_purchased_parts(base: BaseLayout, plan: BaseSplit) -> dict[str, int]:
     """Purchased parts of the base, without balls and without what bolts the drive to it.
 
     Args:
         base: in numbers.
-        plan: its pieces and joints; without, they are found.
+        plan: its pieces and joints.
 
     Returns:
         Names as in the parts lists, and how many of each.
 
     Raises:
-        SpecError: when a part is in no list, or the base cannot be cut to fit the bed.
+        SpecError: when a part is in no list.
     """
-    found = Counter(magnets(base)) + Counter(fasteners(base, plan or split_base(base)))
+    found = Counter(magnets(base)) + Counter(fasteners(base, plan))
     return dict(sorted(found.items()))
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import BaseSpec
 
 FLOOR_MM = 1.0  # below holes
 BITE_MM = 4.0  # of a screw in its insert: 1.3 diameters

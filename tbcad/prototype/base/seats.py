@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads

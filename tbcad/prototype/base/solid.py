@@ -15,7 +15,7 @@ from tbcad.prototype.base import seat_solids as seat
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.base.split import BaseSplit, downward_directions, split_base
+from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.base.split_solids import (
     carrier_pieces,
     flange_solids,
@@ -23,6 +23,7 @@ from tbcad.prototype.base.split_solids import (
     number_solids,
 )
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 SUNK_MM = 0.4
@@ -34,24 +35,24 @@ ROOT = 0.6
 LABEL_ROOM = 0.85  # of a boss's end
 
 
-def carrier_parts(base: BaseLayout, plan: BaseSplit | None = None) -> list[PlacedSolid]:
+def carrier_parts(base: BaseLayout, plan: BaseSplit, printer: PrinterSpec) -> list[PlacedSolid]:
     """The carrier laid on the bed: in one piece where it fits, else in as few as can be.
 
     Args:
         base: in numbers.
-        plan: how it is cut; without, it is found.
+        plan: how it is cut.
+        printer: with its bed.
 
     Raises:
-        SpecError: when it cannot be cut to fit; it says how large the bed must be.
+        SpecError: when a piece does not fit; it says how large the bed must be.
         InvalidSolidError: when the kernel fails.
     """
-    plan = plan or split_base(base)
     solid = carrier_solid(base, plan)
     if plan.joints:
-        return carrier_pieces(base, plan, solid)
+        return carrier_pieces(base, plan, solid, printer)
     return [
         placed_on_bed(
-            "carrier", solid, downward_directions(base, plan.pieces[0]), base.axes, base.keys
+            "carrier", solid, downward_directions(base, plan.pieces[0]), base.axes, printer
         )
     ]
 

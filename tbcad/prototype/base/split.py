@@ -21,6 +21,7 @@ from tbcad.prototype.base.profile import offset
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.printing.bed import as_text, needed, shortfall
 from tbcad.spec.errors import SpecError
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats, Ints
 
 MISS_MM = 1.0  # of a plane from any boss
@@ -52,13 +53,13 @@ class BaseSplit:
         return low.index(True)
 
 
-def split_base(base: BaseLayout) -> BaseSplit:
+def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
     Raises:
         SpecError: when no cut does; it names the bed that would.
     """
-    search = _Search(base)
+    search = _Search(base, printer)
     if search.lack(np.zeros((0, 4))) <= 0:
         return BaseSplit((np.zeros((0, 4)),), ())
     joint_hardware(base.keys)
@@ -66,8 +67,8 @@ def split_base(base: BaseLayout) -> BaseSplit:
         for found in search.splits(count):
             return found
     raise SpecError(
-        "no way was found to cut the base for the printer's bed: make prototype.base.bed_mm at "
-        f"least {as_text(search.least_bed())}, or prototype.largest_ball_mm or prototype.k smaller"
+        "no way was found to cut the base for the printer's bed: make printer.bed_mm at least "
+        f"{as_text(search.least_bed())}, or prototype.largest_ball_mm or prototype.k smaller"
     )
 
 
@@ -110,6 +111,7 @@ Tree = tuple[tuple[Floats, ...], tuple[Cut, ...]]
 @dataclass
 class _Search:
     base: BaseLayout
+    printer: PrinterSpec
     cuts: dict[bytes, list[tuple[float, CutPlane]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -153,9 +155,7 @@ class _Search:
 
     def lack(self, piece: Floats) -> float:
         """By how much the bed is too small for a piece, mm; 0 or less: it fits."""
-        return shortfall(
-            self._corners(piece), downward_directions(self.base, piece), self.base.keys
-        )
+        return shortfall(self._corners(piece), downward_directions(self.base, piece), self.printer)
 
     def least_bed(self) -> Floats:
         """The bed that the best cut into two needs, or the base as a whole, mm, (3,)."""
@@ -168,7 +168,7 @@ class _Search:
         return self._needed(none)
 
     def _needed(self, piece: Floats) -> Floats:
-        return needed(self._corners(piece), downward_directions(self.base, piece), self.base.keys)
+        return needed(self._corners(piece), downward_directions(self.base, piece), self.printer)
 
     def _cuts_of(self, piece: Floats) -> list[tuple[float, CutPlane]]:
         """Planes that part a piece, those that leave the least too large first."""

@@ -16,6 +16,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import access_radius, joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 FAR_MM = 2000.0
@@ -84,13 +85,16 @@ def _number(base: BaseLayout, plan: BaseSplit, out: Floats, place: Floats) -> li
     return relief(text, height, base.keys.relief_mm, SUNK_MM, axes, at)
 
 
-def carrier_pieces(base: BaseLayout, plan: BaseSplit, whole: TopoDS_Solid) -> list[PlacedSolid]:
+def carrier_pieces(
+    base: BaseLayout, plan: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec
+) -> list[PlacedSolid]:
     """The pieces laid on the bed.
 
     Args:
         base: that is cut.
         plan: how.
         whole: the carrier with its flanges, not yet cut.
+        printer: with its bed.
 
     Raises:
         SpecError: when a piece does not fit the bed.
@@ -102,7 +106,7 @@ def carrier_pieces(base: BaseLayout, plan: BaseSplit, whole: TopoDS_Solid) -> li
             _piece(base, plan, n, whole),
             downward_directions(base, planes),
             base.axes,
-            base.keys,
+            printer,
         )
         for n, planes in enumerate(plan.pieces)
     ]

@@ -12,7 +12,7 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.files.balls_csv import Row, Value, write_table
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError, shown
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.prototype import MotionSpec
 
 COLUMNS = (
     *("item", "quantity", "part", "what", "material", "mass_g", "total_mass_g"),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
 LONGEST = 79

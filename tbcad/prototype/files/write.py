@@ -15,7 +15,7 @@ from tbcad.prototype.files.part_files import record, write_piece
 from tbcad.prototype.machine import Machine, machine
 from tbcad.prototype.stage.layout import leds
 from tbcad.spec.design import Spec
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Progress
 
 SCHEMA = "tbcad-prototype/1"
@@ -133,7 +133,6 @@ def _write_tables(built: Machine, design: MirrorDesign, folder: Path) -> None:
 
 
 def _needed(built: Machine, design: MirrorDesign) -> bom_csv.PartsNeeded:
-    keys = design.spec.prototype.base
     return bom_csv.PartsNeeded(
         bought=built.bought,
         leds=len(built.stage.leds),
@@ -143,5 +142,5 @@ def _needed(built: Machine, design: MirrorDesign) -> bom_csv.PartsNeeded:
             for piece in built.pieces
             if piece.role != "cap"
         ),
-        print_density=keys.density_g_cm3,
+        print_density=design.spec.printer.density_g_cm3,
     )

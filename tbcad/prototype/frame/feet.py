@@ -18,8 +18,8 @@ from tbcad.prototype.frame.brackets import (
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import FrameSpec
 from tbcad.spec.prototype import PrototypeSpec as ProtoKeys
-from tbcad.spec.stage_keys import FrameSpec
 from tbcad.types import Floats
 
 TALL_MM, DEEP_MM = 50.0, 48.0  # of the uprights' feet

@@ -5,17 +5,17 @@ from OCP.TopoDS import TopoDS_Solid
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.printing.item_solids import printed, solid
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.base_keys import BaseSpec
+from tbcad.spec.printer import PrinterSpec
 
 
-def parts(numbers: FrameLayout, keys: BaseSpec) -> list[PlacedSolid]:
+def parts(numbers: FrameLayout, printer: PrinterSpec) -> list[PlacedSolid]:
     """Head, feet, clamp and bracket, laid on the bed.
 
     Raises:
         SpecError: when one does not fit on it.
         InvalidSolidError: when the kernel fails.
     """
-    return [printed(item, keys) for item in numbers.printed]
+    return [printed(item, printer) for item in numbers.printed]
 
 
 def bought(numbers: FrameLayout) -> list[tuple[str, TopoDS_Solid]]:

@@ -33,7 +33,7 @@ from tbcad.prototype.frame.purchased import (
 )
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import FrameSpec
+from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 GAP_MM = 3.0  # between what turns and the plate

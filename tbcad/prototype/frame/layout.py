@@ -28,8 +28,8 @@ from tbcad.prototype.keepout import Room, least
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import FrameSpec as FrameKeys
 from tbcad.spec.prototype import PrototypeSpec
-from tbcad.spec.stage_keys import FrameSpec as FrameKeys
 from tbcad.types import Floats
 
 ROUND_MM = 10.0  # plate beyond the brackets' feet

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tbcad.geometry.vectors import unit
-from tbcad.spec.base_keys import BaseSpec
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 # Parts are measured by coarse meshes whose facets may lie this far inside of them.
@@ -13,37 +13,37 @@ SLACK_MM = 0.4
 TURNS = np.radians(np.arange(0, 180, 5))
 
 
-def room(keys: BaseSpec) -> Floats:
+def room(printer: PrinterSpec) -> Floats:
     """Width, depth and height that a part may have, mm, (3,)."""
-    return np.array(keys.bed_mm) - np.array([2, 2, 1]) * keys.bed_margin_mm - SLACK_MM
+    return np.array(printer.bed_mm) - np.array([2, 2, 1]) * printer.bed_margin_mm - SLACK_MM
 
 
-def fitting(corners: Floats, down: Floats, keys: BaseSpec) -> Floats | None:
+def fitting(corners: Floats, down: Floats, printer: PrinterSpec) -> Floats | None:
     """A way of laying a part so that it fits, or None.
 
     Args:
         corners: of the part, mm, (n, 3).
         down: unit direction that is to point down, (3,).
-        keys: the bed.
+        printer: with its bed.
 
     Returns:
         Rows that the axes become, (3, 3).
     """
     ways = _ways(down)
-    fits = (np.ptp(corners @ ways, axis=1) <= room(keys)).all(axis=1)
+    fits = (np.ptp(corners @ ways, axis=1) <= room(printer)).all(axis=1)
     return ways[int(fits.argmax())] if fits.any() else None
 
 
-def shortfall(corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> float:
+def shortfall(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> float:
     """By how much the bed is too small for corners (n, 3), mm; 0 or less: they fit."""
-    return float(_lacks(_sizes(corners, downs), keys).min())
+    return float(_lacks(_sizes(corners, downs), printer).min())
 
 
-def needed(corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> Floats:
+def needed(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> Floats:
     """Least bed for corners (n, 3), laid the way that lacks least of the bed, mm, (3,)."""
     sizes = _sizes(corners, downs)
-    size = sizes[_lacks(sizes, keys).argmin()]
-    least: Floats = np.ceil(size + np.array(keys.bed_mm) - room(keys))
+    size = sizes[_lacks(sizes, printer).argmin()]
+    least: Floats = np.ceil(size + np.array(printer.bed_mm) - room(printer))
     return least
 
 
@@ -52,8 +52,8 @@ def _sizes(corners: Floats, downs: Sequence[Floats]) -> Floats:
     return np.concatenate([np.ptp(corners @ _ways(down), axis=1) for down in downs])
 
 
-def _lacks(sizes: Floats, keys: BaseSpec) -> Floats:
-    result: Floats = (sizes - room(keys)).max(axis=1)
+def _lacks(sizes: Floats, printer: PrinterSpec) -> Floats:
+    result: Floats = (sizes - room(printer)).max(axis=1)
     return result
 
 

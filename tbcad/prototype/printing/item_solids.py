@@ -18,7 +18,7 @@ from tbcad.cad.solids import (
 from tbcad.geometry.primitives import Component, Cylinder, Primitive, Revolved
 from tbcad.geometry.primitives import Prism as Straight
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.spec.base_keys import BaseSpec
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 COARSE_MM = 0.02
@@ -51,7 +51,7 @@ def solid(item: Component) -> TopoDS_Solid:
     return found
 
 
-def printed(item: Component, keys: BaseSpec) -> PlacedSolid:
+def printed(item: Component, printer: PrinterSpec) -> PlacedSolid:
     """A part laid on the printer's bed.
 
     Raises:
@@ -59,7 +59,7 @@ def printed(item: Component, keys: BaseSpec) -> PlacedSolid:
         InvalidSolidError: when the kernel fails.
     """
     downs = [np.array(down) for down in item.downs]
-    return placed_on_bed(item.name, solid(item), downs, np.eye(3), keys)
+    return placed_on_bed(item.name, solid(item), downs, np.eye(3), printer)
 
 
 def _upward(body: Straight) -> Floats:

@@ -11,8 +11,8 @@ from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, moved, one_solid, volume
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
-from tbcad.spec.base_keys import BaseSpec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 # Only to measure with; the parts themselves are meshed finely when they are written.
@@ -53,7 +53,7 @@ class PlacedSolid:
 
 
 def placed_on_bed(
-    name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, keys: BaseSpec
+    name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, printer: PrinterSpec
 ) -> PlacedSolid:
     """A part on the bed, the way round that needs the least support of those that fit.
 
@@ -62,7 +62,7 @@ def placed_on_bed(
         shape: about z, in the carrier's own frame.
         downs: directions of that frame that may point down, as (3,) unit vectors.
         axes: of that frame in the frame of the shell, as rows.
-        keys: the bed.
+        printer: with its bed.
 
     Raises:
         SpecError: when it fits no way round.
@@ -70,9 +70,9 @@ def placed_on_bed(
     """
     coarse = meshed(shape, COARSE_MM, COARSE_ANGLE)
     corners = coarse.vertices[ConvexHull(coarse.vertices).vertices]
-    ways = [way for down in downs if (way := fitting(corners, down, keys)) is not None]
+    ways = [way for down in downs if (way := fitting(corners, down, printer)) is not None]
     if not ways:
-        raise SpecError(_too_large(name, corners, downs, keys))
+        raise SpecError(_too_large(name, corners, downs, printer))
     best = ways[int(np.argmin([round(_overhang(coarse, way), 3) for way in ways]))]
     placed = coarse.vertices @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
@@ -81,11 +81,11 @@ def placed_on_bed(
     return PlacedSolid(name, solid, axes.T @ best, origin)
 
 
-def _too_large(name: str, corners: Floats, downs: Sequence[Floats], keys: BaseSpec) -> str:
+def _too_large(name: str, corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> str:
     """What to say of a part that does not fit: the bed that the nearest way needs."""
-    bed = as_text(needed(corners, downs, keys))
+    bed = as_text(needed(corners, downs, printer))
     return (
-        f"{name} does not fit on the printer's bed: make prototype.base.bed_mm at least {bed}, or "
+        f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
         "prototype.largest_ball_mm or prototype.k smaller"
     )
 

@@ -17,7 +17,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import StageSpec
+from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
 DISC_MM = 3.0

@@ -30,9 +30,9 @@ from tbcad.prototype.stage.crown import (
 )
 from tbcad.prototype.stage.leds import check_leds
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import FrameSpec as FrameKeys
 from tbcad.spec.prototype import PrototypeSpec
-from tbcad.spec.stage_keys import FrameSpec as FrameKeys
-from tbcad.spec.stage_keys import StageSpec as StageKeys
+from tbcad.spec.prototype import StageSpec as StageKeys
 from tbcad.types import Floats
 
 NECK_MM = 6.0  # radius where the crown leaves the sphere, at most

@@ -7,7 +7,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.keepout import Room
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import StageSpec
+from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
 POCKET_PLAY_MM = 0.1  # to either side

@@ -15,7 +15,7 @@ from tbcad.prototype.balls.clearance import (
 )
 from tbcad.prototype.balls.groups import group_mirrors
 from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 KEYS = load_spec(None).prototype
 K = 12

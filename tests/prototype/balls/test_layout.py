@@ -18,8 +18,9 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
-from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 
 SPEC = load_spec(None)
 KEYS = SPEC.prototype

@@ -9,8 +9,8 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import BaseSpec
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,9 @@ from tbcad.prototype.base.profile import (
     trimmed,
 )
 from tbcad.prototype.base.seats import APART_MM, insertion_clearance, seat_layout, shifted_contacts
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import BaseSpec
 
 KEYS = BaseSpec()
 

@@ -38,15 +38,17 @@ from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
 from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
-from tbcad.prototype.base.split import downward_directions
+from tbcad.prototype.base.split import downward_directions, split_base
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh
 
 UP = np.array([0.0, 0.0, 1.0])
 KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
+PRINTER = PrinterSpec()
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +64,7 @@ def numbers(made: PrototypeLayout) -> BaseLayout:
 
 @pytest.fixture(scope="module")
 def part(numbers: BaseLayout) -> PlacedSolid:
-    (only,) = carrier_parts(numbers)
+    (only,) = carrier_parts(numbers, split_base(numbers, PRINTER), PRINTER)
     return only
 
 
@@ -203,14 +205,12 @@ class TestCarrier:
     def test_it_is_laid_on_the_bed(self, part: PlacedSolid) -> None:
         low, high = bounds(part.on_bed)
         assert low[2] == pytest.approx(0, abs=0.5)
-        assert (high - low <= np.array(KEYS.bed_mm) - [6, 6, 3]).all()
+        assert (high - low <= np.array(PRINTER.bed_mm) - [6, 6, 3]).all()
         assert volume(part.on_bed) == pytest.approx(part.volume)
 
     def test_a_bed_too_small(self, numbers: BaseLayout, part: PlacedSolid) -> None:
-        small = BaseSpec(bed_mm=(120.0, 120.0, 120.0))
-        with pytest.raises(
-            SpecError, match=r"make prototype\.base\.bed_mm at least \d+ x \d+"
-        ) as said:
+        small = PrinterSpec(bed_mm=(120.0, 120.0, 120.0))
+        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least \d+ x \d+") as said:
             placed_on_bed(
                 "carrier",
                 part.shape,
@@ -226,11 +226,12 @@ class TestCarrier:
             part.shape,
             downward_directions(numbers, np.zeros((0, 4))),
             np.eye(3),
-            BaseSpec(bed_mm=tuple(bed)),
+            PrinterSpec(bed_mm=tuple(bed)),
         )
 
     def test_the_same_bytes(self, numbers: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
-        for name, again in (("one", part), ("two", carrier_parts(numbers)[0])):
+        (rebuilt,) = carrier_parts(numbers, split_base(numbers, PRINTER), PRINTER)
+        for name, again in (("one", part), ("two", rebuilt)):
             write_step(tmp_path / name, Solid(again.name, again.shape, ()))
         assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
@@ -363,7 +364,7 @@ class TestCaps:
 
 @pytest.fixture(scope="module")
 def plates(numbers: BaseLayout) -> list[PlacedSolid]:
-    return coupon_plates(numbers)
+    return coupon_plates(numbers, PRINTER)
 
 
 class TestCoupon:
@@ -423,11 +424,9 @@ class TestCoupon:
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_a_row_larger_than_the_bed(self, made: PrototypeLayout) -> None:
-        crowded = base_layout(
-            BaseSpec(coupon_offsets_mm=(0.1,) * 9, bed_mm=(100.0, 100.0, 100.0)), made
-        )
-        with pytest.raises(SpecError, match=r"make prototype.base.bed_mm larger or"):
-            coupon_plates(crowded)
+        crowded = base_layout(BaseSpec(coupon_offsets_mm=(0.1,) * 9), made)
+        with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
+            coupon_plates(crowded, PrinterSpec(bed_mm=(100.0, 100.0, 100.0)))
 
 
 class TestRelief:

@@ -17,9 +17,10 @@ from tbcad.prototype.base.screws import access_radius, joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.bed import needed, room, shortfall
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec
 
 KEYS = BaseSpec()
 DOWN = [np.array([0.0, 0.0, -1.0])]
@@ -29,8 +30,8 @@ def keys(**changed: object) -> BaseSpec:
     return BaseSpec.model_validate(KEYS.model_dump() | changed)
 
 
-def cube(size: float) -> BaseSpec:
-    return keys(bed_mm=[size] * 3)
+def cube(size: float) -> PrinterSpec:
+    return PrinterSpec(bed_mm=(size, size, size))
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +50,8 @@ def cut(
 ) -> tuple[BaseLayout, BaseSplit]:
     at = {"small": (made, 150.0), "paper in two": (paper, 180.0), "paper in three": (paper, 160.0)}
     chosen, bed = at[request.param]
-    numbers = base_layout(cube(bed), chosen)
-    plan = split_base(numbers)
+    numbers = base_layout(KEYS, chosen)
+    plan = split_base(numbers, cube(bed))
     assert len(plan.pieces) == (3 if "three" in request.param else 2)
     return numbers, plan
 
@@ -69,7 +70,7 @@ class TestPlanes:
         self, made: PrototypeLayout, paper: PrototypeLayout
     ) -> None:
         for one in (made, paper):
-            plan = split_base(base_layout(KEYS, one))
+            plan = split_base(base_layout(KEYS, one), PrinterSpec())
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
 
@@ -97,17 +98,18 @@ class TestPlanes:
         assert all(one.any() for one in inside)
 
     def test_the_same_again(self, made: PrototypeLayout) -> None:
-        one, two = (split_base(base_layout(cube(150.0), made)) for _ in range(2))
+        one, two = (split_base(base_layout(KEYS, made), cube(150.0)) for _ in range(2))
         for first, second in zip(one.joints, two.joints, strict=True):
             assert (first.screws == second.screws).all()
             assert (first.plane.normal == second.plane.normal).all()
 
     def test_a_bed_too_small_names_one_that_does(self, made: PrototypeLayout) -> None:
-        with pytest.raises(SpecError, match=r"make prototype\.base\.bed_mm at least") as said:
-            split_base(base_layout(keys(bed_mm=[135.0, 135.0, 60.0]), made))
+        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as said:
+            split_base(base_layout(KEYS, made), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
         (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))
-        large = np.array([float(size) for size in bed])
-        assert len(split_base(base_layout(keys(bed_mm=large.tolist()), made)).pieces) == 2
+        width, depth, height = map(float, bed)
+        larger = PrinterSpec(bed_mm=(width, depth, height))
+        assert len(split_base(base_layout(KEYS, made), larger).pieces) == 2
 
 
 class TestJoints:
@@ -180,16 +182,16 @@ class TestJoints:
     )
     def test_refused(self, made: PrototypeLayout, changed: dict[str, object], text: str) -> None:
         with pytest.raises(SpecError, match=text):
-            split_base(base_layout(keys(bed_mm=[150.0] * 3, **changed), made))
+            split_base(base_layout(keys(**changed), made), cube(150.0))
 
 
 class TestBed:
     def test_a_box(self) -> None:
         corners = np.array(np.meshgrid([0, 100], [0, 50], [0, 20]), dtype=float).reshape(3, -1).T
-        exact = keys(bed_mm=[100.0, 50.0, 20.0], bed_margin_mm=0.0)
+        exact = PrinterSpec(bed_mm=(100.0, 50.0, 20.0), bed_margin_mm=0.0)
         assert shortfall(corners, DOWN, exact) == pytest.approx(0.4)
         assert needed(corners, DOWN, exact).tolist() == [101, 51, 21]
-        assert room(KEYS).tolist() == pytest.approx([249.6, 249.6, 252.6])
+        assert room(PrinterSpec()).tolist() == pytest.approx([249.6, 249.6, 252.6])
 
     def test_it_is_turned_to_fit(self) -> None:
         corners = np.array([[0, 0, 0], [0, 120, 0], [10, 0, 0], [10, 120, 0]], dtype=float)
@@ -199,7 +201,8 @@ class TestBed:
 
 class TestBought:
     def test_a_whole_base(self, paper: PrototypeLayout) -> None:
-        found = base_purchased_parts(base_layout(KEYS, paper))
+        carrier = base_layout(KEYS, paper)
+        found = base_purchased_parts(carrier, split_base(carrier, PrinterSpec()))
         magnet = {name: count for name, count in found.items() if name.startswith("MAGNET")}
         assert sum(magnet.values()) == len(paper.balls.body_radius)
         # Four of the drive, two of the set screws.
@@ -219,18 +222,20 @@ class TestBought:
         assert found["INSERT-M3"] == 6 + screws
 
     def test_other_hubs(self, made: PrototypeLayout) -> None:
-        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), made))
+        whole = split_base(base_layout(KEYS, made), PrinterSpec())
+        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), made), whole)
         assert clamp["INSERT-M3"] == 5
         assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
-        stage = base_purchased_parts(base_layout(keys(drive="stage-60", hold="glue"), made))
+        stage = base_purchased_parts(base_layout(keys(drive="stage-60", hold="glue"), made), whole)
         assert stage == {}
 
     def test_not_in_a_list(self, made: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
             magnets(base_layout(keys(magnet_height_mm=4.0), made))
         numbers = base_layout(keys(insert_hole_mm=4.4), made)
+        whole = split_base(numbers, PrinterSpec())
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
-            fasteners(numbers, split_base(numbers))
+            fasteners(numbers, whole)
         short = replace(numbers, hub=replace(numbers.hub, boss=6.0), keys=KEYS)
         with pytest.raises(SpecError, match=r"no M3 screw of at most 2\.0 mm is in setscrews\.csv"):
-            fasteners(short, split_base(numbers))
+            fasteners(short, whole)

@@ -27,36 +27,37 @@ from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_soli
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh
 
-KEYS = BaseSpec(bed_mm=(160.0, 160.0, 160.0))
+PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))
 Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
-Cut = tuple[BaseLayout, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
+Cut = tuple[BaseLayout, PrinterSpec, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
-def cut_up(numbers: BaseLayout) -> Cut:
-    plan = split_base(numbers)
-    parts = carrier_parts(numbers, plan)
-    return numbers, plan, parts, [as_trimesh(part.shape) for part in parts]
+def cut_up(numbers: BaseLayout, printer: PrinterSpec) -> Cut:
+    plan = split_base(numbers, printer)
+    parts = carrier_parts(numbers, plan, printer)
+    return numbers, printer, plan, parts, [as_trimesh(part.shape) for part in parts]
 
 
 @pytest.fixture(scope="module")
 def small(small_design: MirrorDesign) -> Cut:
     made = prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
-    return cut_up(base_layout(KEYS, made))
+    return cut_up(base_layout(BaseSpec(), made), PRINTER)
 
 
 @pytest.fixture(scope="module")
 def paper(paper_design: MirrorDesign) -> Cut:
     made = prototype_layout(load_spec(None), paper_design)
-    return cut_up(base_layout(BaseSpec(bed_mm=(180.0, 180.0, 180.0)), made))
+    return cut_up(base_layout(BaseSpec(), made), PrinterSpec(bed_mm=(180.0, 180.0, 180.0)))
 
 
 def check_pieces(cut: Cut) -> None:
     """Each is one watertight solid that fits the bed; no two overlap; all pads are there."""
-    numbers, plan, parts, meshes = cut
+    _, printer, plan, parts, meshes = cut
     assert [part.name for part in parts] == [f"carrier_{n + 1}" for n in range(len(plan.pieces))]
     for part, mesh in zip(parts, meshes, strict=True):
         assert len(solids(part.shape)) == 1
@@ -65,7 +66,7 @@ def check_pieces(cut: Cut) -> None:
         assert mesh.body_count == 1
         assert mesh.volume == pytest.approx(part.volume, rel=1e-3)
         low, high = bounds(part.on_bed)
-        assert (high - low <= np.array(numbers.keys.bed_mm) - [6, 6, 3]).all()
+        assert (high - low <= np.array(printer.bed_mm) - [6, 6, 3]).all()
         assert low[2] == pytest.approx(0, abs=0.5)
     nets = [Manifold(Mesh64(m.vertices, m.faces.astype(np.uint64))) for m in meshes]
     for n, one in enumerate(nets):
@@ -76,7 +77,7 @@ def check_pieces(cut: Cut) -> None:
 
 
 def check_pads(cut: Cut) -> None:
-    numbers, _, parts, _ = cut
+    numbers, _, _, parts, _ = cut
     planes = [plane_faces(part.shape) for part in parts]
     middle = np.concatenate([one for one, _ in planes])
     area = np.concatenate([one for _, one in planes])
@@ -94,7 +95,7 @@ class TestSmall:
         check_pads(small)
 
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
-        numbers, plan, parts, _ = small
+        numbers, _, plan, parts, _ = small
         seats = numbers.own_seats
         added, removed = added_solids(numbers, seats, plan), removed_solids(numbers, seats)
         with_flanges = volume_by_meshes(added, removed, 0.01)
@@ -108,7 +109,7 @@ class TestSmall:
         assert drilled > with_flanges - hole_volume(numbers, joint) - heads_volume(numbers, joint)
 
     def test_holes_of_both_sides_are_coaxial(self, small: Cut) -> None:
-        numbers, plan, parts, _ = small
+        numbers, _, plan, parts, _ = small
         (joint,) = plan.joints
         used, size = numbers.keys, joint_hardware(numbers.keys)
         turn = numbers.axes
@@ -129,7 +130,7 @@ class TestSmall:
 
     def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
         """Straight from the plane into the material, until the mesh is met."""
-        numbers, plan, _, meshes = small
+        numbers, _, plan, _, meshes = small
         (joint,) = plan.joints
         used, depth = numbers.keys, joint_hardware(numbers.keys).dowel_depth
         for side in (-1, 1):
@@ -143,7 +144,7 @@ class TestSmall:
                 assert hit == pytest.approx(expected, abs=1e-4) if side != head else hit > 25
 
     def test_each_piece_bears_its_number(self, small: Cut) -> None:
-        numbers, plan, _, meshes = small
+        numbers, _, plan, _, meshes = small
         (joint,) = plan.joints
         for side, place in zip((-1, 1), joint.labels, strict=True):
             n = piece_at(plan, joint, side)
@@ -158,13 +159,13 @@ class TestSmall:
             assert mesh.area_faces[flat].sum() == pytest.approx(squares * square**2, rel=1e-6)
 
     def test_no_facet_reaches_into_the_light(self, small: Cut) -> None:
-        numbers, _, _, meshes = small
+        numbers, _, _, _, meshes = small
         for mesh in meshes:
             points = np.vstack([mesh.vertices, mesh.triangles_center])
             assert numbers.light.beyond(points @ numbers.frame.T).min() > 0
 
     def test_balls_can_be_put_in(self, small: Cut) -> None:
-        numbers, _, _, meshes = small
+        numbers, _, _, _, meshes = small
         points = np.vstack([np.vstack([m.vertices, m.triangles_center]) for m in meshes])
         found = numbers.seats
         for centre, way, radius in zip(found.centre, found.way, found.radius, strict=True):
@@ -174,8 +175,8 @@ class TestSmall:
             assert not ((along > 0) & (along < length) & (beside < radius)).any()
 
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
-        numbers, plan, parts, _ = small
-        for name, again in (("one", parts), ("two", carrier_parts(numbers, plan))):
+        numbers, printer, plan, parts, _ = small
+        for name, again in (("one", parts), ("two", carrier_parts(numbers, plan, printer))):
             for part in again:
                 write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))
         for part in parts:
@@ -186,7 +187,7 @@ class TestSmall:
 @pytest.mark.slow
 class TestPaper:
     def test_pieces_and_pads(self, paper: Cut) -> None:
-        assert len(paper[2]) == 2
+        assert len(paper[3]) == 2
         check_pieces(paper)
         check_pads(paper)
 
@@ -243,13 +244,13 @@ def first_hit(mesh: trimesh.Trimesh, at: np.ndarray, out: np.ndarray) -> float:
 
 
 def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
-    numbers, _, _, _ = small
+    numbers, *_ = small
     plan = BaseSplit((np.zeros((0, 4)),), ())
     assert piece_holes(numbers, plan, 0) == []
 
 
 def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:
-    found = meshed(small[2][0].shape, 0.2)
+    found = meshed(small[3][0].shape, 0.2)
     check_mesh("piece", found)
     with pytest.raises(InvalidSolidError, match="piece: the kernel's mesh of the solid is not"):
         check_mesh("piece", Mesh(found.vertices, found.triangles[1:]))

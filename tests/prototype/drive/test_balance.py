@@ -15,7 +15,7 @@ from tbcad.prototype.drive.balance import (
     counterweight_masses,
     sum_masses,
 )
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 # The paper's: w leans 45 degrees below the horizon.
 FRAME = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0).frame()

@@ -19,7 +19,7 @@ from tbcad.prototype.drive.drive import (
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.prototype import MotionSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

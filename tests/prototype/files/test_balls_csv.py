@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.files.balls_csv import COLUMNS, rows, write_balls
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 Read = list[dict[str, str]]
 

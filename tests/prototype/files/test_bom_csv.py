@@ -19,9 +19,9 @@ from tbcad.prototype.files.bom_csv import (
     write_bom,
 )
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import MotionSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

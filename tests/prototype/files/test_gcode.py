@@ -12,9 +12,9 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.motion_keys import MotionSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import MotionSpec
 
 MOTION = MotionSpec()
 # What GRBL 1.1h takes, by modal group (grbl/gcode.c); only these are used here.

@@ -15,7 +15,7 @@ from tbcad.prototype.files.plan_csv import (
     write_plan,
     write_stops,
 )
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 Read = list[dict[str, str]]
 

@@ -14,7 +14,7 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.output.build import export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tests.helpers import area, read_mesh, read_step, volume
 
 MESH_ERROR_MM = 0.1

@@ -18,9 +18,10 @@ from tbcad.prototype.frame.layout import FrameLayout, bought_parts, frame
 from tbcad.prototype.keepout import Room, room
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage
-from tbcad.spec.design import Spec, load_spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import FrameSpec, StageSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

@@ -25,17 +25,17 @@ from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage import stage_solids as stages
 from tbcad.prototype.stage.layout import StageLayout, stage
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec, FrameSpec, StageSpec
 from tests.helpers import as_trimesh
 
 LISTS = load_parts()
 DRIVE = load_drives(LISTS)[0]
 SPEC = load_spec(None, ["n=6", "prototype.k=4"])
 KEYS = FrameSpec(clearance_mm=1.5)
-PRINTER = BaseSpec()
+PRINTER = PrinterSpec()
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def made(small_design: MirrorDesign) -> PrototypeLayout:
 
 @pytest.fixture(scope="module")
 def carrier(made: PrototypeLayout) -> BaseLayout:
-    return base_layout(PRINTER, made)
+    return base_layout(BaseSpec(), made)
 
 
 @pytest.fixture(scope="module")
@@ -286,7 +286,7 @@ def allowed(pair: set[str]) -> float:
 
 def test_a_bed_too_small_is_refused(numbers: FrameLayout) -> None:
     with pytest.raises(SpecError, match="does not fit on the printer's bed"):
-        parts(numbers, BaseSpec(bed_mm=(90.0, 90.0, 90.0)))
+        parts(numbers, PrinterSpec(bed_mm=(90.0, 90.0, 90.0)))
 
 
 def test_the_same_bytes_twice(numbers: FrameLayout, tmp_path: Path) -> None:

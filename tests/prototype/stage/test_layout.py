@@ -25,9 +25,9 @@ from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, leds, stage
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import FrameSpec, StageSpec
 
 PARTS = load_parts()
 SPEC = load_spec(None, ["n=6", "prototype.k=4"])

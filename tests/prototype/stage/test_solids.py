@@ -19,15 +19,15 @@ from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout, stage
 from tbcad.prototype.stage.stage_solids import parts
-from tbcad.spec.base_keys import BaseSpec
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.stage_keys import FrameSpec, StageSpec
+from tbcad.spec.load import load_spec
+from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec, FrameSpec, StageSpec
 from tests.helpers import as_trimesh
 
 LISTS = load_parts()
 CAPTURE = 30.0
-KEYS = BaseSpec()
+PRINTER = PrinterSpec()
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def made(small_design: MirrorDesign) -> PrototypeLayout:
 
 @pytest.fixture(scope="module")
 def space(made: PrototypeLayout) -> Room:
-    return room(made, base_layout(KEYS, made), CAPTURE, 0.0)
+    return room(made, base_layout(BaseSpec(), made), CAPTURE, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def numbers(made: PrototypeLayout, space: Room) -> StageLayout:
 
 @pytest.fixture(scope="module")
 def solids(numbers: StageLayout) -> dict[str, PlacedSolid]:
-    return {part.name: part for part in parts(numbers, KEYS)}
+    return {part.name: part for part in parts(numbers, PRINTER)}
 
 
 @pytest.fixture(scope="module")
@@ -131,11 +131,11 @@ class TestSolids:
 
     def test_a_bed_too_small_is_refused(self, numbers: StageLayout) -> None:
         with pytest.raises(SpecError, match="stage_post does not fit"):
-            parts(numbers, BaseSpec(bed_mm=(120.0, 120.0, 120.0)))
+            parts(numbers, PrinterSpec(bed_mm=(120.0, 120.0, 120.0)))
 
 
 def test_the_same_bytes_twice(numbers: StageLayout, tmp_path: Path) -> None:
     for name in ("one", "two"):
-        crown = parts(numbers, KEYS)[1]
+        crown = parts(numbers, PRINTER)[1]
         write_step(tmp_path / name, Solid(crown.name, crown.shape, ()))
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

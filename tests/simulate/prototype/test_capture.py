@@ -28,7 +28,7 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, project_points
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tests.prototype_exports import plan_of
 from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 

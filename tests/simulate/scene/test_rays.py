@@ -8,7 +8,7 @@ from tbcad.mirrors.array import design
 from tbcad.optics.trace import miss_distances
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 Cameras = tuple[Reflector, Reflector]
 

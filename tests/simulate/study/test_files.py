@@ -24,7 +24,7 @@ from tbcad.simulate.study.resolution import Ratio, resolution
 from tbcad.simulate.study.study import Study, check_study_folder, study_files, write_study
 from tbcad.simulate.study.sweep import n_range
 from tbcad.simulate.study.tables import SUMMARY, Table, csv_text
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 SMALL = ("n=4", "width_px=208", "height_px=155")
 # No radius gives some of these mirrors their coverage.

@@ -10,7 +10,7 @@ from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
 from tbcad.simulate.study.pixels import Sensor, _traced, count_pixels, parse_sensor, virtual_cameras
 from tbcad.simulate.study.resolution import Ratio, balance, parse_ratio
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 # The paper's lens does not hold the few large mirrors of a small n.
 WIDE = ("n=8", "hfov_deg=95", "width_px=832", "height_px=620")

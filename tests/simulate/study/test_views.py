@@ -16,8 +16,8 @@ from tbcad.simulate.study.prototype_vs_shell import paired_difference, prototype
 from tbcad.simulate.study.ssim import SensorCase, sensor_cases, ssim
 from tbcad.simulate.study.study import Study, study_files
 from tbcad.simulate.study.viewpoints import viewpoints_around
-from tbcad.spec.design import load_spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 
 SMALL = ["n=6", "camera.width_px=208", "camera.height_px=155"]
 SENSORS = (Sensor(208, 155), Sensor(416, 310), Sensor(832, 620))

@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.simulate.study.virtual_images import image_distances, virtual_images
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.types import Floats
 
 FAN = 1e-5  # distance of a fan's neighbouring ray from the apex, mm

@@ -10,7 +10,7 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import project_points, reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, seen, virtual
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal

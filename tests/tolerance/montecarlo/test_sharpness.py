@@ -14,7 +14,7 @@ from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.study.viewpoints import ground_truths
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import seen
 from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import nominal

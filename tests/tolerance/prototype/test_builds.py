@@ -14,7 +14,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.prototype.builds import PrototypeResult, PrototypeWork, simulate
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw

@@ -26,7 +26,7 @@ from tbcad_verify.types import Floats
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import rows
 from tbcad.optics.cells import cell_areas
-from tbcad.spec.design import load_spec
+from tbcad.spec.load import load_spec
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 NO_WALLS = np.zeros((0, 4))
