@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.geometry.vectors import dot, norm, perpendicular_axes
 from tbcad.types import Floats
 
 
@@ -124,10 +124,9 @@ class Spheroid:
         if abs(offset) >= 1:
             raise ValueError("the plane does not meet the ellipsoid")
         across = across / size
-        helper = np.eye(3)[np.argmin(np.abs(across))]
-        first = unit(np.cross(across, helper))
+        first, second = -perpendicular_axes(across)
         radius = np.sqrt(1 - offset**2)
-        p, q = radius * matrix @ first, radius * matrix @ np.cross(across, first)
+        p, q = radius * matrix @ first, radius * matrix @ second
         # Conjugate half-diameters p, q to principal ones.
         turn = np.arctan2(2 * p @ q, p @ p - q @ q) / 2
         major = np.cos(turn) * p + np.sin(turn) * q

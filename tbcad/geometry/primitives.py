@@ -1,6 +1,6 @@
-"""Parts as bodies that are put together and bodies that are taken away.
+"""Parts as primitives that are united and primitives that are cut out.
 
-Design and model share them: clearances are measured on the very bodies that solids are made of.
+Layout and solids share them: clearances are measured on the primitives that solids are made of.
 """
 
 from dataclasses import dataclass
@@ -8,10 +8,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
+from tbcad.geometry.rotations import even_angles, unit_circle
+from tbcad.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.types import Floats
 
-# Round bodies are measured on polygons round them, of so many sides.
+# Clearances of round primitives are measured on circumscribed polygons of so many sides.
 SIDES = 32
 
 
@@ -27,7 +28,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Prism:
-    """A plane convex polygon (n, 3) moved along a vector (3,) out of its plane, mm."""
+    """A plane convex polygon (n, 3) extruded along a vector (3,) out of its plane, mm."""
 
     corners: Floats
     along: Floats
@@ -35,7 +36,7 @@ class Prism:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A polygon (n, 2) of (z, r) turned about the z axis of the shell's frame, mm."""
+    """A polygon (n, 2) of (z, r) revolved about the z axis of the shell's frame, mm."""
 
     profile: Floats
 
@@ -49,12 +50,12 @@ class Component:
 
     Attributes:
         name: of the part.
-        what: it is.
-        added: bodies it is the union of.
-        removed: bodies that are cut out of it.
+        what: what it is, for lists of parts.
+        added: primitives it is the union of.
+        removed: primitives that are cut out of it.
         downs: directions that may point down when it is printed, (d, 3); none: it is bought.
         part: its name in the lists of purchased parts; None: it is printed.
-        turns: whether it turns with the base.
+        turns: whether it rotates with the base.
     """
 
     name: str
@@ -66,16 +67,9 @@ class Component:
     turns: bool = False
 
 
-def perpendicular_axes(axis: Floats) -> Floats:
-    """Two unit vectors across a unit axis and each other, (2, 3); right-handed with it."""
-    first = unit(np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis))
-    return np.stack([first, np.cross(axis, first)])
-
-
 def cylinder_between(start: Floats, end: Floats, radius: float) -> Cylinder:
-    """The cylinder from a point to another."""
-    along = end - start
-    return Cylinder(start, unit(along), radius, float(np.linalg.norm(along)))
+    """The cylinder from one point (3,) to another, mm."""
+    return Cylinder(start, unit(end - start), radius, float(norm(end - start)))
 
 
 def box(low: Floats, high: Floats, axes: Floats) -> Prism:
@@ -88,36 +82,36 @@ def box(low: Floats, high: Floats, axes: Floats) -> Prism:
 def slot(
     middle: Floats, along: Floats, travel: float, radius: float, depth: Floats
 ) -> tuple[Primitive, ...]:
-    """A hole that lets its screw move: two cylinders and what is between them.
+    """A slot in which a screw can be moved: two cylinders and the prism between them.
 
     Args:
-        middle: of its one end, mm, (3,).
+        middle: of the slot's near face, mm, (3,).
         along: unit vector of the travel, (3,).
-        travel: length by which a screw can be moved, mm.
-        radius: of the hole, mm.
-        depth: vector from the one end to the other, (3,).
+        travel: length by which a screw can be moved, mm; zero or less makes a plain hole.
+        radius: of the slot's ends, mm.
+        depth: vector from the near face to the far one, mm, (3,).
     """
     if travel <= 0:
         return (cylinder_between(middle, middle + depth, radius),)
     step, side = travel / 2 * along, radius * unit(np.cross(along, depth))
     corners = middle + np.stack([-step - side, step - side, step + side, -step + side])
-    ends = [cylinder_between(middle + way, middle + way + depth, radius) for way in (-step, step)]
+    centres = (middle - step, middle + step)
+    ends = [cylinder_between(centre, centre + depth, radius) for centre in centres]
     return (Prism(corners, depth), *ends)
 
 
 def enclosing_triangles(body: Primitive) -> Floats:
-    """Triangles (t, 3, 3) that enclose a body, mm."""
-    if isinstance(body, Cylinder):
-        turn, wide = 2 * np.pi * np.arange(SIDES) / SIDES, 1 / np.cos(np.pi / SIDES)
-        circle = body.radius * wide * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        corners = body.start + circle @ perpendicular_axes(body.axis)
-        return _prism(corners, body.length * body.axis)
+    """Triangles (t, 3, 3) of a closed surface that encloses a primitive, mm."""
     if isinstance(body, Prism):
-        return _prism(body.corners, body.along)
-    return _turned(body.profile)
+        return _prism_triangles(body.corners, body.along)
+    circumscribed = unit_circle(even_angles(SIDES)) / np.cos(np.pi / SIDES)
+    if isinstance(body, Cylinder):
+        corners = body.start + body.radius * circumscribed @ perpendicular_axes(body.axis)
+        return _prism_triangles(corners, body.length * body.axis)
+    return _revolved_triangles(body.profile, circumscribed)
 
 
-def _prism(corners: Floats, along: Floats) -> Floats:
+def _prism_triangles(corners: Floats, along: Floats) -> Floats:
     following = np.roll(corners, -1, axis=0)
     end = np.stack([np.broadcast_to(corners[0], corners.shape), corners, following], axis=1)
     sides = np.stack([corners, following, following + along], axis=1)
@@ -125,13 +119,10 @@ def _prism(corners: Floats, along: Floats) -> Floats:
     return np.concatenate([end[1:-1], end[1:-1] + along, sides, others])
 
 
-def _turned(profile: Floats) -> Floats:
-    turn = 2 * np.pi * np.arange(SIDES) / SIDES
-    radius = profile[:, 1] / np.cos(np.pi / SIDES)
-    height = np.broadcast_to(profile[:, 0, None], (len(profile), SIDES))
-    places = [radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn), height]
-    at = np.stack(places, axis=-1)
-    a, b = at, np.roll(at, -1, axis=0)
+def _revolved_triangles(profile: Floats, circle: Floats) -> Floats:
+    height = np.broadcast_to(profile[:, 0, None, None], (len(profile), len(circle), 1))
+    a = np.concatenate([profile[:, 1, None, None] * circle, height], axis=-1)
+    b = np.roll(a, -1, axis=0)
     c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
-    both = [np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]
-    return np.concatenate(both).reshape(-1, 3, 3)
+    halves = [np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]
+    return np.concatenate(halves).reshape(-1, 3, 3)

@@ -1,11 +1,11 @@
-"""Products of arrays of vectors along their last axis."""
+"""Products, lengths and directions of arrays of vectors along their last axis."""
 
 import numpy as np
 
 from tbcad.types import Floats
 
 FLIP_X = np.array([-1.0, 1.0, 1.0])
-"""Factors that mirror points and vectors in the plane x = 0."""
+"""Factors that reflect points and vectors in the plane x = 0, from one camera to the other."""
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -25,3 +25,12 @@ def unit(v: Floats) -> Floats:
     length = norm(v)[..., None]
     result: Floats = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
     return result
+
+
+def perpendicular_axes(axis: Floats) -> Floats:
+    """Two unit vectors perpendicular to a unit axis (3,) and to each other, (2, 3).
+
+    First, second and axis are a right-handed frame.
+    """
+    first = unit(np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis))
+    return np.stack([first, np.cross(axis, first)])

@@ -1,26 +1,28 @@
 """The part of a ball that shows the capture sphere to the camera, and the light that it takes.
 
-A ball stands with its apex on the ellipsoid; points are given in the ellipsoid's frame (along the
-axis, out from it at azimuth zero, across), since turning about the axis changes nothing there.
+A ball is placed with its apex on the ellipsoid. Points are given in the ellipsoid's frame (along
+the axis, out from it at azimuth zero, across), since a rotation about the axis changes nothing in
+that frame but the azimuth.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.camera import Camera
-from tbcad.optics.trace import reflected
-from tbcad.types import Floats
+from tbcad.optics.reflection import reflected_rays
+from tbcad.types import Bools, Floats
 
 # Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
 OUTLINE_POINTS = 24
-# A ray is turned by twice the tilt of the mirror, less across the plane of incidence.
-STEEPEST = np.radians(70)
-HALVINGS = 50
+# A tilt of the mirror turns the ray by twice as much, or less across the plane of incidence, so
+# no ray at this tilt meets the capture sphere.
+MAX_TILT = np.radians(70)
+BISECTIONS = 50
 
 
 @dataclass(frozen=True)
@@ -39,97 +41,88 @@ class BallPoses:
 
 
 def ball_poses(ellipsoid: Ellipsoid, polar: Floats) -> BallPoses:
-    """Apices and normals at polar angles (k,) in the half-plane of azimuth zero."""
+    """Apices and normals at polar angles (k,), radians, in the half-plane of azimuth zero."""
     frame = ellipsoid.frame()
     u = np.cos(polar)[:, None] * frame[0] + np.sin(polar)[:, None] * frame[1]
     return BallPoses(polar, ellipsoid.apices(u) @ frame.T, ellipsoid.normals(u) @ frame.T)
 
 
-def turned(points: Floats, azimuth: Floats) -> Floats:
-    """Points (..., 3) of the frame turned about its axis by angles (...), radians."""
-    along, out, across = np.moveaxis(points, -1, 0)
-    cosine, sine = np.cos(azimuth), np.sin(azimuth)
-    return np.stack([along, cosine * out - sine * across, sine * out + cosine * across], axis=-1)
+def used_outlines(poses: BallPoses, radius: Floats, pinhole: float, capture: float) -> Floats:
+    """Outline on each ball of the part that shows the capture sphere, mm, (k, OUTLINE_POINTS, 3).
 
-
-def used_outlines(at: BallPoses, radius: Floats, pinhole: float, capture: float) -> Floats:
-    """Outline on each ball of the part that shows the capture sphere, mm, (k, POINTS, 3).
+    Outside the outline rays from the camera miss the sphere. The tilt of the ball's surface at
+    which they touch it is found by bisection, in OUTLINE_POINTS directions about the apex.
 
     Args:
-        at: where the balls stand, (k,).
+        poses: of the balls, (k,).
         radius: of the balls, mm, (k,).
         pinhole: distance of the pinhole along the axis, mm.
         capture: radius of the capture sphere, mm.
-
-    Outside the outline rays from the camera miss the sphere. The tilt of the ball's surface at
-    which they touch it is found by halving, in POINTS directions about the apex.
     """
     camera = np.array([pinhole, 0.0, 0.0])
-    low, high = (
-        np.zeros((len(radius), OUTLINE_POINTS)),
-        np.full((len(radius), OUTLINE_POINTS), STEEPEST),
-    )
-    for _ in range(HALVINGS):
+    low = np.zeros((len(radius), OUTLINE_POINTS))
+    high = np.full_like(low, MAX_TILT)
+    for _ in range(BISECTIONS):
         tilt = (low + high) / 2
-        meets = _meets(*_surface(at, radius, tilt), camera, capture)
-        low, high = np.where(meets, tilt, low), np.where(meets, high, tilt)
-    point, _ = _surface(at, radius, low)
+        hits = _hits_sphere(*_tilted_surface(poses, radius, tilt), camera, capture)
+        low, high = np.where(hits, tilt, low), np.where(hits, high, tilt)
+    point, _ = _tilted_surface(poses, radius, low)
     return point
 
 
-def _surface(at: BallPoses, radius: Floats, tilt: Floats) -> tuple[Floats, Floats]:
-    """Points and normals (k, POINTS, 3) of the balls tilted (k, POINTS) from their apices."""
-    turn = 2 * np.pi * np.arange(OUTLINE_POINTS) / OUTLINE_POINTS
+def _tilted_surface(poses: BallPoses, radius: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+    """Points and normals (k, s, 3) of the balls at tilts (k, s) from their apices' normals."""
+    circle = unit_circle(even_angles(tilt.shape[1]))
     across = np.array([0.0, 0.0, 1.0])
-    in_plane = np.cross(across, at.normal)[:, None]
-    away = np.cos(turn)[:, None] * in_plane + np.sin(turn)[:, None] * across
-    normal = np.cos(tilt)[..., None] * at.normal[:, None] + np.sin(tilt)[..., None] * away
-    return at.apex[:, None] + radius[:, None, None] * (normal - at.normal[:, None]), normal
+    in_plane = np.cross(across, poses.normal)[:, None]
+    tangent = circle[:, :1] * in_plane + circle[:, 1:] * across
+    apex_normal = poses.normal[:, None]
+    normal = np.cos(tilt)[..., None] * apex_normal + np.sin(tilt)[..., None] * tangent
+    return poses.apex[:, None] + radius[:, None, None] * (normal - apex_normal), normal
 
 
-def _meets(point: Floats, normal: Floats, camera: Floats, capture: float) -> NDArray[np.bool_]:
-    """Whether rays from the camera off these points meet the capture sphere."""
-    out = reflected(camera, point, normal)
-    forward = -dot(out, point)
-    meets: NDArray[np.bool_] = forward > np.sqrt(np.maximum(dot(point, point) - capture**2, 0))
-    return meets
+def _hits_sphere(point: Floats, normal: Floats, camera: Floats, capture: float) -> Bools:
+    """Whether rays from the camera meet the capture sphere after mirrors at points (..., 3)."""
+    toward_origin = -dot(reflected_rays(camera, point, normal), point)
+    tangent_length = np.sqrt(np.maximum(dot(point, point) - capture**2, 0))
+    hits: Bools = toward_origin > tangent_length
+    return hits
 
 
 def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
     """Hulls that hold all light of each ball: capture sphere to ball, ball to pinhole, (k,).
 
+    The part in use lies in the ball about the middle of its outline, so every ray lies in the hull
+    of that ball and the capture sphere, or of that ball and the pinhole.
+
     Args:
         outline: on the balls, mm, (k, s, 3).
         pinhole: distance along the axis, mm.
         capture: radius of the capture sphere, mm.
-
-    The useful part lies in the ball about the middle of its outline, so every ray lies in the hull
-    of that ball and the capture sphere, and of that ball and the pinhole.
     """
     middle = (outline.min(axis=1) + outline.max(axis=1)) / 2
-    reach = norm(outline - middle[:, None]).max(axis=1) / np.cos(np.pi / outline.shape[1])
-    middle, still = middle[:, :2], np.zeros_like(reach)
+    radius = norm(outline - middle[:, None]).max(axis=1) / np.cos(np.pi / outline.shape[1])
+    middle, zero = middle[:, :2], np.zeros_like(radius)
     at_object, at_camera = np.zeros_like(middle), np.broadcast_to([pinhole, 0.0], middle.shape)
     return (
-        RoundCones(at_object, middle, still + capture, reach),
-        RoundCones(at_camera, middle, still, reach),
+        RoundCones(at_object, middle, zero + capture, radius),
+        RoundCones(at_camera, middle, zero, radius),
     )
 
 
-def pixel_counts(view: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
-    """Number of pixels inside outlines (m, s, 3) turned by azimuths (m,), exact, (m,).
+def pixel_counts(camera: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
+    """Number of pixels inside outlines (m, s, 3) at azimuths (m,), exact, (m,).
 
     Args:
-        view: the camera.
+        camera: that sees them.
         frame: rows of the ellipsoid's frame, (3, 3).
         outline: at azimuth zero, mm, (m, s, 3).
         azimuth: radians, (m,).
     """
-    ray = turned(outline, azimuth[:, None]) @ frame - view.pinhole
-    axes = np.stack([view.right, np.cross(view.forward, view.right)])
-    width = view.half_sizes[0] * 2 / view.width_px
-    image = (ray @ axes.T) / (ray @ view.forward)[..., None] / width
-    return enclosed_areas(image)
+    ray = rotated_about_x(outline, azimuth[:, None]) @ frame - camera.pinhole
+    axes = np.stack([camera.right, np.cross(camera.forward, camera.right)])
+    pitch = camera.half_sizes[0] * 2 / camera.width_px
+    return enclosed_areas((ray @ axes.T) / (ray @ camera.forward)[..., None] / pitch)
 
 
 def enclosed_areas(outline: Floats) -> Floats:
@@ -144,27 +137,8 @@ def enclosed_areas(outline: Floats) -> Floats:
     return area
 
 
-def ball_miss_distances(camera: Floats, ray: Floats, centre: Floats, radius: Floats) -> Floats:
-    """Distance from the origin of rays after balls, mm, (...); infinite where they miss the ball.
-
-    Args:
-        camera: the pinhole, mm, (3,).
-        ray: unit directions, (..., 3).
-        centre: of the balls, mm, (..., 3).
-        radius: of the balls, mm, (...).
-    """
-    to_centre = centre - camera
-    along = dot(ray, to_centre)
-    inside = radius**2 - dot(to_centre, to_centre) + along**2
-    point = camera + (along - np.sqrt(np.maximum(inside, 0)))[..., None] * ray
-    out = reflected(camera, point, (point - centre) / radius[..., None])
-    back = (inside < 0) | (dot(out, point) > 0)
-    miss: Floats = np.where(back, np.inf, norm(np.cross(point, out)))
-    return miss
-
-
 def field_angles(ellipsoid: Ellipsoid, polar: Floats) -> Floats:
     """Angle at the pinhole between the axis (to the origin) and each apex, radians, (k,)."""
-    way = unit(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
-    angle: Floats = np.arctan2(way[:, 1], -way[:, 0])
+    ray = unit(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
+    angle: Floats = np.arctan2(ray[:, 1], -ray[:, 0])
     return angle

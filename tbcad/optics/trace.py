@@ -1,77 +1,92 @@
-"""Exact rays from camera over mirror past the object, and what each mirror sees."""
+"""What each mirror covers, by exact rays: camera -> edge of the cell -> past the object."""
+
+from collections.abc import Callable
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Cells
+from tbcad.optics.reflection import miss_distances
 from tbcad.types import Floats, Ints
 
-# Samples of each arc, first over all of it, then about the least; a parabola does the rest.
+# Samples of each arc: first over all of it, then between the neighbours of the smallest one.
 SAMPLES = 9
+# After three rounds the samples are a 128th of the arc apart; a parabola does the rest.
 ROUNDS = 3
 
 
-def reflected(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
-    """Unit directions (..., 3) of rays from the pinhole after the mirror at points (..., 3)."""
-    ray = unit(point - pinhole)
-    result: Floats = ray - 2 * dot(ray, normal)[..., None] * normal
-    return result
-
-
-def miss_distances(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
-    """Distances (...) of the reflected rays from the origin, mm."""
-    out = reflected(pinhole, point, normal)
-    result: Floats = norm(np.cross(point, out))
-    return result
-
-
 def limiting_sides(cells: Cells) -> tuple[Ints, Ints]:
-    """Mirror and arc of each side that limits what a mirror sees.
+    """Mirror (e,) and arc (e,) of each side of a cell that limits what its mirror covers.
 
-    The seam halves a mirror whose apex lies on it; its other half belongs to the other camera
-    and shares its virtual camera, so the cut itself does not limit the two together.
+    The seam halves a mirror whose apex lies on it. Its other half belongs to the other camera and
+    shares its virtual camera, so the cut itself does not limit the two together.
     """
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]
     halved = cells.surfaces.apex[mirror, 0] == 0
-    counted = ~(halved & (other == cells.boundary.seam))
-    return mirror[counted], arc[counted]
+    limiting = ~(halved & (other == cells.boundary.seam))
+    return mirror[limiting], arc[limiting]
 
 
 def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
-    """Coverage diameter of each mirror, mm, (m,).
+    """Coverage diameter of each mirror by exact rays, mm, (m,).
 
-    Twice the least distance from the origin of all rays camera -> edge of the cell -> reflected
-    (DESIGN.md section 2), by samples along each arc, refined about the least.
+    It is twice the smallest distance from the origin of all rays camera -> edge of the cell ->
+    reflected. The virtual camera sees the whole capture sphere of the paper's section 3 when its
+    coverage diameter is at least that of the sphere.
+
+    Args:
+        cells: of one camera's m mirrors.
+        pinhole: of the camera, mm, (3,).
     """
     mirror, arc = limiting_sides(cells)
-    low, high = np.zeros(len(arc)), np.ones(len(arc))
-    row = np.arange(len(arc))
-    for _ in range(ROUNDS):
+
+    def miss(t: Floats) -> Floats:
+        arcs = np.broadcast_to(arc[:, None], t.shape)
+        point = cells.arcs.at(arcs, t)
+        normal = cells.surfaces.gradient(np.broadcast_to(mirror[:, None], t.shape), point)
+        return miss_distances(pinhole, point, normal)
+
+    smallest = parabola_minima(samples_about_minima(miss, len(arc), ROUNDS))
+    return 2 * minima_by_mirror(mirror, smallest, cells.mirrors)
+
+
+def samples_about_minima(function: Callable[[Floats], Floats], curves: int, rounds: int) -> Floats:
+    """Values (k, SAMPLES) about the minimum on [0, 1] of each of k curves.
+
+    Args:
+        function: takes parameters (k, SAMPLES), one row a curve, and returns the values there.
+        curves: number of curves, k.
+        rounds: each samples evenly between the neighbours of the last round's smallest sample.
+    """
+    low, high = np.zeros(curves), np.ones(curves)
+    row = np.arange(curves)
+    for _ in range(rounds):
         t = np.linspace(low, high, SAMPLES, axis=1)
-        distance = _along(cells, pinhole, mirror, arc, t)
-        best = np.argmin(distance, axis=1)
+        values = function(t)
+        best = np.argmin(values, axis=1)
         low, high = t[row, np.maximum(best - 1, 0)], t[row, np.minimum(best + 1, SAMPLES - 1)]
-    least = np.full(cells.mirrors, np.inf)
-    np.minimum.at(least, mirror, _lowest(distance))
-    return 2 * least
+    return values
 
 
-def _lowest(values: Floats) -> Floats:
-    """Least of each row (k, s) of even samples, on the parabola through its neighbours."""
+def parabola_minima(values: Floats) -> Floats:
+    """Minimum (k,) of each row (k, s) of even samples, on the parabola through its neighbours.
+
+    For samples a, b, c with the smallest in the middle the parabola's vertex lies
+    (c - a)^2 / (8 (a - 2 b + c)) below b. Where the smallest is at an end, it is the minimum.
+    """
     row, best = np.arange(len(values)), np.argmin(values, axis=1)
     middle = np.clip(best, 1, values.shape[1] - 2)
-    before, here, after = (values[row, middle + k] for k in (-1, 0, 1))
-    bend, slope = before - 2 * here + after, after - before
+    before, centre, after = (values[row, middle + k] for k in (-1, 0, 1))
+    bend, slope = before - 2 * centre + after, after - before
     inside = (best == middle) & (bend > 0)
     result: Floats = values[row, best]
     result[inside] -= (slope**2)[inside] / (8 * bend)[inside]
     return result
 
 
-def _along(cells: Cells, pinhole: Floats, mirror: Ints, arc: Ints, t: Floats) -> Floats:
-    arcs = np.broadcast_to(arc[:, None], t.shape)
-    point = cells.arcs.at(arcs, t)
-    normal = cells.surfaces.gradient(np.broadcast_to(mirror[:, None], t.shape), point)
-    return miss_distances(pinhole, point, normal)
+def minima_by_mirror(mirror: Ints, values: Floats, mirrors: int) -> Floats:
+    """Smallest of the values (e,) of each mirror's sides, (mirrors,); infinite without sides."""
+    smallest = np.full(mirrors, np.inf)
+    np.minimum.at(smallest, mirror, values)
+    return smallest

@@ -4,21 +4,24 @@ import pytest
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.optics.cells import Cells
-from tbcad.optics.trace import coverage_diameters, miss_distances, reflected
+from tbcad.optics.reflection import miss_distances
+from tbcad.optics.trace import coverage_diameters, parabola_minima, samples_about_minima
 from tbcad.spec.load import load_spec
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 
 
-def test_reflection_at_a_plane() -> None:
-    point, normal = np.array([[0.0, 0.0, 10.0]]), np.array([[0.0, 0.0, -1.0]])
-    out = reflected(np.array([3.0, 0.0, 0.0]), point, normal)
-    assert out[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
+def test_minimum_of_a_parabola_is_exact_between_samples() -> None:
+    vertex = np.array([[0.43], [0.07], [0.99]])
+    values = 3.0 + 7.0 * (np.linspace(0, 1, 9) - vertex) ** 2
+    assert parabola_minima(values[:2]) == pytest.approx(3.0, rel=1e-14)
+    assert parabola_minima(values[2:])[0] == values[2, -1]  # the smallest sample is the last
 
 
-def test_ray_over_the_apex_passes_the_origin(paper_half: MirrorArray) -> None:
-    mirrors = paper_half.mirrors
-    assert miss_distances(PINHOLE, mirrors.apex, mirrors.normal).max() < 1e-9
+def test_rounds_of_samples_close_in_on_the_minimum() -> None:
+    centre = np.array([[0.317], [0.0], [1.0]])
+    samples = samples_about_minima(lambda t: np.abs(t - centre), 3, rounds=4)
+    assert samples.min(axis=1) == pytest.approx(0.0, abs=1 / 512)
 
 
 def brute_force_coverage(cells: Cells, pinhole: np.ndarray, i: int, reach: float) -> float:

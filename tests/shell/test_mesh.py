@@ -4,7 +4,7 @@ import trimesh
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.optics.trace import miss_distances
+from tbcad.optics.reflection import miss_distances
 from tbcad.shell.facets import mirror_facets
 from tbcad.spec.load import load_spec
 from tests.helpers import body_of, mesh_of

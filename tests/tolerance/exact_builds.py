@@ -22,6 +22,7 @@ from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
+from tbcad.optics.reflection import miss_distances, reflected_rays
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import object_distances, shell_envelope
 from tbcad.shell.mesh import shell_mesh
@@ -153,7 +154,7 @@ def brutally(half: MirrorArray, draws: Draws, k: int, mirror: int, ways: int = 4
     point = at(low)
     normal = (point / scale - centre[mirror]) / scale
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return float(2 * trace.miss_distances(half.camera.pinhole, point, normal).min())
+    return float(2 * miss_distances(half.camera.pinhole, point, normal).min())
 
 
 def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
@@ -168,7 +169,7 @@ def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
     t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
     point = cells.arcs.at(np.broadcast_to((sides // 2)[:, None], t.shape), t)
     face = np.broadcast_to(mirror[:, None], t.shape)
-    out = trace.reflected(pinhole, point, cells.surfaces.gradient(face, point))
+    out = reflected_rays(pinhole, point, cells.surfaces.gradient(face, point))
     u = half.u[mirror][:, None]
     image = point - out * ((point * u).sum(axis=2) / (out * u).sum(axis=2))[..., None]
     first = np.cross(half.u, [0.3, 0.5, 0.8])

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
 from tbcad.prototype.balls.clearance import (
     allowed_azimuths,
@@ -83,7 +83,7 @@ class PrototypeLayout:
 
     def on_base(self, points: Floats, angle: float = 0.0) -> Floats:
         """Points (k, 3) given at azimuth zero, one a ball, on the base at an angle, mm."""
-        return turned(points, self.placement.azimuth + angle) @ self.half.ellipsoid.frame()
+        return rotated_about_x(points, self.placement.azimuth + angle) @ self.half.ellipsoid.frame()
 
     def apices(self, angle: float = 0.0) -> Floats:
         """Apices of the balls with the base at an angle (radians), mm, (k, 3)."""

@@ -5,17 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import (
-    BallPoses,
-    ball_poses,
-    field_angles,
-    pixel_counts,
-    turned,
-    used_outlines,
-)
-from tbcad.optics.windows import SubstituteBalls, Windows, cell_windows
+from tbcad.optics.ball_light import BallPoses, ball_poses, field_angles, pixel_counts, used_outlines
+from tbcad.optics.windows import Windows, cell_windows
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.spec.prototype import PrototypeSpec
@@ -145,12 +139,13 @@ class BallCandidates:
         """Coverage diameter (m,) with reflecting radii (k,), in moved cells or fixed ones, mm."""
         half, group_of = self.half, self.groups.group_of
         poses = ball_poses(half.ellipsoid, self.groups.polar)
-        centre = turned((poses.apex - radius[:, None] * poses.normal)[group_of], half.azimuth)
-        across = turned(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), half.azimuth)
+        centre = rotated_about_x(
+            (poses.apex - radius[:, None] * poses.normal)[group_of], half.azimuth
+        )
+        across = rotated_about_x(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), half.azimuth)
         frame = half.ellipsoid.frame()
         rotation = self._window_rotation() if moved else np.zeros(len(half))
-        balls = SubstituteBalls(centre @ frame, radius[group_of], across @ frame, rotation)
-        covered = self.windows.coverage(balls)
+        covered = self.windows.coverage(centre @ frame, radius[group_of], across @ frame, rotation)
         return covered if moved else np.where(self._shows_origin(), covered, 0.0)
 
     def covers_groups(self, radius: Floats, ignored: Bools, moved: bool) -> Bools:
@@ -168,9 +163,9 @@ class BallCandidates:
         """Whether the ball's apex, which shows the origin, is in the mirror's own cell, (m,)."""
         half = self.half
         apex = ball_poses(half.ellipsoid, self.groups.polar).apex[self.groups.group_of]
-        sight = turned(apex, half.azimuth) @ half.ellipsoid.frame() - half.camera.pinhole
+        sight = rotated_about_x(apex, half.azimuth) @ half.ellipsoid.frame() - half.camera.pinhole
         direction = sight / norm(sight)[:, None]
-        return self.windows.surround(direction, direction, np.zeros(len(half)))
+        return self.windows.contains(direction, direction, np.zeros(len(half)))
 
     def only(self, mirrors: Bools) -> "BallCandidates":
         """The same, computing coverage for some mirrors only; infinite for the others."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
-from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.keepout import Room, least
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
@@ -143,7 +143,7 @@ def _grazed(made: PrototypeLayout, capture: float) -> float:
     stops, mine = made.stops, made.fit.ball
     outline = made.balls.outline[mine]
     turn = (made.placement.azimuth[mine] + stops.angle[stops.stop])[:, None]
-    points = turned(outline, turn) @ made.half.ellipsoid.frame()
+    points = rotated_about_x(outline, turn) @ made.half.ellipsoid.frame()
     away = norm(points)
     down = np.arcsin(capture / away) + np.arcsin(points[..., 2] / away)
     return capture * float(np.sin(down.min()))

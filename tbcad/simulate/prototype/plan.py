@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
+from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
-from tbcad.optics.windows import rotated
 from tbcad.simulate.scene.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
 from tbcad.types import Floats, Ints
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.windows import rotated
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.types import Floats, Ints

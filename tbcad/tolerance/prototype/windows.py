@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.optics.trace import reflected
-from tbcad.optics.windows import cell_windows, rotated
+from tbcad.optics.reflection import reflected_rays
+from tbcad.optics.windows import cell_windows
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
@@ -217,7 +218,7 @@ def _through(run: Windowed, pose: Posed) -> tuple[Floats, Floats]:
     inside = pose.radius**2 - dot(to_centre, to_centre) + along**2
     half = np.sqrt(np.where(inside < 0, np.nan, inside))
     point = pose.pinhole + (along - half)[:, None] * ray
-    return point, reflected(pose.pinhole, point, (point - pose.centre) / pose.radius[:, None])
+    return point, reflected_rays(pose.pinhole, point, (point - pose.centre) / pose.radius[:, None])
 
 
 def _off(ray: tuple[Floats, Floats], aim: tuple[Floats, Floats]) -> Floats:

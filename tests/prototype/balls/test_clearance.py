@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import turned
-from tbcad.optics.trace import reflected
+from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.catalogue import load_catalogue
 from tbcad.prototype.balls.clearance import (
     SOLVER_MARGIN,
@@ -38,7 +38,7 @@ def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
     inner = balls.poses.apex[j] + share * (balls.outline[j] - balls.poses.apex[j])
     normal = unit(inner.reshape(-1, 3) - balls.centre[j])
     point = balls.centre[j] + balls.radius[j] * normal
-    out = reflected(camera, point, normal)
+    out = reflected_rays(camera, point, normal)
     end = point - dot(point, out)[:, None] * out
     return np.tile(point, (2, 1)), np.concatenate([end, np.broadcast_to(camera, end.shape)])
 
@@ -63,7 +63,7 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
         start, end = rays(balls, j, pinhole)
         for i in set(range(K)) - {j}:
             place = np.concatenate([[dark[i, j]], turn[turn > dark[i, j]]])
-            centre = turned(np.broadcast_to(balls.body_centre[i], (len(place), 3)), place)
+            centre = rotated_about_x(np.broadcast_to(balls.body_centre[i], (len(place), 3)), place)
             gap = gaps(start, end, centre) - balls.body_radius[i] - KEYS.light_margin_mm
             assert gap.min() > 0
             nearest[i, j] = gap[0]
@@ -77,7 +77,7 @@ def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> 
     touch, _ = min_separations(balls, KEYS, norm(paper_half.camera.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
-        other = turned(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
+        other = rotated_about_x(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
         assert norm(other - balls.body_centre[j]) == pytest.approx(60 + KEYS.ball_wall_mm)
 
 
@@ -93,7 +93,7 @@ def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None
     near = ceiling < np.pi
     assert near[0]
     assert not near[-1]
-    at = turned(balls.body_centre[0], np.array(ceiling[0])) @ frame
+    at = rotated_about_x(balls.body_centre[0], np.array(ceiling[0])) @ frame
     away = np.hypot(at[0], at[1])
     assert away == pytest.approx(30 + KEYS.post_diameter_mm / 2 + KEYS.ball_wall_mm)
 

@@ -7,7 +7,7 @@ import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.optics.trace import reflected
+from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
 from tbcad.prototype.balls.selection import (
@@ -149,7 +149,7 @@ class TestPlaces:
                     ]
                 )
                 x, n = point[j] @ rotation.T @ frame, normal[j] @ rotation.T @ frame
-                out = reflected(camera, x, n)
+                out = reflected_rays(camera, x, n)
                 end = x - dot(x, out)[:, None] * out
                 assert norm(end).max() < 30 + 1e-6
                 others = np.arange(len(made)) != j

@@ -12,9 +12,9 @@ from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from tbcad.cad.solids import faces, meshed, volume
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_drives
@@ -217,9 +217,11 @@ class TestClearance:
         found = []
         low, high = made.stops.angle[[0, -1]]
         for angle in np.linspace(low, high, 25).tolist():
-            found.append(turned(ends, np.full(len(ends), angle)) @ frame_)
+            found.append(rotated_about_x(ends, np.full(len(ends), angle)) @ frame_)
             for azimuth in np.linspace(*carrier.sector, 5).tolist():
-                found.append(turned(outline, np.full(len(outline), azimuth + angle)) @ frame_)
+                found.append(
+                    rotated_about_x(outline, np.full(len(outline), azimuth + angle)) @ frame_
+                )
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=4)
         away = np.asarray(cKDTree(points).query(np.vstack(found))[0])
         assert away.min() > KEYS.clearance_mm
@@ -242,7 +244,7 @@ class TestClearance:
             ball = int(made.fit.ball[mirror])
             turn = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
             rim = made.balls.outline[ball]
-            points = turned(rim, np.full(len(rim), turn)) @ frame_
+            points = rotated_about_x(rim, np.full(len(rim), turn)) @ frame_
             hits, rays, _ = mesh.ray.intersects_location(points, pinhole - points)
             assert (norm(hits - points[rays]) > norm(pinhole - points[rays])).all()
             # To the capture sphere's near edge, no farther.

@@ -17,9 +17,9 @@ from tbcad.geometry.primitives import (
     enclosing_triangles,
     slot,
 )
+from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.ball_light import turned
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
@@ -190,7 +190,7 @@ class TestRoom:
         for mirror in rng.choice(len(made.half), 12, replace=False).tolist():
             ball = int(made.fit.ball[mirror])
             azimuth = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
-            rim = turned(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
+            rim = rotated_about_x(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
             start = CAPTURE * unit(rng.normal(size=(len(rim), 3)))
             ends = [start, np.broadcast_to(made.half.camera.pinhole, rim.shape)]
             for other in ends:
@@ -211,7 +211,7 @@ class TestRoom:
             )
             flat = np.column_stack([middle, 0 * radius])
             for azimuth in np.linspace(low, high, 241):
-                centre = turned(flat, np.full(len(flat), azimuth))
+                centre = rotated_about_x(flat, np.full(len(flat), azimuth))
                 found = np.minimum(found, (norm(local[:, None] - centre) - radius).min(axis=1))
         exact = space.light(points)
         assert (exact <= found + 1e-9).all()
@@ -225,13 +225,13 @@ class TestRoom:
         seat = carrier.seats
         for angle in np.linspace(made.stops.angle[0], made.stops.angle[-1], 7).tolist():
             ends = seat.centre + seat.back[:, None] * seat.axis
-            local = turned(ends @ carrier.frame.T, np.full(len(ends), angle))
+            local = rotated_about_x(ends @ carrier.frame.T, np.full(len(ends), angle))
             assert (space.swept(local @ carrier.frame) == 0).all()
             assert (space.swept(made.body_centres(angle)) < -5).all()
             for azimuth in carrier.sector:
                 turn = np.full(len(carrier.outer), azimuth + angle)
                 line = np.column_stack([carrier.outer, 0 * turn])
-                points = turned(line, turn) @ carrier.frame
+                points = rotated_about_x(line, turn) @ carrier.frame
                 assert space.swept(points).max() < 1e-6
 
     def test_swept_is_a_distance_off_the_sector(self, carrier: BaseLayout, space: Room) -> None:
@@ -240,7 +240,7 @@ class TestRoom:
         at = carrier.middle[len(carrier.middle) // 2]
         along = np.array([[at[0], at[1], 0.0]])
         for beyond in (0.05, 0.1):
-            point = turned(along, np.array([high + beyond])) @ carrier.frame
+            point = rotated_about_x(along, np.array([high + beyond])) @ carrier.frame
             away = at[1] * np.sin(beyond)
             assert space.swept(point)[0] <= away + 1e-9
             assert space.swept(point)[0] > 0.5 * away

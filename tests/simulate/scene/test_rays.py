@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import design
-from tbcad.optics.trace import miss_distances
+from tbcad.optics.reflection import miss_distances
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
 from tbcad.spec.load import load_spec

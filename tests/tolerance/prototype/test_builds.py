@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.optics.ball_light import ball_miss_distances
+from tbcad.optics.reflection import sphere_miss_distances
 from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
@@ -98,7 +98,7 @@ def slow(
     for half, (run, (mirror, place)) in enumerate(zip(both, pictures, strict=True)):
         way = unit(turn.apply(view.forward) + place / draws.focal[machine] @ axes)
         centre, radius = balls(at, run, draws, machine, half)
-        miss = ball_miss_distances(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
+        miss = sphere_miss_distances(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
         which = at.virtual[half * len(run.at) :][mirror]
         np.minimum.at(least, which, 2 * miss.min(axis=1))
     return least
@@ -171,7 +171,7 @@ def test_highlights_show_the_middle_of_the_object() -> None:
     centre = 130 * unit(generator.normal(size=(50, 3)) + 3 * np.eye(3)[2])
     way = highlights(pinhole, centre, radius)
     assert norm(way) == pytest.approx(1)
-    assert ball_miss_distances(pinhole, way, centre, radius) == pytest.approx(0, abs=1e-5)
+    assert sphere_miss_distances(pinhole, way, centre, radius) == pytest.approx(0, abs=1e-5)
 
 
 class TestMotions:

@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+
+from tbcad.geometry.vectors import unit
+from tbcad.mirrors.array import MirrorArray
+from tbcad.optics.reflection import miss_distances, reflected_rays, sphere_miss_distances
+
+
+def test_reflection_at_a_plane() -> None:
+    point, normal = np.array([[0.0, 0.0, 10.0]]), np.array([[0.0, 0.0, -1.0]])
+    reflected = reflected_rays(np.array([3.0, 0.0, 0.0]), point, normal)
+    assert reflected[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
+
+
+def test_ray_over_the_apex_passes_the_origin(paper_half: MirrorArray) -> None:
+    mirrors = paper_half.mirrors
+    pinhole = paper_half.camera.pinhole
+    assert miss_distances(pinhole, mirrors.apex, mirrors.normal).max() < 1e-9
+
+
+def test_rays_find_their_points_on_the_spheres(paper_half: MirrorArray) -> None:
+    """Points beside the apices, given and found again by the intersection with the sphere."""
+    mirrors, pinhole = paper_half.mirrors, paper_half.camera.pinhole
+    normal = unit(mirrors.normal + 0.01 * unit(np.random.default_rng(1).normal(size=(847, 3))))
+    point = mirrors.centre + mirrors.radius[:, None] * normal
+    ray = unit(point - pinhole)
+    found = sphere_miss_distances(pinhole, ray, mirrors.centre, mirrors.radius)
+    assert found == pytest.approx(miss_distances(pinhole, point, normal), abs=1e-9)
+
+
+def test_rays_past_a_sphere_or_away_from_the_origin_miss_by_infinity() -> None:
+    pinhole, radius = np.array([-50.0, 0.0, 0.0]), np.array(10.0)
+    ray = unit(np.array([[1.0, 0.2, 0.0], [1.0, 0.0, 0.0]]))
+    miss = sphere_miss_distances(pinhole, ray, np.array([100.0, 0.0, 0.0]), radius)
+    assert miss[0] == np.inf
+    assert miss[1] == 0
+    before_the_origin = np.array([-20.0, 0.0, 0.0])
+    assert sphere_miss_distances(pinhole, ray[1], before_the_origin, radius) == np.inf
