@@ -19,7 +19,7 @@ from tbcad.types import Progress
 if TYPE_CHECKING:
     from build123d import Part
     from tbcad_verify.report.report import Report
-    from tbcad_verify.run.verify import Options as VerifyOptions
+    from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
@@ -235,14 +235,14 @@ def verify(
         InputError: the folder is no readable export.
     """
     from tbcad_verify.errors import BadExport
-    from tbcad_verify.run.verify import Options
+    from tbcad_verify.run.verify import VerifyOptions
     from tbcad_verify.run.verify import verify as verify_files
 
     def stage(name: str) -> None:
         progress(f"verification: {name}")
 
     try:
-        return verify_files(Path(exports), stage, options or Options())
+        return verify_files(Path(exports), stage, options or VerifyOptions())
     except BadExport as error:
         raise InputError(str(error)) from None
 

@@ -151,13 +151,13 @@ def verify_command(
 
     Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
     """
-    from tbcad_verify.run.verify import Options
+    from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.api import verify
 
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
-    options = Options(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
+    options = VerifyOptions(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
     with stages(VERIFY_STAGES) as screen:
         report = verify(folder, options, progress=screen.stage)
     _show(report)

@@ -9,22 +9,23 @@ from pathlib import Path
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
-from tbcad_verify.run.verify import Options, verify
-from tbcad_verify.run.watch import SECONDS
+from tbcad_verify.run.verify import VerifyOptions, verify
+from tbcad_verify.run.watch import STAGE_LIMIT_S
 
-ABOUT = """Prove on the files in DIR, which `tbcad build` wrote, that every virtual camera sees the
-whole object. Writes DIR/verify.json. Exit status: 0 proved, 1 not proved, 2 DIR is no export."""
-WIDE = 160  # columns of the table when nobody's terminal says otherwise
+ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole
+object, and every part can be made. The result is written to DIR/verify.json.
+Exit status: 0 verified, 1 not verified, 2 DIR is not an export."""
+PIPED_WIDTH = 160  # columns of the table when stdout is no terminal
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Verify a folder, print the table and the verdict.
 
     Args:
-        argv: arguments without the program's name; None takes the process's own.
+        argv: arguments without the program's name; None: those of the process.
 
     Returns:
-        0 proved, 1 not proved, 2 bad input.
+        0 verified, 1 not verified, 2 bad input.
     """
     parser = argparse.ArgumentParser("tbcad_verify", description=ABOUT)
     parser.add_argument("folder", metavar="DIR", type=Path, help="a folder that tbcad build wrote")
@@ -34,39 +35,44 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="NAME|FILE",
         action="append",
         default=[],
-        help=f"fail unless every part suits this machine: {', '.join(built_in())}, or a TOML file",
+        help="fail unless every part can be made by this printer: "
+        f"{', '.join(built_in())}, or a TOML file; repeatable",
     )
     parser.add_argument(
-        "--clients", action="store_true", help="ask FreeCAD, gmsh, PrusaSlicer and admesh too"
+        "--clients", action="store_true", help="also ask FreeCAD, gmsh, PrusaSlicer and admesh"
     )
     parser.add_argument(
-        "--time-limit", metavar="S", type=float, default=SECONDS, help="seconds for each stage"
+        "--time-limit",
+        metavar="S",
+        type=float,
+        default=STAGE_LIMIT_S,
+        help="seconds for each stage, file and program (default: %(default)g)",
     )
-    options = parser.parse_args(argv)
-    if not options.time_limit > 0:
+    arguments = parser.parse_args(argv)
+    if not arguments.time_limit > 0:
         parser.error("--time-limit must be more than 0 seconds")
+    options = VerifyOptions(
+        seconds=arguments.time_limit,
+        printers=tuple(arguments.printer),
+        clients=arguments.clients,
+    )
     try:
-        wishes = Options(
-            seconds=options.time_limit,
-            printers=tuple(options.printer),
-            clients=options.clients,
-        )
-        return _verify(options.folder, wishes, options.quiet)
+        return _verify(arguments.folder, options, arguments.quiet)
     except BadExport as error:
         print(f"tbcad_verify: {error}", file=sys.stderr)
         return 2
 
 
-def _verify(folder: Path, wishes: Options, quiet: bool) -> int:
+def _verify(folder: Path, options: VerifyOptions, quiet: bool) -> int:
     from rich.console import Console
 
-    report = verify(folder, (lambda _: None) if quiet else _say, wishes)
+    report = verify(folder, (lambda _: None) if quiet else _print_stage, options)
     if quiet:
         print(report.verdict)
     else:
-        report.show(Console() if sys.stdout.isatty() else Console(width=WIDE))
+        report.show(Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH))
     return 0 if report.passed else 1
 
 
-def _say(stage: str) -> None:
+def _print_stage(stage: str) -> None:
     print(f"verify: {stage}", file=sys.stderr, flush=True)

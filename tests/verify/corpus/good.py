@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tbcad_verify.run.verify import Options
+from tbcad_verify.run.verify import VerifyOptions
 
 from tbcad.cli import run
 from tests.verify.corpus.copies import digests
 
-HERE = Options(write=False, apart=False)
+HERE = VerifyOptions(write=False, apart=False)
 SETTINGS = (
     "optics.n=4",
     "camera.hfov_deg=110",

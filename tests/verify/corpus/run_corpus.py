@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from tbcad_verify.run.verify import Options
+from tbcad_verify.run.verify import VerifyOptions
 
 from tests.verify.corpus.copies import digests
 from tests.verify.corpus.harmless import HARMLESS
@@ -66,7 +66,7 @@ def tried(options: argparse.Namespace, mutations: Sequence[Mutation]) -> Iterato
 
         def one(mutation: Mutation) -> Outcome:
             room = Path(tempfile.mkdtemp(dir=place))
-            return attempt(mutation, options.export, room, Options(write=False))
+            return attempt(mutation, options.export, room, VerifyOptions(write=False))
 
         with ThreadPoolExecutor(options.jobs) as pool:
             yield from pool.map(one, mutations)

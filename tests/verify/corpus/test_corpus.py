@@ -70,7 +70,7 @@ def test_a_trial_can_fail(mutation: Mutation, wanting: str, good: Path, tmp_path
 
 
 def test_what_takes_too_long_is_unknown(good: Path) -> None:
-    report = verify(good, wishes=replace(HERE, seconds=0.05))
+    report = verify(good, options=replace(HERE, seconds=0.05))
     lost = [check for check in report.checks if check.passed is None]
     assert {check.name.partition(" ")[0] for check in lost} == {"step"}
     assert {check.file for check in lost} == {"shell_a.step", "shell_b.step"}

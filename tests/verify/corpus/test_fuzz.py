@@ -90,7 +90,7 @@ def holds(good: Path, name: str, how: Callable[[bytes], bytes]) -> None:
 
 def outcome(folder: Path) -> tuple[bool, str]:
     try:
-        report = verify(folder, wishes=HERE)
+        report = verify(folder, options=HERE)
     except BadExport as error:
         return False, str(error)
     return report.passed, report.verdict

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
-from tbcad_verify.run.verify import Options, verify
+from tbcad_verify.run.verify import VerifyOptions, verify
 
 from tests.verify.corpus.copies import copy, sign
 from tests.verify.corpus.mutation import Mutation
@@ -33,7 +33,7 @@ class Outcome:
     seconds: float
 
 
-def attempt(mutation: Mutation, export: Path, room: Path, wishes: Options) -> Outcome:
+def attempt(mutation: Mutation, export: Path, room: Path, options: VerifyOptions) -> Outcome:
     """Break a copy in an empty folder of its own, and prove it."""
     folder = copy(export, room / "export")
     words = list(mutation.words)
@@ -41,7 +41,7 @@ def attempt(mutation: Mutation, export: Path, room: Path, wishes: Options) -> Ou
         words += _broken(mutation, folder)
     begin = time.perf_counter()
     try:
-        checks = verify(folder, _interference(mutation, folder), wishes).checks
+        checks = verify(folder, _interference(mutation, folder), options).checks
     except BadExport as error:
         outcome = _refusal(mutation, words, str(error))
     except Exception as error:

@@ -203,13 +203,13 @@ def test_an_open_hole_needs_three_quarters_of_its_turn(missing: float, count: in
 def test_loose_shells() -> None:
     found = shape(box(10, 10, 10), box(1, 1, 1, at=(20, 0, 0)), box(1, 1, 1, at=(0, 20, 0)))
     assert (found.pieces.solids, found.pieces.cavities) == (3, 0)
-    assert found.bulk.volume == pytest.approx(1002)
+    assert found.mass.volume == pytest.approx(1002)
 
 
 def test_inside_out_is_a_cavity_and_has_no_wall() -> None:
     found = shape(turned_inside_out(box(10, 10, 10)))
     assert (found.pieces.solids, found.pieces.cavities) == (0, 1)
-    assert found.bulk.volume == pytest.approx(-1000)
+    assert found.mass.volume == pytest.approx(-1000)
 
 
 BASE = shape(flange())
@@ -230,7 +230,7 @@ def test_a_rigid_motion_changes_no_figure(
     # A corner 500 mm away is rounded by 1.5e-5 mm on each axis.
     assert found.walls.least == pytest.approx(BASE.walls.least, abs=5e-4)
     assert np.sort(found.holes.diameter) == pytest.approx(np.sort(BASE.holes.diameter), abs=2e-4)
-    assert found.bulk.volume == pytest.approx(BASE.bulk.volume, rel=1e-5)
+    assert found.mass.volume == pytest.approx(BASE.mass.volume, rel=1e-5)
     at = matrix @ [*BASE.holes.middle[:, BASE.holes.diameter.argmin()], 1]
     assert found.holes.middle[:, found.holes.diameter.argmin()] == pytest.approx(at[:3], abs=1e-3)
 
@@ -242,7 +242,7 @@ def test_scaling_scales(scale: float) -> None:
     assert found.walls.least == pytest.approx(scale * BASE.walls.least, rel=1e-5)
     diameters = np.sort(found.holes.diameter)
     assert diameters == pytest.approx(scale * np.sort(BASE.holes.diameter), rel=1e-5)
-    assert found.bulk.volume == pytest.approx(scale**3 * BASE.bulk.volume, rel=1e-5)
+    assert found.mass.volume == pytest.approx(scale**3 * BASE.mass.volume, rel=1e-5)
 
 
 def test_the_same_mesh_gives_the_same_bits() -> None:

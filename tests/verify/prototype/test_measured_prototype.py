@@ -294,10 +294,10 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
 
 def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None:
     view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
-    bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
+    masses = {one.part.name: one.placed_mass for one in bodies_of(view) if one.placed_mass}
     checks = {
         check.name: check
-        for check in part_step_checks(view.export, bulks, read_step_files(view.export, 60))
+        for check in part_step_checks(view.export, masses, read_step_files(view.export, 60))
     }
     assert [name for name, check in checks.items() if not check.passed] == ["step properties"]
     assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
@@ -313,8 +313,8 @@ def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
         ),
     ):
         view = view_of(stepped(made, low, high))
-        bulks = {one.part.name: one.placed_bulk for one in bodies_of(view) if one.placed_bulk}
-        checks = part_step_checks(view.export, bulks, read_step_files(view.export, 60))
+        masses = {one.part.name: one.placed_mass for one in bodies_of(view) if one.placed_mass}
+        checks = part_step_checks(view.export, masses, read_step_files(view.export, 60))
         assert {check.name for check in checks if not check.passed} == names
 
 
@@ -352,6 +352,6 @@ def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
 def test_the_bend_of_a_cube_is_its_edges(view: PrototypeContext) -> None:
     """Twelve edges at a right angle, of 8, 8 and 2 mm."""
     stage = next(one for one in bodies_of(view) if one.part.name == "stage")
-    assert stage.placed_bulk is not None
-    assert stage.placed_bulk.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
+    assert stage.placed_mass is not None
+    assert stage.placed_mass.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
     assert mass_properties(stage.placed_mesh).volume == pytest.approx(128, rel=1e-6)

@@ -46,7 +46,7 @@ def signed(folder: Path) -> Path:
 
 def found(folder: Path) -> dict[str, Check]:
     """Failed and unknown checks by name."""
-    report = verify(folder, wishes=replace(HERE, write=False))
+    report = verify(folder, options=replace(HERE, write=False))
     return {check.name: check for check in report.checks if check.passed is not True}
 
 
@@ -93,7 +93,7 @@ def moved(row: Row, name: str, by: float) -> None:
 
 
 def test_a_good_prototype_passes(made: Path) -> None:
-    report = verify(made, wishes=HERE)
+    report = verify(made, options=HERE)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert report.verdict.startswith("PASS: no shell in this export; prototype: 4 balls at 48")
     section = json.loads((made / "verify.json").read_text())["prototype"]
@@ -105,20 +105,20 @@ def test_a_good_prototype_passes(made: Path) -> None:
 
 
 def test_the_proof_in_another_process_is_the_same(made: Path) -> None:
-    here = verify(made, wishes=replace(HERE, write=False))
-    apart = verify(made, wishes=replace(HERE, write=False, apart=True))
+    here = verify(made, options=replace(HERE, write=False))
+    apart = verify(made, options=replace(HERE, write=False, apart=True))
     assert apart.to_json() == here.to_json()
 
 
 def test_a_prototype_beside_a_shell(tmp_path: Path) -> None:
-    report = verify(export(tmp_path / "x", Machine(shell=True)), wishes=HERE)
+    report = verify(export(tmp_path / "x", Machine(shell=True)), options=HERE)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert "virtual cameras see" in report.verdict
     assert "prototype: 4 balls" in report.verdict
 
 
 def test_the_shell_is_not_asked_for_when_there_is_none(made: Path) -> None:
-    names = {check.name for check in verify(made, wishes=HERE).checks}
+    names = {check.name for check in verify(made, options=HERE).checks}
     assert "poses" in names
     assert not names & {"coverage, spheres", "light path", "mirrors found"}
 
@@ -421,7 +421,7 @@ def test_a_mesh_with_a_hole_fails(made: Path) -> None:
 
 
 def test_a_machine_that_cannot_make_the_parts_fails(made: Path) -> None:
-    report = verify(made, wishes=replace(HERE, write=False, printers=("sla",)))
+    report = verify(made, options=replace(HERE, write=False, printers=("sla",)))
     assert {c.file for c in report.checks if c.name == "print sla" and not c.passed} >= {"foot.stl"}
 
 

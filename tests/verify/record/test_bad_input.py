@@ -151,19 +151,19 @@ def test_broken_export_is_refused(good: Path, how: str, capsys: pytest.CaptureFi
 
 def test_missing_folder_and_file_for_folder(tmp_path: Path) -> None:
     with pytest.raises(BadExport, match="no such folder"):
-        verify(tmp_path / "nowhere", wishes=HERE)
+        verify(tmp_path / "nowhere", options=HERE)
     (tmp_path / "file").write_text("x")
     with pytest.raises(BadExport, match="not a folder"):
-        verify(tmp_path / "file", wishes=HERE)
+        verify(tmp_path / "file", options=HERE)
     (tmp_path / "empty").mkdir()
     with pytest.raises(BadExport, match=r"design\.json: missing"):
-        verify(tmp_path / "empty", wishes=HERE)
+        verify(tmp_path / "empty", options=HERE)
 
 
 def test_link_inside_is_followed(good: Path) -> None:
     (good / "shell_a.stl").rename(good / "real.stl")
     (good / "shell_a.stl").symlink_to("real.stl")
-    assert verify(sign(good, NAMES), wishes=HERE).passed
+    assert verify(sign(good, NAMES), options=HERE).passed
 
 
 def test_bad_arguments_are_bad_input() -> None:
@@ -182,7 +182,7 @@ def test_a_file_cut_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(files.np, "fromfile", cut)
     with pytest.raises(BadExport, match="changed while it was read"):
-        verify(good, wishes=HERE)
+        verify(good, options=HERE)
 
 
 def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +194,7 @@ def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.Monk
     real = os.fstat
     monkeypatch.setattr(files.os, "fstat", smaller)
     with pytest.raises(BadExport, match="changed while it was read"):
-        verify(good, wishes=HERE)
+        verify(good, options=HERE)
 
 
 def test_a_folder_that_takes_no_verdict(good: Path, capsys: pytest.CaptureFixture[str]) -> None:

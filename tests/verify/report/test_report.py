@@ -17,7 +17,7 @@ from tbcad_verify.mesh import rays
 from tbcad_verify.record.poses import geodesic
 from tbcad_verify.report.checks import Check, at_least, at_most, informative, worst_offenders
 from tbcad_verify.report.report import Report
-from tbcad_verify.run.verify import Options
+from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
 
 from tests.verify.benches import HERE
@@ -45,7 +45,7 @@ def detail(report: Report, name: str) -> str:
 
 
 def test_a_good_export_passes(good: Path) -> None:
-    report = verify(good, wishes=HERE)
+    report = verify(good, options=HERE)
     assert failed(report) == set()
     assert report.passed
     written = json.loads((good / "verify.json").read_text())
@@ -73,17 +73,17 @@ def test_a_good_export_passes(good: Path) -> None:
 
 
 def test_same_export_same_bytes(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    verify(good, wishes=HERE)
+    verify(good, options=HERE)
     before = (good / "verify.json").read_bytes()
     for threads in (1, 3):
         monkeypatch.setattr(rays, "THREADS", threads)
-        verify(good, wishes=HERE)
+        verify(good, options=HERE)
         assert (good / "verify.json").read_bytes() == before
     assert [path.name for path in good.iterdir() if "verify" in path.name] == ["verify.json"]
 
 
 def test_nothing_is_written_when_asked(good: Path) -> None:
-    assert verify(good, wishes=Options(write=False, apart=False)).passed
+    assert verify(good, options=VerifyOptions(write=False, apart=False)).passed
     assert not (good / "verify.json").exists()
 
 
@@ -237,7 +237,7 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str, str]] = {
 def test_broken_export_fails_for_its_reason(good: Path, how: str) -> None:
     change, name, words = BROKEN[how]
     change(good)
-    report = verify(sign(good, NAMES), wishes=HERE)
+    report = verify(sign(good, NAMES), options=HERE)
     assert not report.passed
     assert name in failed(report)
     assert words in detail(report, name)
@@ -262,14 +262,14 @@ def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
             "shell_b.stl": stl(mirrored(facets)),
         },
     )
-    assert failed(verify(folder, wishes=HERE)) == {"directions"}
+    assert failed(verify(folder, options=HERE)) == {"directions"}
 
 
 def test_changed_files_are_noticed(good: Path) -> None:
     data = bytearray((good / "shell_a.stl").read_bytes())
     data[0] ^= 1
     (good / "shell_a.stl").write_bytes(data)
-    report = verify(good, wishes=HERE)
+    report = verify(good, options=HERE)
     assert failed(report) == {"manifest"}
     assert "shell_a.stl" in detail(report, "manifest")
 
@@ -277,14 +277,14 @@ def test_changed_files_are_noticed(good: Path) -> None:
 def test_listed_but_missing_and_unlisted_files(good: Path) -> None:
     (good / "notes.csv").write_text("x")
     sign(good, [*NAMES, "notes.csv"])
-    assert verify(good, wishes=HERE).passed
+    assert verify(good, options=HERE).passed
     (good / "notes.csv").unlink()
-    assert failed(verify(good, wishes=HERE)) == {"manifest"}
+    assert failed(verify(good, options=HERE)) == {"manifest"}
     sign(good, NAMES[:3])
-    assert "shell_b.stl" in detail(verify(good, wishes=HERE), "manifest")
+    assert "shell_b.stl" in detail(verify(good, options=HERE), "manifest")
     sign(good, NAMES)
     (good / "notes.txt").write_text("mine")
-    report = verify(good, wishes=HERE)
+    report = verify(good, options=HERE)
     assert report.passed
     assert next(c.measured for c in report.checks if c.name == "other files") == 1
 
@@ -296,7 +296,7 @@ def test_a_check_that_breaks_is_unknown_and_no_pass(
         raise ZeroDivisionError("on purpose")
 
     monkeypatch.setattr(pixels.light, "full_sensor", broken)
-    report = verify(good, wishes=HERE)
+    report = verify(good, options=HERE)
     assert not report.passed
     unknown = {check.name for check in report.checks if check.passed is None}
     assert unknown == set(pixels.CHECKS)
@@ -316,7 +316,7 @@ def test_everything_optical_is_unknown_without_a_bench(
         raise MemoryError
 
     monkeypatch.setattr(stages, "recover", broken)
-    report = verify(good, wishes=HERE)
+    report = verify(good, options=HERE)
     names = {check.name for check in report.checks if check.passed is None}
     assert {"mirrors found", "coverage, facets", "light path"} <= names
     assert "watertight" not in names
@@ -326,7 +326,7 @@ def test_a_spec_without_its_keys_is_unknown(good: Path) -> None:
     design = json.loads((good / "design.json").read_text())
     del design["spec"]["optics"]
     (good / "design.json").write_text(json.dumps(design))
-    report = verify(sign(good, NAMES), wishes=HERE)
+    report = verify(sign(good, NAMES), options=HERE)
     unknown = {check.name for check in report.checks if check.passed is None}
     assert unknown == {"requirements", "poses", "directions"}
     assert not report.passed

@@ -13,8 +13,8 @@ import pytest
 from tbcad_verify.run.child import Limits, Outcome, run
 
 
-def python(place: Path, body: str, limits: Limits | None = None) -> Outcome:
-    return run([sys.executable, "-IS", "-c", body], place, limits or Limits(10))
+def python(folder: Path, body: str, limits: Limits | None = None) -> Outcome:
+    return run([sys.executable, "-IS", "-c", body], folder, limits or Limits(10))
 
 
 def is_alive(pid: int) -> bool:

@@ -1,4 +1,4 @@
-"""A stage that crashes, hangs or talks nonsense is unknown, as is all after it: never a pass."""
+"""A stage that crashes, hangs or sends nonsense is unknown, and so are those after it."""
 
 from __future__ import annotations
 
@@ -10,94 +10,110 @@ import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
-from tbcad_verify.run.results import JsonLinesSink, Results, replay
-from tbcad_verify.run.verify import Options, verify
-from tbcad_verify.run.watch import watched
+from tbcad_verify.run.results import CollectedResults, Results
+from tbcad_verify.run.verify import VerifyOptions, verify
+from tbcad_verify.run.watch import UNREADABLE, watch
 
 STAGES = ("one", "two", "three")
-BEGUN = (
-    "import sys, os, time, json;"
-    "print(json.dumps({'stage': 'one'}));"
-    "print(json.dumps({'checks': [{'name': 'a', 'file': '', 'passed': True, 'measured': 1.0,"
-    " 'limit': 2.0, 'unit': 'mm', 'detail': ''}]}));"
-    "print(json.dumps({'stage': 'two'}), flush=True);"
-)
-ENDS = {
+CHECK = Check("a", "", True, 1.0, 2.0, "mm")
+BEGUN = """
+import os, sys, time
+from multiprocessing.connection import Connection
+from tbcad_verify.errors import BadExport
+from tbcad_verify.report.checks import Check
+from tbcad_verify.run.results import Results
+pipe = Connection(os.dup(1), readable=False)
+pipe.send(Results(stages=["one"], checks=[Check("a", "", True, 1.0, 2.0, "mm")]))
+pipe.send(Results(stages=["two"]))
+"""
+FAILURES = {
     "crash": ("os.kill(os.getpid(), 11)", "crashed (SIGSEGV)"),
     "killed": ("os.kill(os.getpid(), 9)", "crashed (SIGKILL)"),
-    "quiet end": ("sys.exit(0)", "ended with exit code 0"),
-    "trouble": ("sys.exit(3)", "ended with exit code 3"),
-    "hangs": ("time.sleep(60)", "took more than 1 s and was stopped"),
-    "nonsense": ("print('hello', flush=True); time.sleep(60)", "said what nobody understands"),
-    "half a line": ("print('{', end='', flush=True)", "said what nobody understands"),
+    "no end": ("sys.exit(0)", "ended with exit code 0"),
+    "exit code": ("sys.exit(3)", "ended with exit code 3"),
+    "hangs": ("time.sleep(60)", "took more than 5 s and was stopped"),
+    "no pickle": ("pipe.send_bytes(b'hello'); time.sleep(60)", UNREADABLE),
+    "no results": ("pipe.send('hello'); time.sleep(60)", UNREADABLE),
+    "half a message": ("os.write(1, bytes(3))", "ended with exit code 0"),
+    "hangs in a message": ("os.write(1, bytes(3)); time.sleep(60)", "took more than 5 s"),
 }
 
 
-def told(code: str, seconds: float = 30) -> Results:
-    results = Results(lambda _: None)
-    watched([sys.executable, "-c", BEGUN + code], STAGES, results, seconds)
+def watched(code: str, seconds: float = 30) -> CollectedResults:
+    results = CollectedResults()
+    watch([sys.executable, "-c", BEGUN + code], STAGES, results, seconds)
     return results
 
 
-@pytest.mark.parametrize("how", ENDS)
-def test_what_does_not_come_to_an_end_is_unknown(how: str) -> None:
-    code, reason = ENDS[how]
-    results = told(code, 1 if how == "hangs" else 30)
-    assert [(check.name, check.passed) for check in results.found] == [
-        ("a", True),
-        ("two", None),
-        ("three", None),
-    ]
-    assert results.found[1].detail == reason
-    assert results.found[2].detail == f"not reached: 'two' {reason}"
+@pytest.mark.parametrize("failure", FAILURES)
+def test_a_stage_without_an_end_is_unknown(failure: str) -> None:
+    code, reason = FAILURES[failure]
+    results = watched(code, 5 if reason.startswith("took") else 30)
+    verdicts = [(check.name, check.passed) for check in results.checks]
+    assert verdicts == [("a", True), ("two", None), ("three", None)]
+    assert results.checks[1].detail.startswith(reason)
+    assert results.checks[2].detail == f"not reached: 'two' {results.checks[1].detail}"
 
 
-def test_a_process_that_never_speaks() -> None:
-    results = Results(lambda _: None)
-    watched([sys.executable, "-c", "pass"], STAGES, results, 30)
-    assert [(c.name, c.passed) for c in results.found] == [(name, None) for name in STAGES]
+def test_a_worker_that_sends_nothing() -> None:
+    results = CollectedResults()
+    watch([sys.executable, "-c", "pass"], STAGES, results, 30)
+    assert [(c.name, c.passed) for c in results.checks] == [(name, None) for name in STAGES]
 
 
-def test_what_comes_to_an_end_is_handed_on() -> None:
-    results = told("print(json.dumps({'stage': 'three'})); print(json.dumps({'done': True}))")
+def test_a_worker_that_ends_is_left_as_it_is() -> None:
+    results = watched("pipe.send(Results(stages=['three'])); pipe.send(None)")
     assert results.stages == list(STAGES)
-    assert results.found == [Check("a", "", True, 1.0, 2.0, "mm")]
+    assert results.checks == [CHECK]
 
 
-def test_a_refusal_is_the_callers() -> None:
+def test_a_refusal_is_raised() -> None:
     with pytest.raises(BadExport, match="the file is bad"):
-        told("print(json.dumps({'refused': 'the file is bad'}), flush=True)")
+        watched("pipe.send(BadExport('the file is bad'))")
 
 
-def test_lines_are_what_was_sent(tmp_path: Path) -> None:
-    checks = [Check("a", "f", None, None, None, "mm", "why"), Check("b", "", False, 1.5, 1.0, "mm")]
+def test_no_worker_outlives_an_interrupt() -> None:
+    """Ctrl-C, here from the progress report of a stage."""
+
+    def interrupt(title: str) -> None:
+        if title.isdecimal():
+            started.append(int(title))
+            raise KeyboardInterrupt
+
+    started: list[int] = []
+    results = CollectedResults(progress=interrupt)
+    code = "pipe.send(Results(stages=[str(os.getpid())])); time.sleep(60)"
+    with pytest.raises(KeyboardInterrupt):
+        watch([sys.executable, "-c", BEGUN + code], STAGES, results, 30)
+    assert started
+    assert not Path(f"/proc/{started[0]}").exists()
+
+
+def test_results_add_up() -> None:
+    titles: list[str] = []
+    results = CollectedResults(progress=titles.append)
     column = np.array([1.0, np.nan, 0.1 + 0.2])
-    with (tmp_path / "lines").open("w") as stream:
-        lines = JsonLinesSink(stream)
-        lines.stage("s")
-        lines.checks(checks)
-        lines.mirrors({"pixels": column})
-        lines.send({"done": True})
-    results = Results(lambda _: None)
-    ended = [replay(line, results) for line in (tmp_path / "lines").read_text().splitlines()]
-    assert ended == [False, False, False, True]
-    assert results.stages == ["s"]
-    assert results.found == checks
-    np.testing.assert_array_equal(results.columns["pixels"], column)
+    results.add(Results(stages=["s"], checks=[CHECK], prototype={"balls": []}))
+    results.add(Results(mirrors={"pixels": column}, printing=[{"part": "x"}], checks=[CHECK]))
+    assert titles == results.stages == ["s"]
+    assert results.checks == [CHECK, CHECK]
+    assert results.prototype == {"balls": []}
+    assert results.printing == [{"part": "x"}]
+    np.testing.assert_array_equal(results.mirrors["pixels"], column)
 
 
-def test_the_same_proof_apart_and_here(good: Path) -> None:
+def test_the_result_is_the_same_in_a_process_of_its_own(good: Path) -> None:
     said: list[str] = []
     assert verify(good, said.append).passed
     apart = (good / NAME).read_bytes()
     here: list[str] = []
-    assert verify(good, here.append, Options(apart=False)).passed
+    assert verify(good, here.append, VerifyOptions(apart=False)).passed
     assert (good / NAME).read_bytes() == apart
     assert said == here
 
 
 def test_too_little_time_is_no_pass(good: Path) -> None:
-    report = verify(good, wishes=Options(seconds=0.01))
+    report = verify(good, options=VerifyOptions(seconds=0.01))
     assert not report.passed
     assert {check.passed for check in report.checks} == {None}
     assert "unknown: reading" in report.verdict
@@ -113,7 +129,7 @@ def test_a_file_replaced_while_it_is_read(good: Path) -> None:
             copy.replace(good / "shell_a.stl")
 
     with pytest.raises(BadExport, match=r"shell_a\.stl: changed while it was read"):
-        verify(good, replace, Options(apart=False))
+        verify(good, replace, VerifyOptions(apart=False))
     assert not (good / NAME).exists()
 
 
@@ -123,4 +139,4 @@ def test_a_file_removed_while_it_is_read(good: Path) -> None:
             (good / "mirrors.csv").unlink()
 
     with pytest.raises(BadExport, match=r"mirrors\.csv: changed"):
-        verify(good, remove, Options(apart=False))
+        verify(good, remove, VerifyOptions(apart=False))

@@ -214,7 +214,7 @@ def test_a_mirror_without_pixels_fails(good: Path) -> None:
     for camera in design["cameras"]:
         camera["width_px"], camera["height_px"] = 13, 10
     (good / "design.json").write_text(json.dumps(design))
-    report = verify(good, wishes=replace(HERE, write=False))
+    report = verify(good, options=replace(HERE, write=False))
     lines = {c.name: c for c in report.checks}
     assert lines["pixels a virtual camera"].passed is False
     assert lines["pixels a virtual camera"].measured == 0

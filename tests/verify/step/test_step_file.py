@@ -47,11 +47,11 @@ def test_box_in_closed_form(tmp_path: Path) -> None:
     found = both(written(tmp_path, box((-4, -8, -12), (6, 12, 18))))
     assert found.counts == {"solids": 1, "shells": 1, "open_edges": 0}
     assert found.valid
-    assert found.bulk.volume == pytest.approx(6000, rel=1e-12)
-    assert found.bulk.area == pytest.approx(2200, rel=1e-12)
-    assert found.bulk.centroid == pytest.approx([1, 2, 3], abs=1e-9)
-    assert found.bulk.low == pytest.approx([-4, -8, -12], abs=1e-9)
-    assert found.bulk.high == pytest.approx([6, 12, 18], abs=1e-9)
+    assert found.mass.volume == pytest.approx(6000, rel=1e-12)
+    assert found.mass.area == pytest.approx(2200, rel=1e-12)
+    assert found.mass.centroid == pytest.approx([1, 2, 3], abs=1e-9)
+    assert found.mass.low == pytest.approx([-4, -8, -12], abs=1e-9)
+    assert found.mass.high == pytest.approx([6, 12, 18], abs=1e-9)
     assert found.properties == {}
     faces = found.faces
     assert set(faces.kind) == {"plane"}
@@ -73,15 +73,15 @@ def test_ball_and_its_hollow(tmp_path: Path) -> None:
     spheres = hollow.faces.kind == "sphere"
     assert spheres.any()
     assert not hollow.faces.outward[spheres].any()
-    assert hollow.bulk.volume == pytest.approx(8000 - 36 * np.pi, rel=1e-9)
+    assert hollow.mass.volume == pytest.approx(8000 - 36 * np.pi, rel=1e-9)
 
 
 def test_box_of_a_cap(tmp_path: Path) -> None:
     cap = BRepAlgoAPI_Common(ball(10), box((-20, -20, 8), (20, 20, 18))).Shape()
     found = both(written(tmp_path, cap))
     wide = 6.0  # the circle 8 mm up a sphere of 10
-    assert found.bulk.low == pytest.approx([-wide, -wide, 8], abs=1e-6)
-    assert found.bulk.high == pytest.approx([wide, wide, 10], abs=1e-6)
+    assert found.mass.low == pytest.approx([-wide, -wide, 8], abs=1e-6)
+    assert found.mass.high == pytest.approx([wide, wide, 10], abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -97,8 +97,8 @@ def test_box_of_a_turned_ball_with_a_flat(tmp_path: Path, seed: int) -> None:
     cosine = np.outer([-1, 1], [up.X(), up.Y(), up.Z()])
     rim = cosine * flat + np.sqrt(radius**2 - flat**2) * np.sqrt(1 - cosine**2)
     low, high = np.where(cosine * radius <= flat, radius, rim)
-    assert found.bulk.low == pytest.approx(-low, abs=1e-6)
-    assert found.bulk.high == pytest.approx(high, abs=1e-6)
+    assert found.mass.low == pytest.approx(-low, abs=1e-6)
+    assert found.mass.high == pytest.approx(high, abs=1e-6)
 
 
 def test_two_solids_are_counted(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_two_solids_are_counted(tmp_path: Path) -> None:
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
     found, here = examine(load(tmp_path, file.name), 60), both(file)
-    assert found.bulk == here.bulk
+    assert found.mass == here.mass
     assert found.faces.names == here.faces.names
 
 

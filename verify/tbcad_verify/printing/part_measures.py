@@ -38,7 +38,7 @@ class PartMeasures:
     Attributes:
         mesh: its triangles.
         status: manifold3d's word; "NoError" is good.
-        bulk: volume, area, middle, box.
+        mass: volume, area, middle, box.
         pieces: separate solids, and closed cavities.
         walls: thickness.
         holes: round ones.
@@ -48,7 +48,7 @@ class PartMeasures:
 
     mesh: Mesh
     status: str
-    bulk: MassProperties
+    mass: MassProperties
     pieces: MeshPieces
     walls: WallThickness
     holes: RoundHoles

@@ -82,7 +82,7 @@ def place(shape: PartMeasures, profile: Profile) -> Placement:
 
 def _rank(shape: PartMeasures, pose: Pose, overhang: float | None) -> tuple[int, int, int]:
     # Whole numbers, so that rounding does not choose between orientations that are alike.
-    grain = 1e-6 * shape.bulk.area
+    grain = 1e-6 * shape.mass.area
     height, tilt = float(pose.size[2]), 1 - float(pose.rotation[2, 2])
     return round((overhang or 0) / grain), round(height / SLACK_MM), round(1e6 * tilt)
 

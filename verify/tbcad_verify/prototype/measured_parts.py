@@ -14,21 +14,13 @@ from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, me
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype_record import Printed
-from tbcad_verify.report.checks import Check, Unknown, at_most, guarded, reason_of
-from tbcad_verify.shell.integrity import fold_check, mesh_checks
+from tbcad_verify.report.checks import Check, Unknown, at_most, check_names, guarded, reason_of
+from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
 
 ROTATION = 1e-9
 BED_MM = 0.05
 # Round bosses meet ribs in grooves that run out to a few degrees; what is closer is a fold.
 FOLD_RAD = 0.02
-SOLID = {
-    "watertight": "bad edges",
-    "facets": "bad facets",
-    "outward": "mm^3",
-    "components": "solids",
-    "manifold3d": "complaints",
-    "folds": "edges",
-}
 POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 
@@ -41,8 +33,8 @@ class MeasuredPart:
         mesh: as it lies on the bed; None where it could not be made out.
         placed: the same in the frame of the shell, the base at angle zero.
         topology: of the mesh.
-        bulk: of the mesh on the bed.
-        placed_bulk: of the placed mesh.
+        mass: of the mesh on the bed.
+        placed_mass: of the placed mesh.
         checks: of mesh and pose.
         reason: why something is None.
     """
@@ -51,8 +43,8 @@ class MeasuredPart:
     mesh: Mesh | None
     placed: Mesh | None
     topology: Topology | None
-    bulk: MassProperties | None
-    placed_bulk: MassProperties | None
+    mass: MassProperties | None
+    placed_mass: MassProperties | None
     checks: list[Check]
     reason: str
 
@@ -84,7 +76,7 @@ def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
         part,
         lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, count_folds(edges, FOLD_RAD))],
     )
-    checks += guarded([(k, part.stl, u) for k, u in POSE.items()], lambda: pose_checks(part, mesh))
+    checks += guarded(check_names(POSE, part.stl), lambda: pose_checks(part, mesh))
     return MeasuredPart(part, mesh, placed, found, mass_properties(mesh), lump, checks, "")
 
 
@@ -98,7 +90,7 @@ def put_back(mesh: Mesh, part: Printed) -> Mesh:
 def pose_checks(part: Printed, mesh: Mesh) -> list[Check]:
     """The pose is a rotation, without mirroring, and the part lies on the bed and not in it."""
     gram = np.abs(part.axes @ part.axes.T - np.eye(3)).max()
-    turn, bed = ((name, part.stl, unit) for name, unit in POSE.items())
+    turn, bed = check_names(POSE, part.stl)
     off = max(float(gram), abs(float(np.linalg.det(part.axes)) - 1))
     low = float(mesh.points[:, 2].min())
     return [
@@ -129,12 +121,12 @@ def _bend(mesh: Mesh, edges: Edges) -> float:
 
 
 def _checks(part: Printed, work: Callable[[], list[Check]]) -> list[Check]:
-    return guarded([(name, part.stl, unit) for name, unit in SOLID.items()], work)
+    return guarded(check_names({**TOPOLOGY, **FOLDS}, part.stl), work)
 
 
 def _unknown(part: Printed, error: Exception) -> list[Check]:
     def broken() -> list[Check]:
         raise error
 
-    names = [(name, part.stl, unit) for name, unit in {**SOLID, **POSE}.items()]
+    names = check_names({**TOPOLOGY, **FOLDS, **POSE}, part.stl)
     return guarded(names, broken)

@@ -36,7 +36,7 @@ from tbcad_verify.report.checks import (
     short_list,
     worst_offenders,
 )
-from tbcad_verify.run.results import ResultSink
+from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.types import Floats
 
 PRINTING = "printability of the prototype"
@@ -60,7 +60,7 @@ DIGITS = 9
 
 
 def verify_prototype(
-    export: Export, prototype: Prototype, facets: Sequence[Facets], taker: ResultSink
+    export: Export, prototype: Prototype, facets: Sequence[Facets], sink: ResultSink
 ) -> list[MeasuredPart]:
     """Make all stages but printability, and hand over what each finds.
 
@@ -68,51 +68,60 @@ def verify_prototype(
         export: the record.
         prototype: its's.
         facets: of its parts, as read.
-        taker: of stages, checks and figures.
+        sink: takes the results.
 
     Returns:
         The parts, measured.
     """
     context = PrototypeContext(export, prototype)
-    taker.stage(STAGES[0])
-    taker.checks(record_checks.checks(context))
-    taker.checks(plan_checks.checks(context))
-    taker.stage(STAGES[1])
+    sink(Results(stages=[STAGES[0]]))
+    sink(Results(checks=record_checks.checks(context)))
+    sink(Results(checks=plan_checks.checks(context)))
+    sink(Results(stages=[STAGES[1]]))
     pairs = list(zip(prototype.parts, facets, strict=True))
     bodies = in_threads(lambda pair: measure_part(*pair), pairs)
     for one in bodies:
-        taker.checks(one.checks)
-        if one.placed_bulk is not None:
-            taker.bulk(one.part.name, one.placed_bulk)
-    taker.stage(STAGES[2])
-    held, measured = _seats(context, bodies, taker)
-    taker.stage(STAGES[3])
+        masses = {} if one.placed_mass is None else {one.part.name: one.placed_mass}
+        sink(Results(checks=one.checks, masses=masses))
+    sink(Results(stages=[STAGES[2]]))
+    held, measured = _seats(context, bodies, sink)
+    sink(Results(stages=[STAGES[3]]))
     ready, reason = attempt(lambda: measure_prototype(context, _known(held), measured, bodies))
     shown, why = attempt(lambda: ball_views(require(ready, reason)))
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in LIGHT.items()]
-    taker.checks(guarded(names, lambda: _light(context, require(shown, reason or why), names)))
-    taker.stage(STAGES[4])
-    _swing(context, ready, reason, bodies, taker)
-    taker.prototype(json_rows(context, held, shown))
+    sink(
+        Results(
+            checks=guarded(names, lambda: _light(context, require(shown, reason or why), names))
+        )
+    )
+    sink(Results(stages=[STAGES[4]]))
+    _swing(context, ready, reason, bodies, sink)
+    sink(Results(prototype=json_rows(context, held, shown)))
     return bodies
 
 
 def _seats(
-    context: PrototypeContext, bodies: list[MeasuredPart], taker: ResultSink
+    context: PrototypeContext, bodies: list[MeasuredPart], sink: ResultSink
 ) -> tuple[MeasuredSeats | None, list[caps.MeasuredCap]]:
     files = _files(bodies, "base")
     base, reason = attempt(lambda: joined_meshes(of_roles(bodies, "base"))[0])
     held, why = attempt(lambda: seats.measure_seats(context, require(base, reason)))
     names = [(name, files, unit) for name, unit in seats.CHECKS.items()]
-    taker.checks(guarded(names, lambda: seats.checks(context, require(held, reason or why), files)))
+    sink(
+        Results(
+            checks=guarded(
+                names, lambda: seats.checks(context, require(held, reason or why), files)
+            )
+        )
+    )
     made = of_roles(bodies, "cap")
     if not context.prototype.balls.cap.any():
         return held, []
     found, odd = attempt(lambda: [caps.measure_cap(context, one) for one in made])
     files = _files(bodies, "cap")
     names = [(name, files, unit) for name, unit in caps.CHECKS.items()]
-    taker.checks(guarded(names, lambda: caps.checks(context, require(found, odd), files)))
+    sink(Results(checks=guarded(names, lambda: caps.checks(context, require(found, odd), files))))
     return held, found or []
 
 
@@ -121,25 +130,31 @@ def _swing(
     ready: MeasuredPrototype | None,
     reason: str,
     bodies: list[MeasuredPart],
-    taker: ResultSink,
+    sink: ResultSink,
 ) -> None:
     files = _files(bodies, "base", "cap", "stage", "frame")
     names = [(name, files, unit) for name, unit in swing.CHECKS.items()]
     found, odd = attempt(lambda: assembly.assembly_meshes(context))
     bought, why = attempt(lambda: assembly.standing_solids(context, require(found, odd)))
-    taker.checks(
-        guarded(
-            names,
-            lambda: swing.checks(require(ready, reason), bodies, require(bought, why), files),
+    sink(
+        Results(
+            checks=guarded(
+                names,
+                lambda: swing.checks(require(ready, reason), bodies, require(bought, why), files),
+            )
         )
     )
     whole = (assembly.CHECK[0], context.prototype.assembly[1], assembly.CHECK[1])
-    taker.checks(
-        guarded([whole], lambda: [assembly.check(whole, context, bodies, require(found, odd))])
+    sink(
+        Results(
+            checks=guarded(
+                [whole], lambda: [assembly.check(whole, context, bodies, require(found, odd))]
+            )
+        )
     )
     files = _files(bodies, "stage")
     names = [(name, files, unit) for name, unit in leds.CHECKS.items()]
-    taker.checks(guarded(names, lambda: leds.checks(context, bodies, files)))
+    sink(Results(checks=guarded(names, lambda: leds.checks(context, bodies, files))))
 
 
 def _light(context: PrototypeContext, found: BallViews, names: list[CheckName]) -> list[Check]:

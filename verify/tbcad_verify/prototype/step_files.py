@@ -40,19 +40,19 @@ def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unkn
 
 
 def part_step_checks(
-    export: Export, bulks: dict[str, MassProperties], found: dict[str, StepFile | Unknown]
+    export: Export, masses: dict[str, MassProperties], found: dict[str, StepFile | Unknown]
 ) -> list[Check]:
     """All checks of the STEP files of a prototype's parts.
 
     Args:
         export: the record.
-        bulks: figures of the meshes moved back to their places, by part.
+        masses: figures of the meshes moved back to their places, by part.
         found: the files as read.
     """
     return [
         check
         for part in _parts(export)
-        for check in _part(export, part, found[part.name], bulks.get(part.name))
+        for check in _part(export, part, found[part.name], masses.get(part.name))
     ]
 
 
@@ -61,16 +61,16 @@ def _parts(export: Export) -> list[Printed]:
 
 
 def _part(
-    export: Export, part: Printed, found: StepFile | Unknown, bulk: MassProperties | None
+    export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
     names = [(name, part.step, unit) for name, unit in UNITS.items()]
-    return guarded(names, partial(_known, export, part, found, bulk))
+    return guarded(names, partial(_known, export, part, found, mass))
 
 
 def _known(
-    export: Export, part: Printed, found: StepFile | Unknown, bulk: MassProperties | None
+    export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
     if isinstance(found, Unknown):
         raise found
-    lump = PartComparison(part.name, found, bulk, export.mesh_error_mm, CLAIM_SHARE)
+    lump = PartComparison(part.name, found, mass, export.mesh_error_mm, CLAIM_SHARE)
     return comparison_checks(part.step, lump)

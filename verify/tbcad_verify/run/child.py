@@ -1,4 +1,7 @@
-"""One child process: limited in time and output, without our settings, and never left behind."""
+"""One child process, limited in time and output, without the user's settings.
+
+It is never left running.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,16 @@ import contextlib
 import os
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-KEPT = ("PATH", "LD_LIBRARY_PATH")  # all that a program needs of our environment
-TICK_S = 0.02
-CHUNK = 1 << 16  # bytes
+KEPT_VARIABLES = ("PATH", "LD_LIBRARY_PATH")  # all that a program needs of our environment
+POLL_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class Limits:
     Attributes:
         seconds: time from its start.
         output: bytes printed.
-        stop: once set, children are killed and no new one is started.
+        stop: once this is set, children are killed and none is started.
     """
 
     seconds: float = 300.0
@@ -38,10 +41,10 @@ class Outcome:
     """How a child ended.
 
     Attributes:
-        code: exit status; None when it was stopped, crashed or never started.
-        text: what it printed to both of its outputs, as far as the limit allows.
+        code: exit status; None if it was stopped, crashed or never started.
+        text: what it printed to stdout and stderr, up to the limit.
         seconds: how long it ran.
-        reason: why there is no exit status; empty when there is one.
+        reason: why there is no exit status; empty if there is one.
     """
 
     code: int | None
@@ -50,98 +53,92 @@ class Outcome:
     reason: str = ""
 
 
-def run(command: Sequence[str], place: Path, limits: Limits) -> Outcome:
-    """Run a program in a folder of its own and wait for its end.
+def run(command: Sequence[str], folder: Path, limits: Limits) -> Outcome:
+    """Run a program in a private folder and wait for its end.
 
-    It reads nothing, sees no screen, and finds its home in the folder, so that the user's settings
-    neither matter nor change. Whatever it started is killed when it ends.
+    The program has no input and no screen. Its home is in the folder, so that the user's settings
+    neither matter nor change. Processes that it started are killed when it ends.
 
     Args:
         command: absolute path of the program, and its arguments.
-        place: an existing private folder.
+        folder: an existing private folder.
         limits: of time and output.
     """
     if limits.stop.is_set():
         return Outcome(None, "", 0.0, "stopped")
     started = time.monotonic()
-    try:
-        child = _start(command, place)
-    except (OSError, ValueError) as error:
-        return Outcome(None, "", 0.0, f"cannot be started ({error})")
-    with child:
+    with tempfile.TemporaryFile() as output:
         try:
-            said, reason = _listen(child, started + limits.seconds, limits)
+            child = _start(command, folder, output)
+        except (OSError, ValueError) as error:
+            return Outcome(None, "", 0.0, f"cannot be started ({error})")
+        try:
+            reason = _wait(child, output, started + limits.seconds, limits)
         finally:
-            _kill(child)
-    text = said.decode("utf-8", "replace").replace(str(place), ".")
-    seconds = time.monotonic() - started
-    why = reason or _crash(child.returncode)
-    return Outcome(None if why else child.returncode, text, seconds, why)
+            kill_group(child)
+        output.seek(0)
+        text = output.read(limits.output).decode("utf-8", "replace").replace(str(folder), ".")
+    reason = reason or crash_reason(child.returncode)
+    code = None if reason else child.returncode
+    return Outcome(code, text, time.monotonic() - started, reason)
 
 
-def _start(command: Sequence[str], place: Path) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        list(command),
-        cwd=place,
-        env=_environment(place),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,  # a process group that can be killed as a whole
-    )
-
-
-def _environment(place: Path) -> dict[str, str]:
-    home = place / "home"
-    home.mkdir(exist_ok=True)
-    own = {f"XDG_{what}_HOME": str(home / what.lower()) for what in ("CONFIG", "DATA", "CACHE")}
-    return {
-        **{name: os.environ[name] for name in KEPT if name in os.environ},
-        **own,
-        "HOME": str(home),
-        "FREECAD_USER_HOME": str(home),
-        "TMPDIR": str(place),
-        "LC_ALL": "C.UTF-8",
-        "QT_QPA_PLATFORM": "offscreen",
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-
-
-def _listen(child: subprocess.Popen[bytes], deadline: float, limits: Limits) -> tuple[bytes, str]:
-    stream = child.stdout
-    assert stream is not None
-    os.set_blocking(stream.fileno(), False)
-    said = bytearray()
-    while True:
-        ended = child.poll() is not None  # asked first: then all that it printed is there to read
-        _drain(stream, said, limits.output)
-        if len(said) > limits.output:
-            return bytes(said[: limits.output]), f"printed more than {limits.output} bytes"
-        if ended:
-            return bytes(said), ""
-        if time.monotonic() > deadline:
-            return bytes(said), f"no answer within {limits.seconds:g} s"
-        if limits.stop.wait(TICK_S):
-            return bytes(said), "stopped"
-
-
-def _drain(stream: IO[bytes], said: bytearray, limit: int) -> None:
-    with contextlib.suppress(BlockingIOError):
-        while len(said) <= limit and (more := os.read(stream.fileno(), CHUNK)):
-            said += more
-
-
-def _kill(child: subprocess.Popen[bytes]) -> None:
-    """Kill the group, which may outlive the child that led it."""
+def kill_group(child: subprocess.Popen[Any]) -> None:
+    """Kill a child's process group, which may outlive the child, and wait for the child's end."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child.pid, signal.SIGKILL)
     child.wait()
 
 
-def _crash(code: int) -> str:
+def crash_reason(code: int) -> str:
+    """The signal that ended a process, from its return code; empty if it ended by itself."""
     if code >= 0:
         return ""
     try:
         return f"crashed ({signal.Signals(-code).name})"
     except ValueError:
         return f"crashed (signal {-code})"
+
+
+def _start(command: Sequence[str], folder: Path, output: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        list(command),
+        cwd=folder,
+        env=_environment(folder),
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,  # a process group that can be killed as a whole
+    )
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    home = folder / "home"
+    home.mkdir(exist_ok=True)
+    xdg = {f"XDG_{what}_HOME": str(home / what.lower()) for what in ("CONFIG", "DATA", "CACHE")}
+    return {
+        **{name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ},
+        **xdg,
+        "HOME": str(home),
+        "FREECAD_USER_HOME": str(home),
+        "TMPDIR": str(folder),
+        "LC_ALL": "C.UTF-8",
+        "QT_QPA_PLATFORM": "offscreen",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+
+
+def _wait(
+    child: subprocess.Popen[bytes], output: IO[bytes], deadline: float, limits: Limits
+) -> str:
+    """Wait for a child's end; why it must be killed before, or nothing."""
+    while True:
+        ended = child.poll() is not None  # asked first: then all that it printed is in the file
+        if os.fstat(output.fileno()).st_size > limits.output:
+            return f"printed more than {limits.output} bytes"
+        if ended:
+            return ""
+        if time.monotonic() > deadline:
+            return f"no answer within {limits.seconds:g} s"
+        if limits.stop.wait(POLL_S):
+            return "stopped"

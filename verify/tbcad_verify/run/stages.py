@@ -1,8 +1,11 @@
-"""The stages that read the meshes. Each stands alone: one that breaks is unknown, never passed."""
+"""The stages that read the meshes.
+
+Each is independent of the others: the checks of one that breaks are unknown, never passed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,196 +18,215 @@ from tbcad_verify.printing.assessment import assess, print_name, to_row
 from tbcad_verify.printing.assessment import checks as printing_checks
 from tbcad_verify.printing.part_measures import measure
 from tbcad_verify.printing.profile import Profile, built_in, load
-from tbcad_verify.prototype import stages as machine
 from tbcad_verify.prototype.measured_parts import MeasuredPart
-from tbcad_verify.record.poses import virtual_cameras
+from tbcad_verify.prototype.stages import PRINTING, verify_prototype
+from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import Export, Part, read_export
-from tbcad_verify.report.checks import Check, CheckName, attempt, guarded, require
-from tbcad_verify.run.results import ResultSink
+from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
+from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
-from tbcad_verify.shell.integrity import fold_check, manifest_checks, mesh_checks, record_checks
+from tbcad_verify.shell.integrity import (
+    FOLDS,
+    MANIFEST,
+    TOPOLOGY,
+    fold_check,
+    manifest_checks,
+    mesh_checks,
+    record_checks,
+)
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import Recovery, recover
+from tbcad_verify.types import Floats
 
-STAGES = (
+SHELL_STAGES = (
     "reading",
     "3MF",
     "files and record",
     "meshes and mirrors",
     "printability",
-    "optical bench",
+    "optical setup",
     "coverage",
     "every pixel",
 )
-SOLID = ("watertight", "facets", "outward", "components", "manifold3d")
-FILES = (("manifest", "manifest.json", "wrong files"), ("other files", "", "files"))
+READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
+
+Digests = dict[str, tuple[int, str]]  # size and sha256 by file name
 
 
 @dataclass(frozen=True)
-class Solid:
-    """One part as read, None where working something out broke, and why."""
+class ShellPart:
+    """One part of a shell as measured; None where that failed.
 
+    Attributes:
+        part: its record.
+        mesh: its triangles, joined.
+        topology: what is wrong with the mesh.
+        mass: volume, area, centroid and box.
+        recovery: its patches and mirrors.
+        checks: of the mesh.
+        reason: why something is None.
+    """
+
+    part: Part
     mesh: Mesh | None
     topology: Topology | None
-    bulk: MassProperties | None
+    mass: MassProperties | None
     recovery: Recovery | None
     checks: list[Check]
     reason: str
 
 
-def stages(export: Export) -> tuple[str, ...]:
-    """Titles of the stages of an export's proof, in order."""
-    return (*STAGES, *(machine.STAGES if export.prototype else ()))
+def stage_titles(export: Export) -> tuple[str, ...]:
+    """Titles of the stages that an export has, in order."""
+    return (*SHELL_STAGES, *(PROTOTYPE_STAGES if export.prototype else ()))
 
 
-def run_stages(folder: Path, taker: ResultSink, printers: Sequence[str] = ()) -> None:
-    """Make all stages, and hand over what each finds.
+def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> None:
+    """Run all stages, and hand over what each measures.
 
     Args:
         folder: what `tbcad build` wrote.
-        taker: of stages, checks and figures.
-        printers: profiles that every part must suit; none: the built-in ones, told only.
+        sink: takes the results.
+        printers: profiles that every part must suit; without any, the built-in ones inform only.
 
     Raises:
-        BadExport: the folder is no readable export, or a profile cannot be used.
+        BadExport: the folder is not a readable export, or a profile cannot be used.
     """
     profiles = [load(name) for name in printers or built_in()]
-    taker.stage("reading")
+    sink(Results(stages=[READING]))
     export = read_export(folder)
     printed = export.prototype.parts if export.prototype else ()
-    facets, digests = _read_parts(export, export.parts)
-    others, more = _read_parts(export, printed)
-    digests |= more
-    taker.stage("3MF")
-    every: list[Part | Printed] = [*export.parts, *printed]
-    for part, one in zip(every, facets + others, strict=True):
-        if part.threemf:
-            digests[part.threemf] = _threemf(export, part, one, taker)
-    taker.stage("files and record")
-    taker.checks(guarded(FILES, lambda: manifest_checks(export, {**export.digests, **digests})))
-    taker.checks(record_checks(export))
-    taker.stage("meshes and mirrors")
-    solids = in_threads(
-        lambda pair: _solid(export, *pair), list(zip(export.parts, facets, strict=True))
-    )
-    del facets
-    for part, solid in zip(export.parts, solids, strict=True):
-        taker.checks(solid.checks)
-        if solid.bulk is not None:
-            taker.bulk(part.name, solid.bulk)
-    taker.stage("printability")
-    for part, solid in zip(export.parts, solids, strict=True):
-        _printing(part, solid, profiles, bool(printers), taker)
+    shell_facets, digests = _read_stls(export, export.parts)
+    printed_facets, printed_digests = _read_stls(export, printed)
+    digests |= printed_digests
+
+    sink(Results(stages=[THREEMF]))
+    digests |= _compare_3mfs(export, export.parts, shell_facets, sink)
+    digests |= _compare_3mfs(export, printed, printed_facets, sink)
+
+    sink(Results(stages=[RECORD]))
+    manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
+    sink(Results(checks=manifest + record_checks(export)))
+
+    sink(Results(stages=[MESHES]))
+    shells = _measure_shells(export, shell_facets, sink)
+    del shell_facets  # half of the memory
+
+    sink(Results(stages=[PRINTABILITY]))
+    for shell in shells:
+        _assess_printing(shell, profiles, bool(printers), sink)
+
     if export.parts:
-        _optics(export, solids, taker)
+        _trace_shells(export, shells, sink)
     if export.prototype:
-        bodies = machine.verify_prototype(export, export.prototype, others, taker)
-        taker.stage(machine.PRINTING)
-        for body in bodies:
-            _printing(body.part, body, profiles, bool(printers), taker)
+        measured = verify_prototype(export, export.prototype, printed_facets, sink)
+        sink(Results(stages=[PRINTING]))
+        for part in measured:
+            _assess_printing(part, profiles, bool(printers), sink)
 
 
-def _printing(
-    part: Part | Printed,
-    solid: Solid | MeasuredPart,
-    profiles: list[Profile],
-    wanted: bool,
-    taker: ResultSink,
-) -> None:
-    def work() -> list[Check]:
-        topology = require(solid.topology, solid.reason)
-        mesh, lump = require(solid.mesh, solid.reason), require(solid.bulk, solid.reason)
-        shape = measure(mesh, topology.status, lump)
-        prints = [assess(part.stl, shape, profile) for profile in profiles]
-        taker.prints([to_row(one) for one in prints])
-        return printing_checks(prints, wanted)
-
-    taker.checks(guarded([print_name(part.stl, profile) for profile in profiles], work))
+def _read_stls(export: Export, parts: Sequence[Part | Printed]) -> tuple[list[Facets], Digests]:
+    pairs = [read_facets(export.folder, part.stl) for part in parts]
+    return [facets for facets, _ in pairs], {blob.name: blob.digest for _, blob in pairs}
 
 
-def _read_parts(
-    export: Export, parts: Sequence[Part | Printed]
-) -> tuple[list[Facets], dict[str, tuple[int, str]]]:
-    facets, digests = [], {}
-    for part in parts:
-        one, blob = read_facets(export.folder, part.stl)
-        facets.append(one)
-        digests[part.stl] = blob.digest
-    return facets, digests
+def _compare_3mfs(
+    export: Export, parts: Sequence[Part | Printed], stls: list[Facets], sink: ResultSink
+) -> Digests:
+    pairs = [pair for pair in zip(parts, stls, strict=True) if pair[0].threemf]
+    return {part.threemf: _compare_3mf(export, part, facets, sink) for part, facets in pairs}
 
 
-def _threemf(
-    export: Export, part: Part | Printed, facets: Facets, taker: ResultSink
+def _compare_3mf(
+    export: Export, part: Part | Printed, facets: Facets, sink: ResultSink
 ) -> tuple[int, str]:
     corners, blob = read_3mf(export.folder, part.threemf)
     name = ("3MF", part.threemf, "mm")
-    taker.checks(guarded([name], lambda: [same_check(name, corners, facets)]))
+    sink(Results(checks=guarded([name], lambda: [same_check(name, corners, facets)])))
     return blob.digest
 
 
-def _solid(export: Export, part: Part, facets: Facets) -> Solid:
-    mesh, reason = attempt(lambda: mesh_from_facets(facets))
-    topology, odd = attempt(lambda: examine_topology(require(mesh, reason), facets))
+def _measure_shells(export: Export, stls: list[Facets], sink: ResultSink) -> list[ShellPart]:
+    pairs = list(zip(export.parts, stls, strict=True))
+    shells = in_threads(lambda pair: _measure_shell(export, *pair), pairs)
+    for shell in shells:
+        masses = {} if shell.mass is None else {shell.part.name: shell.mass}
+        sink(Results(checks=shell.checks, masses=masses))
+    return shells
+
+
+def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
+    radius_mm, pinhole = export.target_mm / 2, pinhole_of(export, part)
+    mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
+    topology, no_topology = attempt(lambda: examine_topology(require(mesh, no_mesh), facets))
+    mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
+    recovery, no_mirrors = attempt(lambda: recover(require(mesh, no_mesh), pinhole, radius_mm))
     checks = guarded(
-        [(name, part.stl, "") for name in SOLID],
-        lambda: mesh_checks(part.stl, require(topology, odd)),
+        check_names(TOPOLOGY, part.stl),
+        lambda: mesh_checks(part.stl, require(topology, no_topology)),
+    ) + guarded(
+        check_names(FOLDS, part.stl),
+        lambda: [fold_check(part.stl, require(recovery, no_mirrors).folds)],
     )
-    lump, off = attempt(lambda: mass_properties(require(mesh, reason)))
-    recovery, why = attempt(
-        lambda: recover(require(mesh, reason), pinhole_of(export, part), export.target_mm / 2)
-    )
-    folds = guarded(
-        [("folds", part.stl, "edges")],
-        lambda: [fold_check(part.stl, require(recovery, reason or why).folds)],
-    )
-    return Solid(mesh, topology, lump, recovery, checks + folds, reason or why or odd or off)
+    reason = no_mesh or no_mirrors or no_topology or no_mass
+    return ShellPart(part, mesh, topology, mass, recovery, checks, reason)
 
 
-def _optics(export: Export, solids: list[Solid], taker: ResultSink) -> None:
+def _assess_printing(
+    measured: ShellPart | MeasuredPart, profiles: list[Profile], required: bool, sink: ResultSink
+) -> None:
+    stl, reason = measured.part.stl, measured.reason
+
+    def work() -> list[Check]:
+        topology = require(measured.topology, reason)
+        shape = measure(
+            require(measured.mesh, reason), topology.status, require(measured.mass, reason)
+        )
+        prints = [assess(stl, shape, profile) for profile in profiles]
+        sink(Results(printing=[to_row(one) for one in prints]))
+        return printing_checks(prints, required)
+
+    sink(Results(checks=guarded([print_name(stl, profile) for profile in profiles], work)))
+
+
+def _trace_shells(export: Export, shells: list[ShellPart], sink: ResultSink) -> None:
+    """The optical stages: mirrors against the record, coverage, and every pixel."""
     files = ", ".join(part.stl for part in export.parts)
-    taker.stage("optical bench")
-    bench, reason = attempt(lambda: _bench(export, solids))
 
-    def ready() -> OpticalSetup:
-        return require(bench, reason)
+    def report(
+        units: Mapping[str, str], work: Callable[[], list[Check]], mirrors: dict[str, Floats]
+    ) -> None:
+        sink(Results(checks=guarded(check_names(units, files), work), mirrors=mirrors))
 
-    taker.checks(
-        guarded(_names(mirrors_found.CHECKS, files), lambda: mirrors_found.checks(ready(), files))
+    sink(Results(stages=[SETUP]))
+    setup, no_setup = attempt(lambda: _set_up(export, shells))
+    report(
+        mirrors_found.CHECKS,
+        lambda: mirrors_found.checks(require(setup, no_setup), files),
+        mirrors_found.columns(setup) if setup else {},
     )
-    if bench is not None:
-        errors = bench.match.centre_error, bench.match.radius_error
-        taker.mirrors(dict(zip(("centre_error_mm", "radius_error_mm"), errors, strict=True)))
-    taker.stage("coverage")
-    seen, why = attempt(lambda: coverage.measure(ready()))
-    taker.checks(
-        guarded(
-            _names(coverage.CHECKS, files),
-            lambda: coverage.checks(ready(), require(seen, why), files),
-        )
+
+    sink(Results(stages=[COVERAGE]))
+    covered, not_covered = attempt(lambda: coverage.measure(require(setup, no_setup)))
+    report(
+        coverage.CHECKS,
+        lambda: coverage.checks(require(setup, no_setup), require(covered, not_covered), files),
+        coverage.columns(setup, covered) if setup and covered else {},
     )
-    if seen is not None:
-        virtual = virtual_cameras(export.mirrors).index
-        taker.mirrors(
-            {
-                "coverage_facet_mm": seen.facet[virtual],
-                "coverage_fitted_mm": seen.fitted[virtual],
-            }
-        )
-    taker.stage("every pixel")
-    light, why = attempt(lambda: pixels.checks(ready(), seen, files))
-    taker.checks(guarded(_names(pixels.CHECKS, files), lambda: require(light, why)[1]))
-    if light is not None:
-        taker.mirrors({"pixels": light[0]})
+
+    sink(Results(stages=[PIXELS]))
+    found, not_found = attempt(lambda: pixels.checks(require(setup, no_setup), covered, files))
+    report(
+        pixels.CHECKS,
+        lambda: require(found, not_found)[1],
+        {"pixels": found[0]} if found else {},
+    )
 
 
-def _names(units: dict[str, str], files: str) -> list[CheckName]:
-    return [(name, files, unit) for name, unit in units.items()]
-
-
-def _bench(export: Export, solids: list[Solid]) -> OpticalSetup:
-    ready = [
-        (require(solid.mesh, solid.reason), require(solid.recovery, solid.reason))
-        for solid in solids
-    ]
-    return set_up(export, [mesh for mesh, _ in ready], [recovery for _, recovery in ready])
+def _set_up(export: Export, shells: list[ShellPart]) -> OpticalSetup:
+    return set_up(
+        export,
+        [require(shell.mesh, shell.reason) for shell in shells],
+        [require(shell.recovery, shell.reason) for shell in shells],
+    )

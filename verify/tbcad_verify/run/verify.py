@@ -1,102 +1,123 @@
-"""The whole proof of an export: every stage in its place, then one report."""
+"""The verification of an export: all stages, then one report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
 from tbcad_verify.prototype import step_files
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.prototype_record import Printed
 from tbcad_verify.record.record import TEXTS, Export, Part, read_export
-from tbcad_verify.report.checks import Check, short_list
+from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import Report, findings
-from tbcad_verify.run.results import Results
-from tbcad_verify.run.stages import run_stages, stages
-from tbcad_verify.run.watch import SECONDS, watched, worker
+from tbcad_verify.run.results import CollectedResults, Results
+from tbcad_verify.run.stages import run_stages, stage_titles
+from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.step.shell_checks import shell_step_checks
+from tbcad_verify.step.step_file import StepFile
+from tbcad_verify.types import Progress
 
-SUMMED = 1e-3  # of a volume: what programs lose that add up in float32
+FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
 Stamps = dict[str, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
-class Options:
-    """What a user may ask of a proof.
+class VerifyOptions:
+    """What else to verify, and how.
 
     Attributes:
-        write: leave verify.json in the folder.
-        apart: read the meshes in a process of its own, so that a crash is told, not suffered.
-        seconds: longest that one stage, file or program may take.
-        printers: profiles by name or path that every part must suit; none: the built-in ones are
-            tried, and what they say is told only.
-        clients: ask the programs that users open the files with, where they are installed.
+        write: write verify.json into the folder.
+        apart: read the meshes in another process, so that a crash there becomes "unknown".
+        seconds: time limit of one stage, file or program.
+        printers: profiles, by name or path, that every part must suit. Without any, the built-in
+            ones are tried, and what they find informs only.
+        clients: also ask the programs that users open the files with, where they are installed.
     """
 
     write: bool = True
     apart: bool = True
-    seconds: float = SECONDS
+    seconds: float = STAGE_LIMIT_S
     printers: tuple[str, ...] = ()
     clients: bool = False
 
 
 def verify(
-    folder: Path, progress: Callable[[str], None] = lambda _: None, wishes: Options = Options()
+    folder: Path,
+    progress: Progress = lambda _: None,
+    options: VerifyOptions = VerifyOptions(),
 ) -> Report:
-    """Prove an export, and write verify.json into it.
+    """Verify an export, and write verify.json into it.
 
     Args:
         folder: what `tbcad build` wrote.
         progress: called with the name of each stage before it starts.
-        wishes: what else to do, and how.
+        options: what else to verify, and how.
 
     Raises:
-        BadExport: the folder is no readable export, or cannot be written to; nothing is written.
+        BadExport: the folder is not a readable export, or cannot be written to; nothing is
+            written.
     """
-    for name in wishes.printers:
+    for name in options.printers:
         load(name)
     root = open_folder(Path(folder))
     before = stamps(root, listing(root))
     export = read_export(root)
-    results = Results(progress)
+    results = CollectedResults(progress=progress)
     with ThreadPoolExecutor(1) as pool:
-        # Processes of their own, which need nothing from all that comes before their checks.
-        early = pool.submit(step_files.read_step_files, export, wishes.seconds)
-        if wishes.apart:
-            watched(worker(export.folder, wishes.printers), stages(export), results, wishes.seconds)
-        else:
-            run_stages(export.folder, results, wishes.printers)
-        if any(part.step for part in export.parts):
-            results.stage("STEP")
-            results.checks(shell_step_checks(export, results.bulks, wishes.seconds))
-        if export.prototype and any(part.step for part in export.prototype.parts):
-            results.stage("STEP of the prototype")
-            results.checks(step_files.part_step_checks(export, results.bulks, early.result()))
-    programs = _programs(export, results, wishes.seconds) if wishes.clients else []
+        # Reading the prototype's STEP files needs none of the stages, and takes as long as they do.
+        step_reading = pool.submit(step_files.read_step_files, export, options.seconds)
+        _mesh_stages(export, results, options)
+        _shell_steps(export, results, options.seconds)
+        _prototype_steps(export, results, step_reading)
+    programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
     report = Report(
         export.target_mm,
-        tuple(results.found),
-        findings(export.mirrors, results.columns),
+        tuple(results.checks),
+        findings(export.mirrors, results.mirrors),
         tuple(programs),
         tuple(results.printing),
         shell=bool(export.parts),
-        prototype=results.machine,
+        prototype=results.prototype,
     )
-    if wishes.write:
+    if options.write:
         _write(report, export.folder)
     return report
 
 
+def _mesh_stages(export: Export, results: CollectedResults, options: VerifyOptions) -> None:
+    if options.apart:
+        command = worker_command(export.folder, options.printers)
+        watch(command, stage_titles(export), results, options.seconds)
+    else:
+        run_stages(export.folder, results.add, options.printers)
+
+
+def _shell_steps(export: Export, results: CollectedResults, seconds: float) -> None:
+    if any(part.step for part in export.parts):
+        results.add(Results(stages=["STEP"]))
+        results.add(Results(checks=shell_step_checks(export, results.masses, seconds)))
+
+
+def _prototype_steps(
+    export: Export,
+    results: CollectedResults,
+    reading: Future[dict[str, StepFile | Unknown]],
+) -> None:
+    if export.prototype and any(part.step for part in export.prototype.parts):
+        results.add(Results(stages=["STEP of the prototype"]))
+        checks = step_files.part_step_checks(export, results.masses, reading.result())
+        results.add(Results(checks=checks))
+
+
 def _refuse_changes(export: Export, before: Stamps) -> None:
-    """A verdict on files that are no longer those that were read is worth nothing."""
+    """A verdict holds for the files that were read, not for others in their place."""
     names = {*export.manifest, *TEXTS}
     after = stamps(export.folder, names)
     changed = sorted(name for name in names if after.get(name) != before.get(name))
@@ -106,35 +127,30 @@ def _refuse_changes(export: Export, before: Stamps) -> None:
         )
 
 
-def _programs(export: Export, results: Results, seconds: float) -> list[Check]:
-    wanted = [_wanted(export, part, results.bulks.get(part.name)) for part in export.parts]
-    for part in export.prototype.parts if export.prototype else ():
-        wanted.append(_printed(export, part, results.bulks.get(part.name)))
-    return check_with_programs(export.folder, wanted, seconds, results.stage)
+def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> list[Check]:
+    shells = [_expected(export, part, _spheres(export, part), results) for part in export.parts]
+    prototype = export.prototype.parts if export.prototype else ()
+    printed = [_expected(export, part, None, results) for part in prototype]
+    return check_with_programs(export.folder, shells + printed, seconds, results.progress)
 
 
-def _wanted(export: Export, part: Part, bulk: MassProperties | None) -> ExpectedPart:
-    """What other programs should find in a part's files."""
+def _spheres(export: Export, part: Part) -> int:
     mirrors = export.rows.camera == part.camera
-    volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
+    return int((mirrors & ~export.rows.flat).sum())
+
+
+def _expected(
+    export: Export, part: Part | Printed, spheres: int | None, results: Results
+) -> ExpectedPart:
+    """What other programs should find in a part's files."""
+    mass = results.masses.get(part.name)
+    volume, area = (mass.volume, mass.area) if mass else (math.nan, math.nan)
     return ExpectedPart(
         part.name,
         {"step": part.step, "stl": part.stl, "3mf": part.threemf},
-        int((mirrors & ~export.rows.flat).sum()),
+        spheres,
         volume,
-        max(area * export.mesh_error_mm, SUMMED * abs(volume)),
-    )
-
-
-def _printed(export: Export, part: Printed, bulk: MassProperties | None) -> ExpectedPart:
-    """The same of a prototype's part, whose spherical faces nobody counts."""
-    volume, area = (bulk.volume, bulk.area) if bulk else (math.nan, math.nan)
-    return ExpectedPart(
-        part.name,
-        {"step": part.step, "stl": part.stl, "3mf": part.threemf},
-        None,
-        volume,
-        max(area * export.mesh_error_mm, SUMMED * abs(volume)),
+        max(area * export.mesh_error_mm, FLOAT32_SHARE * abs(volume)),
     )
 
 

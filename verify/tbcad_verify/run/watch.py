@@ -1,104 +1,93 @@
-"""Running stages in another process, with a limit on how long each may take."""
+"""Running the stages in another process, with a limit on how long each may take."""
 
 from __future__ import annotations
 
-import os
-import queue
-import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from multiprocessing import Pipe
 from pathlib import Path
-from typing import TextIO
+from typing import Any
 
-from tbcad_verify.report.checks import unknown
-from tbcad_verify.run.results import Results, replay
+from tbcad_verify.errors import BadExport
+from tbcad_verify.report.checks import Check, unknown
+from tbcad_verify.run.child import crash_reason, kill_group
+from tbcad_verify.run.results import CollectedResults, Results
 
-SECONDS = 600.0
+STAGE_LIMIT_S = 600.0
+UNREADABLE = "sent a message that cannot be read"
 
 
-def worker(folder: Path, printers: Sequence[str]) -> list[str]:
-    """The command that proves a folder."""
-    # -P: what lies in the current folder, which may be the export, must not be imported.
+def worker_command(folder: Path, printers: Sequence[str]) -> list[str]:
+    """The command that runs the stages on a folder."""
+    # -P: modules in the current folder, which may be the export, must not be imported.
     return [sys.executable, "-P", "-m", "tbcad_verify.run.worker", str(folder), *printers]
 
 
-def watched(
-    command: Sequence[str], stages: Sequence[str], results: Results, seconds: float
+def watch(
+    command: Sequence[str], titles: Sequence[str], results: CollectedResults, seconds: float
 ) -> None:
-    """Run a process that tells `results.Lines`; stages that do not come to an end are unknown.
+    """Run a worker process, which sends its results; stages that it does not end are unknown.
 
     Args:
-        command: program and arguments.
-        stages: titles of all stages, in order.
-        results: takes what comes.
-        seconds: longest that one stage may take.
+        command: program and arguments. The program's stdout is the pipe to which it sends.
+        titles: of all stages, in order.
+        results: are added to.
+        seconds: time limit of one stage.
 
     Raises:
-        BadExport: the folder is no readable export.
+        BadExport: the folder is not a readable export.
     """
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        encoding="utf-8",
-        start_new_session=True,
-    ) as process:
+    reader, writer = Pipe(duplex=False)
+    with reader, ThreadPoolExecutor(1) as receiver:
+        with writer:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=writer.fileno(),
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
         try:
-            reason = _followed(process, results, seconds)
+            reason = _collect(process, lambda: receiver.submit(reader.recv), results, seconds)
         finally:
-            _stop(process)
+            kill_group(process)  # and so closes the pipe, for which the receiver may still wait
     if reason:
-        _call_unknown(stages, results, reason)
+        results.checks += _unknown_stages(titles, results.stages, reason)
 
 
-def _followed(process: subprocess.Popen[str], results: Results, seconds: float) -> str:
-    """Hand on all lines; why they ended too early, or nothing."""
-    lines: queue.Queue[str] = queue.Queue()
-    assert process.stdout is not None
-    threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
+def _collect(
+    process: subprocess.Popen[bytes],
+    receive: Callable[[], Future[Any]],
+    results: CollectedResults,
+    seconds: float,
+) -> str:
+    """Add what a worker sends to the results; why it sent no end, or nothing."""
     while True:
         try:
-            line = lines.get(timeout=seconds)
-        except queue.Empty:
+            message = receive().result(seconds)
+        except TimeoutError:
             return f"took more than {seconds:g} s and was stopped"
-        if not line:
-            return _ending(process)
-        try:
-            if replay(line, results):
-                return ""
-        except (ValueError, LookupError, TypeError):
-            return "said what nobody understands"
+        except (EOFError, OSError):
+            code = process.wait()
+            return crash_reason(code) or f"ended with exit code {code}"
+        except Exception:  # whatever pickle raises
+            return UNREADABLE
+        if message is None:
+            return ""
+        if isinstance(message, BadExport):
+            raise message
+        if not isinstance(message, Results):
+            return UNREADABLE
+        results.add(message)
 
 
-def _pump(stream: TextIO, lines: queue.Queue[str]) -> None:
-    for line in stream:
-        lines.put(line)
-    lines.put("")
-
-
-def _ending(process: subprocess.Popen[str]) -> str:
-    code = process.wait()
-    if code < 0:
-        return f"crashed ({signal.Signals(-code).name})"
-    return f"ended with exit code {code}"
-
-
-def _stop(process: subprocess.Popen[str]) -> None:
-    if process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
-
-
-def _call_unknown(stages: Sequence[str], results: Results, reason: str) -> None:
-    """The stage that was under way, and those it kept from being made."""
-    broken = results.stages[-1] if results.stages else stages[0]
-    later = [title for title in stages if title not in results.stages and title != broken]
-    results.checks(
-        [
-            unknown((broken, "", ""), reason),
-            *(unknown((title, "", ""), f"not reached: {broken!r} {reason}") for title in later),
-        ]
-    )
+def _unknown_stages(titles: Sequence[str], begun: Sequence[str], reason: str) -> list[Check]:
+    """The stage that was under way, and those that were not reached."""
+    broken = begun[-1] if begun else titles[0]
+    later = [title for title in titles if title not in begun and title != broken]
+    return [
+        unknown((broken, "", ""), reason),
+        *(unknown((title, "", ""), f"not reached: {broken!r} {reason}") for title in later),
+    ]

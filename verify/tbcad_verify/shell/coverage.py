@@ -100,6 +100,15 @@ def checks(bench: OpticalSetup, found: Coverage, files: str) -> list[Check]:
     ]
 
 
+def columns(setup: OpticalSetup, covered: Coverage) -> dict[str, Floats]:
+    """What verify.json says of each recorded mirror."""
+    virtual = setup.virtual.index
+    return {
+        "coverage_facet_mm": covered.facet[virtual],
+        "coverage_fitted_mm": covered.fitted[virtual],
+    }
+
+
 def _diameters(
     bench: OpticalSetup, outlines: list[Outline], lines: list[ReflectedRays], turned: Floats
 ) -> Floats:

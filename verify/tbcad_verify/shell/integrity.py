@@ -27,6 +27,7 @@ from tbcad_verify.report.checks import (
     CheckName,
     at_least,
     at_most,
+    check_names,
     guarded,
     informative,
     short_list,
@@ -36,7 +37,16 @@ from tbcad_verify.report.report import NAME
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
-OWN = frozenset({"manifest.json", NAME})
+OWN_FILES = frozenset({"manifest.json", NAME})
+MANIFEST = (("manifest", "manifest.json", "wrong files"), ("other files", "", "files"))
+TOPOLOGY = {
+    "watertight": "bad edges",
+    "facets": "bad facets",
+    "outward": "mm^3",
+    "components": "solids",
+    "manifold3d": "complaints",
+}
+FOLDS = {"folds": "edges"}
 
 
 def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
@@ -51,18 +61,19 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
         for name, wanted in sorted(export.manifest.items())
         if parsed.get(name, _found(export, name)) != wanted
     ]
-    unlisted = sorted({*parsed} - {*export.manifest} - OWN)
+    unlisted = sorted({*parsed} - {*export.manifest} - OWN_FILES)
     unread = sorted({*filter(_is_part, export.manifest)} - export.part_files)
-    others = sorted(listing(export.folder) - {*export.manifest} - OWN)
+    others = sorted(listing(export.folder) - {*export.manifest} - OWN_FILES)
+    manifest, other_files = MANIFEST
     return [
         at_most(
-            ("manifest", "manifest.json", "wrong files"),
+            manifest,
             len(wrong + unlisted + unread),
             0,
             "missing, unlisted, not as written, or of no part: "
             + short_list(wrong + unlisted + unread),
         ),
-        informative(("other files", "", "files"), len(others), short_list(others)),
+        informative(other_files, len(others), short_list(others)),
     ]
 
 
@@ -85,39 +96,39 @@ def _guard(name: CheckName, job: Callable[[CheckName, Export], Check], export: E
     return guarded([name], lambda: [job(name, export)])[0]
 
 
-def mesh_checks(name: str, found: Topology) -> list[Check]:
-    """One closed, oriented, clean solid."""
+def mesh_checks(file: str, topology: Topology) -> list[Check]:
+    """The checks of `TOPOLOGY`: one closed, oriented solid without faulty facets."""
+    watertight, facets, outward, components, manifold = check_names(TOPOLOGY, file)
     return [
         at_most(
-            ("watertight", name, "bad edges"),
-            found.open_edges + found.crowded_edges + found.turned_edges,
+            watertight,
+            topology.open_edges + topology.crowded_edges + topology.turned_edges,
             0,
-            f"{found.open_edges} open, {found.crowded_edges} with more than two facets, "
-            f"{found.turned_edges} with facets turned against each other",
+            f"{topology.open_edges} open, {topology.crowded_edges} with more than two facets, "
+            f"{topology.turned_edges} with facets turned against each other",
         ),
         at_most(
-            ("facets", name, "bad facets"),
-            found.degenerate + found.duplicate + found.stored_normals,
+            facets,
+            topology.degenerate + topology.duplicate + topology.stored_normals,
             0,
-            f"{found.degenerate} without area, {found.duplicate} doubled, "
-            f"{found.stored_normals} with a stored normal against their corners' order",
+            f"{topology.degenerate} without area, {topology.duplicate} doubled, "
+            f"{topology.stored_normals} with a stored normal against their corners' order",
         ),
         at_least(
-            ("outward", name, "mm^3"),
-            found.volume,
+            outward,
+            topology.volume,
             LEAST_VOLUME_MM3,
             "inside out: the signed volume is not positive",
         ),
-        at_most(("components", name, "solids"), found.components, 1, "more than one piece"),
-        at_most(
-            ("manifold3d", name, "complaints"), int(found.status != "NoError"), 0, found.status
-        ),
+        at_most(components, topology.components, 1, "more than one piece"),
+        at_most(manifold, int(topology.status != "NoError"), 0, topology.status),
     ]
 
 
-def fold_check(name: str, folds: int) -> Check:
+def fold_check(file: str, folds: int) -> Check:
     """No facet lies back to back with its neighbour."""
-    return at_most(("folds", name, "edges"), folds, 0, "the surface is folded onto itself")
+    (name,) = check_names(FOLDS, file)
+    return at_most(name, folds, 0, "the surface is folded onto itself")
 
 
 def _is_part(name: str) -> bool:
@@ -125,7 +136,7 @@ def _is_part(name: str) -> bool:
 
 
 def _found(export: Export, name: str) -> tuple[int, str] | None:
-    if name in OWN:
+    if name in OWN_FILES:
         return None
     try:
         return digest(export.folder, name)

@@ -41,6 +41,14 @@ def checks(bench: OpticalSetup, files: str) -> list[Check]:
     ]
 
 
+def columns(setup: OpticalSetup) -> dict[str, Floats]:
+    """What verify.json says of each recorded mirror."""
+    return {
+        "centre_error_mm": setup.match.centre_error,
+        "radius_error_mm": setup.match.radius_error,
+    }
+
+
 def _forms(bench: OpticalSetup) -> Floats:
     """(M,) form error of each mirror's patch, mm; of the nearest patch for missing mirrors."""
     fits, segment = bench.recovery.fits, bench.match.segment.copy()

@@ -33,7 +33,7 @@ class PartComparison:
     Attributes:
         name: of the part.
         file: as read.
-        bulk: the mesh's, in the same place; None where it could not be measured.
+        mass: the mesh's, in the same place; None where it could not be measured.
         off: how far the mesh may be from the exact surface, mm.
         claim: by what share the file's own claims may be off: faces between edges that have no
             closed form are only integrated to about a millionth.
@@ -41,7 +41,7 @@ class PartComparison:
 
     name: str
     file: StepFile
-    bulk: MassProperties | None
+    mass: MassProperties | None
     off: float
     claim: float = CLAIM_SHARE
 
@@ -129,7 +129,7 @@ def box(name: CheckName, lump: PartComparison) -> Check:
 
 def properties(name: CheckName, lump: PartComparison) -> Check:
     """The file's own claims, so that any reader can tell whether it has read what was written."""
-    claims, solid = lump.file.properties, lump.file.bulk
+    claims, solid = lump.file.properties, lump.file.mass
     if set(claims) != {"volume", "area", "centroid"}:
         detail = f"the file claims {short_list(sorted(claims)) or 'nothing'}; all three are wanted"
         return at_most(name, np.inf, lump.claim, detail)
@@ -144,9 +144,9 @@ def properties(name: CheckName, lump: PartComparison) -> Check:
 
 
 def _bulks(lump: PartComparison) -> tuple[MassProperties, MassProperties]:
-    if lump.bulk is None:
+    if lump.mass is None:
         raise Unknown("the mesh could not be measured")
-    return lump.bulk, lump.file.bulk
+    return lump.mass, lump.file.mass
 
 
 def _three(point: Sequence[float]) -> str:

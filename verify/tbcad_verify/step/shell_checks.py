@@ -77,13 +77,13 @@ Job = Callable[[CheckName, ShellComparison, Export], Check]
 
 
 def shell_step_checks(
-    export: Export, bulks: dict[str, MassProperties], seconds: float
+    export: Export, masses: dict[str, MassProperties], seconds: float
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
     Args:
         export: the record.
-        bulks: figures of the meshes, by part.
+        masses: figures of the meshes, by part.
         seconds: longest that reading one file may take.
 
     Raises:
@@ -92,7 +92,7 @@ def shell_step_checks(
     parts = [part for part in export.parts if part.step]
     blobs = [load(export.folder, part.step) for part in parts]
     found = in_threads(
-        lambda pair: _part(export, *pair, bulks, seconds), list(zip(parts, blobs, strict=True))
+        lambda pair: _part(export, *pair, masses, seconds), list(zip(parts, blobs, strict=True))
     )
     areas = guarded([AREAS], lambda: [_recorded(export)])
     return areas + [check for checks in found for check in checks]
@@ -108,12 +108,12 @@ def _recorded(export: Export) -> Check:
 
 
 def _part(
-    export: Export, part: Part, blob: FileBytes, bulks: dict[str, MassProperties], seconds: float
+    export: Export, part: Part, blob: FileBytes, masses: dict[str, MassProperties], seconds: float
 ) -> list[Check]:
     names = [(name, part.step, unit) for name, unit in UNITS.items()]
 
     def work() -> list[Check]:
-        subject = _subject(export, part, examine(blob, seconds), bulks.get(part.name))
+        subject = _subject(export, part, examine(blob, seconds), masses.get(part.name))
         return [
             check
             for name, job in zip(names, JOBS, strict=True)
@@ -128,14 +128,14 @@ def _one(job: Job, name: CheckName, subject: ShellComparison, export: Export) ->
 
 
 def _subject(
-    export: Export, part: Part, file: StepFile, bulk: MassProperties | None
+    export: Export, part: Part, file: StepFile, mass: MassProperties | None
 ) -> ShellComparison:
     row = np.flatnonzero(export.rows.camera == part.camera)
     ids = [export.rows.ids[k] for k in row.tolist()]
     count = Counter(file.faces.names)
     place = {name: k for k, name in enumerate(file.faces.names)}
     face = np.array([place[name] if count[name] == 1 else -1 for name in ids], dtype=np.intp)
-    lump = PartComparison(part.name, file, bulk, export.mesh_error_mm)
+    lump = PartComparison(part.name, file, mass, export.mesh_error_mm)
     return ShellComparison(lump, row, face, cells_of_export(export, part.camera))
 
 

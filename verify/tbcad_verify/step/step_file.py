@@ -66,7 +66,7 @@ class StepFile:
         counts: the kernel's solids, shells and open edges.
         valid: the kernel's check of the shape.
         gap: how far the kernel had to widen corners and edges until they met, mm.
-        bulk: of the whole, by the kernel.
+        mass: of the whole, by the kernel.
         properties: volume, area and centroid as the file claims them; what it does not is missing.
         faces: all of them.
     """
@@ -75,7 +75,7 @@ class StepFile:
     counts: dict[str, int]
     valid: bool
     gap: float
-    bulk: MassProperties
+    mass: MassProperties
     properties: dict[str, Any]
     faces: StepFaces
 
