@@ -1,4 +1,4 @@
-"""The mirrors of both cameras: poses, radii, cells, and the record the files are written from."""
+"""The mirrors of both cameras: directions, poses, radii and cells, from the spec."""
 
 from dataclasses import dataclass, replace
 
@@ -13,9 +13,12 @@ from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.spec.design import Spec
+from tbcad.spec.design import CameraSpec, Spec
 from tbcad.spec.errors import SpecError
-from tbcad.types import Floats, Ints, Progress
+from tbcad.types import Bools, Floats, Ints, Progress
+
+# Directions that differ by less than rounding have equal heights or azimuths.
+DIRECTION_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -25,17 +28,19 @@ class MirrorArray:
     Attributes:
         camera_id: "a" or "b".
         camera: its pinhole, axes and sensor.
-        ellipsoid: of this camera.
-        u: directions of the virtual cameras, (m, 3).
-        theta0: half angle a flat mirror would see, radians, (m,).
-        theta1: half angle wanted by eq. 1, radians, (m,).
-        half_width: l, mm, (m,).
-        polar: polar angle about w, radians, (m,).
-        azimuth: azimuth about w, radians, (m,).
-        cells: of the reflecting surfaces, coat included.
+        ellipsoid: that its mirrors are tangent to; the foci are the origin and the pinhole.
+        u: unit vectors from the origin to the virtual cameras, (m, 3); a virtual camera is at
+            u times ellipsoid.camera_distance, a mirror's apex on the line to it.
+        theta0: half angle that the virtual camera sees in the flat mirror, radians, (m,)
+            (section 3.2 of the paper).
+        theta1: half angle in which it sees the whole capture sphere (eq. 1), radians, (m,).
+        half_width: of the flat mirror, the paper's l, mm, (m,).
+        polar: angle of u from the ellipsoid's axis, radians, (m,).
+        azimuth: of u about the axis from the side of the zenith, radians, (m,).
+        cells: of the reflecting surfaces, with the coat.
         modelled_cells: of the modelled surfaces, under the coat.
         area: of the cells, mm^2, (m,).
-        coverage: exact coverage diameter, mm, (m,).
+        coverage: coverage diameter by exact rays, mm, (m,) (optics.trace).
     """
 
     camera_id: str
@@ -65,15 +70,13 @@ class MirrorArray:
 
     @property
     def ids(self) -> list[str]:
-        """Names of the mirrors: a0001, a0002 ...; b's mirror of the same number mirrors it."""
+        """Names of the mirrors: a0001, a0002 ...; b0001 is the mirror image of a0001."""
         return [f"{self.camera_id}{i + 1:04d}" for i in range(len(self))]
 
     @property
     def mirrors(self) -> Surfaces:
-        """The reflecting surfaces, coat included."""
-        every = self.cells.surfaces
-        m = len(self)
-        return Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+        """The reflecting surfaces, with the coat, over m of them."""
+        return self.cells.mirror_surfaces
 
     @property
     def foot(self) -> float:
@@ -81,7 +84,7 @@ class MirrorArray:
         return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
 
     def mirrored(self) -> "MirrorArray":
-        """The other camera's half."""
+        """Camera b's mirrors: the mirror image in the plane x = 0."""
         return replace(
             self,
             camera_id="b",
@@ -96,14 +99,23 @@ class MirrorArray:
 
 @dataclass(frozen=True)
 class MirrorDesign:
-    """The spec and the two halves that follow from it."""
+    """The mirrors of both cameras.
+
+    Attributes:
+        spec: that they follow from.
+        halves: camera a's mirrors (x >= 0) and camera b's (x <= 0).
+    """
 
     spec: Spec
     halves: tuple[MirrorArray, MirrorArray]
 
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
-    """Poses, radii and cells of all mirrors.
+    """Directions, poses, radii and cells of all mirrors (section 3 of the paper).
+
+    Args:
+        spec: the design.
+        progress: called with the state of the search for radii.
 
     Raises:
         SpecError: when the spec's mirrors cannot be made; it names them.
@@ -113,60 +125,61 @@ def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
 
 
 def numbering_order(u: Floats) -> Ints:
-    """Order of the mirrors' numbers: from the zenith down, then by azimuth about z."""
-    height = np.round(u[:, 2], 9)
-    turn = np.round(np.arctan2(u[:, 1], u[:, 0]), 9)
-    return np.lexsort((turn, -height))
+    """Order (m,) of directions (m, 3) by mirror number: from the zenith down, then by azimuth."""
+    height = np.round(u[:, 2], DIRECTION_DIGITS)
+    azimuth = np.round(np.arctan2(u[:, 1], u[:, 0]), DIRECTION_DIGITS)
+    return np.lexsort((azimuth, -height))
 
 
 def numbered_directions(n: int) -> tuple[Floats, Ints]:
-    """All geodesic directions, camera a's first in the order of their ids, and all faces."""
+    """Directions and faces of the geodesic polyhedron of frequency n, camera a's mirrors first.
+
+    Returns:
+        Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and
+        the outward triangles over them, (20 n^2, 3).
+    """
     u, faces = geodesic(n)
-    mine = (u[:, 0] >= 0) & (u[:, 2] >= 0)
-    first = np.flatnonzero(mine)[numbering_order(u[mine])]
-    order = np.concatenate([first, np.flatnonzero(~mine)])
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return u[order], place[faces]
+    in_half_a = _in_half_a(u)
+    first = np.flatnonzero(in_half_a)[numbering_order(u[in_half_a])]
+    order = np.concatenate([first, np.flatnonzero(~in_half_a)])
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
+    return u[order], number[faces]
+
+
+def _in_half_a(u: Floats) -> Bools:
+    """Whether a direction is one of camera a's: on its side of the seam, and not below."""
+    result: Bools = (u[:, 0] >= 0) & (u[:, 2] >= 0)
+    return result
 
 
 def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = numbered_directions(optics.n)
-    kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
-    u = every[kept]
+    u = every[_in_half_a(every)]
     theta0 = flat.half_angles(ellipsoid, u, every)
     half_width = flat.half_widths(ellipsoid, u, theta0)
     theta1 = flat.required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
-    # The equatorial mirrors stay whole: the foot plane lies the greatest half width below them.
-    foot = -float(half_width[u[:, 2] == 0].max())
-    triangles, boundary = bounded_triangulation(faces, every, kept)
-    task = RadiusProblem(
+    triangles, boundary = bounded_triangulation(faces, every, _in_half_a(every))
+    problem = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u),
             ellipsoid.normals(u),
             flat.paper_curvatures(theta0, theta1, half_width),
         ),
-        planes=planes(np.array([[0, 0, 0], [0, 0, foot]]), np.array([[1, 0, 0], [0, 0, 1]])),
+        planes=_bounding_planes(u, half_width),
         boundary=boundary,
         triangles=triangles,
         pinhole=ellipsoid.pinhole,
-        least=1 / (spec.mirrors.max_radius_widths * half_width),
+        min_curvature=1 / (spec.mirrors.max_radius_widths * half_width),
         target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
     )
-    cells, covered = solve_radii(spec.mirrors.radius_rule, task, progress)
+    cells, coverage = solve_radii(spec.mirrors.radius_rule, problem, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
-    camera = spec.camera
     return MirrorArray(
         camera_id="a",
-        camera=fitted_camera(
-            ellipsoid.pinhole,
-            cells.corners,
-            camera.width_px,
-            camera.height_px,
-            float(np.radians(camera.hfov_deg)),
-        ),
+        camera=_camera(spec.camera, ellipsoid.pinhole, cells),
         ellipsoid=ellipsoid,
         u=u,
         theta0=theta0,
@@ -175,24 +188,32 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
         polar=polar,
         azimuth=azimuth,
         cells=cells,
-        modelled_cells=_under_coat(cells, spec.mirrors.coating_um / 1000),
+        modelled_cells=_cells_under_coat(cells, spec.mirrors.coating_um / 1000),
         area=cell_areas(cells),
-        coverage=covered,
+        coverage=coverage,
     )
 
 
-def _under_coat(cells: Cells, coating: float) -> Cells:
+def _bounding_planes(u: Floats, half_width: Floats) -> Surfaces:
+    """The seam x = 0 and the foot plane, so low that the equatorial mirrors stay whole."""
+    foot = -float(half_width[u[:, 2] == 0].max())
+    return planes(np.array([[0, 0, 0], [0, 0, foot]]), np.array([[1, 0, 0], [0, 0, 1]]))
+
+
+def _camera(sensor: CameraSpec, pinhole: Floats, cells: Cells) -> Camera:
+    hfov = float(np.radians(sensor.hfov_deg))
+    return fitted_camera(pinhole, cells.corners, sensor.width_px, sensor.height_px, hfov)
+
+
+def _cells_under_coat(cells: Cells, coating: float) -> Cells:
     """Cells of the surfaces that a coat of this thickness (mm) turns into the reflecting ones."""
     if coating == 0:
         return cells
-    m = cells.mirrors
-    every = cells.surfaces
-    mirrors = Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+    mirrors = cells.mirror_surfaces
     if np.any(mirrors.curvature * coating >= 1):
         raise SpecError(
-            f"mirrors.coating_um {coating * 1000:g} is more than the least mirror radius "
+            f"mirrors.coating_um {coating * 1000:g} is more than the smallest mirror radius "
             f"{np.nanmin(mirrors.radius):.3g} mm: make the coat thinner"
         )
-    bounds = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
-    body = mirrors.offset(-coating).joined(bounds)
-    return cells_of(body, cells.boundary, cells.triangles)
+    modelled = mirrors.offset(-coating).joined(cells.surfaces.subset(slice(cells.mirrors, None)))
+    return cells_of(modelled, cells.boundary, cells.triangles)

@@ -40,6 +40,20 @@ class Cells:
         """Number of mirrors m."""
         return self.boundary.seam
 
+    @property
+    def mirror_surfaces(self) -> Surfaces:
+        """The mirrors' surfaces without the two planes, over m of them."""
+        return self.surfaces.subset(slice(self.mirrors))
+
+    @property
+    def halved(self) -> Bools:
+        """Which mirrors (m,) the seam halves: those whose apices lie on it.
+
+        Their other halves belong to the other camera and share their virtual cameras.
+        """
+        result: Bools = self.surfaces.apex[: self.mirrors, 0] == 0
+        return result
+
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
         return Cells(

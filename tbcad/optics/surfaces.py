@@ -60,14 +60,18 @@ class Surfaces:
 
     def value(self, i: Ints, x: Floats) -> Floats:
         """f_i at the points x (..., 3), for indices i (...)."""
-        away = x - self.apex[i]
-        squared = dot(away, away)
-        height: Floats = dot(self.normal[i], away)
+        from_apex = x - self.apex[i]
+        squared = dot(from_apex, from_apex)
+        height: Floats = dot(self.normal[i], from_apex)
         return height + self.curvature[i] / 2 * squared
 
     def gradient(self, i: Ints, x: Floats) -> Floats:
         """Gradient of f_i at x (..., 3); on the surface itself the unit normal toward the light."""
         return self.normal[i] + self.curvature[i][..., None] * (x - self.apex[i])
+
+    def subset(self, which: slice | Ints) -> "Surfaces":
+        """Some of the surfaces, by a slice or by indices."""
+        return Surfaces(*(array[which] for array in self._arrays()))
 
     def with_curvature(self, curvature: Floats) -> "Surfaces":
         """The same poses with other curvatures (m,)."""

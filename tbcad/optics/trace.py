@@ -17,14 +17,13 @@ ROUNDS = 3
 def limiting_sides(cells: Cells) -> tuple[Ints, Ints]:
     """Mirror (e,) and arc (e,) of each side of a cell that limits what its mirror covers.
 
-    The seam halves a mirror whose apex lies on it. Its other half belongs to the other camera and
-    shares its virtual camera, so the cut itself does not limit the two together.
+    The cut of a halved mirror does not: its other half belongs to the other camera and shares its
+    virtual camera, so the cut itself does not limit the two together.
     """
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]
-    halved = cells.surfaces.apex[mirror, 0] == 0
-    limiting = ~(halved & (other == cells.boundary.seam))
+    limiting = ~(cells.halved[mirror] & (other == cells.boundary.seam))
     return mirror[limiting], arc[limiting]
 
 

@@ -86,8 +86,7 @@ class Windows:
         forward = self.cells.arcs.left[self.arc] == self.mirror
         total = np.zeros(self.cells.mirrors)
         np.add.at(total, self.mirror, np.where(forward, winding, -winding))
-        halved = self.cells.surfaces.apex[: self.cells.mirrors, 0] == 0
-        inside: Bools = np.abs(total) > np.where(halved, np.pi / 2, np.pi)
+        inside: Bools = np.abs(total) > np.where(self.cells.halved, np.pi / 2, np.pi)
         return inside
 
 

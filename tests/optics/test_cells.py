@@ -30,12 +30,9 @@ def first_hit(surfaces: Surfaces, directions: np.ndarray) -> tuple[np.ndarray, n
 
 def within(cells: Cells, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First hit of rays that end on a mirror between the seam and the foot plane."""
-    m = cells.mirrors
-    every = cells.surfaces
-    mirrors = Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
-    hit, distance = first_hit(mirrors, directions)
+    hit, distance = first_hit(cells.mirror_surfaces, directions)
     point = distance[:, None] * directions
-    foot = every.apex[cells.boundary.foot, 2]
+    foot = cells.surfaces.apex[cells.boundary.foot, 2]
     inside = (point[:, 0] >= 0) & (point[:, 2] >= foot)
     return hit[inside], point[inside]
 

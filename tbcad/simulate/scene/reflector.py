@@ -38,8 +38,7 @@ class Reflector:
     @property
     def mirrors(self) -> Surfaces:
         """The reflecting surfaces without the seam and the foot plane."""
-        every, m = self.cells.surfaces, len(self)
-        return Surfaces(every.apex[:m], every.normal[:m], every.curvature[:m])
+        return self.cells.mirror_surfaces
 
     @property
     def foot(self) -> float:
