@@ -15,94 +15,98 @@ from tbcad.prototype.balls.placement import (
 from tbcad.spec.errors import SpecError
 
 
-def task(
-    apart: np.ndarray, half: np.ndarray, ceiling: float = np.pi, most: float = 2 * np.pi
+def problem(
+    separation: np.ndarray, half: np.ndarray, limit: float = np.pi, max_swing: float = 2 * np.pi
 ) -> PlacementProblem:
     k = len(half)
-    limit = np.full(k, ceiling)
-    return PlacementProblem(apart, -half, half, -limit, limit, np.zeros(k), most)
+    limits = np.full(k, limit)
+    return PlacementProblem(separation, -half, half, -limits, limits, np.zeros(k), max_swing)
 
 
-def least_swing(apart: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    """In each order, the longest chain of least differences between any two; the best order."""
+def min_swing_by_orders(separation: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """In each order, the longest chain of minimum differences between any two; the best order."""
     best = np.inf
     for order in permutations(range(len(low))):
         need = (high - low).max()
         for start in range(len(order)):
             chain = {order[start]: 0.0}
             for ball in order[start + 1 :]:
-                chain[ball] = max(far + apart[other, ball] for other, far in chain.items())
+                chain[ball] = max(far + separation[other, ball] for other, far in chain.items())
                 need = max(need, high[order[start]] - low[ball] + chain[ball])
         best = min(best, need)
     return float(best)
 
 
 @st.composite
-def tasks(draw: st.DrawFn) -> PlacementProblem:
+def problems(draw: st.DrawFn) -> PlacementProblem:
     k = draw(st.integers(1, 5))
-    apart = np.zeros((k, k))
+    separation = np.zeros((k, k))
     for i in range(k):
         for j in range(i):
-            apart[i, j] = apart[j, i] = draw(st.sampled_from([0.0, 0.1, 0.2, 0.35, 0.6]))
+            separation[i, j] = separation[j, i] = draw(st.sampled_from([0.0, 0.1, 0.2, 0.35, 0.6]))
     low = np.array([draw(st.floats(-1.6, -0.2)) for _ in range(k)])
     high = np.array([draw(st.floats(0.2, 1.6)) for _ in range(k)])
     limit = np.full(k, 2 * np.pi)
-    return PlacementProblem(apart, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
+    return PlacementProblem(separation, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
 
 
 @settings(max_examples=50, deadline=None)
-@given(tasks())
-def test_swing_is_the_least_of_all_orders(given_task: PlacementProblem) -> None:
-    found = min_swing_placement(given_task)
-    expected = least_swing(given_task.min_separation, given_task.served_low, given_task.served_high)
+@given(problems())
+def test_swing_is_the_minimum_of_all_orders(case: PlacementProblem) -> None:
+    found = min_swing_placement(case)
+    expected = min_swing_by_orders(case.min_separation, case.served_low, case.served_high)
     assert found.swing == pytest.approx(expected, abs=3 * SLACK)
-    assert found.bound == pytest.approx(expected, abs=3 * SLACK)
-    assert given_task.satisfied_by(found.azimuth)
-    assert greedy_placement(given_task).swing > found.swing - 3 * SLACK
+    assert found.swing_bound == pytest.approx(expected, abs=3 * SLACK)
+    assert case.satisfied_by(found.azimuth)
+    assert greedy_placement(case).swing > found.swing - 3 * SLACK
 
 
 def test_three_of_a_kind_by_hand() -> None:
-    """The narrow one may go outside: 1.0 + 0.9 + 0.3 for the pair of wide ones is the least."""
-    apart = np.full((3, 3), 0.3) - 0.3 * np.eye(3)
-    found = min_swing_placement(task(apart, np.array([1.0, 0.9, 0.5])))
+    """The narrow one may go outside: 1.0 + 0.9 + 0.3 for the pair of wide ones is the minimum."""
+    separation = np.full((3, 3), 0.3) - 0.3 * np.eye(3)
+    found = min_swing_placement(problem(separation, np.array([1.0, 0.9, 0.5])))
     assert found.swing == pytest.approx(2.2, abs=1e-4)
     assert sorted(np.abs(np.diff(np.sort(found.azimuth))))[0] >= 0.3 - SLACK
 
 
 def test_balls_stay_clear_of_the_post() -> None:
-    apart = np.full((4, 4), 0.4) - 0.4 * np.eye(4)
+    separation = np.full((4, 4), 0.4) - 0.4 * np.eye(4)
     half = np.full(4, 1.5)
-    assert min_swing_placement(task(apart, half)).swing == pytest.approx(4.2, abs=1e-4)
+    assert min_swing_placement(problem(separation, half)).swing == pytest.approx(4.2, abs=1e-4)
     # The same balls need azimuths 0.6 to either side and half a swing of 2.1 beside that.
-    assert min_swing_placement(task(apart, half, ceiling=2.7001)).swing == pytest.approx(
+    assert min_swing_placement(problem(separation, half, limit=2.7001)).swing == pytest.approx(
         4.2, abs=1e-3
     )
     with pytest.raises(SpecError, match=r"found no place for 4 balls.*post_diameter_mm smaller"):
-        min_swing_placement(task(apart, half, ceiling=2.69))
+        min_swing_placement(problem(separation, half, limit=2.69))
 
 
 def test_swing_beyond_the_drive_is_refused() -> None:
-    apart = np.array([[0, 0.5], [0.5, 0]])
+    separation = np.array([[0, 0.5], [0.5, 0]])
     half = np.array([1.0, 1.0])
-    assert min_swing_placement(task(apart, half, most=2.51)).swing == pytest.approx(2.5, abs=1e-4)
+    assert min_swing_placement(problem(separation, half, max_swing=2.51)).swing == pytest.approx(
+        2.5, abs=1e-4
+    )
     with pytest.raises(SpecError, match=r"swing of 143 degrees.*max_swing_deg larger"):
-        min_swing_placement(task(apart, half, most=2.49))
+        min_swing_placement(problem(separation, half, max_swing=2.49))
 
 
-def test_of_equal_swings_the_least_outermost_azimuth() -> None:
+def test_of_equal_swings_the_minimum_outermost_azimuth() -> None:
     """The third ball, narrow and wide-edged, has room to 0.5 but is drawn in."""
     edge = np.array([0.0, 0.0, 0.4])
-    apart = np.zeros((3, 3))
+    separation = np.zeros((3, 3))
     limit = np.full(3, np.pi)
     low, high = -np.array([1.0, 1.0, 0.5]), np.array([1.0, 1.0, 0.5])
-    found = min_swing_placement(PlacementProblem(apart, low, high, -limit, limit, edge, 6.0))
+    found = min_swing_placement(PlacementProblem(separation, low, high, -limit, limit, edge, 6.0))
     assert found.outermost == pytest.approx(1.4, abs=1e-4)
 
 
 def test_same_every_time() -> None:
     rng = np.random.default_rng(1)
     gaps = np.triu(rng.uniform(0, 0.3, (9, 9)), 1)
-    found = [min_swing_placement(task(gaps + gaps.T, np.linspace(0.5, 1.5, 9))) for _ in range(2)]
+    found = [
+        min_swing_placement(problem(gaps + gaps.T, np.linspace(0.5, 1.5, 9))) for _ in range(2)
+    ]
     assert found[0].azimuth.tobytes() == found[1].azimuth.tobytes()
 
 

@@ -5,24 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import BaseSpec
 
 
 @pytest.fixture(scope="module")
-def whole(paper_design: MirrorDesign) -> BaseLayout:
-    return base_layout(BaseSpec(), prototype_layout(load_spec(None), paper_design))
+def base(paper_prototype: PrototypeLayout) -> BaseLayout:
+    return base_layout(BaseSpec(), paper_prototype)
 
 
-def test_arcs_miss_every_number(whole: BaseLayout) -> None:
-    seats = whole.own_seats
-    for ring in whole.rings:
+def test_arcs_miss_every_number(base: BaseLayout) -> None:
+    seats = base.own_seats
+    for ring in base.rings:
         z, r = ring.mean(axis=0)
-        for low, high in ring_arcs(whole, ring, *whole.sector):
+        for low, high in ring_arcs(base, ring, *base.sector):
             assert (high - low) * ring[:, 1].max() >= SHORTEST_MM - STEP_MM
             azimuth = np.linspace(low, high, 500)
             points = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), 0 * azimuth + z], axis=1)
@@ -33,9 +31,9 @@ def test_arcs_miss_every_number(whole: BaseLayout) -> None:
                 assert not ((along > 0) & (beside < seats.boss[k])).any()
 
 
-def test_a_rib_without_bosses_is_whole_and_others_are_not(whole: BaseLayout) -> None:
+def test_a_rib_without_bosses_is_whole_and_others_are_not(base: BaseLayout) -> None:
     sides = [0.0, -0.5, -0.5, -1.0]
-    counts = [len(rib_gaps(whole, a, s)) for a, s in zip(whole.ribs.tolist(), sides, strict=True)]
+    counts = [len(rib_gaps(base, a, s)) for a, s in zip(base.ribs.tolist(), sides, strict=True)]
     assert counts[0] == counts[-1] == 0  # the edges' ribs stand beyond all bosses
     assert max(counts) > 0
 

@@ -33,34 +33,24 @@ def keys(**changed: object) -> BaseSpec:
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
-
-
-@pytest.fixture(scope="module")
-def paper(paper_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None), paper_design)
-
-
-@pytest.fixture(scope="module")
-def whole(paper: PrototypeLayout) -> BaseLayout:
-    return base_layout(KEYS, paper)
+def whole(paper_prototype: PrototypeLayout) -> BaseLayout:
+    return base_layout(KEYS, paper_prototype)
 
 
 class TestSeats:
     def test_pads_are_tangent_to_the_bodies(
-        self, whole: BaseLayout, paper: PrototypeLayout
+        self, whole: BaseLayout, paper_prototype: PrototypeLayout
     ) -> None:
         seat = whole.seats
-        away = dot(seat.contacts - paper.body_centres()[:, None], seat.pad_normals)
-        assert np.abs(away + paper.balls.body_radius[:, None]).max() < 1e-9
+        away = dot(seat.contacts - paper_prototype.body_centres()[:, None], seat.pad_normals)
+        assert np.abs(away + paper_prototype.balls.body_radius[:, None]).max() < 1e-9
         assert np.abs(norm(seat.pad_normals) - 1).max() < 1e-12
 
     def test_pads_stand_at_the_angle_of_the_spec_a_third_of_a_turn_apart(
-        self, whole: BaseLayout, paper: PrototypeLayout
+        self, whole: BaseLayout, paper_prototype: PrototypeLayout
     ) -> None:
         normal = whole.seats.pad_normals
-        tilt = dot(normal, paper.normals()[:, None])
+        tilt = dot(normal, paper_prototype.normals()[:, None])
         assert np.degrees(np.arccos(tilt)) == pytest.approx(np.full(tilt.shape, 50.0))
         pairs = dot(normal, np.roll(normal, 1, axis=1))
         apart = np.cos(np.radians(50)) ** 2 - np.sin(np.radians(50)) ** 2 / 2
@@ -80,8 +70,8 @@ class TestSeats:
         pads = seat.radius * np.sin(seat.tilt) - seat.pad * np.cos(seat.tilt)
         assert (seat.pocket < pads).all()
 
-    def test_glue_needs_no_magnet(self, made: PrototypeLayout) -> None:
-        seat = seat_layout(keys(hold="glue"), made)
+    def test_glue_needs_no_magnet(self, small_prototype: PrototypeLayout) -> None:
+        seat = seat_layout(keys(hold="glue"), small_prototype)
         assert (seat.magnet == 0).all()
         assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
 
@@ -91,8 +81,8 @@ class TestSeats:
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
         self, paper_design: MirrorDesign
     ) -> None:
-        made = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
-        seat = seat_layout(KEYS, made)
+        small_prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
+        seat = seat_layout(KEYS, small_prototype)
         slant = np.degrees(np.arccos(np.clip(-dot(seat.way, seat.axis) / norm(seat.way), -1, 1)))
         assert 5 < slant.max() < 21
         # On its way out it leaves its own pads.
@@ -105,9 +95,11 @@ class TestSeats:
 
 
 class TestLight:
-    def test_all_light_is_within_the_level(self, whole: BaseLayout, paper: PrototypeLayout) -> None:
+    def test_all_light_is_within_the_level(
+        self, whole: BaseLayout, paper_prototype: PrototypeLayout
+    ) -> None:
         random = np.random.default_rng(1)
-        for cone in light_hulls(paper.balls.outline, whole.light.pinhole, 30.0):
+        for cone in light_hulls(paper_prototype.balls.outline, whole.light.pinhole, 30.0):
             share = random.random((len(cone), 500, 1))
             middle = cone.start[:, None] + share * (cone.end - cone.start)[:, None]
             reach = cone.start_radius[:, None] * (1 - share[..., 0])
@@ -127,9 +119,9 @@ class TestLight:
         inside = region.beyond(weights @ facets).min(axis=1)
         assert (region.least_beyond(facets) <= inside + 1e-9).all()
 
-    def test_a_boss_in_the_light_is_refused(self, made: PrototypeLayout) -> None:
+    def test_a_boss_in_the_light_is_refused(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
-            base_layout(keys(light_clearance_mm=12.0), made)
+            base_layout(keys(light_clearance_mm=12.0), small_prototype)
 
 
 class TestProfile:
@@ -163,12 +155,16 @@ class TestProfile:
                 line = whole.inner if sign < 0 else whole.outer
                 assert (sign * distance_outside(line, at)).min() > -1e-9
 
-    def test_the_sector_holds_all_bosses(self, whole: BaseLayout, paper: PrototypeLayout) -> None:
+    def test_the_sector_holds_all_bosses(
+        self, whole: BaseLayout, paper_prototype: PrototypeLayout
+    ) -> None:
         low, high = whole.sector
-        azimuth = paper.placement.azimuth
+        azimuth = paper_prototype.placement.azimuth
         assert low < azimuth.min() < azimuth.max() < high
-        assert whole.outermost(paper.placement.swing) > paper.placement.outermost
-        assert whole.outermost(paper.placement.swing) < np.radians(160)
+        assert (
+            whole.outermost(paper_prototype.placement.swing) > paper_prototype.placement.outermost
+        )
+        assert whole.outermost(paper_prototype.placement.swing) < np.radians(160)
         assert len(whole.ribs) == KEYS.ribs
         assert (np.diff(whole.ribs) > 0).all()
 
@@ -204,25 +200,34 @@ class TestRefused:
             ({"magnets_mm": [40.0]}, "no magnet fits between the pads of ball 1: add one of"),
         ],
     )
-    def test_seats(self, made: PrototypeLayout, changed: dict[str, object], text: str) -> None:
+    def test_seats(
+        self, small_prototype: PrototypeLayout, changed: dict[str, object], text: str
+    ) -> None:
         with pytest.raises(SpecError, match=text):
-            base_layout(keys(**changed), made)
+            base_layout(keys(**changed), small_prototype)
 
-    def test_pads_in_the_way_of_other_balls(self, made: PrototypeLayout) -> None:
-        close = replace(made.placement, azimuth=made.placement.azimuth * 0)
-        small = replace(made.balls.at, apex=made.balls.poses.apex * 0 + made.balls.poses.apex[:1])
-        crowded = replace(made, placement=close, balls=replace(made.balls, at=small))
+    def test_pads_in_the_way_of_other_balls(self, small_prototype: PrototypeLayout) -> None:
+        close = replace(small_prototype.placement, azimuth=small_prototype.placement.azimuth * 0)
+        small = replace(
+            small_prototype.balls.poses,
+            apex=small_prototype.balls.poses.apex * 0 + small_prototype.balls.poses.apex[:1],
+        )
+        crowded = replace(
+            small_prototype, placement=close, balls=replace(small_prototype.balls, poses=small)
+        )
         with pytest.raises(SpecError, match="stands where another ball is put in"):
             seat_layout(KEYS, crowded)
 
-    def test_a_ball_next_to_the_axis(self, made: PrototypeLayout) -> None:
-        seat = seat_layout(KEYS, made)
-        frame = made.half.ellipsoid.frame()
+    def test_a_ball_next_to_the_axis(self, small_prototype: PrototypeLayout) -> None:
+        seat = seat_layout(KEYS, small_prototype)
+        frame = small_prototype.half.ellipsoid.frame()
         near = replace(seat, centre=seat.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
         with pytest.raises(SpecError, match="stands too near to the axis for its seat"):
-            sector(KEYS, near, made)
+            sector(KEYS, near, small_prototype)
 
-    def test_balls_all_round_the_axis(self, made: PrototypeLayout) -> None:
-        spread = replace(made.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0]))
+    def test_balls_all_round_the_axis(self, small_prototype: PrototypeLayout) -> None:
+        spread = replace(
+            small_prototype.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0])
+        )
         with pytest.raises(SpecError, match=r"would go 3\d\d degrees round its axis"):
-            base_layout(KEYS, replace(made, placement=spread))
+            base_layout(KEYS, replace(small_prototype, placement=spread))

@@ -52,14 +52,14 @@ PRINTER = PrinterSpec()
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
+def prototype(small_design: MirrorDesign) -> PrototypeLayout:
     options = ["n=6", "prototype.k=4", "prototype.snap=nearest", "prototype.largest_ball_mm=50"]
     return prototype_layout(load_spec(None, options), small_design)
 
 
 @pytest.fixture(scope="module")
-def numbers(made: PrototypeLayout) -> BaseLayout:
-    return base_layout(KEYS, made)
+def numbers(prototype: PrototypeLayout) -> BaseLayout:
+    return base_layout(KEYS, prototype)
 
 
 @pytest.fixture(scope="module")
@@ -95,9 +95,9 @@ class TestCarrier:
         assert part.mass_g(1.27) == pytest.approx(part.volume * 1.27e-3)
 
     def test_ball_centres_are_recovered_from_the_pads(
-        self, numbers: BaseLayout, made: PrototypeLayout, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
-        centre, radius = made.body_centres(), made.balls.body_radius
+        centre, radius = prototype.body_centres(), prototype.balls.body_radius
         for k, (contacts, normals) in enumerate(
             zip(numbers.seats.contacts, numbers.seats.pad_normals, strict=True)
         ):
@@ -124,15 +124,15 @@ class TestCarrier:
                 assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_balls_touch_nothing_but_their_pads(
-        self, numbers: BaseLayout, made: PrototypeLayout, mesh: trimesh.Trimesh
+        self, numbers: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=1)
         points = np.vstack([points, mesh.vertices])
         for contacts, centre, pad, radius in zip(
             numbers.seats.contacts,
-            made.body_centres(),
+            prototype.body_centres(),
             numbers.seats.pad,
-            made.balls.body_radius,
+            prototype.balls.body_radius,
             strict=True,
         ):
             room = norm(points - centre) - radius
@@ -242,7 +242,7 @@ def test_booleans_in_parallel_give_the_same_bytes(
     """Faces come in the same order, in two threads or one, by oriented boxes or plain ones."""
     found = numbers.own_seats
 
-    def made(name: str) -> bytes:
+    def step(name: str) -> bytes:
         bosses = [
             seat.moved_to_seat(seat.boss_solid(found, k), found, k) for k in range(len(found))
         ]
@@ -251,11 +251,11 @@ def test_booleans_in_parallel_give_the_same_bytes(
         write_step(tmp_path / name, Solid("block", solid, ()))
         return (tmp_path / name).read_bytes()
 
-    first = made("one")
+    first = step("one")
     used: list[str] = []
     for kind in (BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse):
         monkeypatch.setattr(f"tbcad.cad.solids.{kind.__name__}", plain(kind, used))
-    assert made("two") == first
+    assert step("two") == first
     assert {"SetRunParallel", "SetUseOBB"} <= set(used)
 
 
@@ -309,11 +309,11 @@ class TestHub:
 
 class TestCaps:
     def test_fronts_and_bodies_are_exact_spheres(
-        self, numbers: BaseLayout, made: PrototypeLayout
+        self, numbers: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        parts = cap_parts(numbers, made)
-        assert len(parts) == made.balls.cap.sum() > 0
-        for k, found in zip(np.flatnonzero(made.balls.cap), parts, strict=True):
+        parts = cap_parts(numbers, prototype)
+        assert len(parts) == prototype.balls.cap.sum() > 0
+        for k, found in zip(np.flatnonzero(prototype.balls.cap), parts, strict=True):
             spheres = {}
             for face in faces(found.shape):
                 surface = BRep_Tool.Surface_s(face)
@@ -321,45 +321,51 @@ class TestCaps:
                     middle = surface.Location()
                     spheres[round(surface.Radius(), 6)] = [middle.X(), middle.Y(), middle.Z()]
             assert sorted(spheres) == pytest.approx(
-                [made.balls.body_radius[k], made.balls.radius[k]]
+                [prototype.balls.body_radius[k], prototype.balls.radius[k]]
             )
             first, second = (spheres[size] for size in sorted(spheres))
-            assert first == pytest.approx(made.body_centres()[k], abs=1e-9)
-            assert second == pytest.approx(made.centres()[k], abs=1e-9)
+            assert first == pytest.approx(prototype.body_centres()[k], abs=1e-9)
+            assert second == pytest.approx(prototype.centres()[k], abs=1e-9)
 
-    def test_volume_against_a_closed_form(self, numbers: BaseLayout, made: PrototypeLayout) -> None:
-        for k, found in zip(np.flatnonzero(made.balls.cap), cap_parts(numbers, made), strict=True):
-            body, front = float(made.balls.body_radius[k]), float(made.balls.radius[k])
+    def test_volume_against_a_closed_form(
+        self, numbers: BaseLayout, prototype: PrototypeLayout
+    ) -> None:
+        for k, found in zip(
+            np.flatnonzero(prototype.balls.cap), cap_parts(numbers, prototype), strict=True
+        ):
+            body, front = float(prototype.balls.body_radius[k]), float(prototype.balls.radius[k])
             edge, behind = body / np.sqrt(2), flat_depth(numbers, k)
             drop = front - np.sqrt(front**2 - edge**2)
             lens = np.pi * drop**2 * (3 * front - drop) / 3
             zone = np.pi * (body**2 * (behind + edge) - (behind**3 + edge**3) / 3)
-            wide, deep = cap_pocket(numbers, k, float(made.balls.body_depth[k]))
+            wide, deep = cap_pocket(numbers, k, float(prototype.balls.body_depth[k]))
             assert found.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
 
     def test_they_are_watertight_and_printed_front_up(
-        self, numbers: BaseLayout, made: PrototypeLayout
+        self, numbers: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        for k, found in zip(np.flatnonzero(made.balls.cap), cap_parts(numbers, made), strict=True):
+        for k, found in zip(
+            np.flatnonzero(prototype.balls.cap), cap_parts(numbers, prototype), strict=True
+        ):
             whole = as_trimesh(found.shape)
             assert whole.is_watertight
-            assert (norm(whole.vertices - made.apices()[k])).min() < 1e-6
+            assert (norm(whole.vertices - prototype.apices()[k])).min() < 1e-6
             low, high = bounds(found.on_bed)
             assert low[2] == pytest.approx(0, abs=1e-6)
-            assert high[2] == pytest.approx(flat_depth(numbers, k) + made.balls.body_depth[k])
+            assert high[2] == pytest.approx(flat_depth(numbers, k) + prototype.balls.body_depth[k])
 
-    def test_they_rest_on_the_pads(self, numbers: BaseLayout, made: PrototypeLayout) -> None:
-        for k in np.flatnonzero(made.balls.cap).tolist():
+    def test_they_rest_on_the_pads(self, numbers: BaseLayout, prototype: PrototypeLayout) -> None:
+        for k in np.flatnonzero(prototype.balls.cap).tolist():
             along = dot(numbers.seats.contacts[k] - numbers.seats.centre[k], numbers.seats.axis[k])
             steep = np.cos(numbers.seats.tilt)
             assert along == pytest.approx(np.full(3, steep * numbers.seats.radius[k]))
             edge = along + numbers.seats.pad[k] * np.sin(numbers.seats.tilt)
             assert edge.max() < flat_depth(numbers, k)
 
-    def test_glued_caps_have_no_pocket(self, made: PrototypeLayout) -> None:
-        glued = base_layout(BaseSpec(hold="glue"), made)
+    def test_glued_caps_have_no_pocket(self, prototype: PrototypeLayout) -> None:
+        glued = base_layout(BaseSpec(hold="glue"), prototype)
         assert cap_pocket(glued, 0, 5.0) == (0.0, 0.0)
-        assert as_trimesh(cap_parts(glued, made)[0].shape).is_watertight
+        assert as_trimesh(cap_parts(glued, prototype)[0].shape).is_watertight
 
 
 @pytest.fixture(scope="module")
@@ -423,8 +429,8 @@ class TestCoupon:
             area = solid.area_faces[in_plane(solid, plane, normal)].sum()
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
-    def test_a_row_larger_than_the_bed(self, made: PrototypeLayout) -> None:
-        crowded = base_layout(BaseSpec(coupon_offsets_mm=(0.1,) * 9), made)
+    def test_a_row_larger_than_the_bed(self, prototype: PrototypeLayout) -> None:
+        crowded = base_layout(BaseSpec(coupon_offsets_mm=(0.1,) * 9), prototype)
         with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
             coupon_plates(crowded, PrinterSpec(bed_mm=(100.0, 100.0, 100.0)))
 

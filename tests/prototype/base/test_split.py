@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.joints import flange_profile
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.profile import distance_outside
@@ -18,7 +17,6 @@ from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.bed import needed, room, shortfall
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 
@@ -34,21 +32,17 @@ def cube(size: float) -> PrinterSpec:
     return PrinterSpec(bed_mm=(size, size, size))
 
 
-@pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
-
-
-@pytest.fixture(scope="module")
-def paper(paper_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None), paper_design)
-
-
 @pytest.fixture(scope="module", params=["small", "paper in two", "paper in three"])
 def cut(
-    request: pytest.FixtureRequest, made: PrototypeLayout, paper: PrototypeLayout
+    request: pytest.FixtureRequest,
+    small_prototype: PrototypeLayout,
+    paper_prototype: PrototypeLayout,
 ) -> tuple[BaseLayout, BaseSplit]:
-    at = {"small": (made, 150.0), "paper in two": (paper, 180.0), "paper in three": (paper, 160.0)}
+    at = {
+        "small": (small_prototype, 150.0),
+        "paper in two": (paper_prototype, 180.0),
+        "paper in three": (paper_prototype, 160.0),
+    }
     chosen, bed = at[request.param]
     numbers = base_layout(KEYS, chosen)
     plan = split_base(numbers, cube(bed))
@@ -67,9 +61,9 @@ def rims(numbers: BaseLayout) -> np.ndarray:
 
 class TestPlanes:
     def test_a_base_that_fits_stays_whole(
-        self, made: PrototypeLayout, paper: PrototypeLayout
+        self, small_prototype: PrototypeLayout, paper_prototype: PrototypeLayout
     ) -> None:
-        for one in (made, paper):
+        for one in (small_prototype, paper_prototype):
             plan = split_base(base_layout(KEYS, one), PrinterSpec())
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
@@ -97,19 +91,19 @@ class TestPlanes:
         assert (np.sum(inside, axis=0) == 1).all()
         assert all(one.any() for one in inside)
 
-    def test_the_same_again(self, made: PrototypeLayout) -> None:
-        one, two = (split_base(base_layout(KEYS, made), cube(150.0)) for _ in range(2))
+    def test_the_same_again(self, small_prototype: PrototypeLayout) -> None:
+        one, two = (split_base(base_layout(KEYS, small_prototype), cube(150.0)) for _ in range(2))
         for first, second in zip(one.joints, two.joints, strict=True):
             assert (first.screws == second.screws).all()
             assert (first.plane.normal == second.plane.normal).all()
 
-    def test_a_bed_too_small_names_one_that_does(self, made: PrototypeLayout) -> None:
+    def test_a_bed_too_small_names_one_that_does(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as said:
-            split_base(base_layout(KEYS, made), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
+            split_base(base_layout(KEYS, small_prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
         (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))
         width, depth, height = map(float, bed)
         larger = PrinterSpec(bed_mm=(width, depth, height))
-        assert len(split_base(base_layout(KEYS, made), larger).pieces) == 2
+        assert len(split_base(base_layout(KEYS, small_prototype), larger).pieces) == 2
 
 
 class TestJoints:
@@ -180,9 +174,11 @@ class TestJoints:
             ({"joint_mm": 27.0}, r"no M3 screw is 31 to 33\.2 mm long"),
         ],
     )
-    def test_refused(self, made: PrototypeLayout, changed: dict[str, object], text: str) -> None:
+    def test_refused(
+        self, small_prototype: PrototypeLayout, changed: dict[str, object], text: str
+    ) -> None:
         with pytest.raises(SpecError, match=text):
-            split_base(base_layout(keys(**changed), made), cube(150.0))
+            split_base(base_layout(keys(**changed), small_prototype), cube(150.0))
 
 
 class TestBed:
@@ -200,11 +196,11 @@ class TestBed:
 
 
 class TestBought:
-    def test_a_whole_base(self, paper: PrototypeLayout) -> None:
-        carrier = base_layout(KEYS, paper)
+    def test_a_whole_base(self, paper_prototype: PrototypeLayout) -> None:
+        carrier = base_layout(KEYS, paper_prototype)
         found = base_purchased_parts(carrier, split_base(carrier, PrinterSpec()))
         magnet = {name: count for name, count in found.items() if name.startswith("MAGNET")}
-        assert sum(magnet.values()) == len(paper.balls.body_radius)
+        assert sum(magnet.values()) == len(paper_prototype.balls.body_radius)
         # Four of the drive, two of the set screws.
         assert found["INSERT-M3"] == 6
         (screw,) = (name for name in found if name.startswith("SET"))
@@ -221,18 +217,20 @@ class TestBought:
         assert found["M3x12"] == screws
         assert found["INSERT-M3"] == 6 + screws
 
-    def test_other_hubs(self, made: PrototypeLayout) -> None:
-        whole = split_base(base_layout(KEYS, made), PrinterSpec())
-        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), made), whole)
+    def test_other_hubs(self, small_prototype: PrototypeLayout) -> None:
+        whole = split_base(base_layout(KEYS, small_prototype), PrinterSpec())
+        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), small_prototype), whole)
         assert clamp["INSERT-M3"] == 5
         assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
-        stage = base_purchased_parts(base_layout(keys(drive="stage-60", hold="glue"), made), whole)
+        stage = base_purchased_parts(
+            base_layout(keys(drive="stage-60", hold="glue"), small_prototype), whole
+        )
         assert stage == {}
 
-    def test_not_in_a_list(self, made: PrototypeLayout) -> None:
+    def test_not_in_a_list(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
-            magnets(base_layout(keys(magnet_height_mm=4.0), made))
-        numbers = base_layout(keys(insert_hole_mm=4.4), made)
+            magnets(base_layout(keys(magnet_height_mm=4.0), small_prototype))
+        numbers = base_layout(keys(insert_hole_mm=4.4), small_prototype)
         whole = split_base(numbers, PrinterSpec())
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
             fasteners(numbers, whole)

@@ -17,8 +17,7 @@ from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -27,7 +26,6 @@ from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_soli
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh
@@ -44,15 +42,14 @@ def cut_up(numbers: BaseLayout, printer: PrinterSpec) -> Cut:
 
 
 @pytest.fixture(scope="module")
-def small(small_design: MirrorDesign) -> Cut:
-    made = prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
-    return cut_up(base_layout(BaseSpec(), made), PRINTER)
+def small(small_prototype: PrototypeLayout) -> Cut:
+    return cut_up(base_layout(BaseSpec(), small_prototype), PRINTER)
 
 
 @pytest.fixture(scope="module")
-def paper(paper_design: MirrorDesign) -> Cut:
-    made = prototype_layout(load_spec(None), paper_design)
-    return cut_up(base_layout(BaseSpec(), made), PrinterSpec(bed_mm=(180.0, 180.0, 180.0)))
+def paper(paper_prototype: PrototypeLayout) -> Cut:
+    printer = PrinterSpec(bed_mm=(180.0, 180.0, 180.0))
+    return cut_up(base_layout(BaseSpec(), paper_prototype), printer)
 
 
 def check_pieces(cut: Cut) -> None:

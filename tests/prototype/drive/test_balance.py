@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
     BaseBalance,
@@ -15,7 +14,6 @@ from tbcad.prototype.drive.balance import (
     counterweight_masses,
     sum_masses,
 )
-from tbcad.spec.load import load_spec
 
 # The paper's: w leans 45 degrees below the horizon.
 FRAME = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0).frame()
@@ -35,11 +33,6 @@ def turned(load: PointMasses, angle: float) -> PointMasses:
     return PointMasses(
         load.mass_g, r * np.cos(angle) + across * np.sin(angle) + along * (1 - np.cos(angle))
     )
-
-
-@pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=6"]), small_design)
 
 
 class TestTorque:
@@ -131,9 +124,9 @@ class TestCounterweight:
         assert left.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
         assert left.mass_g == pytest.approx(mass + weight.mass_g)
 
-    def test_of_a_prototype(self, made: PrototypeLayout) -> None:
-        load = ball_masses(made, 1.27)
-        before = sum_masses(made.half.ellipsoid.frame(), load)
+    def test_of_a_prototype(self, small_prototype: PrototypeLayout) -> None:
+        load = ball_masses(small_prototype, 1.27)
+        before = sum_masses(small_prototype.half.ellipsoid.frame(), load)
         weight = before.counterweight(100)
         after = sum_masses(before.frame, load, counterweight_masses(weight, -70, before.frame))
         assert before.torque_amplitude > 100
@@ -141,25 +134,28 @@ class TestCounterweight:
 
 
 class TestBalls:
-    def test_balls_weigh_where_they_sit(self, made: PrototypeLayout) -> None:
-        load = ball_masses(made, 1.27)
-        bought = ~made.balls.cap
-        assert len(load) == len(made)
-        assert load.mass_g[bought].sum() == pytest.approx(made.mass_g)
-        assert (load.centre == made.body_centres()).all()
+    def test_balls_weigh_where_they_sit(self, small_prototype: PrototypeLayout) -> None:
+        load = ball_masses(small_prototype, 1.27)
+        bought = ~small_prototype.balls.cap
+        assert len(load) == len(small_prototype)
+        assert load.mass_g[bought].sum() == pytest.approx(small_prototype.mass_g)
+        assert (load.centre == small_prototype.body_centres()).all()
 
-    def test_turning_the_base_turns_the_balls(self, made: PrototypeLayout) -> None:
-        frame = made.half.ellipsoid.frame()
-        still = sum_masses(frame, ball_masses(made, 1.27))
+    def test_turning_the_base_turns_the_balls(self, small_prototype: PrototypeLayout) -> None:
+        frame = small_prototype.half.ellipsoid.frame()
+        still = sum_masses(frame, ball_masses(small_prototype, 1.27))
         moved = sum_masses(
-            frame, PointMasses(ball_masses(made, 1.27).mass_g, made.body_centres(0.4))
+            frame,
+            PointMasses(
+                ball_masses(small_prototype, 1.27).mass_g, small_prototype.body_centres(0.4)
+            ),
         )
         assert still.torque(np.array([0.4])) == pytest.approx(moved.torque(np.array([0.0])))
         assert still.inertia == pytest.approx(moved.inertia)
 
-    def test_caps_by_slices(self, made: PrototypeLayout) -> None:
+    def test_caps_by_slices(self, small_prototype: PrototypeLayout) -> None:
         """Their volume as the sum of thin discs: within both spheres."""
-        balls = made.balls
+        balls = small_prototype.balls
         assert balls.cap.any()
         for j in np.flatnonzero(balls.cap):
             body, radius, depth = balls.body_radius[j], balls.radius[j], balls.body_depth[j]
@@ -171,8 +167,8 @@ class TestBalls:
             area = np.pi * np.where(x < drop, front, np.maximum(back, 0))
             assert cap_volume(balls)[j] == pytest.approx(np.trapezoid(area, x), rel=1e-5)
 
-    def test_balls_have_no_cap(self, made: PrototypeLayout) -> None:
-        assert (cap_volume(made.balls)[~made.balls.cap] == 0).all()
+    def test_balls_have_no_cap(self, small_prototype: PrototypeLayout) -> None:
+        assert (cap_volume(small_prototype.balls)[~small_prototype.balls.cap] == 0).all()
 
 
 def test_one_mass_is_its_own_sum() -> None:
