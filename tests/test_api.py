@@ -58,7 +58,8 @@ def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert result.passed
     assert (tmp_path / "exports" / "shell_a.step").is_file()
     assert isinstance(field, tbcad.LightField)
-    for value in (names["design"], names["half"], result, result.report, field):
+    spec = tbcad.load_spec(None)
+    for value in (spec, names["design"], names["half"], result, result.report, field):
         assert len(repr(value)) < 250
 
 

@@ -157,6 +157,12 @@ class Spec(Section):
     printer: PrinterSpec = PrinterSpec()
     prototype: PrototypeSpec = PrototypeSpec()
 
+    def __repr__(self) -> str:
+        """Return name and subdivision; `spec_dict` gives every key."""
+        return f"<Spec {self.name!r}: n = {self.optics.n}>"
+
+    __str__ = __repr__
+
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         _check_capture_sphere(self.optics)
