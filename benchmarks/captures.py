@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -50,6 +51,7 @@ def with_sensor(export: Path, folder: Path, times: int) -> None:
         camera["height_px"] *= times
     folder.mkdir()
     (folder / "design.json").write_text(json.dumps(document), encoding="utf-8")
+    shutil.copy(export / "mirrors.csv", folder)
 
 
 def _capture(export: Path, out: Path, subject: Path | None) -> list[str]:

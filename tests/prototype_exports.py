@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
-from tbcad.prototype.files.balls_csv import rows as ball_rows
-from tbcad.prototype.files.plan_csv import rows, write_plan
+from tbcad.prototype.files import balls_csv, plan_csv
 from tbcad.simulate.prototype.plan import Plan
 
 
@@ -34,14 +34,16 @@ def plan_of(made: PrototypeLayout) -> Plan:
 def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
-    write_plan(folder / "rotation_plan.csv", rows(planned_pictures(made)))
+    plan = plan_csv.rows(planned_pictures(made))
+    write_table(folder / "rotation_plan.csv", plan_csv.COLUMNS, plan)
+    write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.rows(made))
     axis, zero, third = made.half.ellipsoid.frame().tolist()
     document = {
-        "schema": "tbcad-prototype/1",
+        "schema": "tbcad-prototype/2",
         "camera": "a",
         "picture": little.spec.prototype.picture,
         "frame": {"axis": axis, "zero": zero, "third": third},
-        "balls": ball_rows(made),
+        "balls": "balls.csv",
     }
     (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
     return folder

@@ -1,18 +1,17 @@
-"""The record: mirrors.csv, and design.json with the resolved spec, cameras and mirrors."""
+"""The record of a design: mirrors.csv, and design.json with the resolved spec and the cameras."""
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.spec.load import spec_dict
 
-Row = dict[str, str | float | None]
-
-SCHEMA = "tbcad-design/1"
+SCHEMA = "tbcad-design/2"
+DESIGN_FILE, MIRRORS_FILE = "design.json", "mirrors.csv"
 COLUMNS = (
     *("id", "camera"),
     *("ux", "uy", "uz", "px", "py", "pz", "nx", "ny", "nz", "cx", "cy", "cz"),
@@ -22,7 +21,7 @@ COLUMNS = (
 
 
 def rows(half: MirrorArray) -> list[Row]:
-    """One record for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
+    """One row for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
     mirrors = half.mirrors
     numbers = np.column_stack(
         [
@@ -44,25 +43,19 @@ def rows(half: MirrorArray) -> list[Row]:
     ]
 
 
-def write_mirrors(path: Path, records: list[Row]) -> None:
-    """Write mirrors.csv with full double precision; what does not exist is left empty."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(records)
-
-
 def write_record(folder: Path, design: MirrorDesign, shells: bool) -> None:
-    """Write mirrors.csv and design.json; whether the shells' files are there too is recorded."""
-    records = [row for half in design.halves for row in rows(half)]
-    write_mirrors(folder / "mirrors.csv", records)
-    write_design(folder / "design.json", design, records, shells)
+    """Write mirrors.csv and design.json; `shells`: whether the shells' files are there too."""
+    write_table(
+        folder / MIRRORS_FILE, COLUMNS, (row for half in design.halves for row in rows(half))
+    )
+    text = json.dumps(document(design, shells), indent=1, allow_nan=False) + "\n"
+    (folder / DESIGN_FILE).write_text(text, encoding="utf-8")
 
 
-def write_design(path: Path, design: MirrorDesign, records: list[Row], shells: bool = True) -> None:
-    """Write design.json."""
+def document(design: MirrorDesign, shells: bool) -> dict[str, Any]:
+    """What design.json holds; the mirrors are in the file that it names."""
     spec = design.spec
-    document = {
+    return {
         "schema": SCHEMA,
         "spec": spec_dict(spec),
         "target_mm": spec.optics.capture_diameter_mm,
@@ -70,9 +63,8 @@ def write_design(path: Path, design: MirrorDesign, records: list[Row], shells: b
         "foot_z_mm": design.halves[0].foot,
         "cameras": [camera(half) for half in design.halves],
         "parts": [part(half) for half in design.halves if shells],
-        "mirrors": records,
+        "mirrors": MIRRORS_FILE,
     }
-    path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def camera(half: MirrorArray) -> dict[str, Any]:

@@ -13,7 +13,7 @@ SHELL = "shell"
 RIG = ("rig", "base", "seat", "exploded")
 SUBJECTS = (SHELL, *RIG)
 NEEDED = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
-NEEDED_FOR_RIG = ("prototype.json",)
+NEEDED_FOR_RIG = ("prototype.json", "balls.csv")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL) -> None:

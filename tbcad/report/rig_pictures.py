@@ -1,8 +1,9 @@
-"""Pictures of the prototype, drawn from an export's prototype.json, STL files and assembly.
+"""Pictures of the prototype, drawn from an export's records, STL files and assembly.
 
 Run as a program (`python -m tbcad.report.rig_pictures DIR SUBJECT FILE`), as `pictures`.
 """
 
+import csv
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -25,6 +26,15 @@ class _Drawn(NamedTuple):
     group: str
     mesh: pyvista.PolyData
     colour: Floats
+
+
+class _Ball(NamedTuple):
+    """A body in a seat: its number, whether a cap is its front, its centre (3,) and radius, mm."""
+
+    number: int
+    cap: bool
+    centre: Floats
+    radius: float
 
 
 # From glTF's metres and y up to millimetres and z up.
@@ -76,17 +86,16 @@ def _base(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     for column, eye in enumerate((axis - zero - 0.4 * third, zero - 0.4 * axis + 0.3 * third)):
         plotter.subplot(0, column)
         _parts(plotter, folder, record, ("base", "cap"))
-        _balls(plotter, record)
+        _add_balls(plotter, folder)
         _show_all(plotter, eye)
 
 
 def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     """The seat of the largest ball that is bought: empty, and with the ball in it."""
-    balls = [ball for ball in record["balls"] if ball["kind"] == "ball"] or record["balls"]
-    ball = max(balls, key=lambda one: one["body_radius_mm"])
-    seat = record["seats"][ball["number"] - 1]
-    axis, radius = np.array(seat["axis"]), ball["body_radius_mm"]
-    middle = np.array([ball[key] for key in ("bx", "by", "bz")])
+    balls = _read_balls(folder)
+    ball = max([one for one in balls if not one.cap] or balls, key=lambda one: one.radius)
+    seat = record["seats"][ball.number - 1]
+    axis, radius, middle = np.array(seat["axis"]), ball.radius, ball.centre
     side = np.cross(axis, (0.0, 1.0, 0.3))
     eye = middle - 7 * radius * axis + 2.5 * radius * side / np.linalg.norm(side)
     for column in (0, 1):
@@ -96,7 +105,7 @@ def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
             mark = pyvista.Sphere(radius=seat["pad_diameter_mm"] / 5, center=contact)
             plotter.add_mesh(mark, color="red")
         if column:
-            _balls(plotter, record, only=ball["number"])
+            _add_balls(plotter, folder, only=ball.number)
         _look(plotter, eye, middle + 0.3 * radius * axis)
 
 
@@ -146,14 +155,27 @@ def _mesh(folder: Path, part: Record) -> pyvista.PolyData:
     return mesh.compute_normals(split_vertices=True, feature_angle=30.0)
 
 
-def _balls(plotter: pyvista.Plotter, record: Record, only: int = 0) -> None:
-    for ball in record["balls"]:
-        if ball["kind"] == "ball" and only in (0, ball["number"]):
-            middle = np.array([ball[key] for key in ("bx", "by", "bz")])
-            ball_mesh = pyvista.Sphere(
-                radius=ball["body_radius_mm"], center=middle, theta_resolution=48, phi_resolution=48
+def _read_balls(folder: Path) -> list[_Ball]:
+    with (folder / "balls.csv").open(newline="", encoding="utf-8") as file:
+        return [
+            _Ball(
+                int(row["number"]),
+                row["kind"] == "cap",
+                np.array([float(row[key]) for key in ("bx", "by", "bz")]),
+                float(row["body_radius_mm"]),
             )
-            plotter.add_mesh(ball_mesh, color=COLOURS["ball"], smooth_shading=True, specular=0.9)
+            for row in csv.DictReader(file)
+        ]
+
+
+def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
+    """Add the bought balls, or the one of this number."""
+    for ball in _read_balls(folder):
+        if not ball.cap and only in (0, ball.number):
+            sphere = pyvista.Sphere(
+                radius=ball.radius, center=ball.centre, theta_resolution=48, phi_resolution=48
+            )
+            plotter.add_mesh(sphere, color=COLOURS["ball"], smooth_shading=True, specular=0.9)
 
 
 def _assembly(folder: Path, record: Record) -> list[_Drawn]:

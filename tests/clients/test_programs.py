@@ -1,12 +1,12 @@
 """Programs that users open our files with. Each is skipped when it is not installed."""
 
+import csv
 import json
 import math
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tbcad_verify.programs import (
@@ -66,17 +66,16 @@ def wanted(export: Path, relative: float) -> list[ExpectedPart]:
     for part in [*design["parts"], *made["parts"]]:
         volume = float(trimesh.load_mesh(export / part["stl"]).volume)
         files = {kind: part[kind] for kind in ("step", "stl", "3mf")}
-        spheres = mirrors(design, part["camera"]) if "camera" in part else None
+        spheres = mirrors(export, part["camera"]) if "camera" in part else None
         found.append(ExpectedPart(part["name"], files, spheres, volume, relative * volume))
     return found
 
 
-def mirrors(design: dict[str, Any], camera: str) -> int:
+def mirrors(export: Path, camera: str) -> int:
     """Number of a camera's curved mirrors."""
-    return sum(
-        mirror["camera"] == camera and mirror["radius_mm"] is not None
-        for mirror in design["mirrors"]
-    )
+    with (export / "mirrors.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return sum(row["camera"] == camera and row["radius_mm"] != "" for row in rows)
 
 
 def of(program: str, checks: Iterable[Check]) -> list[Check]:

@@ -85,7 +85,8 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
     assert tuple(rows[0]) == COLUMNS
     document = json.loads((exported / "design.json").read_text())
     assert document["spec"] == spec_dict(small_design.spec)
-    assert [row["id"] for row in rows] == [row["id"] for row in document["mirrors"]]
+    assert document["mirrors"] == "mirrors.csv"
+    assert [row["id"] for row in rows] == [*small_design.halves[0].ids, *small_design.halves[1].ids]
     for half in small_design.halves:
         own = [row for row in rows if row["camera"] == half.camera_id]
         apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own])

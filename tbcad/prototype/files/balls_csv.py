@@ -1,15 +1,10 @@
 """balls.csv: every ball, where it stands with the base at angle zero, and what it shows."""
 
-import csv
-from pathlib import Path
-
 import numpy as np
 
+from tbcad.formats.csv_table import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.types import Floats
-
-Value = str | int | float | None
-Row = dict[str, Value]
 
 COLUMNS = (
     *("number", "kind", "size", "diameter_mm", "grade", "standard", "mass_g"),
@@ -36,20 +31,7 @@ def rows(made: PrototypeLayout) -> list[Row]:
     ]
 
 
-def write_balls(path: Path, records: list[Row]) -> None:
-    """Write balls.csv with full double precision; what does not exist is left empty."""
-    write_table(path, COLUMNS, records)
-
-
-def write_table(path: Path, columns: tuple[str, ...], records: list[Row]) -> None:
-    """Write records as CSV: UTF-8, one header line, numbers in full double precision."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(records)
-
-
-def _names(made: PrototypeLayout, j: int) -> list[Value]:
+def _names(made: PrototypeLayout, j: int) -> list[Cell]:
     balls = made.balls
     diameter, size = 2 * float(balls.body_radius[j]), balls.size[j]
     if balls.cap[j]:

@@ -2,14 +2,13 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
+from tbcad.formats.csv_table import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance, cap_volume
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.files.balls_csv import Row, Value, write_table
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError, shown
 from tbcad.spec.prototype import MotionSpec
@@ -85,15 +84,10 @@ def rows(made: PrototypeLayout, drive: Drive, needed: PartsNeeded, parts: Parts)
     ]
 
 
-def write_bom(path: Path, records: list[Row]) -> None:
-    """Write bom.csv; what does not exist is left empty."""
-    write_table(path, COLUMNS, records)
-
-
 def drive_record(
     summed: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float], radius: float
-) -> dict[str, Value | list[float]]:
-    """What the drive must bear and does, for design.json.
+) -> dict[str, Cell | list[float]]:
+    """What the drive must bear and does, for prototype.json.
 
     Args:
         summed: masses on the base.
@@ -126,16 +120,16 @@ def drive_record(
     }
 
 
-def _values(quantity: int, name: str, what: str, material: str, mass: float) -> list[Value]:
+def _values(quantity: int, name: str, what: str, material: str, mass: float) -> list[Cell]:
     return [quantity, name, what, material, mass, quantity * mass]
 
 
-def _bought(part: PurchasedPart, quantity: int) -> list[Value]:
+def _bought(part: PurchasedPart, quantity: int) -> list[Cell]:
     what = _values(quantity, part.name, part.what, part.material, part.mass_g)
     return [*what, None, BOUGHT]
 
 
-def _balls(made: PrototypeLayout) -> list[list[Value]]:
+def _balls(made: PrototypeLayout) -> list[list[Cell]]:
     """Bought balls by rising diameter."""
     balls, grade = made.balls, made.grade.grade
     counts = Counter(balls.stock[~balls.cap].tolist())
@@ -154,7 +148,7 @@ def _balls(made: PrototypeLayout) -> list[list[Value]]:
     ]
 
 
-def _caps(made: PrototypeLayout, needed: PartsNeeded) -> list[list[Value]]:
+def _caps(made: PrototypeLayout, needed: PartsNeeded) -> list[list[Cell]]:
     """Caps by number of their ball: no two are alike."""
     balls, volume = made.balls, cap_volume(made.balls)
     own, density = needed.cap_material, needed.cap_density
@@ -168,7 +162,7 @@ def _caps(made: PrototypeLayout, needed: PartsNeeded) -> list[list[Value]]:
     return result
 
 
-def _asked(needed: PartsNeeded, parts: Parts) -> list[list[Value]]:
+def _asked(needed: PartsNeeded, parts: Parts) -> list[list[Cell]]:
     """Parts by name, in the order of the lists; those of none are left out."""
     counts = Counter({**ALWAYS, needed.led: needed.leds}) + Counter(needed.bought)
     if unknown := [name for name in counts if name not in parts]:
@@ -176,7 +170,7 @@ def _asked(needed: PartsNeeded, parts: Parts) -> list[list[Value]]:
     return [_bought(part, counts[name]) for name, part in parts.items() if counts[name]]
 
 
-def _print(one: Printed, needed: PartsNeeded) -> list[Value]:
+def _print(one: Printed, needed: PartsNeeded) -> list[Cell]:
     mass = one.volume * 1e-3 * needed.print_density
     values = _values(one.quantity, one.name, one.what, needed.print_material, mass)
     return [*values, one.volume, PRINTED]

@@ -1,21 +1,26 @@
-"""rotation_plan.csv: every picture; stops.csv: the same for the hand at the machine, by stops."""
+"""Tables for whoever assembles and runs the prototype.
 
-from pathlib import Path
+rotation_plan.csv lists every picture, stops.csv every stop of the base, and plate_holes.csv where
+the base plate is drilled and tapped.
+"""
 
 import numpy as np
 
+from tbcad.formats.csv_table import Row
 from tbcad.prototype.balls.layout import PlannedPicture, PrototypeLayout
-from tbcad.prototype.files.balls_csv import Row, write_table
+from tbcad.prototype.frame.layout import FrameLayout
 
 COLUMNS = (
     *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),
     *("polar_error_deg", "azimuth_error_deg", "error_deg"),
 )
 STOP_COLUMNS = ("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg")
+HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
+THREAD = "M5"
 
 
 def rows(photographs: list[PlannedPicture]) -> list[Row]:
-    """One record for each mirror's picture, in order; stops and balls are numbered from 1.
+    """One row for each mirror's picture, in order; stops and balls are numbered from 1.
 
     One photograph shows all mirrors of a stop with the object as it is turned. Errors of azimuth
     and polar angle are the ball's less the mirror's.
@@ -24,21 +29,24 @@ def rows(photographs: list[PlannedPicture]) -> list[Row]:
 
 
 def stop_rows(made: PrototypeLayout) -> list[Row]:
-    """One record for each stop: how many mirrors, which balls, and the worst errors, all >= 0.
+    """One row for each stop: how many mirrors, which balls, and the worst errors, all >= 0.
 
     They hold for both turns of the object.
     """
     return [_stop(made, stop) for stop in range(len(made.stops))]
 
 
-def write_plan(path: Path, records: list[Row]) -> None:
-    """Write rotation_plan.csv with full double precision."""
-    write_table(path, COLUMNS, records)
+def hole_rows(frame: FrameLayout) -> list[Row]:
+    """One row for each hole of the plate, numbered from 1.
 
-
-def write_stops(path: Path, records: list[Row]) -> None:
-    """Write stops.csv with full double precision."""
-    write_table(path, STOP_COLUMNS, records)
+    x runs along the plate, from the uprights to the camera, and y across it, both from the corner
+    that is behind on the right when one looks from the uprights to the camera.
+    """
+    places = (frame.holes - frame.corner + 0.0).tolist()
+    return [
+        dict(zip(HOLE_COLUMNS, (number, x, y, THREAD, name), strict=True))
+        for number, ((x, y), name) in enumerate(zip(places, frame.holds, strict=True), 1)
+    ]
 
 
 def _row(order: int, one: PlannedPicture) -> Row:

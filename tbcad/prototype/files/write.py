@@ -4,13 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tbcad.formats.csv_table import write_table
 from tbcad.formats.glb import write_glb
 from tbcad.formats.step_assembly import write_assembly
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import rig
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
-from tbcad.prototype.files import balls_csv, bom_csv, drilling, gcode, plan_csv
+from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
 from tbcad.prototype.files.part_files import record, write_piece
 from tbcad.prototype.machine import Machine, machine
 from tbcad.prototype.stage.layout import leds
@@ -18,9 +19,10 @@ from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Progress
 
-SCHEMA = "tbcad-prototype/1"
+SCHEMA = "tbcad-prototype/2"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
 NAME, STEP, GLB = "prototype.json", "prototype.step", "prototype.glb"
+BALLS_FILE = "balls.csv"
 
 
 def export_prototype(
@@ -57,7 +59,7 @@ def document(built: Machine, design: MirrorDesign) -> dict[str, Any]:
         "target_pad_um": PAD_UM,
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, keys.motion),
-        "balls": balls_csv.rows(made),
+        "balls": BALLS_FILE,
         "choices": _choices(made, design.spec),
         "seats": _seats(built),
         "parts": [record(piece) for piece in built.pieces],
@@ -122,14 +124,16 @@ def _seats(built: Machine) -> list[dict[str, Any]]:
 
 def _write_tables(built: Machine, design: MirrorDesign, folder: Path) -> None:
     made, motion = built.made, design.spec.prototype.motion
-    balls_csv.write_balls(folder / "balls.csv", balls_csv.rows(made))
-    plan_csv.write_plan(folder / "rotation_plan.csv", plan_csv.rows(planned_pictures(made)))
-    plan_csv.write_stops(folder / "stops.csv", plan_csv.stop_rows(made))
-    drilling.write_drilling(folder / "plate_holes.csv", drilling.rows(built.frame))
+    bill = bom_csv.rows(made, built.drive, _needed(built, design), built.parts)
+    for name, columns, rows in (
+        (BALLS_FILE, balls_csv.COLUMNS, balls_csv.rows(made)),
+        ("rotation_plan.csv", plan_csv.COLUMNS, plan_csv.rows(planned_pictures(made))),
+        ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(made)),
+        ("plate_holes.csv", plan_csv.HOLE_COLUMNS, plan_csv.hole_rows(built.frame)),
+        ("bom.csv", bom_csv.COLUMNS, bill),
+    ):
+        write_table(folder / name, columns, rows)
     gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))
-    bom_csv.write_bom(
-        folder / "bom.csv", bom_csv.rows(made, built.drive, _needed(built, design), built.parts)
-    )
 
 
 def _needed(built: Machine, design: MirrorDesign) -> bom_csv.PartsNeeded:

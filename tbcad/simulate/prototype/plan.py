@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import REBUILD, Finite, Record, Vector, read_csv, read_json
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.scene.exported import AGAIN, ROUNDING, Exported, Number, Record, Vector
+from tbcad.simulate.scene.exported import ROUNDING, Exported
 from tbcad.types import Floats, Ints
 
-Model = TypeVar("Model")
-
-RECORD, PLAN = "prototype.json", "rotation_plan.csv"
-LARGEST_FILE = 100_000_000  # bytes; n = 60 takes 2 million
+SCHEMA = "tbcad-prototype/2"
+RECORD, BALLS, PLAN = "prototype.json", "balls.csv", "rotation_plan.csv"
+MISSING = "build the prototype too, tbcad build"
 # Of lengths in mm after rounding in a text file.
 ROUNDING_MM = 1e-6
 ERROR_DEG = 1e-6
@@ -40,35 +38,34 @@ class _Ball(Record):
     number: int
     radius_mm: Length
     body_radius_mm: Length
-    px: Number
-    py: Number
-    pz: Number
-    nx: Number
-    ny: Number
-    nz: Number
-    cx: Number
-    cy: Number
-    cz: Number
-    bx: Number
-    by: Number
-    bz: Number
+    px: Finite
+    py: Finite
+    pz: Finite
+    nx: Finite
+    ny: Finite
+    nz: Finite
+    cx: Finite
+    cy: Finite
+    cz: Finite
+    bx: Finite
+    by: Finite
+    bz: Finite
 
 
 class _Document(Record):
-    schema_name: Literal["tbcad-prototype/1"] = Field(alias="schema")
     camera: Literal["a"]
     picture: Literal["moved", "fixed"]
     frame: _Frame
-    balls: list[_Ball] = Field(min_length=1)
+    balls: Literal["balls.csv"]
 
 
 class _Picture(Record):
-    object_turn_deg: Number
+    object_turn_deg: Finite
     stop: int = Field(ge=1, le=1_000_000)
     base_angle_deg: float = Field(ge=-360, le=360)
     ball: int = Field(ge=1)
     mirror: str = Field(pattern=r"^[ab]\d{4,8}$")
-    error_deg: Number
+    error_deg: Finite
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ class Plan:
     stop: Ints
 
     def __len__(self) -> int:
-        """Number of balls."""
+        """Finite of balls."""
         return len(self.radius)
 
     @property
@@ -118,14 +115,15 @@ def read_plan(exported: Exported) -> Plan:
     Raises:
         InputError: there is none, or what it says cannot be.
     """
-    record, table = exported.folder / RECORD, exported.folder / PLAN
-    document = _document(record)
-    pictures = _pictures(table)
-    balls = np.array([[*ball.model_dump().values()] for ball in document.balls])
-    _check_balls(record, exported, document, balls)
-    _check_pictures(table, pictures, len(balls))
-    angle = _angles(table, pictures)
-    ball, stop = _served(table, pictures, len(exported.reflectors[0]))
+    record, table, plan_file = (exported.folder / name for name in (RECORD, BALLS, PLAN))
+    document = read_json(record, _Document, SCHEMA, MISSING)
+    balls = np.array([[*one.model_dump().values()] for one in read_csv(table, _Ball, MISSING)])
+    pictures = read_csv(plan_file, _Picture, MISSING)
+    _check_frame(record, exported, document)
+    _check_balls(table, balls)
+    _check_pictures(plan_file, pictures, len(balls))
+    angle = _angles(plan_file, pictures)
+    ball, stop = _served(plan_file, pictures, len(exported.reflectors[0]))
     plan = Plan(
         frame=_frame(document),
         apex=balls[:, 3:6],
@@ -138,45 +136,8 @@ def read_plan(exported: Exported) -> Plan:
         ball=ball,
         stop=stop,
     )
-    _check_errors(table, pictures, plan, exported)
+    _check_errors(plan_file, pictures, plan, exported)
     return plan
-
-
-def _document(path: Path) -> _Document:
-    try:
-        return _Document.model_validate(json.loads(_text(path)))
-    except ValidationError as error:
-        raise _refused(path, error) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from None
-
-
-def _pictures(path: Path) -> list[_Picture]:
-    try:
-        rows = list(csv.DictReader(_text(path).splitlines()))
-        return TypeAdapter(list[_Picture]).validate_python(rows)
-    except ValidationError as error:
-        raise _refused(path, error) from None
-    except csv.Error as error:
-        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from None
-
-
-def _text(path: Path) -> str:
-    if not path.is_file():
-        raise InputError(f"{path} is not there: build the prototype too, tbcad build")
-    if path.stat().st_size > LARGEST_FILE:
-        raise InputError(f"{path} is over 100 MB, no prototype: {AGAIN}")
-    try:
-        return path.read_text(encoding="utf-8")
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from None
-
-
-def _refused(path: Path, error: ValidationError) -> InputError:
-    first = error.errors(include_url=False, include_context=False)[0]
-    place: list[Any] = [part + 1 if isinstance(part, int) else part for part in first["loc"]]
-    where = " ".join(str(part) for part in place)
-    return InputError(f"{path}: {where}: {first['msg'].lower()}: {AGAIN}")
 
 
 def _frame(document: _Document) -> Floats:
@@ -184,19 +145,24 @@ def _frame(document: _Document) -> Floats:
     return np.array([frame.axis, frame.zero, frame.third])
 
 
-def _check_balls(path: Path, exported: Exported, document: _Document, balls: Floats) -> None:
+def _check_frame(path: Path, exported: Exported, document: _Document) -> None:
     frame, (a, b) = _frame(document), exported.reflectors
     pinhole = a.camera.pinhole
-    away = norm(pinhole) * frame[0] - pinhole
+    offset = norm(pinhole) * frame[0] - pinhole
     if np.abs(frame @ frame.T - np.eye(3)).max() > ROUNDING or np.linalg.det(frame) < 0:
-        raise InputError(f"{path}: frame is not square and right-handed: {AGAIN}")
-    if norm(away) > ROUNDING_MM:
-        raise InputError(f"{path}: frame.axis does not point at the pinhole of camera a: {AGAIN}")
+        raise InputError(f"{path}: frame is not square and right-handed: {REBUILD}")
+    if norm(offset) > ROUNDING_MM:
+        raise InputError(f"{path}: frame.axis does not point at the pinhole of camera a: {REBUILD}")
     if norm(b.camera.pinhole - HALF_TURN * pinhole) > ROUNDING_MM:
         raise InputError(
             f"{path}: camera b is not where the object turned by 180 degrees about z has camera "
             "a, so one camera cannot take both halves: set y of optics.camera_mm to 0"
         )
+
+
+def _check_balls(path: Path, balls: Floats) -> None:
+    if not balls.size:
+        raise InputError(f"{path}: no balls, at least one is needed: {REBUILD}")
     number, radius, normal = balls[:, 0], balls[:, 1], balls[:, 6:9]
     faults = (
         (number != np.arange(1, len(balls) + 1), "is out of order"),
@@ -208,7 +174,7 @@ def _check_balls(path: Path, exported: Exported, document: _Document, balls: Flo
     )
     for wrong, what in faults:
         if wrong.any():
-            raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {AGAIN}")
+            raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {REBUILD}")
 
 
 def _check_pictures(path: Path, pictures: list[_Picture], balls: int) -> None:
@@ -216,11 +182,11 @@ def _check_pictures(path: Path, pictures: list[_Picture], balls: int) -> None:
         if one.object_turn_deg not in (0, 180):
             raise InputError(
                 f"{path}: row {row} has object_turn_deg {one.object_turn_deg:g}, allowed is 0 or "
-                f"180: {AGAIN}"
+                f"180: {REBUILD}"
             )
         if one.ball > balls:
             raise InputError(
-                f"{path}: row {row} names ball {one.ball}, allowed is 1 to {balls}: {AGAIN}"
+                f"{path}: row {row} names ball {one.ball}, allowed is 1 to {balls}: {REBUILD}"
             )
 
 
@@ -229,13 +195,13 @@ def _angles(path: Path, pictures: list[_Picture]) -> Floats:
     angles: dict[int, float] = {}
     for one in pictures:
         if angles.setdefault(one.stop, one.base_angle_deg) != one.base_angle_deg:
-            raise InputError(f"{path}: stop {one.stop} has two base angles: {AGAIN}")
+            raise InputError(f"{path}: stop {one.stop} has two base angles: {REBUILD}")
     stops = sorted(angles)
     if stops != list(range(1, len(stops) + 1)):
-        raise InputError(f"{path}: stops are not numbered from 1 without a gap: {AGAIN}")
+        raise InputError(f"{path}: stops are not numbered from 1 without a gap: {REBUILD}")
     angle = np.array([angles[stop] for stop in stops])
     if (np.diff(angle) <= 0).any():
-        raise InputError(f"{path}: base angles do not rise from stop to stop: {AGAIN}")
+        raise InputError(f"{path}: base angles do not rise from stop to stop: {REBUILD}")
     return angle
 
 
@@ -248,14 +214,14 @@ def _served(path: Path, pictures: list[_Picture], mirrors: int) -> tuple[Ints, I
             raise InputError(
                 f"{path}: row {row} shows {one.mirror}, allowed with the object turned by "
                 f"{one.object_turn_deg:g} degrees is {_name(half, 0)} to "
-                f"{_name(half, mirrors - 1)}: {AGAIN}"
+                f"{_name(half, mirrors - 1)}: {REBUILD}"
             )
         if found[0, half, mirror] >= 0:
-            raise InputError(f"{path}: row {row} shows {one.mirror} a second time: {AGAIN}")
+            raise InputError(f"{path}: row {row} shows {one.mirror} a second time: {REBUILD}")
         found[:, half, mirror] = one.ball - 1, one.stop - 1
     missing = np.argwhere(found[0] < 0)
     if missing.size:
-        raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {AGAIN}")
+        raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {REBUILD}")
     return found[0], found[1]
 
 
@@ -276,7 +242,7 @@ def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Ex
     if off[half, mirror] > ERROR_DEG:
         raise InputError(
             f"{path}: {_name(int(half), int(mirror))} has error_deg {said[half, mirror]:g}, but "
-            f"its ball stands {off[half, mirror]:.3g} degrees off that: {AGAIN}"
+            f"its ball stands {off[half, mirror]:.3g} degrees off that: {REBUILD}"
         )
 
 

@@ -1,17 +1,18 @@
-"""What an export says of its cameras and mirrors: design.json, checked before it is used."""
+"""What an export says of its cameras and mirrors: design.json and mirrors.csv, checked."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import REBUILD, Finite, Record, Vector, read_csv, read_json
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import numbered_directions
+from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE, SCHEMA
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
@@ -20,20 +21,15 @@ from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
 from tbcad.types import Floats
 
-NAME = "design.json"
-LARGEST_FILE = 200_000_000  # bytes; n = 60 takes 12 million
-AGAIN = "build it again with tbcad build"
+MISSING = "name a folder that tbcad build wrote"
 # What is called a unit vector may be off by rounding in a text file.
 ROUNDING = 1e-9
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Vector = tuple[Number, Number, Number]
-
-
-class Record(BaseModel):
-    """A table of a file: what else it has is left alone."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
+# None for a planar mirror, whose cell is empty.
+Radius = Annotated[
+    Annotated[float, Field(gt=0, allow_inf_nan=False)] | None,
+    BeforeValidator(lambda cell: cell or None),
+]
 
 
 class _Camera(Record):
@@ -47,27 +43,25 @@ class _Camera(Record):
 
 
 class _Mirror(Record):
-    id: str
     camera: Literal["a", "b"]
-    ux: Number
-    uy: Number
-    uz: Number
-    px: Number
-    py: Number
-    pz: Number
-    nx: Number
-    ny: Number
-    nz: Number
-    radius_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None
+    ux: Finite
+    uy: Finite
+    uz: Finite
+    px: Finite
+    py: Finite
+    pz: Finite
+    nx: Finite
+    ny: Finite
+    nz: Finite
+    radius_mm: Radius
 
 
 class _Document(Record):
-    schema_name: Literal["tbcad-design/1"] = Field(alias="schema")
-    spec: dict[str, Any]
+    spec: Spec
     target_mm: float = Field(gt=0, le=1000)
-    foot_z_mm: Number
+    foot_z_mm: Finite
     cameras: tuple[_Camera, _Camera]
-    mirrors: list[_Mirror]
+    mirrors: Literal["mirrors.csv"]
 
 
 class Exported(Record):
@@ -94,86 +88,64 @@ def read_export(folder: Path) -> Exported:
     Raises:
         InputError: it is none, or what it says cannot be.
     """
-    path = folder / NAME
-    document = _document(path)
-    try:
-        spec = Spec.model_validate(document.spec)
-    except ValidationError as error:
-        raise _refused(path, error, "spec.") from None
-    a, b = (_reflector(path, document, spec, camera) for camera in document.cameras)
-    if (a.camera_id, b.camera_id) != ("a", "b"):
-        raise InputError(f"{path}: cameras are not a and b: {AGAIN}")
-    return Exported(folder=folder, spec=spec, capture_mm=document.target_mm, reflectors=(a, b))
+    path = folder / DESIGN_FILE
+    document = read_json(path, _Document, SCHEMA, MISSING)
+    if tuple(camera.id for camera in document.cameras) != ("a", "b"):
+        raise InputError(f"{path}: cameras are not a and b: {REBUILD}")
+    table = folder / MIRRORS_FILE
+    mirrors = read_csv(table, _Mirror, MISSING)
+    a, b = (
+        _reflector(table, document, camera, [one for one in mirrors if one.camera == camera.id])
+        for camera in document.cameras
+    )
+    return Exported(
+        folder=folder, spec=document.spec, capture_mm=document.target_mm, reflectors=(a, b)
+    )
 
 
-def _document(path: Path) -> _Document:
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad build wrote")
-    if path.stat().st_size > LARGEST_FILE:
-        raise InputError(f"{path} is over 200 MB, no design: {AGAIN}")
-    try:
-        return _Document.model_validate(json.loads(path.read_bytes()))
-    except ValidationError as error:
-        raise _refused(path, error) from None
-    except (ValueError, RecursionError, OSError) as error:
-        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from None
-
-
-def _refused(path: Path, error: ValidationError, prefix: str = "") -> InputError:
-    first = error.errors(include_url=False, include_context=False)[0]
-    where = prefix + ".".join(str(part) for part in first["loc"])
-    return InputError(f"{path}: {where}: {first['msg'].lower()}: {AGAIN}")
-
-
-def _reflector(path: Path, document: _Document, spec: Spec, camera: _Camera) -> Reflector:
-    every, faces = numbered_directions(spec.optics.n)
+def _reflector(
+    path: Path, document: _Document, camera: _Camera, mirrors: list[_Mirror]
+) -> Reflector:
+    n = document.spec.optics.n
+    every, faces = numbered_directions(n)
     kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
-    mine = [mirror for mirror in document.mirrors if mirror.camera == camera.id]
-    if len(mine) != kept.sum():
+    if len(mirrors) != kept.sum():
         raise InputError(
-            f"{path}: camera {camera.id} has {len(mine)} mirrors, allowed is "
-            f"{kept.sum()} at n = {spec.optics.n}: {AGAIN}"
+            f"{path}: camera {camera.id} has {len(mirrors)} mirrors, allowed is "
+            f"{kept.sum()} at n = {n}: {REBUILD}"
         )
     mirrored = camera.id == "b"
     triangles, boundary = bounded_triangulation(faces, every, kept)
-    u, mirrors = _surfaces(path, mine)
+    u, surfaces = _surfaces(path, mirrors)
     walls = planes(
         np.array([[0, 0, 0], [0, 0, document.foot_z_mm]]),
         np.array([[-1.0 if mirrored else 1.0, 0, 0], [0, 0, 1]]),
     )
     try:
         cells = cells_of(
-            mirrors.joined(walls), boundary, triangles[:, ::-1] if mirrored else triangles
+            surfaces.joined(walls), boundary, triangles[:, ::-1] if mirrored else triangles
         )
     except NotRegularError as error:
         raise InputError(
-            f"{path}: the mirrors of camera {camera.id} bound no cells: {error}: {AGAIN}"
+            f"{path}: the mirrors of camera {camera.id} bound no cells: {error}: {REBUILD}"
         ) from None
-    return Reflector(camera.id, _view(path, camera), u, cells)
+    return Reflector(camera.id, _view(path.with_name(DESIGN_FILE), camera), u, cells)
 
 
 def _surfaces(path: Path, mirrors: list[_Mirror]) -> tuple[Floats, Surfaces]:
     columns = np.array(
         [
             (
-                m.ux,
-                m.uy,
-                m.uz,
-                m.px,
-                m.py,
-                m.pz,
-                m.nx,
-                m.ny,
-                m.nz,
-                1 / m.radius_mm if m.radius_mm else 0,
+                *(one.ux, one.uy, one.uz, one.px, one.py, one.pz, one.nx, one.ny, one.nz),
+                1 / one.radius_mm if one.radius_mm else 0,
             )
-            for m in mirrors
+            for one in mirrors
         ]
     )
     u, apex, normal, curvature = np.split(columns, [3, 6, 9], axis=1)
     for name, vectors in (("u", u), ("n", normal)):
         if np.abs(norm(vectors) - 1).max() > ROUNDING:
-            raise InputError(f"{path}: mirrors have {name} of another length than 1: {AGAIN}")
+            raise InputError(f"{path}: mirrors have {name} of another length than 1: {REBUILD}")
     return u, Surfaces(apex, normal, curvature[:, 0])
 
 
@@ -181,7 +153,7 @@ def _view(path: Path, camera: _Camera) -> Camera:
     forward, right = np.array(camera.forward), np.array(camera.right)
     gram = np.array([forward @ forward - 1, right @ right - 1, forward @ right])
     if np.abs(gram).max() > ROUNDING:
-        raise InputError(f"{path}: camera {camera.id} has axes that are not square: {AGAIN}")
+        raise InputError(f"{path}: camera {camera.id} has axes that are not square: {REBUILD}")
     return Camera(
         np.array(camera.pinhole_mm),
         forward,

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import REBUILD
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.scene.embree import embree_scene
-from tbcad.simulate.scene.exported import AGAIN, Exported
+from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.rays import MirrorNumbers, ReflectedRays, pixel_directions, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats, Ints
@@ -62,7 +63,7 @@ def read_shell_meshes(export: Exported) -> ShellMeshes:
         facets = _facets(path)
         owner = _owners(at.mirrors.offset(-coat), facets)
         if len(lost := np.setdiff1d(np.arange(len(at)), owner)):
-            raise InputError(f"{path} has no facets of {len(lost)} mirrors of the record: {AGAIN}")
+            raise InputError(f"{path} has no facets of {len(lost)} recorded mirrors: {REBUILD}")
         corners.append(facets)
         owners.append(sign * (owner + 1))
         surfaces.append(fitted_surfaces(at.mirrors, facets, owner).offset(coat))
@@ -128,13 +129,13 @@ def _facets(path: Path) -> Floats:
     if not path.is_file():
         raise InputError(f"{path} is not there: build the shell too, or leave --mesh out")
     if path.stat().st_size > MAX_FILE_BYTES:
-        raise InputError(f"{path} is over 4 GiB: {AGAIN}")
+        raise InputError(f"{path} is over 4 GiB: {REBUILD}")
     try:
         corners = np.asarray(trimesh.load_mesh(path, process=False).triangles, dtype=np.float64)
     except Exception as error:  # trimesh's readers raise whatever their libraries do
-        raise InputError(f"{path} cannot be read: {error}: {AGAIN}") from error
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from error
     if len(corners) == 0 or not np.isfinite(corners).all():
-        raise InputError(f"{path} has no facets, or some that are not finite: {AGAIN}")
+        raise InputError(f"{path} has no facets, or some that are not finite: {REBUILD}")
     return corners
 
 

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.files.balls_csv import COLUMNS, rows, write_balls
+from tbcad.prototype.files.balls_csv import COLUMNS, rows
 from tbcad.spec.load import load_spec
 
 Read = list[dict[str, str]]
@@ -24,7 +25,7 @@ def made(small_design: MirrorDesign) -> PrototypeLayout:
 @pytest.fixture(scope="module")
 def read(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("balls") / "balls.csv"
-    write_balls(path, rows(made))
+    write_table(path, COLUMNS, rows(made))
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -92,7 +93,7 @@ def test_what_they_show(made: PrototypeLayout, read: Read) -> None:
 def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path in paths:
-        write_balls(path, rows(made))
+        write_table(path, COLUMNS, rows(made))
     data = [path.read_bytes() for path in paths]
     assert data[0] == data[1]
     assert b"\r" not in data[0]

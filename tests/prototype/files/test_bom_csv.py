@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
@@ -16,7 +17,6 @@ from tbcad.prototype.files.bom_csv import (
     Printed,
     drive_record,
     rows,
-    write_bom,
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
@@ -51,7 +51,7 @@ def drive() -> Drive:
 @pytest.fixture(scope="module")
 def read(made: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
-    write_bom(path, rows(made, drive, NEEDED, PARTS))
+    write_table(path, COLUMNS, rows(made, drive, NEEDED, PARTS))
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -139,7 +139,7 @@ def test_unknown_part(made: PrototypeLayout, drive: Drive) -> None:
 
 def test_same_bytes(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        write_bom(tmp_path / name, rows(made, drive, NEEDED, load_parts()))
+        write_table(tmp_path / name, COLUMNS, rows(made, drive, NEEDED, load_parts()))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 

@@ -4,16 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
-from tbcad.prototype.files.balls_csv import Row
 from tbcad.prototype.files.plan_csv import (
     COLUMNS,
     STOP_COLUMNS,
     rows,
     stop_rows,
-    write_plan,
-    write_stops,
 )
 from tbcad.spec.load import load_spec
 
@@ -33,14 +31,14 @@ def made(small_design: MirrorDesign) -> PrototypeLayout:
 @pytest.fixture(scope="module")
 def plan(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("plan") / "rotation_plan.csv"
-    write_plan(path, rows(planned_pictures(made)))
+    write_table(path, COLUMNS, rows(planned_pictures(made)))
     return read_back(path)
 
 
 @pytest.fixture(scope="module")
 def stops(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("stops") / "stops.csv"
-    write_stops(path, stop_rows(made))
+    write_table(path, STOP_COLUMNS, stop_rows(made))
     return read_back(path)
 
 
@@ -96,7 +94,7 @@ def test_stops_sum_up_the_plan(plan: Read, stops: Read) -> None:
 
 def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
     def written(name: str, records: list[Row]) -> bytes:
-        write_plan(tmp_path / name, records)
+        write_table(tmp_path / name, COLUMNS, records)
         return (tmp_path / name).read_bytes()
 
     assert written("a", rows(planned_pictures(made))) == written("b", rows(planned_pictures(made)))

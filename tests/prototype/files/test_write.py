@@ -1,6 +1,5 @@
 """The prototype's files: read back, and compared with the numbers they are from."""
 
-import csv
 import hashlib
 import json
 from pathlib import Path
@@ -9,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.output.build import export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
 from tbcad.spec.load import load_spec
+from tests.csv_files import Rows, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
 
 MESH_ERROR_MM = 0.1
@@ -35,6 +36,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def record(folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = json.loads((folder / "prototype.json").read_text())
     return found
+
+
+@pytest.fixture(scope="module")
+def balls(folder: Path) -> Rows:
+    return read_csv(folder / "balls.csv")
+
+
+def centre_of(ball: dict[str, str]) -> NDArray[np.float64]:
+    """Of the body in the seat, mm."""
+    return np.array([float(ball[key]) for key in ("bx", "by", "bz")])
 
 
 def in_rig(folder: Path, part: dict[str, Any]) -> trimesh.Trimesh:
@@ -78,42 +89,38 @@ def test_meshes_lie_on_the_bed_and_steps_stand_in_the_rig(
         assert np.linalg.det(axes) == pytest.approx(1)
 
 
-def test_pads_are_where_the_record_says(folder: Path, record: dict[str, Any]) -> None:
+def test_pads_are_where_the_record_says(folder: Path, record: dict[str, Any], balls: Rows) -> None:
     base = [in_rig(folder, part) for part in record["parts"] if part["role"] == "base"]
     points = np.vstack([mesh.vertices for mesh in base])
-    for seat, ball in zip(record["seats"], record["balls"], strict=True):
-        centre = np.array([ball[key] for key in ("bx", "by", "bz")])
+    for seat, ball in zip(record["seats"], balls, strict=True):
+        centre, radius = centre_of(ball), float(ball["body_radius_mm"])
         for contact, normal in zip(seat["contacts_mm"], seat["normals"], strict=True):
-            assert np.linalg.norm(contact - centre) == pytest.approx(ball["body_radius_mm"])
+            assert np.linalg.norm(contact - centre) == pytest.approx(radius)
             near = np.linalg.norm(points - contact, axis=1) < 0.51 * seat["pad_diameter_mm"]
             on_pad = points[near & (np.abs((points - contact) @ normal) < 0.01)]
             assert len(on_pad) > 10
             assert np.abs((on_pad - contact) @ normal).max() < 1e-4
 
 
-def test_the_choice_that_was_taken_is_among_those_told(record: dict[str, Any]) -> None:
+def test_the_choice_that_was_taken_is_recorded(record: dict[str, Any], balls: Rows) -> None:
     """Its pixels are those of the balls; the default is cover, with caps."""
     (taken,) = [one for one in record["choices"] if one["way"] == "cover, with caps"]
     assert len(record["choices"]) == 4
-    assert taken["pixels"] == pytest.approx(sum(ball["pixels"] for ball in record["balls"]))
-    assert taken["caps"] == sum(ball["kind"] == "cap" for ball in record["balls"])
+    assert taken["pixels"] == pytest.approx(sum(float(ball["pixels"]) for ball in balls))
+    assert taken["caps"] == sum(ball["kind"] == "cap" for ball in balls)
 
 
-def test_tables_and_record_agree(folder: Path, record: dict[str, Any]) -> None:
-    with (folder / "balls.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == len(record["balls"]) == len(record["seats"]) == 4
-    for row, ball in zip(rows, record["balls"], strict=True):
-        assert {key: "" if value is None else str(value) for key, value in ball.items()} == row
-    with (folder / "bom.csv").open(newline="") as file:
-        printed = {row["part"] for row in csv.DictReader(file) if row["from"] == "printed"}
+def test_tables_and_record_agree(folder: Path, record: dict[str, Any], balls: Rows) -> None:
+    assert record["balls"] == "balls.csv"
+    assert len(balls) == len(record["seats"]) == 4
+    bill = read_csv(folder / "bom.csv")
+    printed = {row["part"] for row in bill if row["from"] == "printed"}
     assert printed >= {part["name"] for part in record["parts"] if part["role"] != "cap"}
 
 
 def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any]) -> None:
     """In the assembly's plate, as drilled, seen from above; and every foot is held by some."""
-    with (folder / "plate_holes.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(folder / "plate_holes.csv")
     assert {row["holds"] for row in rows} == {
         part["name"] for part in record["parts"] if part["role"] == "frame"
     } - {"bearing_head"}
@@ -129,27 +136,27 @@ def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any
 
 
 def test_the_assembly_is_a_tree_of_named_coloured_bodies(
-    folder: Path, record: dict[str, Any]
+    folder: Path, record: dict[str, Any], balls: Rows
 ) -> None:
     text = (folder / "prototype.step").read_text()
     bodies = [part["name"] for part in record["parts"] if part["role"] != "tool"]
-    balls = [f"ball_{ball['number']}" for ball in record["balls"] if ball["kind"] == "ball"]
-    for name in [*bodies, *balls, "capture_sphere", "camera_view"]:
+    names = [f"ball_{ball['number']}" for ball in balls if ball["kind"] == "ball"]
+    for name in [*bodies, *names, "capture_sphere", "camera_view"]:
         assert f"PRODUCT('{name}'" in text
     solids = text.count("MANIFOLD_SOLID_BREP(")
-    assert text.count("STYLED_ITEM(") == solids >= len(bodies) + len(balls) + 2
+    assert text.count("STYLED_ITEM(") == solids >= len(bodies) + len(names) + 2
 
 
-def test_the_glb_is_in_metres_and_upright(folder: Path, record: dict[str, Any]) -> None:
+def test_the_glb_is_in_metres_and_upright(folder: Path, balls: Rows) -> None:
     scene = trimesh.load(folder / "prototype.glb")
-    (ball,) = [one for one in record["balls"] if one["kind"] == "ball"]
+    (ball,) = [one for one in balls if one["kind"] == "ball"]
     matrix, name = scene.graph[f"ball_{ball['number']}"]
     points = trimesh.transform_points(scene.geometry[name].vertices, matrix)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    wanted = np.array([ball["bx"], ball["bz"], -ball["by"]]) / 1000
+    wanted = centre_of(ball)[[0, 2, 1]] * [1, 1, -1] / 1000
     assert middle == pytest.approx(wanted, abs=2e-4)
     assert np.ptp(points, axis=0) == pytest.approx(
-        np.full(3, 2e-3 * ball["body_radius_mm"]), rel=5e-3
+        np.full(3, 2e-3 * float(ball["body_radius_mm"])), rel=5e-3
     )
 
 

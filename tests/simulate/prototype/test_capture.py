@@ -1,6 +1,5 @@
 """Capture with the prototype: its plan as read, its photographs, and what is merged of them."""
 
-import csv
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,6 +28,7 @@ from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, project_points
 from tbcad.spec.load import load_spec
+from tests.csv_files import edit_csv
 from tests.prototype_exports import plan_of
 from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 
@@ -369,15 +369,7 @@ class TestReading:
         self, written: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
     ) -> None:
         folder = copied(written, tmp_path)
-        path = folder / "rotation_plan.csv"
-        with path.open(newline="") as file:
-            table = list(csv.DictReader(file))
-        names = list(table[0])
-        change(table)
-        with path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, names)
-            writer.writerow({name: name for name in (table[0] if table else names)})
-            writer.writerows(table)
+        edit_csv(folder / "rotation_plan.csv", change)
         with pytest.raises(InputError, match=message) as caught:
             read_plan(read_export(folder))
         assert "\n" not in str(caught.value)
@@ -385,15 +377,9 @@ class TestReading:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            (lambda record: record.update(schema="tbcad-prototype/9"), "schema: "),
+            (lambda record: record.update(schema="tbcad-prototype/1"), "reads 'tbcad-prototype/2'"),
             (lambda record: record.update(picture="bent"), "picture: "),
-            (lambda record: record.update(balls=[]), "balls: "),
-            (lambda record: record["balls"].pop(), "names ball 5, allowed is 1 to 4"),
-            (lambda record: record["balls"].reverse(), "ball 1 is out of order"),
-            (lambda record: record["balls"][2].update(radius_mm=-1), "balls 3 radius_mm: "),
-            (lambda record: record["balls"][2].update(nx=2.0), "ball 3 has a normal"),
-            (lambda record: record["balls"][1].update(cx=1.0), "ball 2 has a centre"),
-            (lambda record: record["balls"][1].update(bz=float("nan")), "balls 2 bz: "),
+            (lambda record: record.update(balls=[]), "balls: input should be 'balls.csv'"),
             (lambda record: record["frame"].update(zero=[1, 0, 0]), "not square"),
             (lambda record: record["frame"].update(third=[0, 1, 0]), "right-handed"),
             (lambda record: record["frame"].update(turned_frame(record)), "does not point"),
@@ -411,7 +397,29 @@ class TestReading:
             read_plan(read_export(folder))
         assert "\n" not in str(caught.value)
 
-    @pytest.mark.parametrize("name", ["prototype.json", "rotation_plan.csv"])
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (lambda balls: balls.clear(), "balls.csv: no balls"),
+            (lambda balls: balls.pop(), "names ball 5, allowed is 1 to 4"),
+            (lambda balls: balls.reverse(), "ball 1 is out of order"),
+            (lambda balls: balls[2].update(radius_mm="-1"), "row 3 radius_mm: "),
+            (lambda balls: balls[2].update(nx="2.0"), "ball 3 has a normal"),
+            (lambda balls: balls[1].update(cx="1.0"), "ball 2 has a centre"),
+            (lambda balls: balls[1].update(bz="nan"), "row 2 bz: "),
+            (lambda balls: balls[1].update(bz=""), "row 2 bz: "),
+        ],
+    )
+    def test_refused_balls(
+        self, written: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+    ) -> None:
+        folder = copied(written, tmp_path)
+        edit_csv(folder / "balls.csv", change)
+        with pytest.raises(InputError, match=message) as caught:
+            read_plan(read_export(folder))
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize("name", ["prototype.json", "balls.csv", "rotation_plan.csv"])
     def test_files_that_are_not_there_or_no_text(
         self, written: Path, tmp_path: Path, name: str
     ) -> None:

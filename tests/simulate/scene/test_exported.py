@@ -1,6 +1,7 @@
 """What an export says of itself, and what is refused of it."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ from tbcad.errors import InputError
 from tbcad.simulate.scene.exported import Exported, read_export
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
+from tests.csv_files import edit_csv
 
 Document = dict[str, Any]
+Rows = list[dict[str, str]]
 
 
 def test_the_record_gives_the_designs_rays(
@@ -32,27 +35,25 @@ def changed(record: Path, folder: Path, change: Callable[[Document], object]) ->
     document = json.loads((record / "design.json").read_text())
     change(document)
     (folder / "design.json").write_text(json.dumps(document))
+    shutil.copy(record / "mirrors.csv", folder)
     return folder
 
 
-def set_mirror(key: str, value: object) -> Callable[[Document], object]:
-    return lambda document: document["mirrors"][3].update({key: value})
+def cell(key: str, value: str) -> Callable[[Rows], object]:
+    """Change a cell of the fourth row."""
+    return lambda rows: rows[3].update({key: value})
 
 
 @pytest.mark.parametrize(
     ("change", "wrong"),
     [
-        (lambda d: d.update(schema="tbcad-design/2"), "schema"),
+        (lambda d: d.update(schema="tbcad-design/1"), "reads 'tbcad-design/2': build it again"),
+        (lambda d: d.update(mirrors="../mirrors.csv"), "mirrors: input should be 'mirrors.csv'"),
         (lambda d: d.pop("foot_z_mm"), "foot_z_mm"),
-        (lambda d: d["mirrors"].pop(), "has 102 mirrors, allowed is 103"),
         (lambda d: d["cameras"].reverse(), "not a and b"),
         (lambda d: d["cameras"][0].update(forward=[0, 0, 2]), "axes"),
         (lambda d: d["cameras"][1].update(width_px=10**9), "width_px"),
         (lambda d: d["spec"]["optics"].update(n=99), r"spec\.optics\.n"),
-        (set_mirror("radius_mm", -5), "radius_mm"),
-        (set_mirror("px", float("nan")), "px"),
-        (set_mirror("ux", 5.0), "u of another length"),
-        (set_mirror("px", 1000.0), "bound no cells"),
     ],
 )
 def test_records_that_cannot_be(
@@ -63,13 +64,41 @@ def test_records_that_cannot_be(
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        (lambda rows: rows.pop(), "has 102 mirrors, allowed is 103"),
+        (lambda rows: [row.pop("px") for row in rows], "row 1 px: field required"),
+        (cell("camera", "c"), "row 4 camera: "),
+        (cell("radius_mm", "-5"), "row 4 radius_mm: "),
+        (cell("radius_mm", "0"), "row 4 radius_mm: "),
+        (cell("px", "nan"), "row 4 px: "),
+        (cell("px", ""), "row 4 px: "),
+        (cell("ux", "5.0"), "u of another length"),
+        (cell("px", "1000.0"), "bound no cells"),
+    ],
+)
+def test_mirrors_that_cannot_be(
+    record: Path, tmp_path: Path, change: Callable[[Rows], object], wrong: str
+) -> None:
+    folder = changed(record, tmp_path, lambda _: None)
+    edit_csv(folder / "mirrors.csv", change)
+    with pytest.raises(InputError, match=wrong) as error:
+        read_export(folder)
+    assert str(tmp_path / "mirrors.csv") in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["design.json", "mirrors.csv"])
+def test_a_record_that_is_not_there(record: Path, tmp_path: Path, name: str) -> None:
+    folder = changed(record, tmp_path, lambda _: None)
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=f"{name} is not there: name a folder that tbcad build"):
+        read_export(folder)
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{", "null", '{"schema": 5}', "[" * 100_000])
 def test_other_files(tmp_path: Path, text: str) -> None:
     (tmp_path / "design.json").write_text(text)
     with pytest.raises(InputError, match=r"design\.json"):
-        read_export(tmp_path)
-
-
-def test_no_export(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="tbcad build"):
         read_export(tmp_path)

@@ -1,0 +1,94 @@
+"""JSON and CSV files of an export, checked against pydantic models before they are used."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from tbcad.errors import InputError
+
+REBUILD = "build it again with tbcad build"
+MAX_BYTES = 200_000_000  # n = 60 takes 12 million
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+
+
+class Record(BaseModel):
+    """A JSON object or a CSV row; keys that the model does not name are ignored."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+Model = TypeVar("Model", bound=Record)
+
+
+def read_json(path: Path, model: type[Model], schema: str, missing: str) -> Model:
+    """The JSON object in a file.
+
+    Args:
+        path: the file.
+        model: that the object must fit.
+        schema: that the object must name.
+        missing: what to do if there is no such file, for the error.
+
+    Raises:
+        InputError: the file is missing, too large, not JSON, of another schema, or does not fit.
+    """
+    text = _text(path, missing)
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+    found = value.get("schema") if isinstance(value, dict) else None
+    if found != schema:
+        raise InputError(
+            f"{path}: schema is {found!r:.40}, this version of tbcad reads {schema!r}: {REBUILD}"
+        )
+    try:
+        return model.model_validate(value)
+    except ValidationError as error:
+        raise _refused(path, error) from None
+
+
+def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:
+    """The rows of a CSV file with a header line.
+
+    Args:
+        path: the file.
+        model: that every row must fit.
+        missing: what to do if there is no such file, for the error.
+
+    Raises:
+        InputError: the file is missing, too large, not CSV, or a row does not fit.
+    """
+    text = _text(path, missing)
+    try:
+        rows = list(csv.DictReader(text.splitlines()))
+        return TypeAdapter(list[model]).validate_python(rows)  # type: ignore[valid-type]
+    except ValidationError as error:
+        raise _refused(path, error) from None
+    except csv.Error as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+
+
+def _refused(path: Path, error: ValidationError) -> InputError:
+    """What is wrong first, in one line; rows are counted from 1."""
+    first = error.errors(include_url=False, include_context=False)[0]
+    row, *keys = first["loc"]
+    key = ".".join(str(part) for part in keys)
+    where = f"row {row + 1} {key}" if isinstance(row, int) else ".".join(filter(None, (row, key)))
+    return InputError(f"{path}: {where}: {first['msg'].lower()}: {REBUILD}")
+
+
+def _text(path: Path, missing: str) -> str:
+    if not path.is_file():
+        raise InputError(f"{path} is not there: {missing}")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"{path} has more than {MAX_BYTES} bytes: {REBUILD}")
+    try:
+        return path.read_text(encoding="utf-8")
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
