@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export as read_record
 from tbcad_verify.record.files import read
-from tbcad_verify.record.record import Export
-from tbcad_verify.record.record import read_export as read_record
 from tbcad_verify.shell import coverage as proof
 from tbcad_verify.shell.optics import set_up
 from tbcad_verify.shell.recover import recover

@@ -21,8 +21,8 @@ from tbcad_verify.mesh.rays import (
     row_chunks,
 )
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.export import Camera, read_export
 from tbcad_verify.record.files import read
-from tbcad_verify.record.record import Camera, read_export
 from tbcad_verify.shell import light
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import read
-from tbcad_verify.record.record import Export
 from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
 from tbcad_verify.shell.recover import recover
@@ -89,7 +89,7 @@ def meshed(design: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Pat
 def proved(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
     """Coverage of every virtual camera by the proof's own reading of STL files, mm, (v,)."""
     cameras = {
-        name: replace(camera, pinhole=camera.pinhole + shifts[name])
+        name: camera.model_copy(update={"pinhole": camera.pinhole + shifts[name]})
         for name, camera in record.cameras.items()
     }
     record = replace(record, cameras=cameras)

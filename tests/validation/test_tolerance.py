@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tbcad_verify.record.record import Export
-from tbcad_verify.record.record import read_export as read_record
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export as read_record
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record

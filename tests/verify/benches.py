@@ -6,8 +6,8 @@ from pathlib import Path
 
 from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
-from tbcad_verify.record.record import read_export
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover

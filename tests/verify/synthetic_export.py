@@ -298,7 +298,7 @@ def rows(design: Design, record: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def document(design: Design, mirrors: list[dict[str, Any]]) -> dict[str, Any]:
+def document(design: Design) -> dict[str, Any]:
     sensor = {"width_px": design.width, "height_px": design.height, "hfov_deg": design.hfov}
     cameras = [
         {
@@ -311,7 +311,7 @@ def document(design: Design, mirrors: list[dict[str, Any]]) -> dict[str, Any]:
         for name, s in (("a", 1.0), ("b", -1.0))
     ]
     return {
-        "schema": "tbcad-design/1",
+        "schema": "tbcad-design/2",
         "spec": {
             "optics": {
                 "n": design.n,
@@ -327,7 +327,7 @@ def document(design: Design, mirrors: list[dict[str, Any]]) -> dict[str, Any]:
         "foot_z_mm": FOOT,
         "cameras": cameras,
         "parts": [{"name": f"shell_{c}", "camera": c, "stl": f"shell_{c}.stl"} for c in ("a", "b")],
-        "mirrors": mirrors,
+        "mirrors": "mirrors.csv",
     }
 
 
@@ -371,7 +371,7 @@ def export(folder: Path, design: Design) -> tuple[Path, Cells]:
     a = solid(cells)
     mirrors = rows(design, record)
     files = {
-        "design.json": json.dumps(document(design, mirrors), indent=1).encode(),
+        "design.json": json.dumps(document(design), indent=1).encode(),
         "mirrors.csv": table(mirrors),
         "shell_a.stl": stl(a),
         "shell_b.stl": stl(mirrored(a)),

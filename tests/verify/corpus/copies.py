@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+TEXTS = ("id", "camera")  # columns of mirrors.csv
 VERDICT = "verify.json"  # written by every proof, so never shared
 
 
@@ -38,6 +41,25 @@ def load(folder: Path, name: str) -> Any:
 def store(folder: Path, name: str, value: object) -> None:
     """Put a value as JSON."""
     put(folder, name, json.dumps(value, indent=1).encode())
+
+
+def load_mirrors(folder: Path) -> list[dict[str, Any]]:
+    """The rows of mirrors.csv: numbers, texts in the first two columns, None where it is empty."""
+    with (folder / "mirrors.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return [
+        {key: cell if key in TEXTS else float(cell) if cell else None for key, cell in row.items()}
+        for row in rows
+    ]
+
+
+def store_mirrors(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Put rows as mirrors.csv."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    put(folder, "mirrors.csv", stream.getvalue().encode())
 
 
 def sign(folder: Path, more: Iterable[str] = ()) -> None:

@@ -13,7 +13,7 @@ from tests.verify.corpus.copies import change, load, put
 from tests.verify.corpus.facets import HALVES, read, write, write_stl
 from tests.verify.corpus.mesh_changes import part, tetrahedron
 from tests.verify.corpus.mutation import Job, Mutation
-from tests.verify.corpus.record_changes import design
+from tests.verify.corpus.record_changes import design, mirrors
 
 
 def again(folder: Path) -> Sequence[str]:
@@ -80,6 +80,7 @@ HARMLESS: tuple[Mutation, ...] = (
     passes("design.json in one line", "design.json", compact),
     passes("cameras in another order", "design.json", design(lambda d: d["cameras"].reverse())),
     passes("lines that end as in DOS", "mirrors.csv", dos),
+    passes("mirrors in another order", "mirrors.csv", mirrors(lambda rows, _: rows.reverse(), 0)),
     passes("a further column", "mirrors.csv", wide),
     passes("a part out of the light", "STL, record", aside),
     passes("a file that is not listed", "folder", notes),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.types import Floats
-from tests.verify.corpus.copies import load
+from tests.verify.corpus.copies import load, load_mirrors
 from tests.verify.corpus.facets import Corners
 
 TOUCHES_MM = 2e-5  # float32, 150 mm from the origin
@@ -40,9 +40,8 @@ class Ball:
 
 def balls(folder: Path, half: str) -> list[Ball]:
     """All mirrors of a half, those in the middle of it first."""
-    design = load(folder, "design.json")
-    coat = design["coating_mm"]
-    found = [_ball(row, coat) for row in design["mirrors"] if row["camera"] == half]
+    coat = load(folder, "design.json")["coating_mm"]
+    found = [_ball(row, coat) for row in load_mirrors(folder) if row["camera"] == half]
     side = np.array([1 if half == "a" else -1, 1, 1])
     return sorted(found, key=lambda ball: float(-ball.apex @ (AIM * side) / _length(ball.apex)))
 

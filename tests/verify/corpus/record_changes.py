@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from math import cos, radians, sin
 from pathlib import Path
@@ -12,62 +10,58 @@ from typing import Any
 import numpy as np
 
 from tests.verify.corpus import part21
-from tests.verify.corpus.copies import change, load, put, store
+from tests.verify.corpus.copies import change, load, load_mirrors, store, store_mirrors
 from tests.verify.corpus.facets import read, write
 from tests.verify.corpus.mutation import Job
 from tests.verify.corpus.patches import balls
 
 Design = dict[str, Any]
+Row = dict[str, Any]
 JSON, TABLE = "design.json", "mirrors.csv"
-RECORD = "record"
 
 
-def record(how: Callable[[Design, str], None], named: int = 1) -> Job:
-    """Change design.json, told a mirror's id, and let mirrors.csv follow."""
+def mirrors(how: Callable[[list[Row], str], object], named: int = 1) -> Job:
+    """Change the rows of mirrors.csv, given the id of a mirror."""
 
     def job(folder: Path) -> Sequence[str]:
-        design, name = load(folder, JSON), balls(folder, "a")[0].id
-        how(design, name)
-        store(folder, JSON, design)
-        put(folder, TABLE, table(design["mirrors"]))
+        rows, name = load_mirrors(folder), balls(folder, "a")[0].id
+        how(rows, name)
+        store_mirrors(folder, rows)
         return [name][:named]
 
     return job
 
 
+def mirror(how: Callable[[Row], object]) -> Job:
+    """Change one row of mirrors.csv."""
+    return mirrors(lambda rows, name: how(row_of(rows, name)))
+
+
 def design(how: Callable[[Design], object]) -> Job:
-    """Change design.json, mirrors.csv with it; no mirror is concerned."""
-    return record(lambda value, _: how(value) and None, named=0)
+    """Change design.json; no mirror is concerned."""
+
+    def job(folder: Path) -> Sequence[str]:
+        value = load(folder, JSON)
+        how(value)
+        store(folder, JSON, value)
+        return ()
+
+    return job
 
 
-def table(rows: list[Design]) -> bytes:
-    names = list(rows[0])
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([["" if row[k] is None else _field(row[k]) for k in names] for row in rows])
-    return stream.getvalue().encode()
-
-
-def _field(value: object) -> str:
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-def row(value: Design, name: str) -> Design:
-    return next(one for one in value["mirrors"] if one["id"] == name)
+def row_of(rows: list[Row], name: str) -> Row:
+    return next(row for row in rows if row["id"] == name)
 
 
 def exchange(folder: Path) -> Sequence[str]:
-    """Two ids exchanged in both records, the STEP's names as they were."""
+    """Two ids exchanged, the STEP's names as they were."""
     names = [ball.id for ball in balls(folder, "a")[:2]]
 
-    def how(value: Design, _: str) -> None:
-        one, two = (row(value, name) for name in names)
+    def how(rows: list[Row], _: str) -> None:
+        one, two = (row_of(rows, name) for name in names)
         one["id"], two["id"] = two["id"], one["id"]
-        places = [value["mirrors"].index(one), value["mirrors"].index(two)]
-        value["mirrors"][places[0]], value["mirrors"][places[1]] = two, one
 
-    record(how)(folder)
+    mirrors(how)(folder)
     return names
 
 
@@ -81,24 +75,6 @@ def lines(how: Callable[[list[bytes]], list[bytes]]) -> Job:
     return job
 
 
-def swap_lines(rows: list[bytes]) -> list[bytes]:
-    return [rows[0], rows[2], rows[1], *rows[3:]]
-
-
-def swap_words(rows: list[bytes]) -> list[bytes]:
-    """Ids of two lines exchanged."""
-    one, two = (line.split(b",", 1) for line in rows[3:5])
-    return [*rows[:3], two[0] + b"," + one[1], one[0] + b"," + two[1], *rows[5:]]
-
-
-def last_digit(rows: list[bytes]) -> list[bytes]:
-    """One number off by its last digit."""
-    cells = rows[5].split(b",")
-    value = float(cells[5])
-    cells[5] = repr(float(np.nextafter(value, 1e3))).encode()
-    return [*rows[:5], b",".join(cells), *rows[6:]]
-
-
 def word(new: bytes) -> Callable[[list[bytes]], list[bytes]]:
     def how(rows: list[bytes]) -> list[bytes]:
         cells = rows[5].split(b",")
@@ -108,11 +84,10 @@ def word(new: bytes) -> Callable[[list[bytes]], list[bytes]]:
     return how
 
 
-def radius(by: float) -> Callable[[Design, str], None]:
-    """A radius in both records, the centre with it."""
+def radius(by: float) -> Callable[[Row], None]:
+    """A radius, and the centre with it."""
 
-    def how(value: Design, name: str) -> None:
-        one = row(value, name)
+    def how(one: Row) -> None:
         one["radius_mm"] += by
         for axis in "xyz":
             one["c" + axis] -= by * one["n" + axis]
@@ -120,20 +95,29 @@ def radius(by: float) -> Callable[[Design, str], None]:
     return how
 
 
-def apex(value: Design, name: str) -> None:
+def centre(one: Row) -> None:
+    """A centre 10 nm off the normal, the radius as it was."""
+    one["cy"] += 1e-5
+
+
+def apex(one: Row) -> None:
     """A mirror a micrometre further out."""
-    one = row(value, name)
     for k in "pc":
         for axis in "xyz":
             one[k + axis] += 1e-3 * one["u" + axis]
 
 
-def leave_out(value: Design, name: str) -> None:
-    value["mirrors"] = [one for one in value["mirrors"] if one["id"] != name]
+def cell(one: Row) -> None:
+    """A cell's area wrong by a ten thousandth."""
+    one["cell_area_mm2"] *= 1.0001
 
 
-def twin(value: Design, name: str) -> None:
-    value["mirrors"].append(dict(row(value, name), id="a9999"))
+def leave_out(rows: list[Row], name: str) -> None:
+    rows.remove(row_of(rows, name))
+
+
+def twin(rows: list[Row], name: str) -> None:
+    rows.append(dict(row_of(rows, name), id="a9999"))
 
 
 def shift_camera(by: float, echo: bool) -> Callable[[Design], None]:
@@ -185,18 +169,21 @@ def coat(value: Design) -> None:
     value["spec"]["mirrors"]["coating_um"] += 20
 
 
-def target(to: Callable[[Design], float], echo: bool) -> Callable[[Design], None]:
-    def how(value: Design) -> None:
-        value["target_mm"] = to(value)
+def target(to: Callable[[Path], float], echo: bool) -> Job:
+    def job(folder: Path) -> Sequence[str]:
+        value = load(folder, JSON)
+        value["target_mm"] = to(folder)
         if echo:
-            value["spec"]["optics"]["capture_diameter_mm"] = to(value)
+            value["spec"]["optics"]["capture_diameter_mm"] = to(folder)
+        store(folder, JSON, value)
+        return ()
 
-    return how
+    return job
 
 
-def least(value: Design) -> float:
+def beyond_the_worst(folder: Path) -> float:
     """A hundredth of a millimetre more than the worst mirror's own coverage."""
-    return min(one["coverage_mm"] for one in value["mirrors"]) + 0.01
+    return min(row["coverage_mm"] for row in load_mirrors(folder)) + 0.01
 
 
 def foot(value: Design) -> None:
@@ -249,8 +236,3 @@ def cut_line(data: bytes) -> bytes:
 
 def half(data: bytes) -> bytes:
     return data[: len(data) // 2]
-
-
-def cell(value: Design, name: str) -> None:
-    """A cell's area wrong by a ten thousandth."""
-    row(value, name)["cell_area_mm2"] *= 1.0001

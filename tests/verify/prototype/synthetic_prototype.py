@@ -351,14 +351,14 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
             drawn[f"ball_{k + 1}"] = whole.triangles + ball_.b
     files["whole.glb"] = glb(machine, drawn)
     found = {
-        "schema": "tbcad-prototype/1",
+        "schema": "tbcad-prototype/2",
         "camera": "a",
         "target_mm": machine.target,
         "picture": "moved" if machine.moved else "fixed",
         "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
         "swing_deg": [stops[0][1], stops[-1][1]],
         "target_pad_um": 10,
-        "balls": rows_,
+        "balls": "balls.csv",
         "seats": [
             {
                 "ball": k + 1,
@@ -399,7 +399,7 @@ def export(folder: Path, machine: Machine) -> Path:
     design = shell_of(machine)
     record = poses(design)
     mirrors = rows(design, record)
-    found = document(design, mirrors)
+    found = document(design)
     files: dict[str, bytes] = {"mirrors.csv": table(mirrors)}
     if machine.shell:
         a = solid(Cells(design, record))

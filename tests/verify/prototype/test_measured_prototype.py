@@ -34,8 +34,8 @@ from tbcad_verify.prototype.measured_parts import (
 )
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.step_files import part_step_checks, read_step_files
+from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
-from tbcad_verify.record.record import read_export
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
@@ -91,8 +91,10 @@ def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
 def test_pads_are_found_without_the_contacts_being_right(view: PrototypeContext) -> None:
     base, _ = joined_meshes(of_roles(bodies_of(view), "base"))
     made = view.prototype
-    off = made.seats.contacts + 0.3 * made.seats.axis[:, None]
-    near = replace(view, prototype=replace(made, seats=replace(made.seats, contacts=off)))
+    moved = [
+        seat.model_copy(update={"contacts": seat.contacts + 0.3 * seat.axis}) for seat in made.seats
+    ]
+    near = replace(view, prototype=made.model_copy(update={"seats": moved}))
     np.testing.assert_allclose(
         seats.measure_seats(near, base).centre, made.balls.columns("bx", 3).T, atol=1e-5
     )
@@ -218,7 +220,7 @@ def test_coverage_by_rays_on_a_fine_outline(
 
 
 def test_twins_are_turned_about_z(view: PrototypeContext) -> None:
-    rows = view.export.rows
+    rows = view.export.mirrors
     u = rows.columns("ux", 3)
     np.testing.assert_allclose(
         u[:, plan_checks.twins(view)], u[:, view.mine] * [[-1], [-1], [1]], atol=1e-12

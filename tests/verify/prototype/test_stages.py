@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,6 +13,7 @@ import pytest
 from tbcad_verify import main, verify
 from tbcad_verify.report.checks import Check
 
+from tests.csv_files import Rows, edit_csv
 from tests.verify.benches import HERE
 from tests.verify.prototype.synthetic_prototype import Machine, balls, export
 from tests.verify.synthetic_export import sign
@@ -58,38 +57,13 @@ def edited(folder: Path, change: Callable[[Row], None]) -> Path:
     return signed(folder)
 
 
-def table(folder: Path, name: str, change: Callable[[list[Row]], None]) -> Path:
-    path = folder / name
-    rows = list(csv.DictReader(io.StringIO(path.read_text())))
-    change(rows)
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    path.write_text(stream.getvalue())
+def table(folder: Path, name: str, change: Callable[[Rows], object]) -> Path:
+    edit_csv(folder / name, change)
     return signed(folder)
 
 
-def both(folder: Path, ball: int, change: Callable[[Row], Any]) -> Path:
-    """Change a ball in both of its records."""
-
-    def in_table(rows: list[Row]) -> None:
-        row = {key: float(x) if key in NUMERIC else x for key, x in rows[ball - 1].items()}
-        change(row)
-        rows[ball - 1].update({k: repr(x) if k in NUMERIC else x for k, x in row.items()})
-
-    edited(folder, lambda value: change(value["balls"][ball - 1]))
-    return table(folder, "balls.csv", in_table)
-
-
-NUMERIC = frozenset(
-    ["diameter_mm", "radius_mm", "body_radius_mm"]
-    + [name + axis for name in "pncb" for axis in "xyz"]
-)
-
-
-def moved(row: Row, name: str, by: float) -> None:
-    row[name + "x"] += by
+def moved(row: dict[str, str], name: str, by: float) -> None:
+    row[name + "x"] = repr(float(row[name + "x"]) + by)
 
 
 def test_a_good_prototype_passes(made: Path) -> None:
@@ -170,8 +144,8 @@ def in_table(name: str, change: Callable[[list[Row]], None]) -> Callable[[Path],
     return lambda folder: table(folder, name, change)
 
 
-def ball(number: int, change: Callable[[Row], Any]) -> Callable[[Path], Path]:
-    return lambda folder: both(folder, number, change)
+def ball(number: int, change: Callable[[dict[str, str]], object]) -> Callable[[Path], Path]:
+    return in_table("balls.csv", lambda rows: change(rows[number - 1]))
 
 
 def turned_over(axes: list[list[float]]) -> list[list[float]]:
@@ -182,16 +156,6 @@ PLAN = "rotation_plan.csv"
 FIN = 0.5 * balls(Machine())[1].p  # half way from the object to a ball
 # How, which checks may fail (the first must), and a word of its detail.
 RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
-    "table unlike record": (
-        in_table("balls.csv", nudged("mass_g", 1e-9, 0)),
-        ("prototype record",),
-        "ball 1 mass_g",
-    ),
-    "ball missing in table": (
-        in_table("balls.csv", lambda rows: rows.pop() and None),
-        ("prototype record",),
-        "missing",
-    ),
     "another target": (in_record("target_mm", to=24.0), ("prototype requirements",), "target"),
     "frame turned": (
         in_record("frame", "zero", to=lambda v: [-x for x in v]),
@@ -209,7 +173,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
         "ball 2",
     ),
     "ball larger than its stock": (
-        ball(1, lambda row: row.update(diameter_mm=row["diameter_mm"] + 1e-3)),
+        in_table("balls.csv", nudged("diameter_mm", 1e-3, 0)),
         ("ball sizes",),
         "ball 1",
     ),
@@ -431,36 +395,60 @@ def deep(*path: Any, to: Any) -> Callable[[Path], Path]:
 
 REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "schema": (deep("schema", to="x"), "schema"),
-    "no balls": (deep("balls", to=[]), "0 balls"),
-    "many balls": (deep("balls", to=lambda v: v * 400), "1600 balls"),
-    "ball number": (deep("balls", 1, "number", to=7), "number 2"),
-    "ball kind": (deep("balls", 1, "kind", to="cube"), "kind must be one of"),
-    "ball text": (deep("balls", 1, "radius_mm", to="5"), "ball 2: radius_mm"),
-    "ball infinite": (deep("balls", 1, "px", to=1e300), "ball 2: px"),
-    "ball without radius": (deep("balls", 1, "radius_mm", to=0), "ball 2: radius_mm"),
+    "schema before": (
+        deep("schema", to="tbcad-prototype/1"),
+        "schema is tbcad-prototype/1, this version verifies tbcad-prototype/2; write",
+    ),
+    "balls elsewhere": (deep("balls", to="../balls.csv"), "balls is ../balls.csv, allowed is"),
+    "no balls": (in_table("balls.csv", list.clear), "balls.csv: 0 rows"),
+    "many balls": (in_table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
+    "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
+    "ball number": (ball(2, lambda row: row.update(number="7")), "ball 2 must have number 2"),
+    "ball kind": (
+        ball(2, lambda row: row.update(kind="cube")),
+        "line 3: kind is cube, allowed is ball or cap",
+    ),
+    "ball word": (
+        ball(2, lambda row: row.update(radius_mm="five")),
+        "line 3: radius_mm is five, allowed is a number from 0.001 to 10000",
+    ),
+    "ball nan": (ball(2, lambda row: row.update(py="nan")), "line 3: py is nan"),
+    "ball empty": (ball(2, lambda row: row.update(py="")), "line 3: py is ''"),
+    "ball infinite": (ball(2, lambda row: row.update(px="1e300")), "line 3: px is 1e300"),
+    "ball without radius": (ball(2, lambda row: row.update(radius_mm="0")), "line 3: radius_mm"),
+    "ball of negative mass": (ball(1, lambda row: row.update(mass_g="-1")), "line 2: mass_g"),
     "seat missing": (deep("seats", to=lambda v: v[:-1]), "one for each ball"),
-    "seat short": (deep("seats", 0, "normals", to=[[1, 0, 0]]), "three rows"),
+    "seat short": (
+        deep("seats", 0, "normals", to=[[1, 0, 0]]),
+        "seats[0].normals is [[1, 0, 0]], allowed is three rows of three numbers",
+    ),
     "part above": (deep("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
     "part absolute": (deep("parts", 0, "step", to="/etc/passwd"), "plain file name"),
-    "part role": (deep("parts", 0, "role", to="hat"), "role must be one of"),
+    "part role": (deep("parts", 0, "role", to="hat"), "allowed is base, cap, stage, frame or tool"),
     "part twice": (deep("parts", 0, "name", to="stage"), "names of their own"),
     "mesh twice": (deep("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (deep("parts", 1, "ball", to=9), "a cap's ball or null"),
     "base of a ball": (deep("parts", 0, "ball", to=1), "a cap's ball or null"),
-    "quantity": (deep("parts", 0, "quantity", to=0), "quantity"),
+    "quantity": (deep("parts", 0, "quantity", to=0), "a whole number from 1 to 1000"),
     "axes": (deep("parts", 0, "axes", to=[1, 2, 3]), "three numbers"),
     "camera": (deep("camera", to="z"), "camera 'z'"),
-    "picture": (deep("picture", to="blurred"), "picture must be one of"),
+    "picture": (deep("picture", to="blurred"), "picture is blurred, allowed is moved or fixed"),
     "swing": (deep("swing_deg", to=[3, 2]), "swing_deg must ascend"),
-    "frame": (deep("frame", to=[]), "frame must be a dict"),
-    "bought": (deep("bought", 0, "turns", to="no"), "turns"),
+    "frame": (deep("frame", to=[]), "frame is [], allowed is an object"),
+    "bought": (deep("bought", 0, "turns", to="no"), "turns is no, allowed is true or false"),
     "assembly": (deep("assembly", to={"step": "a/b.step"}), "plain file name"),
-    "led": (deep("leds", 0, "position_mm", to=[1, 2]), "position_mm must be three"),
+    "led": (deep("leds", 0, "position_mm", to=[1, 2]), "leds[0].position_mm is [1, 2]"),
     "plan missing": (lambda f: (f / PLAN).unlink(), f"{PLAN}: missing"),
     "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),
-    "plan nan": (in_table(PLAN, lambda r: r[3].update(base_angle_deg="nan")), "base_angle_deg"),
-    "plan odd name": (in_table(PLAN, lambda r: r[3].update(mirror="../x")), "no name"),
-    "plan fraction": (in_table(PLAN, lambda r: r[3].update(stop="1.5")), "whole number"),
+    "plan nan": (in_table(PLAN, lambda r: r[3].update(base_angle_deg="nan")), "base_angle_deg is"),
+    "plan odd name": (
+        in_table(PLAN, lambda r: r[3].update(mirror="../x")),
+        "line 5: mirror is ../x",
+    ),
+    "plan fraction": (
+        in_table(PLAN, lambda r: r[3].update(stop="1.5")),
+        "allowed is a whole number",
+    ),
     "stops foreign": (lambda f: (f / "stops.csv").write_text("a,b\n1,2\n"), "first line"),
     "stops empty": (
         lambda f: (f / "stops.csv").write_text((f / "stops.csv").read_text().split("\n")[0]),

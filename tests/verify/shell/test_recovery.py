@@ -69,9 +69,11 @@ def test_a_missing_mirror_is_named(tmp_path: Path) -> None:
 
 def test_centres_swapped_in_the_record_are_named(good: Path) -> None:
     bench = bench_of(good)
-    table = bench.export.mirrors.table.copy()
-    table[[15, 16], 9:13] = table[[16, 15], 9:13]
-    mirrors = replace(bench.export.mirrors, table=table)
+    order = np.arange(len(bench.export.mirrors))
+    order[[15, 16]] = 16, 15
+    other = bench.export.mirrors.take(order)
+    spheres = {name: getattr(other, name) for name in ("cx", "cy", "cz", "radius_mm")}
+    mirrors = bench.export.mirrors.model_copy(update=spheres)
     swapped = replace(bench, export=replace(bench.export, mirrors=mirrors))
     errors = np.linalg.norm(bench.mirrors.centre() - mirrors.columns("cx", 3), axis=0)
     swapped = replace(swapped, match=replace(bench.match, centre_error=errors))

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.integrate import quad
-from tbcad_verify.record.mirrors import from_json
-from tbcad_verify.record.record import Camera, Export, read_export
+from tbcad_verify.record.export import Camera, Export, read_export
+from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.step.sphere_union import (
     ClosedFormCells,
     cells_of_balls,
@@ -24,7 +24,7 @@ from tbcad_verify.step.sphere_union import (
 from tbcad_verify.types import Floats
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import rows
+from tbcad.mirrors.record import COLUMNS, rows
 from tbcad.optics.cells import cell_areas
 from tbcad.spec.load import load_spec
 
@@ -371,14 +371,15 @@ def made(name: str) -> MirrorDesign:
 def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
     sample = read_export(SAMPLE)
-    table = from_json([dict(row) for half in it.halves for row in rows(half)])
+    table = [row for half in it.halves for row in rows(half)]
     views = {half.camera_id: half.camera.pinhole for half in it.halves}
     cameras: dict[str, Camera] = {
-        key: replace(sample.cameras[key], pinhole=pinhole) for key, pinhole in views.items()
+        key: sample.cameras[key].model_copy(update={"pinhole": pinhole})
+        for key, pinhole in views.items()
     }
     return replace(
         sample,
-        rows=table,
+        mirrors=Mirrors.model_validate({key: [row[key] for row in table] for key in COLUMNS}),
         cameras=cameras,
         foot_z_mm=it.halves[0].foot,
         coating_mm=it.spec.mirrors.coating_um / 1000,
@@ -386,7 +387,7 @@ def as_export(it: MirrorDesign) -> Export:
 
 
 def recorded(export: Export, camera: str) -> Floats:
-    return export.rows.columns("cell_area_mm2")[0][export.rows.camera == camera]
+    return export.mirrors.cell_area_mm2[export.mirrors.camera == camera]
 
 
 @pytest.mark.parametrize("name", list(LINES))
@@ -467,9 +468,9 @@ def gauss_bonnet(it: ClosedFormCells, centre: Floats, radius: Floats) -> Floats:
 def test_gauss_and_bonnet(name: str) -> None:
     export = as_export(made(name))
     it = cells_of_export(export, "a")
-    mine = export.rows.camera == "a"
-    centre = export.rows.columns("cx", 3).T[mine]
-    radius = export.rows.columns("radius_mm")[0][mine]
+    mine = export.mirrors.camera == "a"
+    centre = export.mirrors.columns("cx", 3).T[mine]
+    radius = export.mirrors.radius_mm[mine]
     np.testing.assert_allclose(gauss_bonnet(it, centre, radius), it.area, rtol=1e-8)
 
 
@@ -477,9 +478,9 @@ def test_samples_on_a_real_cell() -> None:
     """Corners and points of edges lie on their mirror, in no other ball, beyond no wall."""
     export = as_export(made("n=18"))
     it = cells_of_export(export, "a")
-    mine = export.rows.camera == "a"
-    centre = export.rows.columns("cx", 3).T[mine]
-    radius = export.rows.columns("radius_mm")[0][mine]
+    mine = export.mirrors.camera == "a"
+    centre = export.mirrors.columns("cx", 3).T[mine]
+    radius = export.mirrors.radius_mm[mine]
     x = it.rim.points[:, :2].reshape(-1, 3)
     depth = np.linalg.norm(x[:, None] - centre, axis=2) - radius
     assert np.abs(depth[np.arange(len(x)), np.repeat(it.rim.mirror, 2)]).max() < 1e-11

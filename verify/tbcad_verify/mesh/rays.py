@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import dot, unit
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats
 
 Ints = NDArray[np.int32]

@@ -34,7 +34,7 @@ def assembly_meshes(context: PrototypeContext) -> Shapes:
     Raises:
         Unknown: there is no GLB, or it cannot be read.
     """
-    name = context.prototype.assembly[1]
+    name = context.prototype.assembly.glb
     if not name:
         raise Unknown("there is no GLB of the assembly")
     data = read(context.export.folder, name).data.tobytes()
@@ -49,7 +49,7 @@ def check(
     boxes = {one.part.name: _box(one.placed_mesh.points) for one in placed}
     balls = context.prototype.balls
     for k in np.flatnonzero(~balls.cap).tolist():
-        middle, radius = balls.columns("bx", 3)[:, k], balls.of("body_radius_mm")[k]
+        middle, radius = balls.columns("bx", 3)[:, k], balls.body_radius_mm[k]
         boxes[f"ball_{k + 1}"] = np.stack([middle - radius, middle + radius])
     off = {title: _off(box, found.get(title)) for title, box in boxes.items()}
     off |= {one.name: 0.0 if one.name in found else np.inf for one in context.prototype.bought}

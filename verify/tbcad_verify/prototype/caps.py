@@ -58,9 +58,9 @@ def measure_cap(context: PrototypeContext, body: MeasuredPart) -> MeasuredCap:
     """
     balls, k = context.prototype.balls, body.part.ball
     centre, middle = balls.columns("cx", 3)[:, k], balls.columns("bx", 3)[:, k]
-    front = fit_sphere(body.placed_mesh, centre, float(balls.of("radius_mm")[k]))
+    front = fit_sphere(body.placed_mesh, centre, float(balls.radius_mm[k]))
     return MeasuredCap(
-        k, front, fit_sphere(body.placed_mesh, middle, float(balls.of("body_radius_mm")[k]))
+        k, front, fit_sphere(body.placed_mesh, middle, float(balls.body_radius_mm[k]))
     )
 
 
@@ -115,13 +115,13 @@ def checks(context: PrototypeContext, caps: list[MeasuredCap], files: str) -> li
             front,
             [(one.ball, one.front) for one in caps],
             balls.columns("cx", 3),
-            balls.of("radius_mm"),
+            balls.radius_mm,
         ),
         _held(
             body,
             [(one.ball, one.body) for one in caps],
             balls.columns("bx", 3),
-            balls.of("body_radius_mm"),
+            balls.body_radius_mm,
         ),
         at_most(
             form,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.prototype import axis
+from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import HALVED
-from tbcad_verify.record.prototype_record import Prototype
-from tbcad_verify.record.record import Camera, Export
+from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
 
@@ -56,12 +56,12 @@ class PrototypeContext:
     @cached_property
     def mine(self) -> Ints:
         """(m,) rows of mirrors.csv that are this camera's mirrors."""
-        return np.flatnonzero(self.export.rows.camera == self.prototype.camera)
+        return np.flatnonzero(self.export.mirrors.camera == self.prototype.camera)
 
     @cached_property
     def halved(self) -> NDArray[np.bool_]:
         """(m,) mirrors that the seam cuts."""
-        return np.asarray(np.abs(self.export.rows.columns("ux")[0][self.mine]) < HALVED)
+        return np.asarray(np.abs(self.export.mirrors.ux[self.mine]) < HALVED)
 
     @cached_property
     def pictures(self) -> Ints:
@@ -70,7 +70,7 @@ class PrototypeContext:
         Raises:
             Unknown: a mirror has none, or a row names a ball or stop that there is not.
         """
-        plan, ids = self.prototype.plan, self.export.rows.ids
+        plan, ids = self.prototype.plan, self.export.mirrors.ids
         straight = np.flatnonzero(plan.turn == 0).tolist()
         row = {plan.mirror[k]: k for k in straight}
         missing = [ids[k] for k in self.mine.tolist() if ids[k] not in row]

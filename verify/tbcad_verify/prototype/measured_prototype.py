@@ -77,8 +77,8 @@ def measure_prototype(
     balls = context.prototype.balls
     if lost := [why for why in held.reason if why]:
         raise Unknown(lost[0])
-    body, radius = held.centre.T.copy(), balls.of("radius_mm").copy()
-    centre, body_radius = body.copy(), balls.of("body_radius_mm").copy()
+    body, radius = held.centre.T.copy(), balls.radius_mm.copy()
+    centre, body_radius = body.copy(), balls.body_radius_mm.copy()
     without = {*np.flatnonzero(balls.cap).tolist()} - {cap.ball for cap in caps}
     if without:
         raise Unknown(f"no part is the cap of ball {min(without) + 1}")

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
 from tbcad_verify.mesh.vectors import dot, tangent_basis, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Bools, Floats, Ints
 
 AROUND = 96  # directions of an outline
@@ -76,12 +76,12 @@ class CellOutlines:
 
 def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:
     """The balls of the camera that the prototype serves."""
-    rows = context.export.rows.take(context.mine)
+    rows = context.export.mirrors.take(context.mine)
     return MirrorSpheres(
         context.pinhole,
         rows.columns("px", 3),
         rows.columns("cx", 3),
-        rows.columns("radius_mm")[0],
+        rows.radius_mm,
         float(np.sign(context.pinhole[0])),
         context.export.foot_z_mm,
         context.halved,

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.prototype import axis, gcode
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype_record import PLAN, PROGRAM, STOPS
+from tbcad_verify.record.prototype import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -49,7 +49,7 @@ def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
 
     Rows are numbered, and name balls that there are.
     """
-    plan, rows = context.prototype.plan, context.export.rows
+    plan, rows = context.prototype.plan, context.export.mirrors
     odd: list[str] = []
     for turn in TURNS:
         own = (rows.camera == context.prototype.camera) == (turn == 0)
@@ -63,7 +63,7 @@ def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
     unordered = np.flatnonzero(plan.order != np.arange(1, len(plan) + 1))
     odd += [f"row {k + 1} out of order" for k in unordered.tolist()]
     served = np.bincount(np.clip(context.ball, 0, None), minlength=len(context.prototype.balls))
-    unlike = np.flatnonzero(served != context.prototype.balls.of("mirrors"))
+    unlike = np.flatnonzero(served != context.prototype.balls.mirrors)
     odd += [f"ball {k + 1} serves {served[k]}" for k in unlike.tolist()]
     return at_most(name, len(odd), 0, short_list(odd))
 
@@ -76,7 +76,7 @@ def twins(context: PrototypeContext) -> Ints:
     Raises:
         Unknown: there is no mirror in that direction.
     """
-    rows = context.export.rows
+    rows = context.export.mirrors
     u = rows.columns("ux", 3)
     others = np.flatnonzero(rows.camera != context.prototype.camera)
     if not others.size:
@@ -91,7 +91,7 @@ def twins(context: PrototypeContext) -> Ints:
 
 def _twins(name: CheckName, context: PrototypeContext) -> Check:
     """The turned half goes by the same ball and stop as the mirrors it is the image of."""
-    plan, rows = context.prototype.plan, context.export.rows
+    plan, rows = context.prototype.plan, context.export.mirrors
     turned = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
     ids = [rows.ids[k] for k in twins(context).tolist()]
     row = np.array([turned.get(one, -1) for one in ids])
@@ -108,7 +108,7 @@ def _twins(name: CheckName, context: PrototypeContext) -> Check:
 
 def errors(context: PrototypeContext) -> Floats:
     """(m, 3) polar angle, azimuth and direction of each ball at its stop less the mirror's, rad."""
-    u = context.export.rows.columns("ux", 3)[:, context.mine]
+    u = context.export.mirrors.columns("ux", 3)[:, context.mine]
     apex = context.prototype.balls.columns("px", 3)[:, context.ball]
     at = axis.turned(apex, context.frame[0][:, None], context.angle)
     (mirror, phi), (ball, psi) = axis.angles(context.frame, u), axis.angles(context.frame, at)
@@ -121,7 +121,7 @@ def _errors(name: CheckName, context: PrototypeContext) -> Check:
     ).max(axis=1)
     worst = np.argsort(-away, kind="stable")
     worst = worst[~(away[worst] <= ERROR_DEG)]
-    ids = [context.export.rows.ids[k] for k in context.mine.tolist()]
+    ids = [context.export.mirrors.ids[k] for k in context.mine.tolist()]
     detail = "recorded otherwise than poses make them: " + worst_offenders(
         ids, away, "deg", worst, ".3g"
     )

@@ -59,7 +59,7 @@ def _moved(context: PrototypeContext, ball: Ints, angle: Floats, d: Floats) -> F
     """
     if not context.prototype.moved:
         return d
-    own = context.export.rows.columns("px", 3)[:, context.mine]
+    own = context.export.mirrors.columns("px", 3)[:, context.mine]
     its = to_ground(context, context.prototype.balls.columns("px", 3)[:, ball], angle)
     (_, phi), (_, psi) = (axis.angles(context.frame, x) for x in (own, its))
     (low, _), (high, _) = (

@@ -1,4 +1,4 @@
-"""The record of a prototype against itself: tables, frame, and balls on the ellipsoid."""
+"""The record of a prototype against itself: frame, seats, and balls on the ellipsoid."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.poses import POSE_MM
-from tbcad_verify.record.prototype_record import BALL_COLUMNS, BALLS, RECORD, Balls
-from tbcad_verify.record.prototype_tables import number_in
+from tbcad_verify.record.prototype import BALLS, RECORD
+from tbcad_verify.record.prototype_tables import Balls
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -23,16 +23,15 @@ from tbcad_verify.types import Floats
 
 ANGLE = 1e-9  # radians, and of unit vectors
 CHECKS = (
-    ("prototype record", BALLS, "cells unlike prototype.json"),
     ("prototype requirements", RECORD, "unlike the design"),
-    ("ball places", RECORD, "mm off"),
-    ("ball sizes", RECORD, "balls"),
+    ("ball places", BALLS, "mm off"),
+    ("ball sizes", BALLS, "balls"),
 )
 
 
 def checks(context: PrototypeContext) -> list[Check]:
-    """Tables agree, the frame is the camera's, and every ball stands where it must."""
-    work = (_agree, _asked, _places, _sizes)
+    """The frame is the camera's, and every ball stands where it must."""
+    work = (_asked, _places, _sizes)
     return [
         check
         for name, job in zip(CHECKS, work, strict=True)
@@ -40,40 +39,24 @@ def checks(context: PrototypeContext) -> list[Check]:
     ]
 
 
-def _agree(name: CheckName, context: PrototypeContext) -> Check:
-    balls, rows = context.prototype.balls, context.prototype.ball_rows
-    if len(rows) != len(balls):
-        return at_most(name, abs(len(rows) - len(balls)) * len(BALL_COLUMNS), 0, "rows are missing")
-    odd = [
-        f"ball {k + 1} {key}"
-        for k, (row, item) in enumerate(zip(rows, balls.rows, strict=True))
-        for key, cell in zip(BALL_COLUMNS, row, strict=True)
-        if not _same(cell, item.get(key))
-    ]
-    return at_most(name, len(odd), 0, f"differ: {short_list(odd)}")
-
-
-def _same(cell: str, value: object) -> bool:
-    """Whether a field of the table is a value of the record, bit for bit."""
-    if value is None or isinstance(value, str):
-        return cell == (value or "")
-    return number_in(cell) == value
-
-
 def _asked(name: CheckName, context: PrototypeContext) -> Check:
     """Target and frame, against the design that the export carries."""
     prototype, export = context.prototype, context.export
     wanted = {
         "target_mm": abs(prototype.target_mm - export.target_mm),
-        "frame": float(np.abs(prototype.frame - context.frame).max()),
-        "seats": float(np.abs(np.linalg.norm(prototype.seats.axis, axis=-1) - 1).max()),
-        "pads": float(np.abs(np.linalg.norm(prototype.seats.normals, axis=-1) - 1).max()),
+        "frame": float(np.abs(prototype.frame.rows - context.frame).max()),
+        "seats": _off_unit(np.array([seat.axis for seat in prototype.seats])),
+        "pads": _off_unit(np.array([seat.normals for seat in prototype.seats])),
     }
     spec = export.spec.get("prototype")
     if isinstance(spec, dict) and "picture" in spec:
         wanted["picture"] = float((spec["picture"] == "moved") != prototype.moved)
     odd = sorted(what for what, away in wanted.items() if not away <= ANGLE)
     return at_most(name, len(odd), 0, f"not as designed: {short_list(odd)}")
+
+
+def _off_unit(vectors: Floats) -> float:
+    return float(np.abs(np.linalg.norm(vectors, axis=-1) - 1).max())
 
 
 def _places(name: CheckName, context: PrototypeContext) -> Check:
@@ -106,10 +89,10 @@ def position_errors(context: PrototypeContext) -> Floats:
     worst = np.max(
         [
             np.abs(norm(p) + norm(pinhole - p) - double_a),
-            np.abs(polar - np.radians(balls.of("polar_deg"))),
-            np.abs(axis.wrapped(azimuth - np.radians(balls.of("azimuth_deg")))),
+            np.abs(polar - np.radians(balls.polar_deg)),
+            np.abs(axis.wrapped(azimuth - np.radians(balls.azimuth_deg))),
             norm(unit(unit(pinhole - p) - unit(p)) - n),
-            norm(c - (p - balls.of("radius_mm") * n)),
+            norm(c - (p - balls.radius_mm * n)),
             norm(b - (p - depth * n)),
         ],
         axis=0,
@@ -125,8 +108,7 @@ def _sizes(name: CheckName, context: PrototypeContext) -> Check:
 
 def _sized(balls: Balls) -> NDArray[np.bool_]:
     """(K,) a ball reflects with all of its diameter; a cap's front is flatter than its body."""
-    radius, body, half = (balls.of(k) for k in ("radius_mm", "body_radius_mm", "diameter_mm"))
-    half = half / 2
+    radius, body, half = balls.radius_mm, balls.body_radius_mm, balls.diameter_mm / 2
     p, c, b = (balls.columns(key, 3) for key in ("px", "cx", "bx"))
     ball = (np.abs(radius - half) <= POSE_MM) & (np.abs(body - half) <= POSE_MM)
     ball &= norm(b - c) <= POSE_MM

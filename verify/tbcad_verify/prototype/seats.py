@@ -98,18 +98,15 @@ def _worst(
 
 def _one(context: PrototypeContext, base: Mesh, k: int) -> tuple[Floats, float, float, str]:
     """Centre, margin and clearance of one ball; or why they are not known."""
-    balls, seats = context.prototype.balls, context.prototype.seats
-    radius = float(balls.of("body_radius_mm")[k])
+    balls, seat = context.prototype.balls, context.prototype.seats[k]
+    radius = float(balls.body_radius_mm[k])
     try:
         near = _around(base, balls.columns("bx", 3)[:, k], radius + ROOM_MM)
-        pads = [
-            _pad(base, near, seats.contacts[k, j], seats.normals[k, j], float(seats.pad[k]) / 2)
-            for j in range(3)
-        ]
+        pads = [_pad(base, near, seat.contacts[j], seat.normals[j], seat.pad / 2) for j in range(3)]
         centre = touching([pad[0] for pad in pads], [pad[1] for pad in pads], radius)
     except Unknown as error:
         return np.full(3, np.nan), -np.inf, -np.inf, str(error)
-    wanted = INSIDE * float(seats.pad[k]) / 2
+    wanted = INSIDE * seat.pad / 2
     margin = min(_margin(base, facets, normal, centre) for normal, _, facets in pads) - wanted
     others = np.setdiff1d(near, np.concatenate([facets for _, _, facets in pads]))
     clear = float(distances(centre, _corners(base, others)).min(initial=np.inf)) - radius

@@ -21,8 +21,8 @@ from tbcad_verify.prototype.measured_parts import (
 )
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeats
-from tbcad_verify.record.prototype_record import Prototype
-from tbcad_verify.record.record import Export
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -144,7 +144,7 @@ def _swing(
             )
         )
     )
-    whole = (assembly.CHECK[0], context.prototype.assembly[1], assembly.CHECK[1])
+    whole = (assembly.CHECK[0], context.prototype.assembly.glb, assembly.CHECK[1])
     sink(
         Results(
             checks=guarded(
@@ -160,14 +160,13 @@ def _swing(
 def _light(context: PrototypeContext, found: BallViews, names: list[CheckName]) -> list[Check]:
     """Every mirror's ball shows all of the object at its stop, and nothing stands in between."""
     cells, covers, off, path, rays, kept = names
-    ids = [context.export.rows.ids[k] for k in context.mine.tolist()]
+    ids = [context.export.mirrors.ids[k] for k in context.mine.tolist()]
     hidden, blocked = found.hidden.astype(float), found.blocked.astype(float)
     short = np.argsort(found.coverage, kind="stable")
     short = short[found.coverage[short] < context.export.target_mm]
     least = ball_coverage(context, found.coverage)
-    recorded = context.prototype.balls.of(
-        "coverage_mm" if context.prototype.moved else "coverage_fixed_mm"
-    )
+    balls = context.prototype.balls
+    recorded = balls.coverage_mm if context.prototype.moved else balls.coverage_fixed_mm
     away = np.where(np.isfinite(least), np.abs(least - recorded), 0)
     furthest = int(away.argmax())
     return [

@@ -6,8 +6,8 @@ from functools import partial
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
-from tbcad_verify.record.prototype_record import Printed
-from tbcad_verify.record.record import Export
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.prototype import Printed
 from tbcad_verify.report.checks import Check, Unknown, guarded
 from tbcad_verify.step.part_checks import UNITS, PartComparison, comparison_checks
 from tbcad_verify.step.step_file import StepFile, examine_all, load

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.record import Camera, Export
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -60,22 +60,6 @@ def malformed(mirrors: Mirrors) -> list[str]:
             if counts[name] > 1 or not WELL_FORMED.fullmatch(name) or name[0] != camera
         }
     )
-
-
-def differing(one: Mirrors, two: Mirrors) -> list[str]:
-    """Ids whose rows differ between two records, bit for bit."""
-    rows = [
-        dict(
-            zip(
-                m.ids,
-                zip(m.camera.tolist(), np.nan_to_num(m.table, nan=-1e300).tolist(), strict=True),
-                strict=True,
-            )
-        )
-        for m in (one, two)
-    ]
-    odd = {name for name in {*rows[0], *rows[1]} if rows[0].get(name) != rows[1].get(name)}
-    return sorted(odd or ({"the order"} if one.ids != two.ids else ()))
 
 
 def pose_errors(export: Export) -> Floats:

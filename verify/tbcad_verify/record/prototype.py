@@ -5,53 +5,185 @@ What is wrong in form is refused here; what is wrong in fact is for the checks.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.record.fields import (
-    Record,
-    limited,
-    number,
-    objects,
-    parse,
-    plain_file,
-    three,
-    triple,
-    typed,
-    vector,
-    word,
-)
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype_record import (
-    BALL_COLUMNS,
-    BALLS,
-    NUMBERS,
-    PLAN,
-    PROGRAM,
-    RECORD,
-    ROLES,
-    STOPS,
-    Balls,
-    Bought,
-    Led,
-    Printed,
-    Prototype,
-    Seats,
+from tbcad_verify.record.prototype_tables import MOST, Balls, Plan, Stops
+from tbcad_verify.record.validation import (
+    FileOrNone,
+    Matrix,
+    Name,
+    PlainFile,
+    Strict,
+    Vector,
+    parse_json,
+    shown,
+    validated,
 )
-from tbcad_verify.record.prototype_tables import cells, read_plan, read_stops
 from tbcad_verify.types import Floats
 
-TABLES = (BALLS, PLAN, STOPS, PROGRAM)
-SCHEMA = "tbcad-prototype/1"
-PICTURES = ("moved", "fixed")
-KINDS = ("ball", "cap")
-KINDS_OF_ALL = ("step", "glb")
-MOST = 1000  # balls, parts or LEDs
-WORDS = ("size", "grade", "standard")
+SCHEMA = "tbcad-prototype/2"
+RECORD = "prototype.json"
+BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
+
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+
+class Frame(Strict):
+    """Axis of the base, azimuth zero, and the third axis."""
+
+    axis: Vector
+    zero: Vector
+    third: Vector
+
+    @property
+    def rows(self) -> Floats:
+        """All three, (3, 3)."""
+        return np.stack([self.axis, self.zero, self.third])
+
+
+class Seat(Strict):
+    """The seat of a ball as recorded: where to begin looking for its pads.
+
+    Attributes:
+        ball: its number, from 1.
+        axis: (3,) unit, away from the light.
+        normals: (3, 3) unit, of each pad, toward the ball's centre.
+        contacts: (3, 3) mm, the pads' middles.
+        pad: diameter of the pads, mm.
+    """
+
+    ball: int
+    axis: Vector
+    normals: Matrix
+    contacts: Matrix = Field(alias="contacts_mm")
+    pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)
+
+
+class Printed(Strict):
+    """One part to be printed; y = x @ axes + origin lays it on the bed.
+
+    Attributes:
+        name: of the part.
+        role: what it is.
+        number: of a cap, its ball's, from 1.
+        quantity: how many are made.
+        stl: the mesh, on the bed.
+        step: the solid, in its place; empty: none.
+        threemf: the mesh again; empty: none.
+        axes: (3, 3).
+        origin: (3,) mm.
+    """
+
+    name: Name
+    role: Literal["base", "cap", "stage", "frame", "tool"]
+    number: int | None = Field(alias="ball")
+    quantity: int = Field(ge=1, le=MOST)
+    stl: PlainFile
+    step: FileOrNone = ""
+    threemf: FileOrNone = Field("", alias="3mf")
+    axes: Matrix
+    origin: Vector = Field(alias="origin_mm")
+
+    @property
+    def ball(self) -> int:
+        """Of a cap, its ball from 0; else -1."""
+        return (self.number or 0) - 1
+
+
+class Led(Strict):
+    """A light-emitting diode of the stage: its position (3,) mm and direction (3,)."""
+
+    name: Name
+    position: Vector = Field(alias="position_mm")
+    direction: Vector
+
+
+class Bought(Strict):
+    """A purchased part, whose shape only the assembly has; `turns`: whether with the base."""
+
+    name: Name
+    turns: bool
+
+
+class Assembly(Strict):
+    """Files of the whole; empty: none."""
+
+    step: FileOrNone = ""
+    glb: FileOrNone = ""
+
+
+class Prototype(Strict):
+    """The whole record.
+
+    Attributes:
+        camera: id of the camera that it serves.
+        target_mm: coverage wanted.
+        picture: whether pictures are moved along with their balls when they are merged.
+        frame: of the base.
+        swing: least and greatest base angle driven, degrees.
+        pad_um: by which pads may misplace a ball.
+        seats: one for each ball.
+        parts: printed.
+        leds: of the stage.
+        bought: what is neither printed nor a ball.
+        assembly: files of the whole.
+        balls: K of them.
+        plan: every picture.
+        stops: of the base.
+        program: text of the controller's program.
+        digests: file name -> (size, sha256), of what was parsed.
+    """
+
+    camera: Name
+    target_mm: float = Field(ge=1e-3, le=1e6)
+    picture: Literal["moved", "fixed"]
+    frame: Frame
+    swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
+    pad_um: float = Field(alias="target_pad_um", ge=1e-3, le=1e4)
+    seats: list[Seat]
+    parts: list[Printed] = Field(min_length=1, max_length=MOST)
+    leds: list[Led] = Field(max_length=MOST)
+    bought: list[Bought] = Field(max_length=MOST)
+    assembly: Assembly = Assembly()
+    balls: Balls
+    plan: Plan
+    stops: Stops
+    program: str
+    digests: Mapping[str, tuple[int, str]]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.swing[0] > self.swing[1]:
+            raise ValueError(f"swing_deg must ascend, not {self.swing}")
+        if [seat.ball for seat in self.seats] != list(range(1, len(self.balls) + 1)):
+            raise ValueError("seats must be one for each ball, in order")
+        for part in self.parts:
+            balls = range(1, len(self.balls) + 1) if part.role == "cap" else (None,)
+            if part.number not in balls:
+                raise ValueError(f"part {part.name}: ball must be a cap's ball or null")
+        if len({part.name for part in self.parts}) != len(self.parts):
+            raise ValueError("parts must have names of their own")
+        if len({part.stl for part in self.parts}) != len(self.parts):
+            raise ValueError("parts must each have an STL of their own")
+        return self
+
+    @property
+    def moved(self) -> bool:
+        """Whether pictures are moved along with their balls when they are merged."""
+        return self.picture == "moved"
+
+    @property
+    def part_files(self) -> frozenset[str]:
+        """All files of all parts and of the assembly."""
+        files = [name for part in self.parts for name in (part.stl, part.step, part.threemf)]
+        return frozenset(filter(None, [*files, self.assembly.step, self.assembly.glb]))
 
 
 def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
@@ -64,154 +196,21 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
     Raises:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
-    texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (RECORD, *TABLES)}
-    found = parse(texts[RECORD])
-    if found.get("schema") != SCHEMA:
-        raise BadExport(f"{RECORD}: schema must be {SCHEMA!r}, not {found.get('schema')!r:.60}")
-    camera = word(found, "camera", RECORD)
-    if camera not in cameras:
-        raise BadExport(f"{RECORD}: camera {camera!r} is not in design.json; {AGAIN}")
-    balls = _balls(objects(found, "balls", RECORD))
-    return Prototype(
-        camera=camera,
-        target_mm=number(found, "target_mm", 1e-3, 1e6, RECORD),
-        moved=_choice(found, "picture", PICTURES) == "moved",
-        frame=_frame(typed(found, "frame", dict, RECORD)),
-        swing=_swing(typed(found, "swing_deg", list, RECORD)),
-        pad_um=number(found, "target_pad_um", 1e-3, 1e4, RECORD),
-        balls=balls,
-        seats=_seats(objects(found, "seats", RECORD), len(balls)),
-        parts=_parts(objects(found, "parts", RECORD), balls),
-        leds=_leds(found),
-        bought=_bought(found),
-        plan=read_plan(texts[PLAN]),
-        stops=read_stops(texts[STOPS]),
-        program=texts[PROGRAM].text(),
-        ball_rows=cells(texts[BALLS], BALL_COLUMNS),
-        assembly=_assembly(found),
-        digests={name: blob.digest for name, blob in texts.items()},
-    )
-
-
-def _choice(record: Record, key: str, allowed: tuple[str, ...]) -> str:
-    value = typed(record, key, str, RECORD)
-    if value not in allowed:
-        raise BadExport(f"{RECORD}: {key} must be one of {', '.join(allowed)}; {AGAIN}")
-    return str(value)
-
-
-def _frame(record: Record) -> Floats:
-    return np.stack([vector(record, key, RECORD) for key in ("axis", "zero", "third")])
-
-
-def _swing(value: list[Any]) -> tuple[float, float]:
-    if len(value) != 2:
-        raise BadExport(f"{RECORD}: swing_deg must be two numbers, not {value!r:.60}; {AGAIN}")
-    low, high = (limited(f"{RECORD}: swing_deg", item, -360, 360) for item in value)
-    if low > high:
-        raise BadExport(f"{RECORD}: swing_deg must ascend, not {value!r:.60}; {AGAIN}")
-    return low, high
-
-
-def _balls(items: Any) -> Balls:
-    _refuse_many("balls", len(items), 1)
-    for k, item in enumerate(items, 1):
-        if item.get("number") != k or isinstance(item["number"], bool):
-            raise BadExport(f"{RECORD}: ball {k} must have number {k}; {AGAIN}")
-        for key in WORDS:
-            if not isinstance(item.get(key), str | None):
-                raise BadExport(f"{RECORD}: ball {k}: {key} must be a text or null; {AGAIN}")
-        if item.get("mass_g") is not None:
-            number(item, "mass_g", 0, 1e9, RECORD)
-    cap = [_choice(item, "kind", KINDS) == "cap" for item in items]
-    table = np.array([[_ball_number(item, key) for key in NUMBERS] for item in items])
-    return Balls(np.array(cap), table, tuple(items))
-
-
-def _ball_number(item: Record, key: str) -> float:
-    positive = key in ("diameter_mm", "radius_mm", "body_radius_mm")
-    what = f"{RECORD}: ball {item['number']}: {key}"
-    return limited(what, item.get(key), 1e-3 if positive else -1e9, 1e4 if positive else 1e9)
-
-
-def _seats(items: Any, count: int) -> Seats:
-    if [item.get("ball") for item in items] != list(range(1, count + 1)):
-        raise BadExport(f"{RECORD}: seats must be one for each ball, in order; {AGAIN}")
-    return Seats(
-        np.array([vector(item, "axis", RECORD) for item in items]),
-        np.array([triple(item, "normals", RECORD) for item in items]),
-        np.array([triple(item, "contacts_mm", RECORD) for item in items]),
-        np.array([number(item, "pad_diameter_mm", 1e-3, 1e3, RECORD) for item in items]),
-    )
-
-
-def _parts(items: Any, balls: Balls) -> tuple[Printed, ...]:
-    _refuse_many("parts", len(items), 1)
-    parts = tuple(_part(item, balls) for item in items)
-    if len({part.name for part in parts}) != len(parts):
-        raise BadExport(f"{RECORD}: parts must have names of their own; {AGAIN}")
-    if len({part.stl for part in parts}) != len(parts):
-        raise BadExport(f"{RECORD}: parts must each have an STL of their own; {AGAIN}")
-    return parts
-
-
-def _part(item: Record, balls: Balls) -> Printed:
-    role, ball = _choice(item, "role", ROLES), item.get("ball")
-    good = type(ball) is int and 1 <= ball <= len(balls) if role == "cap" else ball is None
-    if not good:
-        raise BadExport(f"{RECORD}: ball of a part must be a cap's ball or null; {AGAIN}")
-    return Printed(
-        word(item, "name", RECORD),
-        role,
-        ball - 1 if isinstance(ball, int) else -1,
-        _whole(item, "quantity"),
-        plain_file(item, "stl", RECORD),
-        plain_file(item, "step", RECORD) if item.get("step") else "",
-        plain_file(item, "3mf", RECORD) if item.get("3mf") else "",
-        triple(item, "axes", RECORD),
-        vector(item, "origin_mm", RECORD),
-    )
-
-
-def _whole(item: Record, key: str) -> int:
-    value = item.get(key)
-    if type(value) is not int or not 1 <= value <= MOST:
-        raise BadExport(f"{RECORD}: {key} must be a whole number from 1 to {MOST}; {AGAIN}")
-    return value
-
-
-def _leds(found: Record) -> tuple[Led, ...]:
-    items = objects(found, "leds", RECORD)
-    _refuse_many("leds", len(items), 0)
-    return tuple(
-        Led(
-            word(item, "name", RECORD),
-            three(f"{RECORD}: position_mm", item.get("position_mm")),
-            three(f"{RECORD}: direction", item.get("direction")),
+    names = (RECORD, BALLS, PLAN, STOPS, PROGRAM)
+    texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in names}
+    value = parse_json(texts[RECORD], SCHEMA)
+    if value.get("balls") != BALLS:
+        raise BadExport(
+            f"{RECORD}: balls is {shown(value.get('balls'))}, allowed is {BALLS}; {AGAIN}"
         )
-        for item in items
-    )
-
-
-def _bought(found: Record) -> tuple[Bought, ...]:
-    items = objects(found, "bought", RECORD)
-    _refuse_many("bought parts", len(items), 0)
-    for item in items:
-        if not isinstance(item.get("turns"), bool):
-            raise BadExport(f"{RECORD}: turns of a bought part must be true or false; {AGAIN}")
-    return tuple(Bought(word(item, "name", RECORD), item["turns"]) for item in items)
-
-
-def _assembly(found: Record) -> tuple[str, str]:
-    if found.get("assembly") is None:
-        return "", ""
-    record = typed(found, "assembly", dict, RECORD)
-    names = {
-        kind: plain_file(record, kind, RECORD) if record.get(kind) else "" for kind in KINDS_OF_ALL
+    tables = {
+        "balls": Balls.read(texts[BALLS]),
+        "plan": Plan.read(texts[PLAN]),
+        "stops": Stops.read(texts[STOPS]),
+        "program": texts[PROGRAM].text(),
+        "digests": {name: blob.digest for name, blob in texts.items()},
     }
-    return names["step"], names["glb"]
-
-
-def _refuse_many(what: str, count: int, least: int) -> None:
-    if not least <= count <= MOST:
-        raise BadExport(f"{RECORD}: {count} {what}; allowed are {least} to {MOST}; {AGAIN}")
+    prototype = validated(RECORD, Prototype, value | tables)
+    if prototype.camera not in cameras:
+        raise BadExport(f"{RECORD}: camera {prototype.camera!r} is not in design.json; {AGAIN}")
+    return prototype

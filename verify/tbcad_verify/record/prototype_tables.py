@@ -1,171 +1,125 @@
-"""Tables of a prototype, read as text that nobody vouches for."""
+"""balls.csv, rotation_plan.csv and stops.csv of a prototype."""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from tbcad_verify.errors import BadExport
-from tbcad_verify.record.fields import NAME, limited
-from tbcad_verify.record.files import AGAIN, FileBytes
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.record.columns import Columns, Counts, Texts, column, numbers, numbers_or_empty
+from tbcad_verify.record.validation import Name, allowed, array
+from tbcad_verify.types import Bools, Floats
 
-PLAN_COLUMNS = (
-    *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),
-    *("polar_error_deg", "azimuth_error_deg", "error_deg"),
-)
-STOP_COLUMNS = ("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg")
+MOST = 1000  # balls, parts or LEDs
 MOST_ROWS = 400_000
-MOST_NUMBER = 1e9
+LARGEST = 1e9
+
+Numbers = Annotated[Floats, numbers(-LARGEST, LARGEST)]
+Lengths = Annotated[Floats, numbers(1e-3, 1e4)]
+Angles = Annotated[Floats, numbers(-360, 360)]
+Masses = Annotated[Floats, numbers_or_empty(0, LARGEST)]
+Names = Annotated[NDArray[np.str_], column(Name, np.str_)]
+Kinds = Annotated[NDArray[np.str_], column(Literal["ball", "cap"], np.str_)]
 
 
-@dataclass(frozen=True)
-class Plan:
-    """rotation_plan.csv, one row a mirror's picture, N of them; angles in degrees.
+class Balls(Columns):
+    """One ball or cap a row, K of them, with the base at angle zero."""
 
-    Attributes:
-        order: (N,) from 1.
-        turn: (N,) of the object about z.
-        stop: (N,) number, from 1.
-        angle: (N,) of the base.
-        ball: (N,) number, from 1.
-        mirror: N ids.
-        errors: (N, 3) of polar angle, of azimuth, and of direction, as recorded.
-    """
+    most_rows: ClassVar[int] = MOST
 
-    order: Ints
-    turn: Floats
-    stop: Ints
-    angle: Floats
-    ball: Ints
-    mirror: tuple[str, ...]
-    errors: Floats
+    number: Counts
+    kind: Kinds
+    size: Texts
+    diameter_mm: Lengths
+    grade: Texts
+    standard: Texts
+    mass_g: Masses
+    radius_mm: Lengths
+    body_radius_mm: Lengths
+    polar_deg: Numbers
+    azimuth_deg: Numbers
+    px: Numbers
+    py: Numbers
+    pz: Numbers
+    nx: Numbers
+    ny: Numbers
+    nz: Numbers
+    cx: Numbers
+    cy: Numbers
+    cz: Numbers
+    bx: Numbers
+    by: Numbers
+    bz: Numbers
+    mirrors: Counts
+    pixels: Numbers
+    pixels_shell: Numbers
+    coverage_mm: Numbers
+    coverage_fixed_mm: Numbers
+    error_deg: Numbers
 
-    def __len__(self) -> int:
-        """How many pictures."""
-        return len(self.mirror)
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if (wrong := np.flatnonzero(self.number != np.arange(1, len(self) + 1))).size:
+            raise ValueError(f"ball {wrong[0] + 1} must have number {wrong[0] + 1}")
+        return self
 
+    @property
+    def cap(self) -> Bools:
+        """(K,) true for caps."""
+        return np.asarray(self.kind == "cap")
 
-@dataclass(frozen=True)
-class Stops:
-    """stops.csv, one row a stop, S of them; angles in degrees.
-
-    Attributes:
-        stop: (S,) number, from 1.
-        angle: (S,) of the base.
-        mirrors: (S,) how many are shown.
-        balls: S tuples of the numbers of the balls that show them.
-        errors: (S, 2) largest error of azimuth and of direction, as recorded.
-    """
-
-    stop: Ints
-    angle: Floats
-    mirrors: Ints
-    balls: tuple[tuple[int, ...], ...]
-    errors: Floats
-
-    def __len__(self) -> int:
-        """How many stops."""
-        return len(self.stop)
-
-
-def cells(blob: FileBytes, columns: Sequence[str]) -> list[list[str]]:
-    """The fields of a CSV file below its head.
-
-    Raises:
-        BadExport: broken, of other columns, ragged, empty, or absurdly long.
-    """
-    try:
-        lines = list(csv.reader(io.StringIO(blob.text()), strict=True))
-    except csv.Error as error:
-        raise BadExport(f"{blob.name}: broken CSV ({error}); {AGAIN}") from error
-    if not lines or tuple(lines[0]) != tuple(columns):
-        raise BadExport(f"{blob.name}: the first line must be {','.join(columns[:4])}...; {AGAIN}")
-    for number, line in enumerate(lines[1:], 2):
-        if len(line) != len(columns):
-            raise BadExport(
-                f"{blob.name}: line {number} has {len(line)} fields, not {len(columns)}: "
-                f"truncated or foreign; {AGAIN}"
-            )
-    if not 1 < len(lines) <= MOST_ROWS + 1:
-        raise BadExport(f"{blob.name}: {len(lines) - 1} rows; allowed are 1 to {MOST_ROWS}")
-    return lines[1:]
+    def names(self, which: NDArray[np.integer]) -> list[str]:
+        """What reports call them."""
+        return [f"ball {k + 1}" for k in which.tolist()]
 
 
-def read_plan(blob: FileBytes) -> Plan:
-    """The plan of rotation.
+class Plan(Columns):
+    """One mirror's picture a row, N of them; angles in degrees, numbers from 1."""
 
-    Raises:
-        BadExport: as `cells`, numbers that are none, or names that are none.
-    """
-    rows, of = _columns(blob, PLAN_COLUMNS), blob.name
-    for number, name in enumerate(rows["mirror"], 2):
-        if not NAME.fullmatch(name):
-            raise BadExport(f"{of}: line {number}: mirror {name!r:.80} is no name; {AGAIN}")
-    return Plan(
-        _whole(of, rows, "order"),
-        _numbers(of, rows, "object_turn_deg", 360),
-        _whole(of, rows, "stop"),
-        _numbers(of, rows, "base_angle_deg", 360),
-        _whole(of, rows, "ball"),
-        tuple(rows["mirror"]),
-        np.stack([_numbers(of, rows, key, 360) for key in PLAN_COLUMNS[6:]], axis=1),
-    )
+    most_rows: ClassVar[int] = MOST_ROWS
 
+    order: Counts
+    turn: Angles = Field(alias="object_turn_deg")
+    stop: Counts
+    angle: Angles = Field(alias="base_angle_deg")
+    ball: Counts
+    mirror: Names
+    polar_error: Angles = Field(alias="polar_error_deg")
+    azimuth_error: Angles = Field(alias="azimuth_error_deg")
+    error: Angles = Field(alias="error_deg")
 
-def read_stops(blob: FileBytes) -> Stops:
-    """The stops of the base.
-
-    Raises:
-        BadExport: as `cells`, or numbers that are none.
-    """
-    rows, of = _columns(blob, STOP_COLUMNS), blob.name
-    return Stops(
-        _whole(of, rows, "stop"),
-        _numbers(of, rows, "base_angle_deg", 360),
-        _whole(of, rows, "mirrors"),
-        tuple(
-            tuple(_integer(f"{of}: line {line}: balls", word) for word in words.split())
-            for line, words in enumerate(rows["balls"], 2)
-        ),
-        np.stack([_numbers(of, rows, key, 360) for key in STOP_COLUMNS[4:]], axis=1),
-    )
+    @property
+    def errors(self) -> Floats:
+        """(N, 3) of polar angle, of azimuth, and of direction, as recorded."""
+        return self.columns("polar_error", 3).T
 
 
-def _columns(blob: FileBytes, columns: Sequence[str]) -> dict[str, list[str]]:
-    rows = cells(blob, columns)
-    return {key: [row[k] for row in rows] for k, key in enumerate(columns)}
+def _ball_lists(cells: list[str]) -> tuple[tuple[int, ...], ...]:
+    return tuple(tuple(int(number) for number in cell.split()) for cell in cells)
 
 
-def _numbers(of: str, rows: dict[str, list[str]], key: str, most: float) -> Floats:
-    return np.array(
-        [
-            limited(f"{of}: line {line}: {key}", number_in(word), -most, most)
-            for line, word in enumerate(rows[key], 2)
-        ]
-    )
+BallList = Annotated[
+    str,
+    Field(pattern="^ *([0-9]{1,9}( +|$))*$"),
+    allowed("whole numbers, with spaces between them"),
+]
 
 
-def number_in(word: str) -> float | str:
-    """The number that a word is, or else the word."""
-    try:
-        value = float(word)
-    except ValueError:
-        return word
-    return value if math.isfinite(value) else word
+class Stops(Columns):
+    """One stop of the base a row, S of them; angles in degrees, numbers from 1."""
 
+    most_rows: ClassVar[int] = MOST_ROWS
 
-def _whole(of: str, rows: dict[str, list[str]], key: str) -> Ints:
-    found = [_integer(f"{of}: line {n}: {key}", word) for n, word in enumerate(rows[key], 2)]
-    return np.array(found, dtype=np.int64)
+    stop: Counts
+    angle: Angles = Field(alias="base_angle_deg")
+    mirrors: Counts
+    balls: Annotated[tuple[tuple[int, ...], ...], array(list[BallList], _ball_lists)]
+    azimuth_error: Angles = Field(alias="azimuth_error_deg")
+    error: Angles = Field(alias="error_deg")
 
-
-def _integer(what: str, word: str) -> int:
-    if not (word.isascii() and word.isdigit() and len(word) < 10):
-        raise BadExport(f"{what} must be a whole number, not {word!r:.40}; {AGAIN}")
-    return int(word)
+    @property
+    def errors(self) -> Floats:
+        """(S, 2) largest error of azimuth and of direction, as recorded."""
+        return self.columns("azimuth_error", 2).T

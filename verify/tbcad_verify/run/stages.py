@@ -21,8 +21,8 @@ from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.prototype.stages import PRINTING, verify_prototype
 from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
-from tbcad_verify.record.prototype_record import Printed
-from tbcad_verify.record.record import Export, Part, read_export
+from tbcad_verify.record.export import Export, Part, read_export
+from tbcad_verify.record.prototype import Printed
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels

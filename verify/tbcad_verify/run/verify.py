@@ -11,9 +11,9 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
 from tbcad_verify.prototype import step_files
+from tbcad_verify.record.export import TEXTS, Export, Part, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
-from tbcad_verify.record.prototype_record import Printed
-from tbcad_verify.record.record import TEXTS, Export, Part, read_export
+from tbcad_verify.record.prototype import Printed
 from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import Report, findings
 from tbcad_verify.run.results import CollectedResults, Results
@@ -135,8 +135,8 @@ def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> 
 
 
 def _spheres(export: Export, part: Part) -> int:
-    mirrors = export.rows.camera == part.camera
-    return int((mirrors & ~export.rows.flat).sum())
+    mirrors = export.mirrors.camera == part.camera
+    return int((mirrors & ~export.mirrors.flat).sum())
 
 
 def _expected(

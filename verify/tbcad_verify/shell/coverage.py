@@ -11,7 +11,7 @@ from tbcad_verify.mesh.fits import facet_centres
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, first_hits, in_threads
 from tbcad_verify.mesh.surfaces import ReflectedRays
 from tbcad_verify.mesh.vectors import chunks
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -135,7 +135,7 @@ def _covers(bench: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
 
 def _off_the_record(bench: OpticalSetup, found: Coverage) -> float:
     """Largest difference between coverage on fitted surfaces and as the designer computed it."""
-    recorded = bench.export.mirrors.columns("coverage_mm")[0]
+    recorded = bench.export.mirrors.coverage_mm
     off = np.abs(found.fitted[bench.virtual.index] - recorded)
     return float(np.nan_to_num(off, nan=-1).max())
 

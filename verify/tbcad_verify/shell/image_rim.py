@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, ReflectedRays, nearest_to_origin, reflect
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats
 
 AZIMUTHS = 24

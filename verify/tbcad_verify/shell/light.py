@@ -24,7 +24,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect_directions,
 )
 from tbcad_verify.mesh.vectors import dot, norm
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats, Ints
 
 # Second rays start this far above the mirror, mm: a hundred times what float32 rounds.

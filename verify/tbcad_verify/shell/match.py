@@ -91,7 +91,7 @@ def centre_and_radius_errors(
 
 def recorded_surfaces(mirrors: Mirrors) -> Surfaces:
     """The M reflecting surfaces as recorded, by apex, normal and radius."""
-    radius = mirrors.columns("radius_mm")[0]
+    radius = mirrors.radius_mm
     curvature = np.where(mirrors.flat, 0.0, 1 / np.where(mirrors.flat, 1.0, radius))
     return Surfaces(mirrors.columns("px", 3), mirrors.columns("nx", 3), curvature)
 

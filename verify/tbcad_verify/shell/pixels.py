@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tbcad_verify.record.record import Camera
+from tbcad_verify.record.export import Camera
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

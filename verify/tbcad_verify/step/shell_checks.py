@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
+from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.files import FileBytes
-from tbcad_verify.record.record import Export, Part
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -100,11 +100,11 @@ def shell_step_checks(
 
 def _recorded(export: Export) -> Check:
     """Areas of the reflecting surfaces as recorded, against what the spheres alone make them."""
-    found = np.full(len(export.rows), np.nan)
+    found = np.full(len(export.mirrors), np.nan)
     for camera in export.cameras:
-        found[export.rows.camera == camera] = cells_of_export(export, camera, coated=True).area
-    error = np.abs(export.rows.columns("cell_area_mm2")[0] / found - 1)
-    return _worst_of(AREAS, export.rows.ids, error, CELL_SHARE, "of its area away", ".3g")
+        found[export.mirrors.camera == camera] = cells_of_export(export, camera, coated=True).area
+    error = np.abs(export.mirrors.cell_area_mm2 / found - 1)
+    return _worst_of(AREAS, export.mirrors.ids, error, CELL_SHARE, "of its area away", ".3g")
 
 
 def _part(
@@ -130,8 +130,8 @@ def _one(job: Job, name: CheckName, subject: ShellComparison, export: Export) ->
 def _subject(
     export: Export, part: Part, file: StepFile, mass: MassProperties | None
 ) -> ShellComparison:
-    row = np.flatnonzero(export.rows.camera == part.camera)
-    ids = [export.rows.ids[k] for k in row.tolist()]
+    row = np.flatnonzero(export.mirrors.camera == part.camera)
+    ids = [export.mirrors.ids[k] for k in row.tolist()]
     count = Counter(file.faces.names)
     place = {name: k for k, name in enumerate(file.faces.names)}
     face = np.array([place[name] if count[name] == 1 else -1 for name in ids], dtype=np.intp)
@@ -141,11 +141,11 @@ def _subject(
 
 def _names(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Every mirror's name on exactly one face; no name twice, none empty."""
-    ids = [export.rows.ids[k] for k in subject.row.tolist()]
+    ids = [export.mirrors.ids[k] for k in subject.row.tolist()]
     count = Counter(subject.file.faces.names)
     lost = [one for one in ids if count[one] != 1]
     odd = [one or "(empty)" for one, times in count.items() if times != 1 or not one]
-    others = {one for one in export.rows.ids if one not in set(ids)}
+    others = {one for one in export.mirrors.ids if one not in set(ids)}
     foreign = [one for one in count if one in others]
     odd = [*lost, *(one for one in odd if one not in lost), *foreign]
     return at_most(
@@ -155,8 +155,8 @@ def _names(name: CheckName, subject: ShellComparison, export: Export) -> Check:
 
 def _surfaces(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Centre and radius of every sphere, place and tilt of every plane, as recorded."""
-    faces, mirrors = subject.file.faces, export.rows.take(subject.row)
-    centre, radius = mirrors.columns("cx", 3).T, mirrors.columns("radius_mm")[0]
+    faces, mirrors = subject.file.faces, export.mirrors.take(subject.row)
+    centre, radius = mirrors.columns("cx", 3).T, mirrors.radius_mm
     apex, normal = mirrors.columns("px", 3).T, mirrors.columns("nx", 3).T
     point = _of(subject, faces.point)
     spheres = np.maximum(
@@ -175,7 +175,7 @@ def _surfaces(name: CheckName, subject: ShellComparison, export: Export) -> Chec
 
 def _outward(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Mirrors bulge out of the solid; where planes face is for `_surfaces`."""
-    mirrors = export.rows.take(subject.row)
+    mirrors = export.mirrors.take(subject.row)
     good = _of(subject, subject.file.faces.outward)
     turned = [mirrors.ids[k] for k in np.flatnonzero(~good).tolist()]
     return at_most(name, len(turned), 0, f"the solid lies on the wrong side: {short_list(turned)}")
@@ -196,7 +196,7 @@ def _middles(name: CheckName, subject: ShellComparison, export: Export) -> Check
 
 def _front(name: CheckName, subject: ShellComparison, export: Export) -> Check:
     """Volume between the origin and all mirrors: what the faces enclose against the closed form."""
-    faces, mirrors = subject.file.faces, export.rows.take(subject.row)
+    faces, mirrors = subject.file.faces, export.mirrors.take(subject.row)
     area, middle = _of(subject, faces.area), _of(subject, faces.middle)
     centre, radius = _of(subject, faces.point), _of(subject, faces.radius)
     normal = _of(subject, faces.normal)
@@ -230,7 +230,7 @@ def _worst(
     form: str,
 ) -> Check:
     """The worst mirror; one without a face counts as infinitely wrong."""
-    ids = [export.rows.ids[k] for k in subject.row.tolist()]
+    ids = [export.mirrors.ids[k] for k in subject.row.tolist()]
     return _worst_of(name, ids, error, limit, unit, form)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
-from tbcad_verify.record.record import Export
+from tbcad_verify.record.export import Export
 from tbcad_verify.step.arc_loops import arc_loops, front_pieces
 from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
 from tbcad_verify.step.cell_boxes import cell_boxes
@@ -123,9 +123,9 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     `coated`. A row without a radius is a plane. The camera keeps the side of x = 0 that its
     pinhole is on, and all above the foot plane. The recorded `cell_area_mm2` is the coated one.
     """
-    rows = export.rows
+    rows = export.mirrors
     mine = np.flatnonzero(rows.camera == camera)
-    radius = rows.columns("radius_mm")[0]
+    radius = rows.radius_mm
     curvature = np.where(rows.flat, 0.0, 1 / np.where(rows.flat, 1.0, radius))
     recorded = Surfaces(rows.columns("px", 3), rows.columns("nx", 3), curvature)
     solid = recorded.take(mine).coated(0.0 if coated else -export.coating_mm)

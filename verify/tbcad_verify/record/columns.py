@@ -1,0 +1,120 @@
+"""CSV files that nobody vouches for, read column by column into arrays."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationError
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.record.files import AGAIN, FileBytes
+from tbcad_verify.record.validation import allowed, array, fault
+from tbcad_verify.types import Floats, Ints
+
+FIRST_ROW = 2  # its line in the file, below the header line
+WIDEST = 200  # characters of a text
+
+
+class Columns(BaseModel):
+    """A table: one field a column, in the order of the header line, as arrays over the rows.
+
+    Numbers are finite. A column model says how many rows there may be, and whether columns may
+    follow that are not read.
+    """
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
+    most_rows: ClassVar[int]
+    may_be_wider: ClassVar[bool] = False
+
+    @classmethod
+    def header(cls) -> tuple[str, ...]:
+        """Names of the columns in the file."""
+        return tuple(field.alias or name for name, field in cls.model_fields.items())
+
+    @classmethod
+    def read(cls, blob: FileBytes) -> Self:
+        """The table in a file.
+
+        Raises:
+            BadExport: broken or truncated CSV, other columns, too few or too many rows, or a cell
+                that is not allowed.
+        """
+        rows = cls._rows(blob)
+        cells = zip(*rows, strict=True)
+        try:
+            return cls.model_validate(dict(zip(cls.header(), map(list, cells), strict=False)))
+        except ValidationError as error:
+            raise BadExport(f"{blob.name}: {fault(cls, error, _place)}; {AGAIN}") from error
+
+    @classmethod
+    def _rows(cls, blob: FileBytes) -> list[list[str]]:
+        """The rows below the header line, all of its width."""
+        try:
+            header, *rows = list(csv.reader(io.StringIO(blob.text()), strict=True)) or [[]]
+        except csv.Error as error:
+            raise BadExport(f"{blob.name}: broken CSV ({error}); {AGAIN}") from error
+        names = cls.header()
+        if tuple(header[: len(names)] if cls.may_be_wider else header) != names:
+            start = ",".join(names[:5])
+            raise BadExport(f"{blob.name}: the first line must be {start}...; {AGAIN}")
+        for line, row in enumerate(rows, FIRST_ROW):
+            if len(row) != len(header):
+                raise BadExport(
+                    f"{blob.name}: line {line} has {len(row)} fields, not {len(header)}: "
+                    f"truncated or foreign; {AGAIN}"
+                )
+        if not 1 <= len(rows) <= cls.most_rows:
+            raise BadExport(
+                f"{blob.name}: {len(rows)} rows; allowed are 1 to {cls.most_rows}; {AGAIN}"
+            )
+        return rows
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.__dict__.values())))
+
+    def columns(self, first: str, count: int = 1) -> Floats:
+        """Consecutive columns of numbers, shape (count, rows)."""
+        names = list(type(self).model_fields)
+        start = names.index(first)
+        return np.stack([getattr(self, name) for name in names[start : start + count]])
+
+    def take(self, index: NDArray[np.integer]) -> Self:
+        """The rows with these numbers, from 0, in this order."""
+        return self.model_copy(update={name: of[index] for name, of in self.__dict__.items()})
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    column, *row = location or ("",)
+    return " ".join([*(f"line {int(k) + FIRST_ROW}:" for k in row[:1]), str(column)])
+
+
+def column(cell: Any, kind: type[Any]) -> Any:
+    """Validate every cell as this type, and make an array of this kind of number or text."""
+
+    def build(cells: list[Any]) -> NDArray[Any]:
+        return np.array(cells).astype(kind)
+
+    return array(Annotated[list[cell], FailFast()], build)
+
+
+def numbers(least: float, most: float) -> Any:
+    """A column of numbers in a range."""
+    return column(Annotated[float, Field(ge=least, le=most)], float)
+
+
+def numbers_or_empty(least: float, most: float) -> Any:
+    """A column of numbers in a range, NaN where the cell is empty."""
+    cell = Annotated[float, Field(ge=least, le=most)] | None
+    return column(Annotated[cell, BeforeValidator(lambda text: text or None)], float)
+
+
+Counts = Annotated[
+    Ints,
+    column(Annotated[str, Field(pattern="^[0-9]{1,9}$"), allowed("a whole number")], np.int64),
+]
+Texts = Annotated[NDArray[np.str_], column(Annotated[str, Field(max_length=WIDEST)], np.str_)]

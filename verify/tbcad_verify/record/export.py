@@ -1,0 +1,236 @@
+"""What the export says about itself: cameras, parts, mirrors, and the manifest.
+
+Only requirements and poses are taken from here. What the mirrors are is measured on the mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
+from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
+from tbcad_verify.record.validation import (
+    FileOrNone,
+    Name,
+    PlainFile,
+    Strict,
+    Vector,
+    parse_json,
+    validated,
+)
+from tbcad_verify.types import Floats
+
+SCHEMA = "tbcad-design/2"
+DESIGN, MIRRORS, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
+TEXTS = (DESIGN, MIRRORS, MANIFEST)
+MAX_SIDE_PX = 65536
+MAX_PIXELS = 500_000_000
+SQUARE = 1e-6  # by which axes of a camera may be off unit length or a right angle
+
+
+class Camera(Strict):
+    """A pinhole with square pixels, looking along `forward`; rows run along `right`.
+
+    Attributes:
+        id: one letter.
+        pinhole: (3,) mm.
+        forward: (3,) unit, the optical axis.
+        right: (3,) unit, across the columns.
+        width: columns.
+        height: rows.
+        hfov_deg: full view angle across the columns.
+    """
+
+    id: Name
+    pinhole: Vector = Field(alias="pinhole_mm")
+    forward: Vector
+    right: Vector
+    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)
+    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)
+    hfov_deg: float = Field(ge=1e-3, le=179)
+
+    @model_validator(mode="after")
+    def _traceable(self) -> Self:
+        if self.width * self.height > MAX_PIXELS:
+            size = f"{self.width} x {self.height}"
+            raise ValueError(f"has {size} pixels; at most {MAX_PIXELS} are traced")
+        forward, right = self.forward, self.right
+        gram = np.array([forward @ forward - 1, right @ right - 1, forward @ right])
+        if np.abs(gram).max() > SQUARE:
+            raise ValueError("has forward and right that are no unit vectors at right angles")
+        return self
+
+    @property
+    def hfov(self) -> float:
+        """Full view angle across the columns, rad."""
+        return math.radians(self.hfov_deg)
+
+    @property
+    def down(self) -> Floats:
+        """(3,) unit, down the rows."""
+        return np.cross(self.forward, self.right)
+
+    @property
+    def pitch(self) -> float:
+        """Tangent of view angle per pixel, at unit distance along `forward`."""
+        return 2 * math.tan(self.hfov / 2) / self.width
+
+
+class Part(Strict):
+    """One exported solid, the camera its mirrors are for, and its files; empty: it has none."""
+
+    name: Name
+    camera: str = ""
+    stl: PlainFile
+    step: FileOrNone = ""
+    threemf: FileOrNone = Field("", alias="3mf")
+
+
+class Design(Strict):
+    """design.json.
+
+    Attributes:
+        spec: the resolved design, as written.
+        target_mm: diameter that every virtual camera must see.
+        coating_mm: thickness of the reflecting coat over the meshed surface.
+        foot_z_mm: height of the foot plane.
+        cameras: one or more.
+        parts: of the shell.
+        mirrors: the file that has them.
+    """
+
+    spec: dict[str, Any]
+    target_mm: float = Field(ge=1e-3, le=1e6)
+    coating_mm: float = Field(ge=0, le=1e3)
+    foot_z_mm: float = Field(ge=-1e6, le=1e6)
+    cameras: list[Camera] = Field(min_length=1)
+    parts: list[Part]
+    mirrors: Literal["mirrors.csv"]
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        if len({camera.id for camera in self.cameras}) != len(self.cameras):
+            raise ValueError("cameras must differ in id")
+        return self
+
+
+class Entry(Strict):
+    """What the manifest says of a file."""
+
+    size: int
+    sha256: str
+
+
+class Manifest(Strict):
+    """manifest.json: every file of the export."""
+
+    files: dict[str, Entry] = Field(min_length=1)
+
+    @field_validator("files")
+    @classmethod
+    def _inside(cls, files: dict[str, Entry]) -> dict[str, Entry]:
+        for name in files:
+            refuse_unsafe(name)
+        return files
+
+    def digests(self) -> dict[str, tuple[int, str]]:
+        """File name -> (size, sha256)."""
+        return {name: (entry.size, entry.sha256.lower()) for name, entry in self.files.items()}
+
+
+@dataclass(frozen=True)
+class Export:
+    """A folder's record.
+
+    Attributes:
+        folder: resolved path.
+        spec: the resolved design, as written.
+        target_mm: diameter that every virtual camera must see.
+        coating_mm: thickness of the reflecting coat over the meshed surface.
+        foot_z_mm: height of the foot plane.
+        cameras: by id.
+        parts: in the record's order.
+        mirrors: from mirrors.csv.
+        manifest: file name -> (size, sha256), as it should be.
+        digests: file name -> (size, sha256), of the bytes that all this was parsed from.
+        prototype: the machine with balls; None where only the shell was built.
+    """
+
+    folder: Path
+    spec: Mapping[str, Any]
+    target_mm: float
+    coating_mm: float
+    foot_z_mm: float
+    cameras: Mapping[str, Camera]
+    parts: tuple[Part, ...]
+    mirrors: Mirrors
+    manifest: Mapping[str, tuple[int, str]]
+    digests: Mapping[str, tuple[int, str]]
+    prototype: Prototype | None = None
+
+    @property
+    def part_files(self) -> frozenset[str]:
+        """All files of all parts, and of their assembly."""
+        files = ((part.stl, part.step, part.threemf) for part in self.parts)
+        more = self.prototype.part_files if self.prototype else frozenset()
+        return frozenset(name for names in files for name in names if name) | more
+
+    @property
+    def mesh_error_mm(self) -> float:
+        """How far the spec lets the mesh be from the exact surface, mm; NaN if it does not say."""
+        mesh = self.spec.get("mesh")
+        keys = ("chord_error_mm", "structure_error_mm")
+        values = [mesh.get(key) for key in keys] if isinstance(mesh, dict) else [None]
+        good = all(isinstance(value, int | float) for value in values)
+        return float(max(values)) if good else math.nan  # type: ignore[type-var, arg-type]
+
+
+def read_export(folder: Path) -> Export:
+    """Read design.json, mirrors.csv, manifest.json and what describes a prototype, strictly.
+
+    Raises:
+        BadExport: anything missing, foreign, malformed, not finite or absurd.
+    """
+    root = open_folder(folder)
+    texts = {name: read(root, name, MAX_TEXT_BYTES) for name in TEXTS}
+    design = validated(DESIGN, Design, parse_json(texts[DESIGN], SCHEMA))
+    manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST])).digests()
+    cameras = {camera.id: camera for camera in design.cameras}
+    digests = {name: blob.digest for name, blob in texts.items()}
+    prototype = None
+    if RECORD in manifest or (root / RECORD).exists():
+        prototype = read_prototype(root, cameras)
+        digests |= prototype.digests
+    _check_parts(design, prototype)
+    return Export(
+        folder=root,
+        spec=design.spec,
+        target_mm=design.target_mm,
+        coating_mm=design.coating_mm,
+        foot_z_mm=design.foot_z_mm,
+        cameras=cameras,
+        parts=tuple(design.parts),
+        mirrors=Mirrors.read(texts[MIRRORS]),
+        manifest=manifest,
+        digests=digests,
+        prototype=prototype,
+    )
+
+
+def _check_parts(design: Design, prototype: Prototype | None) -> None:
+    others = prototype.parts if prototype else []
+    meshes = [part.stl for part in design.parts] + [part.stl for part in others]
+    if not meshes or len(set(meshes)) != len(meshes):
+        raise BadExport(f"{DESIGN}: parts must be there, each with an STL of its own; {AGAIN}")
+    twice = {part.name for part in design.parts} & {part.name for part in others}
+    if twice:
+        raise BadExport(f"{RECORD}: part {min(twice)!r} is in {DESIGN} too; {AGAIN}")

@@ -1,0 +1,230 @@
+"""Values that nobody vouches for, checked by pydantic models; a refusal is one clear line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from difflib import get_close_matches
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetPydanticSchema,
+    ValidationError,
+    WithJsonSchema,
+)
+from pydantic_core import ErrorDetails, core_schema
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.record.files import AGAIN, FileBytes
+from tbcad_verify.types import Floats
+
+FARTHEST_MM = 1e6  # of any point in a JSON file from the origin
+SHOWN = 60  # characters of a refused value that are shown
+_KINDS = {"boolean": "true or false", "null": "null", "object": "an object"}
+_LIMITS = {
+    "exclusiveMinimum": "above {:g}",
+    "minimum": "from {:g}",
+    "exclusiveMaximum": "below {:g}",
+    "maximum": "to {:g}",
+}
+
+
+class Strict(BaseModel):
+    """An object of a JSON file: no conversions, finite numbers, other keys ignored."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        strict=True,
+        extra="ignore",
+        allow_inf_nan=False,
+        arbitrary_types_allowed=True,
+    )
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def _in_the_folder(name: str) -> str:
+    if name in {".", ".."}:
+        raise ValueError(f"is {name}, allowed is a plain file name")
+    return name
+
+
+def allowed(words: str) -> WithJsonSchema:
+    """What errors say is allowed, in place of what follows from a type's limits."""
+    return WithJsonSchema({"allowed": words})
+
+
+def array(items: Any, build: Callable[[list[Any]], Any] = np.array) -> GetPydanticSchema:
+    """Validate a list as this type, and make an array of it."""
+    return GetPydanticSchema(
+        lambda _, handler: core_schema.no_info_after_validator_function(
+            build, handler.generate_schema(items)
+        )
+    )
+
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,64}$"), allowed("letters, digits and _")]
+PlainFile = Annotated[
+    str,
+    Field(pattern=r"^[^/\\:\x00]{1,255}$"),
+    AfterValidator(_in_the_folder),
+    allowed("a plain file name"),
+]
+FileOrNone = Annotated[
+    str,
+    Field(pattern=r"^[^/\\:\x00]{0,255}$"),
+    AfterValidator(_in_the_folder),
+    allowed("a plain file name, or empty text"),
+]
+_Length = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+_Three = Annotated[list[_Length], Field(min_length=3, max_length=3), allowed("three numbers")]
+Vector = Annotated[Floats, array(_Three)]
+"""Three numbers, (3,)."""
+Matrix = Annotated[
+    Floats,
+    array(
+        Annotated[
+            list[_Three],
+            Field(min_length=3, max_length=3),
+            allowed("three rows of three numbers"),
+        ]
+    ),
+]
+"""Three rows of three numbers, (3, 3)."""
+
+
+def parse_json(blob: FileBytes, schema: str = "") -> dict[str, Any]:
+    """The JSON object in a file.
+
+    Args:
+        blob: the file.
+        schema: that the object must name; empty: none.
+
+    Raises:
+        BadExport: broken JSON, NaN or infinities, no object, or another schema.
+    """
+    try:
+        value = json.loads(blob.text(), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise BadExport(f"{blob.name}: broken JSON ({error}); {AGAIN}") from error
+    if not isinstance(value, dict):
+        raise BadExport(f"{blob.name}: must be a JSON object; {AGAIN}")
+    if schema and value.get("schema") != schema:
+        raise BadExport(
+            f"{blob.name}: schema is {shown(value.get('schema'))}, this version verifies {schema}; "
+            f"{AGAIN} of this version"
+        )
+    return value
+
+
+def validated(file: str, model: type[Model], value: Any) -> Model:
+    """The value as the model has it.
+
+    Raises:
+        BadExport: the value does not fit.
+    """
+    try:
+        return model.model_validate(value)
+    except ValidationError as error:
+        raise BadExport(f"{file}: {fault(model, error)}; {AGAIN}") from error
+
+
+def key_path(location: tuple[int | str, ...]) -> str:
+    """Keys joined by points, numbers from 0 in brackets."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{shown(part)}" for part in location)
+    return "".join(parts).removeprefix(".")
+
+
+def fault(
+    model: type[BaseModel],
+    error: ValidationError,
+    where: Callable[[tuple[int | str, ...]], str] = key_path,
+) -> str:
+    """What is wrong first in a value that does not fit: where, the value, and what is allowed.
+
+    Args:
+        model: that the value was held against.
+        error: why it does not fit.
+        where: names the place of a value.
+    """
+    # An unknown key first: it is often why another is missing.
+    faults = sorted(
+        error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden"
+    )
+    first, *others = faults
+    more = f" (and {len(others)} more)" if others else ""
+    return f"{_described(model, first, where(first['loc']))}{more}"
+
+
+def shown(value: object) -> str:
+    """A value in at most `SHOWN` printable characters."""
+    try:
+        text = value if isinstance(value, str) and value.isprintable() else repr(value)
+    except ValueError:  # Python refuses to write integers of more than 4300 digits
+        text = "a number of thousands of digits"
+    text = text or "''"
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
+
+
+def _described(model: type[BaseModel], found: ErrorDetails, place: str) -> str:
+    if found["type"] == "extra_forbidden":
+        return _unknown(model, str(found["loc"][0]))
+    if found["type"] == "value_error":
+        return f"{place} {found['ctx']['error']}".strip()
+    value = "missing" if found["type"] == "missing" else shown(found["input"])
+    return f"{place} is {value}, allowed is {_allowed_at(model, found['loc'])}"
+
+
+def _unknown(model: type[BaseModel], key: str) -> str:
+    likely = get_close_matches(key, model.model_fields, 1)
+    hint = f"did you mean {likely[0]}? " if likely else ""
+    return f"unknown key {shown(key)}: {hint}allowed are {', '.join(model.model_fields)}"
+
+
+def _allowed_at(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    whole = model.model_json_schema()
+    node = whole
+    for part in location:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
+        if isinstance(part, int):
+            inner = node["prefixItems"][part] if "prefixItems" in node else node.get("items")
+        else:
+            inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
+        if not isinstance(inner, dict):
+            break
+        node = inner
+    return _words(node)
+
+
+def _words(node: dict[str, Any]) -> str:
+    """A JSON schema in words."""
+    if "allowed" in node:
+        return str(node["allowed"])
+    constants = node.get("enum", [node["const"]] if "const" in node else [])
+    if choices := [*map(shown, constants), *map(_words, node.get("anyOf", ()))]:
+        return " or ".join(filter(None, (", ".join(choices[:-1]), choices[-1])))
+    kind = node.get("type", "object")
+    limits = [words.format(node[key]) for key, words in _LIMITS.items() if key in node]
+    if kind in ("number", "integer"):
+        name = {"number": "a number" if limits else "a finite number", "integer": "a whole number"}
+        return " ".join([name[kind], *limits])
+    if kind == "string":
+        return f"text that matches {node['pattern']}" if "pattern" in node else "text"
+    return _list_words(node) if kind == "array" else _KINDS.get(kind, kind)
+
+
+def _list_words(node: dict[str, Any]) -> str:
+    least, most = node.get("minItems", 0), node.get("maxItems")
+    count = f"{least}" if least == most else f"{least} to {most}" if most else f"{least} or more"
+    inner = node.get("items") or (node.get("prefixItems") or [{}])[0]
+    return f"a list of {count}, each {_words(inner)}"
+
+
+def _refuse_constant(constant: str) -> float:
+    raise ValueError(f"{constant} is no JSON number")
