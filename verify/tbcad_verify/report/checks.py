@@ -93,7 +93,7 @@ def guarded(checks: Sequence[CheckName], work: Callable[[], Sequence[Check]]) ->
 def guarded_each(
     names: Sequence[CheckName], jobs: Sequence[Callable[..., Check]], *arguments: object
 ) -> list[Check]:
-    """One check for each job, called with its name and the arguments; one that breaks is unknown."""
+    """One check for each job, called with its name and the arguments; unknown if it breaks."""
     results = [
         attempt(partial(job, name, *arguments)) for name, job in zip(names, jobs, strict=True)
     ]
