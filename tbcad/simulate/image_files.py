@@ -1,13 +1,13 @@
-"""Pictures as files: written whole or not at all, and two of them side by side."""
+"""Images as files, each replaced as a whole, and several side by side in one."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from tbcad.atomic_files import replace_files
 from tbcad.errors import InputError
 from tbcad.types import Bytes
 
@@ -16,6 +16,7 @@ ANIMATED_SUFFIXES = (".gif", ".webp", ".png")
 LABEL_PX = 22
 GAP_PX = 4
 FRAME_MS = 120
+PNG_COMPRESSION = 3
 
 
 def check_image_path(file: Path, suffixes: Sequence[str] = STILL_SUFFIXES) -> None:
@@ -32,23 +33,30 @@ def check_image_path(file: Path, suffixes: Sequence[str] = STILL_SUFFIXES) -> No
         raise InputError(f"{file} is a folder: choose another name")
 
 
-def write_images(pictures: Mapping[Path, Bytes]) -> None:
-    """Write pictures (h, w, 3), each replaced as a whole, none before all are made."""
-    _written({file: _encoder(picture) for file, picture in pictures.items()})
+def write_images(images: Mapping[Path, Bytes]) -> None:
+    """Write images (h, w, 3) into one folder, each replaced as a whole, none before all are made.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    folder = next(iter(images)).parent
+    replace_files(folder, {path.name: _png(image) for path, image in images.items()})
 
 
-def write_animation(file: Path, frames: Sequence[Bytes]) -> None:
-    """Write pictures (h, w, 3) as one that moves there and back without end."""
+def write_animation(path: Path, frames: Sequence[Bytes]) -> None:
+    """Write images (h, w, 3) as one that moves forward and back without end.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
     images = [Image.fromarray(frame) for frame in frames]
     cycle = images + images[-2:0:-1]
-
-    def save(place: Path) -> None:
-        more: dict[str, Any] = {"lossless": True} if file.suffix.lower() == ".webp" else {}
-        cycle[0].save(
-            place, save_all=True, append_images=cycle[1:], duration=FRAME_MS, loop=0, **more
-        )
-
-    _written({file: save})
+    data, kind = BytesIO(), path.suffix.lower()[1:]
+    options = {"lossless": True} if kind == "webp" else {}
+    cycle[0].save(
+        data, kind, save_all=True, append_images=cycle[1:], duration=FRAME_MS, loop=0, **options
+    )
+    replace_files(path.parent, {path.name: data.getvalue()})
 
 
 def side_by_side(pictures: Mapping[str, Bytes]) -> Bytes:
@@ -69,19 +77,7 @@ def difference(truth: Bytes, picture: Bytes) -> Bytes:
     return np.abs(truth.astype(np.int16) - picture.astype(np.int16)).astype(np.uint8)
 
 
-def _encoder(picture: Bytes) -> Any:
-    return lambda place: Image.fromarray(picture).save(place, compress_level=3)
-
-
-def _written(files: Mapping[Path, Any]) -> None:
-    folder = next(iter(files)).parent
-    try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".tbcad-picture-") as made:
-            places = {file: Path(made) / file.name for file in files}
-            for file, save in files.items():
-                save(places[file])
-            for file, place in places.items():
-                place.replace(file)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"{folder} cannot be written: {reason}: choose another") from error
+def _png(image: Bytes) -> bytes:
+    data = BytesIO()
+    Image.fromarray(image).save(data, "png", compress_level=PNG_COMPRESSION)
+    return data.getvalue()

@@ -244,7 +244,7 @@ def _sharpness(
     export: Exported, made: Errors, subject: SceneObject, wishes: Options, detail: Progress
 ) -> Sharpness:
     scene, m = prepared_scene(subject), len(export.reflectors[0])
-    views = viewpoints_around(*VIEWPOINTS).views(export.capture_mm)
+    views = viewpoints_around(*VIEWPOINTS).cameras(export.capture_mm)
     wanted = Wanted(export.capture_mm, views, ground_truths(scene, views, detail))
     machines = draw(made, wishes.seed, range(PICTURED), m)
     return sharpness(

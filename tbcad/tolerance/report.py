@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.study.tables import Cell, Table
+from tbcad.simulate.study.study import Figure, Study
+from tbcad.simulate.study.tables import Table
 from tbcad.tolerance.analysis import TRIED, Analysis
 from tbcad.tolerance.montecarlo.builds import Yield, yielded
 from tbcad.tolerance.plots import directions, in_words, panels
@@ -18,7 +18,6 @@ from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/1"
 SHARES = (0.01, 0.05, 0.5)
-COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
 NOTES = (
     "Coverage of a virtual camera: twice the least distance from the object's middle of all rays "
     "camera -> edge of its mirror -> reflected. A machine is good when every virtual camera has "
@@ -110,7 +109,8 @@ def document(found: Analysis) -> dict[str, Any]:
 def study(found: Analysis) -> Study:
     """Tables and plots."""
     tables = (_machines(found), _alone(found), _choices(found), _cameras(found))
-    return Study("tolerance", _summary(found), tables, panels(found))
+    notes = (summary_text(found), *NOTES)
+    return Study("tolerance", _figures(found), tables, panels(found), notes)
 
 
 def json_text(found: Analysis) -> str:
@@ -118,23 +118,16 @@ def json_text(found: Analysis) -> str:
     return json.dumps(document(found), indent=1, allow_nan=False) + "\n"
 
 
-def _summary(found: Analysis) -> Table:
-    y, worst = found.yielded, found.result.worst
-    rows: list[tuple[Cell, ...]] = [
-        ("good machines", "%", 100 * y.share, None, ""),
-        ("worst camera, median", "mm", float(np.median(worst)), None, ""),
-        ("worst camera, 1 % see less", "mm", float(np.quantile(worst, 0.01)), None, ""),
-        ("margin needed", "mm", found.margin.mm, None, ""),
-    ]
-    rows += [
-        (f"loss by {in_words(one.kind)} alone", "mm", one.loss, None, "")
-        for one in found.single_errors
-    ]
-    rows += [
-        (f"good machines by {choice.name}", "%", 100 * choice.yielded.share, None, "")
-        for choice in found.choices
-    ]
-    return Table("tolerance-summary", COLUMNS, tuple(rows), (summary_text(found), *NOTES))
+def _figures(found: Analysis) -> tuple[Figure, ...]:
+    worst = found.result.worst
+    return (
+        Figure("good machines", "%", 100 * found.yielded.share),
+        Figure("worst camera, median", "mm", float(np.median(worst))),
+        Figure("worst camera, 1 % see less", "mm", float(np.quantile(worst, 0.01))),
+        Figure("margin needed", "mm", found.margin.mm),
+        *(Figure(f"loss by {in_words(e.kind)} alone", "mm", e.loss) for e in found.single_errors),
+        *(Figure(f"good machines by {c.name}", "%", 100 * c.yielded.share) for c in found.choices),
+    )
 
 
 def _machines(found: Analysis) -> Table:

@@ -13,8 +13,7 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.study import study_files
-from tbcad.simulate.study.tables import SUMMARY
+from tbcad.simulate.study.study import SUMMARY_COLUMNS, study_files
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.analysis import Analysis, Options, ProcessOption, PrototypeYield
 from tbcad.tolerance.margin import Margin
@@ -216,7 +215,7 @@ class TestJson:
 class TestTables:
     def test_summary(self, found: Analysis) -> None:
         table = study(found).summary
-        assert table.columns == SUMMARY
+        assert table.columns == SUMMARY_COLUMNS
         assert summary_text(found) in table.notes
         told = {str(row[0]): row[2] for row in table.rows}
         read: dict[str, Any] = document(found)

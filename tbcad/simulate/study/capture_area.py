@@ -5,28 +5,35 @@ from functools import partial
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray
-from tbcad.simulate.study.paper import claimed, claims
+from tbcad.simulate.study.paper import claims
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.study.sweep import DesignAttempt, for_each_n, spec_with, try_design
-from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
+from tbcad.simulate.study.study import Figure, Study
+from tbcad.simulate.study.sweep import DesignAttempt, for_each_n, try_design
+from tbcad.simulate.study.tables import Cell, Record, Table
 from tbcad.spec.design import Spec
 from tbcad.types import Progress
 
 RULES = ("flat", "paper", "traced")
-MEASURED = ("least_mm", "median_mm", "short", "reason")
-COLUMNS = (
-    *("n", "virtual_cameras", "flat_closed_mm"),
-    *(f"{rule}_{name}" for rule in RULES for name in MEASURED),
-    *("paper_claim_flat_mm", "paper_claim_convex_mm"),
-)
+# By more than rounding in the coverage that the search for radii leaves.
+SHORT_BY = 1e-5
+CURVES = {
+    "traced_minimum_mm": ("traced radii, minimum", "C2.-"),
+    "paper_median_mm": ("eqs. 1 and 2, median", "C1.--"),
+    "paper_minimum_mm": ("eqs. 1 and 2, minimum", "C1.-"),
+    "flat_median_mm": ("flat, median", "C0.--"),
+    "flat_minimum_mm": ("flat, minimum", "C0.-"),
+    "flat_closed_form_mm": ("flat, 2 d sin(min theta_0)", "k:"),
+    "paper_claim_flat_mm": ("the paper: flat", "r+"),
+    "paper_claim_convex_mm": ("the paper: convex", "rx"),
+}
 NOTES = (
-    "flat_closed_mm: 2 d sin(min theta_0), the largest sphere that every flat mirror sees whole "
-    "when its neighbours bound it on all sides.",
-    "Other figures: exact coverage diameter, twice the least distance from the centre of the rays "
-    "off a mirror's edge, of all mirrors of a half. Edges at the foot count, at the seam only for "
-    "mirrors that it does not halve. short: mirrors below the capture diameter.",
+    "flat_closed_form_mm: 2 d sin(min theta_0), the largest sphere that every flat mirror sees "
+    "whole when its neighbours bound it on all sides.",
+    "Other figures: exact coverage diameter, twice the minimum distance from the centre of the "
+    "rays off a mirror's edge, of all mirrors of a half. Edges at the foot count, at the seam only "
+    "for mirrors that it does not halve. mirrors_short: number of mirrors below the capture "
+    "diameter.",
     "Radii: flat: none; paper: eqs. 1 and 2; traced: exact coverage of the capture diameter and "
     "mirrors.margin_mm, or more where a mirror is nearly flat.",
     "Of the paper's curve of flat mirrors we know n = 4 and n = 18.",
@@ -40,80 +47,68 @@ def capture_area(
     scheduler: str | None = None,
 ) -> Study:
     """The study: coverage of flat and convex mirrors for every n."""
-    rows = for_each_n(partial(_of, spec), ns, progress, scheduler)
-    table = Table("capture-area", COLUMNS, joined(rows), NOTES)
-    summary = Table("capture-area-summary", SUMMARY, _summary(table))
-    return Study("capture-area", summary, (table,), (_panel(table, spec),))
+    records = for_each_n(partial(_record, spec), ns, progress, scheduler)
+    table = Table.of_records("capture-area", records, NOTES)
+    n = table.numbers("n")
+    curves = (Series(label, n, table.numbers(c), style) for c, (label, style) in CURVES.items())
+    title = f"Capture diameter, {spec.optics.capture_diameter_mm:g} mm wanted"
+    return Study(
+        "capture-area",
+        tuple(figure for record in records for figure in _figures(record)),
+        (table,),
+        (Panel(title, "n", "mm", tuple(curves)),),
+    )
 
 
-def _of(spec: Spec, n: int) -> list[Cell]:
-    return _row(spec_with(spec, n=n))
+def _record(spec: Spec, n: int) -> Record:
+    """One row: the figures of all radius rules at one n."""
+    attempts = {
+        rule: try_design(spec, optics={"n": n}, mirrors={"radius_rule": rule}) for rule in RULES
+    }
+    half = next((attempt.half for attempt in attempts.values() if attempt.half), None)
+    record: Record = {
+        "n": n,
+        "virtual_cameras": virtual_cameras(half) if half else None,
+        "flat_closed_form_mm": _closed_form(half) if half else None,
+    }
+    for rule, attempt in attempts.items():
+        coverage = _coverage(attempt, spec.optics.capture_diameter_mm)
+        record |= {f"{rule}_{name}": cell for name, cell in coverage.items()}
+    flat, convex = claims().get(f"flat_capture_n{n}"), claims()["convex_capture"]
+    record["paper_claim_flat_mm"] = flat.value if flat else None
+    record["paper_claim_convex_mm"] = convex.value if n == claims()["design_n"].value else None
+    return record
 
 
-def _row(spec: Spec) -> list[Cell]:
-    wanted, n = spec.optics.capture_diameter_mm, spec.optics.n
-    tried = {rule: try_design(spec_with(spec, rule=rule)) for rule in RULES}
-    made = next((one.made for one in tried.values() if one.made), None)
-    closed = None if made is None else _closed(made.halves[0])
-    cameras = None if made is None else virtual_cameras(made.halves[0])
-    measured = [cell for rule in RULES for cell in _measured(tried[rule], wanted)]
-    flat = claims().get(f"flat_capture_n{n}")
-    convex = claimed("convex_capture") if n == claimed("design_n") else None
-    return [n, cameras, closed, *measured, flat.value if flat else None, convex]
-
-
-def _closed(half: MirrorArray) -> float:
+def _closed_form(half: MirrorArray) -> float:
     return float(2 * half.ellipsoid.camera_distance * np.sin(half.theta0.min()))
 
 
-def _measured(tried: DesignAttempt, wanted: float) -> tuple[Cell, ...]:
-    """Least, median, how many fall short (by more than rounding), and why there is none."""
-    if tried.made is None:
-        return None, None, None, tried.reason
-    coverage = tried.made.halves[0].coverage
-    short = int((coverage < wanted * (1 - 1e-5)).sum())
-    return float(coverage.min()), float(np.median(coverage)), short, ""
+def _coverage(attempt: DesignAttempt, capture_mm: float) -> dict[str, Cell]:
+    if attempt.half is None:
+        empty = dict.fromkeys(("minimum_mm", "median_mm", "mirrors_short"))
+        return {**empty, "reason": attempt.reason}
+    coverage = attempt.half.coverage
+    return {
+        "minimum_mm": float(coverage.min()),
+        "median_mm": float(np.median(coverage)),
+        "mirrors_short": int((coverage < capture_mm * (1 - SHORT_BY)).sum()),
+        "reason": "",
+    }
 
 
-def _summary(table: Table) -> tuple[tuple[Cell, ...], ...]:
-    rows: list[tuple[Cell, ...]] = []
-    for row in table.rows:
-        at = dict(zip(table.columns, row, strict=True))
-        n = at["n"]
-        if at["paper_claim_flat_mm"] is not None:
-            claim = at["paper_claim_flat_mm"]
-            rows += [
-                (f"flat, n = {n}, 2 d sin(min theta_0)", "mm", at["flat_closed_mm"], claim),
-                (f"flat, n = {n}, exact least", "mm", at["flat_least_mm"], claim),
-            ]
-        if at["paper_claim_convex_mm"] is not None:
-            claim = at["paper_claim_convex_mm"]
-            rows += [
-                (
-                    f"convex, n = {n}, {rule} radii, exact {kind}",
-                    "mm",
-                    at[f"{rule}_{kind}_mm"],
-                    claim,
-                )
-                for rule in ("paper", "traced")
-                for kind in ("least", "median")
-            ]
-    where = claims()["convex_capture"].where
-    return tuple((*row, where) for row in rows)
-
-
-def _panel(table: Table, spec: Spec) -> Panel:
-    n = np.array(table.numbers("n"))
-    drawn = (
-        ("traced radii, least", "traced_least_mm", "C2.-"),
-        ("eqs. 1 and 2, median", "paper_median_mm", "C1.--"),
-        ("eqs. 1 and 2, least", "paper_least_mm", "C1.-"),
-        ("flat, median", "flat_median_mm", "C0.--"),
-        ("flat, least", "flat_least_mm", "C0.-"),
-        ("flat, 2 d sin(min theta_0)", "flat_closed_mm", "k:"),
-        ("the paper: flat", "paper_claim_flat_mm", "r+"),
-        ("the paper: convex", "paper_claim_convex_mm", "rx"),
-    )
-    series = tuple(Series(label, n, np.array(table.numbers(c)), style) for label, c, style in drawn)
-    wanted = spec.optics.capture_diameter_mm
-    return Panel(f"Capture diameter, {wanted:g} mm wanted", "n", "mm", series)
+def _figures(record: Record) -> list[Figure]:
+    n, where = record["n"], claims()["convex_capture"].where
+    figures = {
+        f"flat, n = {n}, 2 d sin(min theta_0)": ("flat_closed_form_mm", "paper_claim_flat_mm"),
+        f"flat, n = {n}, exact minimum": ("flat_minimum_mm", "paper_claim_flat_mm"),
+    }
+    for rule in ("paper", "traced"):
+        for kind in ("minimum", "median"):
+            name = f"convex, n = {n}, {rule} radii, exact {kind}"
+            figures[name] = (f"{rule}_{kind}_mm", "paper_claim_convex_mm")
+    return [
+        Figure(name, "mm", record[ours], record[paper], where)
+        for name, (ours, paper) in figures.items()
+        if record[paper] is not None
+    ]

@@ -1,4 +1,4 @@
-"""How deep the mirrors' images lie, and the stop that a real lens would need (section 6)."""
+"""Depth of the mirrors' virtual images, and the stop that a real lens would need (section 6)."""
 
 from dataclasses import dataclass
 
@@ -16,23 +16,19 @@ from tbcad.simulate.study.lens import (
 )
 from tbcad.simulate.study.paper import claimed, claims
 from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.study.sweep import spec_with, try_design
-from tbcad.simulate.study.tables import SUMMARY, Cell, Table
+from tbcad.simulate.study.study import Figure, Study
+from tbcad.simulate.study.sweep import try_design
+from tbcad.simulate.study.tables import Record, Table
 from tbcad.simulate.study.virtual_images import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
 POINTS = tuple(f"{place}_{fan}" for place in PLACES for fan in FANS)
-COLUMNS = (
-    *("id", "radii", "polar_deg", "radius_mm", "incidence_deg", "to_mirror_mm"),
+NUMBERS = (
+    *("polar_deg", "radius_mm", "incidence_deg", "to_mirror_mm"),
     *(f"{point}_mm" for point in POINTS),
     *(f"{point}_depth_mm" for point in POINTS),
-)
-STOPS = (
-    *("range", "near_mm", "far_mm", "focus_mm", "focal_mm", "stop", "pupil_mm", "f_number"),
-    *("blur_px", "airy_px", "total_px", "light", "stops_lost"),
 )
 NOTES = (
     "Distances are from the camera's pinhole to the virtual image of a point of the capture "
@@ -47,24 +43,22 @@ LENS_NOTES = (
     "the design's; focused on the harmonic mean of the range's ends, where their blur is equal.",
     "blur_px: geometric blur circle at both ends. airy_px: Airy disc of 550 nm on the axis; it is "
     "larger off the axis. total_px: root of the sum of their squares.",
-    "blur limited: the largest pupil within --blur-px. sharpest: least total_px. light: relative "
+    "blur limited: the largest pupil within --blur-px. sharpest: minimum total_px. light: relative "
     "to the lens wide open (--wide-open); stops_lost: in factors of two. No stop is wider than "
     "wide open.",
     "The aperture that the paper gives, if it gives one, is not known to us.",
 )
-
-
-DRAWN = ("traced radii, along the axis", "the paper's distances")
-SHOWN = {
+PAPER_RANGE = "the paper's distances"
+RANGES_SHOWN = ("traced radii, along the axis", PAPER_RANGE)
+# Columns of the stops that are figures of the study: what they are called, and their units.
+STOP_FIGURES = {
     "pupil_mm": ("pupil", "mm"),
     "f_number": ("F-number", ""),
     "blur_px": ("blur circle", "px"),
     "total_px": ("blur and diffraction", "px"),
-    "light": ("light left", ""),
+    "light": ("light relative to wide open", ""),
 }
-
-
-# What is drawn: radii, point of the capture sphere, fan, label, mark.
+# Images in the plot: radii, point of the capture sphere, fan, label, mark.
 IMAGES = (
     ("traced", 0, 0, "traced radii: nearest point, tangential", "C0."),
     ("traced", 1, 0, "centre, tangential", "C2."),
@@ -72,12 +66,13 @@ IMAGES = (
     ("traced", 2, 1, "farthest point, sagittal", "C1."),
     ("flat", 1, 0, "flat mirrors: centre", "k."),
 )
-FARTHEST_STOP = 8  # of the plot, in F-numbers of the lens wide open
+SMALLEST_STOP = 8  # of the plot, in F-numbers of the lens wide open
+MAX_OPTION = 1000
 
 
 @dataclass(frozen=True)
 class LensOptions:
-    """What the user may say of the lens.
+    """The lens and its pixels.
 
     Attributes:
         blur_px: largest blur circle allowed.
@@ -96,131 +91,160 @@ class LensOptions:
             InputError: one is not.
         """
         for option, value in vars(self).items():
-            if not 0 < value <= 1000:
+            if not 0 < value <= MAX_OPTION:
                 name = "--" + option.replace("_", "-")
-                raise InputError(f"{name} {value:g}: allowed is above 0 to 1000: change it")
+                raise InputError(f"{name} {value:g}: allowed is above 0 to {MAX_OPTION}: change it")
         return self
 
 
-def depth_of_field(spec: Spec, optics: LensOptions, progress: Progress = lambda _: None) -> Study:
+@dataclass(frozen=True)
+class _Mirrors:
+    """The mirrors by one radius rule, and the images of the object in them."""
+
+    rule: str
+    half: MirrorArray
+    images: VirtualImages
+
+
+def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
-    radius, lens = spec.optics.capture_diameter_mm / 2, _lens(spec, optics.checked())
-    found: dict[str, tuple[MirrorArray, VirtualImages]] = {}
-    reasons = []
+    camera, wide_open = spec.camera, options.checked().wide_open
+    lens = lens_for(
+        np.radians(camera.hfov_deg), camera.width_px, options.pixel_um / 1000, wide_open
+    )
+    by_rule, refusals = _by_rule(spec, progress)
+    ranges = _ranges(by_rule)
+    stops = _stop_records(ranges, lens, options.blur_px)
+    tables = (
+        _mirror_table(by_rule, (*NOTES, *refusals)),
+        Table.of_records("depth-of-field-stops", stops, LENS_NOTES),
+    )
+    figures = (*_image_figures(by_rule), *_stop_figures(stops))
+    panels = (_image_panel(by_rule), _blur_panel(ranges, lens))
+    return Study("depth-of-field", figures, tables, panels)
+
+
+def _by_rule(spec: Spec, progress: Progress) -> tuple[list[_Mirrors], list[str]]:
+    """Mirrors by each radius rule that makes them, and why the others do not."""
+    by_rule, refusals = [], []
     for rule in RULES:
         progress(f"radii by rule {rule}")
-        tried = try_design(spec_with(spec, rule=rule))
-        if tried.made is None:
-            reasons.append(f"No figures of {rule} radii: {tried.reason}")
+        attempt = try_design(spec, mirrors={"radius_rule": rule})
+        if attempt.half is None:
+            refusals.append(f"No figures of {rule} radii: {attempt.reason}")
             continue
-        half = tried.made.halves[0]
-        found[rule] = (half, virtual_images(half, radius))
-    rows = tuple(row for rule, (half, at) in found.items() for row in _rows(rule, half, at))
-    mirrors = Table("depth-of-field", COLUMNS, rows, (*NOTES, *reasons))
-    stopped = Table("depth-of-field-stops", STOPS, _stop_rows(found, lens, optics), LENS_NOTES)
-    summary = Table("depth-of-field-summary", SUMMARY, _summary(found, stopped))
-    return Study("depth-of-field", summary, (mirrors, stopped), _panels(found, lens))
+        images = virtual_images(attempt.half, spec.optics.capture_diameter_mm / 2)
+        by_rule.append(_Mirrors(rule, attempt.half, images))
+    return by_rule, refusals
 
 
-def _lens(spec: Spec, optics: LensOptions) -> Lens:
-    camera, pixel = spec.camera, optics.pixel_um / 1000
-    return lens_for(np.radians(camera.hfov_deg), camera.width_px, pixel, optics.wide_open)
+def _mirror_table(by_rule: list[_Mirrors], notes: tuple[str, ...]) -> Table:
+    numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule)])
+    columns = {
+        "id": [name for mirrors in by_rule for name in mirrors.half.ids],
+        "radii": [mirrors.rule for mirrors in by_rule for _ in mirrors.half.ids],
+        **dict(zip(NUMBERS, numbers.T, strict=True)),
+    }
+    return Table.of_columns("depth-of-field", columns, notes)
 
 
-def _rows(rule: str, half: MirrorArray, at: VirtualImages) -> list[tuple[Cell, ...]]:
-    numbers = np.column_stack(
+def _numbers(mirrors: _Mirrors) -> Floats:
+    """The columns NUMBERS of some mirrors, (m, 16)."""
+    half, images = mirrors.half, mirrors.images
+    return np.column_stack(
         [
             np.degrees(half.polar),
             half.mirrors.radius,
-            np.degrees(at.incidence),
-            at.to_mirror,
-            at.distance.reshape(len(half), -1),
-            at.depth.reshape(len(half), -1),
+            np.degrees(images.incidence),
+            images.to_mirror,
+            images.distance.reshape(len(half), -1),
+            images.depth.reshape(len(half), -1),
         ]
     )
-    values = [[None if np.isnan(x) else x for x in row] for row in numbers.tolist()]
-    return [(name, rule, *row) for name, row in zip(half.ids, values, strict=True)]
 
 
-def span(values: Floats) -> DepthRange:
-    """From the least to the largest of some depths."""
+def _range(values: Floats) -> DepthRange:
     return DepthRange(float(values.min()), float(values.max()))
 
 
-def _ranges(found: dict[str, tuple[MirrorArray, VirtualImages]]) -> dict[str, DepthRange]:
-    ranges = {f"{rule} radii, along the axis": span(at.depth) for rule, (_, at) in found.items()}
-    ranges |= {f"{rule} radii, distances": span(at.distance) for rule, (_, at) in found.items()}
-    paper = DepthRange(claimed("depth_near"), claimed("depth_far"))
-    return ranges | {"the paper's distances": paper}
+def _ranges(by_rule: list[_Mirrors]) -> dict[str, DepthRange]:
+    """Ranges of depth that are to be sharp, by name."""
+    return {
+        **{f"{m.rule} radii, along the axis": _range(m.images.depth) for m in by_rule},
+        **{f"{m.rule} radii, distances": _range(m.images.distance) for m in by_rule},
+        PAPER_RANGE: DepthRange(claimed("depth_near"), claimed("depth_far")),
+    }
 
 
-def _stop_rows(
-    found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens, optics: LensOptions
-) -> tuple[tuple[Cell, ...], ...]:
-    rows: list[tuple[Cell, ...]] = []
-    for name, over in _ranges(found).items():
-        head = (name, over.near, over.far, over.focus, focal_length(lens, over))
-        for kind, at in aperture_stops(lens, over, optics.blur_px).items():
-            figures = (at.pupil, at.f_number, at.blur_px, at.airy_px, at.total_px)
-            rows.append((*head, kind, *figures, at.light, at.stops_lost))
-    return tuple(rows)
-
-
-def _summary(
-    found: dict[str, tuple[MirrorArray, VirtualImages]], stopped: Table
-) -> tuple[tuple[Cell, ...], ...]:
-    near, far = claims()["depth_near"], claims()["depth_far"]
-    rows: list[tuple[Cell, ...]] = []
-    for rule, (_, at) in found.items():
-        over = span(at.distance)
-        rows += [
-            (f"camera to nearest image, {rule} radii", "mm", over.near, near.value, near.where),
-            (f"camera to farthest image, {rule} radii", "mm", over.far, far.value, far.where),
-        ]
-    for row in stopped.rows:
-        cells = dict(zip(stopped.columns, row, strict=True))
-        if cells["range"] in DRAWN and cells["stop"] != "wide open":
-            name = f"{cells['stop']}, {cells['range']}"
-            rows += [
-                (f"{name}: {text}", unit, cells[column], None, near.where)
-                for column, (text, unit) in SHOWN.items()
-            ]
-    return tuple(rows)
-
-
-def _panels(found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens) -> tuple[Panel, ...]:
-    series = [
-        Series(
-            label, np.degrees(found[rule][0].polar), found[rule][1].distance[:, place, fan], mark
-        )
-        for rule, place, fan, label, mark in IMAGES
-        if rule in found
+def _stop_records(ranges: dict[str, DepthRange], lens: Lens, blur_px: float) -> list[Record]:
+    return [
+        {
+            "range": name,
+            "near_mm": over.near,
+            "far_mm": over.far,
+            "focus_mm": over.focus,
+            "focal_mm": focal_length(lens, over),
+            "stop": kind,
+            "pupil_mm": stop.pupil,
+            "f_number": stop.f_number,
+            "blur_px": stop.blur_px,
+            "airy_px": stop.airy_px,
+            "total_px": stop.total_px,
+            "light": stop.light,
+            "stops_lost": stop.stops_lost,
+        }
+        for name, over in ranges.items()
+        for kind, stop in aperture_stops(lens, over, blur_px).items()
     ]
-    polar = np.concatenate([half.polar for half, _ in found.values()] or [np.zeros(1)])
+
+
+def _image_figures(by_rule: list[_Mirrors]) -> list[Figure]:
+    near, far = claims()["depth_near"], claims()["depth_far"]
+    return [
+        Figure(f"camera to {which} image, {m.rule} radii", "mm", end, claim.value, claim.where)
+        for m in by_rule
+        for which, end, claim in (
+            ("nearest", float(m.images.distance.min()), near),
+            ("farthest", float(m.images.distance.max()), far),
+        )
+    ]
+
+
+def _stop_figures(stops: list[Record]) -> list[Figure]:
+    where = claims()["depth_near"].where
+    return [
+        Figure(f"{stop['stop']}, {stop['range']}: {text}", unit, stop[column], where=where)
+        for stop in stops
+        if stop["range"] in RANGES_SHOWN and stop["stop"] != "wide open"
+        for column, (text, unit) in STOP_FIGURES.items()
+    ]
+
+
+def _image_panel(by_rule: list[_Mirrors]) -> Panel:
+    series = [
+        Series(label, np.degrees(m.half.polar), m.images.distance[:, place, fan], mark)
+        for rule, place, fan, label, mark in IMAGES
+        for m in by_rule
+        if m.rule == rule
+    ]
+    polar = np.concatenate([m.half.polar for m in by_rule] or [np.zeros(1)])
     ends = np.degrees([polar.min(), polar.max()])
     for key, style in (("depth_near", "r--"), ("depth_far", "r-.")):
-        series.append(
-            Series(f"the paper: {claimed(key):g} mm", ends, np.full(2, claimed(key)), style)
-        )
-    what = (
-        "Virtual images of the capture sphere",
-        "polar angle about w, deg",
-        "from the camera, mm",
-    )
-    return Panel(*what, tuple(series)), _blur_panel(found, lens)
+        paper = claimed(key)
+        series.append(Series(f"the paper: {paper:g} mm", ends, np.full(2, paper), style))
+    title = "Virtual images of the capture sphere"
+    return Panel(title, "polar angle about w, deg", "from the camera, mm", tuple(series))
 
 
-def _blur_panel(found: dict[str, tuple[MirrorArray, VirtualImages]], lens: Lens) -> Panel:
+def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
     series: list[Series] = []
-    ranges = {name: over for name, over in _ranges(found).items() if name in DRAWN}
-    for k, (name, over) in enumerate(ranges.items()):
-        numbers = np.linspace(lens.wide_open, FARTHEST_STOP * lens.wide_open, 60)
-        at = [aperture_stop(lens, over, focal_length(lens, over) / f) for f in numbers]
-        blur, total = (
-            np.array(x) for x in zip(*((s.blur_px, s.total_px) for s in at), strict=True)
-        )
+    f_numbers = np.linspace(lens.wide_open, SMALLEST_STOP * lens.wide_open, 60)
+    shown = [(name, over) for name, over in ranges.items() if name in RANGES_SHOWN]
+    for k, (name, over) in enumerate(shown):
+        stops = [aperture_stop(lens, over, focal_length(lens, over) / f) for f in f_numbers]
+        blur, total = np.array([(stop.blur_px, stop.total_px) for stop in stops]).T
         series += [
-            Series(f"blur circle, {name}", numbers, blur, f"C{k}--"),
-            Series(f"with diffraction, {name}", numbers, total, f"C{k}-"),
+            Series(f"blur circle, {name}", f_numbers, blur, f"C{k}--"),
+            Series(f"with diffraction, {name}", f_numbers, total, f"C{k}-"),
         ]
     return Panel("Blur at the ends of the range", "F-number", "pixels", tuple(series))

@@ -1,18 +1,18 @@
 """Radius of the mirrors against their polar angle (the paper's elevation, Fig. 7b)."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tbcad.mirrors.array import MirrorArray, design
 from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import spec_with
-from tbcad.simulate.study.tables import SUMMARY, Cell, Table
+from tbcad.simulate.study.tables import Record, Table
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
-RULES = ("traced", "paper")
-COLUMNS = ("id", "polar_deg", "azimuth_deg", "traced_radius_mm", "paper_radius_mm", "nearly_flat")
-CORRELATION = ("radii", "of", "with", "correlation", "mirrors")
+CURVES = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
+WHERE = "Fig. 7b"
 NOTES = (
     "The paper's elevation of a mirror is its polar angle about w, the axis from the object to "
     "the camera; azimuth 0 is the zenith's side. Mirrors of camera a; b's mirror them.",
@@ -30,41 +30,43 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
         SpecError: the mirrors cannot be made.
     """
     halves = {}
-    for rule in RULES:
+    for rule in CURVES:
         progress(f"radii by rule {rule}")
-        halves[rule] = design(spec_with(spec, rule=rule)).halves[0]
-    mirrors = Table("elevation", COLUMNS, _rows(halves, spec), NOTES)
-    found = tuple(row for rule in RULES for row in _correlations(rule, halves[rule]))
-    correlated = Table("elevation-correlation", CORRELATION, found)
-    summary = Table("elevation-summary", SUMMARY, _summary(halves, correlated))
+        halves[rule] = design(spec_with(spec, mirrors={"radius_rule": rule})).halves[0]
+    correlations = [record for rule, half in halves.items() for record in _correlations(rule, half)]
+    tables = (
+        _mirrors(halves["traced"], halves["paper"], spec.mirrors.max_radius_widths),
+        Table.of_records("elevation-correlation", correlations),
+    )
     panels = (_panel(halves, "radius", ""), _panel(halves, "radius, logarithmic", "y"))
-    return Study("elevation", summary, (mirrors, correlated), panels)
+    return Study("elevation", _figures(halves, correlations), tables, panels)
 
 
-def _rows(halves: dict[str, MirrorArray], spec: Spec) -> tuple[tuple[Cell, ...], ...]:
-    traced, paper = halves["traced"], halves["paper"]
-    longest = spec.mirrors.max_radius_widths * traced.half_width
-    numbers = np.column_stack(
-        [
-            np.degrees(traced.polar),
-            np.degrees(traced.azimuth),
-            traced.mirrors.radius,
-            paper.mirrors.radius,
-        ]
-    )
-    flat = traced.mirrors.radius >= longest * (1 - 1e-9)
-    return tuple(
-        (name, *row, int(nearly))
-        for name, row, nearly in zip(traced.ids, numbers.tolist(), flat.tolist(), strict=True)
-    )
+def _mirrors(traced: MirrorArray, paper: MirrorArray, max_radius_widths: float) -> Table:
+    longest = max_radius_widths * traced.half_width
+    columns: dict[str, ArrayLike] = {
+        "id": traced.ids,
+        "polar_deg": np.degrees(traced.polar),
+        "azimuth_deg": np.degrees(traced.azimuth),
+        "traced_radius_mm": traced.mirrors.radius,
+        "paper_radius_mm": paper.mirrors.radius,
+        "nearly_flat": (traced.mirrors.radius >= longest * (1 - 1e-9)).astype(int),
+    }
+    return Table.of_columns("elevation", columns, NOTES)
 
 
-def _correlations(rule: str, half: MirrorArray) -> list[tuple[Cell, ...]]:
+def _correlations(rule: str, half: MirrorArray) -> list[Record]:
     radius = half.mirrors.radius
     values = {"radius": radius, "log radius": np.log(radius)}
     angles = {"polar angle": half.polar, "absolute azimuth": np.abs(half.azimuth)}
     return [
-        (rule, name, other, correlation(value, angle), len(half))
+        {
+            "radii": rule,
+            "of": name,
+            "with": other,
+            "correlation": correlation(value, angle),
+            "mirrors": len(half),
+        }
         for name, value in values.items()
         for other, angle in angles.items()
     ]
@@ -75,42 +77,26 @@ def correlation(x: Floats, y: Floats) -> float:
     return float(np.corrcoef(x, y)[0, 1])
 
 
-def _summary(halves: dict[str, MirrorArray], correlated: Table) -> tuple[tuple[Cell, ...], ...]:
-    where = "Fig. 7b"
-    rows: list[tuple[Cell, ...]] = []
-    for rule in RULES:
-        radius, polar = halves[rule].mirrors.radius, np.degrees(halves[rule].polar)
-        rows += [
-            (f"radii by rule {rule}, least", "mm", float(radius.min()), None, where),
-            (f"radii by rule {rule}, largest", "mm", float(radius.max()), None, where),
-        ]
-    rows += [
-        ("polar angle, least", "deg", float(polar.min()), None, where),
-        ("polar angle, largest", "deg", float(polar.max()), None, where),
-    ]
+def _figures(halves: dict[str, MirrorArray], correlations: list[Record]) -> tuple[Figure, ...]:
+    ranges = {f"radii by rule {rule}": ("mm", half.mirrors.radius) for rule, half in halves.items()}
+    ranges["polar angle"] = ("deg", np.degrees(halves["traced"].polar))
+    extremes = (
+        Figure(f"{name}, {which}", unit, value, where=WHERE)
+        for name, (unit, values) in ranges.items()
+        for which, value in (("smallest", float(values.min())), ("largest", float(values.max())))
+    )
+    names = "correlation of {of} with {with}, {radii}"
     return (
-        *rows,
-        *(
-            (f"correlation of {of} with {with_}, {rule}", "", value, None, where)
-            for rule, of, with_, value, _ in correlated.rows
-        ),
+        *extremes,
+        *(Figure(names.format(**r), "", r["correlation"], where=WHERE) for r in correlations),
     )
 
 
 def _panel(halves: dict[str, MirrorArray], what: str, logarithmic: str) -> Panel:
-    styles = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
-    series = tuple(
-        Series(
-            f"{styles[rule][0]}: correlation {_drawn(half, logarithmic):.3f}",
-            np.degrees(half.polar),
-            half.mirrors.radius,
-            styles[rule][1],
-        )
-        for rule, half in halves.items()
-    )
-    return Panel(f"Mirrors' {what}", "polar angle about w, deg", "mm", series, logarithmic)
-
-
-def _drawn(half: MirrorArray, logarithmic: str) -> float:
-    radius = half.mirrors.radius
-    return correlation(np.log(radius) if logarithmic else radius, half.polar)
+    series = []
+    for rule, (label, style) in CURVES.items():
+        radius, polar = halves[rule].mirrors.radius, halves[rule].polar
+        drawn = correlation(np.log(radius) if logarithmic else radius, polar)
+        named = f"{label}: correlation {drawn:.3f}"
+        series.append(Series(named, np.degrees(polar), radius, style))
+    return Panel(f"Mirrors' {what}", "polar angle about w, deg", "mm", tuple(series), logarithmic)

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.camera import fitted_camera
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats
 
 # Beyond this, one ray stands for a block of pixels: the paper's largest sensor, 8320 x 6208,
@@ -114,16 +114,18 @@ def _counted(
 
 def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
     """Rays on each mirror and those that go on to the capture sphere, each (m,)."""
-    trace, height, m = exact_tracer(at), at.camera.height_px, len(at)
+    trace, m = exact_tracer(at), len(at)
     on, seen = np.zeros(m + 1), np.zeros(m + 1)
-    for rows in row_bands(height):
+    for rows in row_bands(at.camera.height_px):
         rays = trace(rows, CENTRE)
-        there = rays.mirror != 0
-        mirror, origin, way = rays.mirror[there], rays.origin[there], rays.direction[there]
-        meets = (norm(np.cross(origin, way)) <= radius) & (dot(origin, way) < 0)
-        on += np.bincount(mirror, minlength=m + 1)
-        seen += np.bincount(mirror[meets], minlength=m + 1)
+        on += np.bincount(rays.mirror.ravel(), minlength=m + 1)
+        seen += np.bincount(rays.mirror[rays.meeting(radius)], minlength=m + 1)
     return on[1:], seen[1:]
+
+
+def megapixels(table: Table) -> Floats:
+    """Millions of pixels of the sensors in a table's columns width_px and height_px, (k,)."""
+    return table.numbers("width_px") * table.numbers("height_px") / 1e6
 
 
 def virtual_cameras(half: MirrorArray) -> int:

@@ -1,30 +1,31 @@
 """Virtual cameras against pixels: how many there are of each, and where they balance (Fig. 5b)."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.definitions import definitions
 from tbcad.simulate.study.paper import claimed, claims
-from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels, virtual_cameras
+from tbcad.simulate.study.pixels import (
+    PixelCounts,
+    Sensor,
+    count_pixels,
+    megapixels,
+    virtual_cameras,
+)
 from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.study.sweep import for_each_n, spec_with, try_design
-from tbcad.simulate.study.tables import SUMMARY, Cell, Table, joined
+from tbcad.simulate.study.study import Figure, Study
+from tbcad.simulate.study.sweep import for_each_n, try_design
+from tbcad.simulate.study.tables import Record, Table
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
 MULTIPLES = (1, 2, 3, 4)
-COLUMNS = (
-    *("n", "width_px", "height_px", "virtual_cameras", "seeing_px", "on_mirrors_px"),
-    *("seeing_average_px", "on_mirrors_average_px", "frame_filled", "rays_traced", "reason"),
-)
-BALANCE = (
-    *("width_px", "height_px", "ratio", "pixels_counted", "balanced_n", "whole_n"),
-    *("virtual_cameras", "average_px", "paper_n", "reason"),
+COUNTED = (
+    *("virtual_cameras", "seeing_px", "on_mirrors_px", "seeing_average_px"),
+    *("on_mirrors_average_px", "frame_filled", "rays_traced"),
 )
 SHOWN = (
     "virtual cameras: directions with z >= 0",
@@ -44,7 +45,7 @@ NOTES = (
 )
 BALANCE_NOTES = (
     "Balanced n: where virtual cameras : average pixels is the ratio, between whole n on a "
-    "straight line of the logarithms; whole_n is the n of the sweep that comes nearest to it.",
+    "straight line of the logarithms; nearest_n is the n of the sweep that comes nearest to it.",
     "Of the paper's Table II we know n = 18 for 2080 x 1552 at 1:1 only; other cells of paper_n "
     "are empty because they are not known to us.",
 )
@@ -139,65 +140,62 @@ def resolution(
         ns: subdivisions to try.
         sensors: in place of the design's.
         ratios: of virtual cameras to average pixels.
-        progress: told how far it has come.
+        progress: called with each step.
         scheduler: address of a Dask scheduler; None for this machine's cores.
     """
-    found = for_each_n(partial(_of, spec, sensors), ns, progress, scheduler)
-    swept = Table("resolution", COLUMNS, joined(row for rows in found for row in rows), NOTES)
-    balanced = Table(
-        "resolution-balance",
-        BALANCE,
-        joined(_balance_row(swept, s, r, k) for s in sensors for r in ratios for k in KINDS),
-        BALANCE_NOTES,
-    )
+    by_n = for_each_n(partial(_counts, spec, sensors), ns, progress, scheduler)
+    counts = Table.of_records("resolution", [row for rows in by_n for row in rows], NOTES)
+    balances = [_balance(counts, s, r, kind) for s in sensors for r in ratios for kind in KINDS]
+    balanced = Table.of_records("resolution-balance", balances, BALANCE_NOTES)
     progress("definitions")
     defined = definitions(spec)
-    summary = Table("resolution-summary", SUMMARY, _summary(balanced, defined))
-    panels = (_panel(swept, sensors), _balance_panel(balanced, ratios))
-    return Study("resolution", summary, (swept, balanced, defined), panels)
+    figures = (*_definition_figures(defined), *map(_balance_figure, balances))
+    panels = (_count_panel(counts, sensors), _balance_panel(balanced, ratios))
+    return Study("resolution", figures, (counts, balanced, defined), panels)
 
 
-def _of(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[tuple[Cell, ...]]:
-    return _rows(spec_with(spec, n=n), sensors)
-
-
-def _rows(spec: Spec, sensors: tuple[Sensor, ...]) -> list[tuple[Cell, ...]]:
+def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
     """One n: a row for every sensor, or what a refusal says."""
-    tried, n = try_design(spec), spec.optics.n
-    if tried.made is None:
-        return [(n, s.width_px, s.height_px, *[None] * 7, tried.reason) for s in sensors]
-    half, radius = tried.made.halves[0], spec.optics.capture_diameter_mm / 2
-    counted = count_pixels(half, sensors, radius)
+    attempt, radius = try_design(spec, optics={"n": n}), spec.optics.capture_diameter_mm / 2
+    heads: list[Record] = [{"n": n, **asdict(sensor)} for sensor in sensors]
+    if attempt.half is None:
+        return [{**head, **dict.fromkeys(COUNTED), "reason": attempt.reason} for head in heads]
+    cameras = virtual_cameras(attempt.half)
+    counts = count_pixels(attempt.half, sensors, radius)
     return [
-        (n, s.width_px, s.height_px, *_cells(half, one), "")
-        for s, one in zip(sensors, counted, strict=True)
+        {**head, **_counted(cameras, one), "reason": ""}
+        for head, one in zip(heads, counts, strict=True)
     ]
 
 
-def _cells(half: MirrorArray, counted: PixelCounts) -> tuple[Cell, ...]:
-    cameras = virtual_cameras(half)
+def _counted(cameras: int, counts: PixelCounts) -> Record:
     # Both cameras' pictures are mirror images, pixel by pixel.
-    seeing, on = (2 * float(x.sum()) for x in (counted.seen, counted.on))
-    return cameras, seeing, on, seeing / cameras, on / cameras, counted.fill, counted.rays
+    seeing, on = 2 * float(counts.seen.sum()), 2 * float(counts.on.sum())
+    figures = (cameras, seeing, on, seeing / cameras, on / cameras, counts.fill, counts.rays)
+    return dict(zip(COUNTED, figures, strict=True))
 
 
-def _of_sensor(swept: Table, sensor: Sensor) -> dict[str, Floats]:
-    mine = np.array(swept.numbers("width_px")) == sensor.width_px
-    mine &= np.array(swept.numbers("height_px")) == sensor.height_px
-    names = ("n", "virtual_cameras", *KINDS.values())
-    return {name: np.array(swept.numbers(name))[mine] for name in names}
+def _of_sensor(table: Table, sensor: Sensor) -> Table:
+    return table.where(**asdict(sensor))
 
 
-def _balance_row(swept: Table, sensor: Sensor, ratio: Ratio, kind: str) -> tuple[Cell, ...]:
-    at = _of_sensor(swept, sensor)
-    n, cameras, pixels = at["n"], at["virtual_cameras"], at[KINDS[kind]]
-    found = balance(n, cameras, pixels, ratio)
-    head = (sensor.width_px, sensor.height_px, str(ratio), kind)
-    paper = _paper_n(sensor, ratio)
-    if np.isnan(found.n):
-        return (*head, None, None, None, None, paper, "outside the sweep: change --from or --to")
-    k = found.nearest
-    return (*head, found.n, int(n[k]), int(cameras[k]), float(pixels[k]), paper, "")
+def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
+    counted = _of_sensor(counts, sensor)
+    cameras, pixels = counted.numbers("virtual_cameras"), counted.numbers(KINDS[kind])
+    found = balance(counted.numbers("n"), cameras, pixels, ratio)
+    inside = not np.isnan(found.n)
+    nearest = counted.records()[found.nearest]
+    return {
+        **asdict(sensor),
+        "ratio": str(ratio),
+        "pixels_counted": kind,
+        "balanced_n": found.n if inside else None,
+        "nearest_n": nearest["n"] if inside else None,
+        "virtual_cameras": nearest["virtual_cameras"] if inside else None,
+        "average_px": nearest[KINDS[kind]] if inside else None,
+        "paper_n": _paper_n(sensor, ratio),
+        "reason": "" if inside else "outside the sweep: change --from or --to",
+    }
 
 
 def _paper_n(sensor: Sensor, ratio: Ratio) -> int | None:
@@ -205,53 +203,45 @@ def _paper_n(sensor: Sensor, ratio: Ratio) -> int | None:
     return int(claimed("design_n")) if known else None
 
 
-def _summary(balanced: Table, defined: Table) -> tuple[tuple[Cell, ...], ...]:
-    """Readings of the design itself beside the paper's two figures, then the balanced n."""
-    one, other = claims()["virtual_cameras"], claims()["other_count"]
-    rows: list[tuple[Cell, ...]] = []
-    for row in defined.rows:
-        at = dict(zip(defined.columns, row, strict=True))
-        claim = one if at["radii"] == "any" else other
-        paper = None if at["paper"] is None else claim.value
-        name = f"{at['reading']}, n = {at['n']}"
-        if at["reading"] in SHOWN:
-            name += "" if at["radii"] == "any" else f", radii {at['radii']}"
-            rows.append((name, "", at["value"], paper, claim.where if paper else ""))
-    return (*rows, *(_balance_summary(row) for row in balanced.rows))
+def _definition_figures(defined: Table) -> list[Figure]:
+    """Definitions of the design itself beside the paper's two figures."""
+    figures = []
+    for record in defined.records():
+        of_cameras = record["radii"] == "any"
+        claim = claims()["virtual_cameras" if of_cameras else "other_count"]
+        paper = None if record["paper"] is None else claim.value
+        name = f"{record['definition']}, n = {record['n']}"
+        name += "" if of_cameras else f", radii {record['radii']}"
+        if record["definition"] in SHOWN:
+            figures.append(Figure(name, "", record["value"], paper, claim.where if paper else ""))
+    return figures
 
 
-def _balance_summary(row: tuple[Cell, ...]) -> tuple[Cell, ...]:
-    at = dict(zip(BALANCE, row, strict=True))
-    sensor, ratio, kind = f"{at['width_px']}x{at['height_px']}", at["ratio"], at["pixels_counted"]
-    name = f"balanced n at {ratio}, {sensor}, {kind}"
-    return (name, "", at["balanced_n"], at["paper_n"], "Table II")
+def _balance_figure(record: Record) -> Figure:
+    names = "balanced n at {ratio}, {width_px}x{height_px}, {pixels_counted}"
+    return Figure(names.format(**record), "", record["balanced_n"], record["paper_n"], "Table II")
 
 
-def _panel(swept: Table, sensors: tuple[Sensor, ...]) -> Panel:
-    at = [_of_sensor(swept, sensor) for sensor in sensors]
-    cameras = Series("virtual cameras", at[0]["n"], at[0]["virtual_cameras"], "k-")
-    series = [
-        Series(f"seeing pixels of one, {sensor}", one["n"], one["seeing_average_px"], f"C{k}.-")
-        for k, (sensor, one) in enumerate(zip(sensors, at, strict=True))
-    ]
+def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
+    first = _of_sensor(counts, sensors[0])
+    series = [Series("virtual cameras", first.numbers("n"), first.numbers("virtual_cameras"), "k-")]
+    for k, sensor in enumerate(sensors):
+        counted = _of_sensor(counts, sensor)
+        label = f"seeing pixels of one, {sensor}"
+        pixels = counted.numbers("seeing_average_px")
+        series.append(Series(label, counted.numbers("n"), pixels, f"C{k}.-"))
     n = np.array([claimed("design_n")] * 2)
     paper = np.array([claimed("virtual_cameras"), claimed("other_count")])
-    known = Series("the paper: 1657 and 1586 at n = 18", n, paper, "r+")
-    return Panel(
-        "Virtual cameras and pixels", "n", "number", (cameras, *series, known), logarithmic="xy"
-    )
+    series.append(Series("the paper: 1657 and 1586 at n = 18", n, paper, "r+"))
+    return Panel("Virtual cameras and pixels", "n", "number", tuple(series), logarithmic="xy")
 
 
 def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
-    pixels = np.array(balanced.numbers("width_px")) * np.array(balanced.numbers("height_px"))
-    n = np.array(balanced.numbers("balanced_n"))
-    kind, ratio = np.array(balanced.column("pixels_counted")), np.array(balanced.column("ratio"))
-    series = [
-        Series(f"{each}, {name}", pixels[mine] / 1e6, n[mine], f"C{k}{style}")
-        for k, each in enumerate(ratios)
-        for name, style in (("seeing", "o-"), ("on mirrors", "x--"))
-        for mine in [(kind == name) & (ratio == str(each))]
-    ]
-    known = np.array(balanced.numbers("paper_n"))
-    series.append(Series("the paper", pixels / 1e6, known, "r+"))
+    series = []
+    for k, ratio in enumerate(ratios):
+        for kind, style in (("seeing", "o-"), ("on mirrors", "x--")):
+            rows = balanced.where(ratio=str(ratio), pixels_counted=kind)
+            label, n = f"{ratio}, {kind}", rows.numbers("balanced_n")
+            series.append(Series(label, megapixels(rows), n, f"C{k}{style}"))
+    series.append(Series("the paper", megapixels(balanced), balanced.numbers("paper_n"), "r+"))
     return Panel("Balanced n", "megapixels", "n", tuple(series), logarithmic="x")

@@ -2,14 +2,33 @@
 
 import errno
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
-from tbcad.errors import InputError
+from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.simulate.study.plots import Panel, plot_png
-from tbcad.simulate.study.tables import Table, csv_text
+from tbcad.simulate.study.tables import Cell, Table, csv_text
+
+SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure that a study measured, beside the paper's.
+
+    Attributes:
+        quantity: what it is.
+        unit: "" for numbers without one.
+        value: as measured; None where there is none.
+        paper: as the paper states it; None where it does not.
+        where: place in the paper.
+    """
+
+    quantity: str
+    unit: str
+    value: Cell
+    paper: Cell = None
+    where: str = ""
 
 
 @dataclass(frozen=True)
@@ -17,17 +36,24 @@ class Study:
     """A study's findings.
 
     Attributes:
-        name: of its plot.
-        summary: tbcad's figures beside the paper's, with columns `tables.SUMMARY`; its name is
-            that of the study with "-summary".
+        name: of its files.
+        figures: the most important ones, beside the paper's.
         tables: all figures.
         panels: of the plot.
+        notes: what the figures mean, besides the notes of the tables.
     """
 
     name: str
-    summary: Table
+    figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
     panels: tuple[Panel, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> Table:
+        """The figures as a table."""
+        rows = tuple(astuple(figure) for figure in self.figures)
+        return Table(f"{self.name}-summary", SUMMARY_COLUMNS, rows, self.notes)
 
 
 def check_study_folder(out: Path) -> None:
@@ -36,30 +62,24 @@ def check_study_folder(out: Path) -> None:
     Raises:
         InputError: they cannot.
     """
-    with _in_words(out):
-        whole = out.absolute()
-        there = next(folder for folder in (whole, *whole.parents) if folder.exists())
-        if not there.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, f"{there} is a file")
-        if not os.access(there, os.W_OK | os.X_OK):
+    with write_errors_as_input_errors(out):
+        absolute = out.absolute()
+        existing = next(folder for folder in (absolute, *absolute.parents) if folder.exists())
+        if not existing.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{existing} is a file")
+        if not os.access(existing, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, "no right to write there")
 
 
-def write_study(study: Study, out: Path, more: Mapping[str, bytes] | None = None) -> list[Path]:
+def write_study(study: Study, out: Path, more: dict[str, bytes] | None = None) -> list[Path]:
     """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
-
-    All are written in full before the first takes its name.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    contents = study_files(study) | dict(more or {})
-    with _in_words(out), ExitStack() as undo:
+    with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-        new = [(_beside(out / name, data, undo), out / name) for name, data in contents.items()]
-        for temporary, path in new:
-            os.replace(temporary, path)
-    return [path for _, path in new]
+    return replace_files(out, study_files(study) | (more or {}))
 
 
 def study_files(study: Study) -> dict[str, bytes]:
@@ -70,25 +90,3 @@ def study_files(study: Study) -> dict[str, bytes]:
     files[f"{study.name}-notes.txt"] = "".join(f"{note}\n" for note in notes).encode()
     files[f"{study.name}.png"] = plot_png(study.panels)
     return files
-
-
-def _beside(path: Path, data: bytes, undo: ExitStack) -> Path:
-    """A new file beside the one it is to replace; it is removed when it does not."""
-    new = path.with_name(f".tbcad-{path.name}-{os.getpid()}.new")
-    undo.callback(_removed, new)
-    new.write_bytes(data)
-    return new
-
-
-def _removed(path: Path) -> None:
-    with suppress(FileNotFoundError):
-        path.unlink()
-
-
-@contextmanager
-def _in_words(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{out} cannot be written: {reason}: name another folder") from error

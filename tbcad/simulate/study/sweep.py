@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.schedule import run
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
@@ -21,33 +21,31 @@ class DesignAttempt:
     """A design, or why there is none.
 
     Attributes:
-        made: the design; None where it was refused.
+        design: None where the spec was refused.
         reason: what the refusal says, else "".
     """
 
-    made: MirrorDesign | None
+    design: MirrorDesign | None
     reason: str = ""
 
+    @property
+    def half(self) -> MirrorArray | None:
+        """Camera a with its mirrors."""
+        return self.design.halves[0] if self.design else None
 
-def try_design(spec: Spec) -> DesignAttempt:
-    """The design of a spec, or why there is none: a study goes on without it."""
+
+def try_design(spec: Spec, **sections: dict[str, object]) -> DesignAttempt:
+    """The design of a spec with other values of some keys, or why there is none."""
     try:
-        return DesignAttempt(design(spec))
+        return DesignAttempt(design(spec_with(spec, **sections)))
     except SpecError as error:
         return DesignAttempt(None, str(error))
 
 
-def spec_with(
-    spec: Spec, n: int | None = None, rule: str | None = None, margin_mm: float | None = None
-) -> Spec:
-    """The spec with another subdivision, radius rule or margin."""
-    optics = _with(spec.optics, n=n)
-    mirrors = _with(spec.mirrors, radius_rule=rule, margin_mm=margin_mm)
-    return spec.model_copy(update={"optics": optics, "mirrors": mirrors})
-
-
-def _with(section: Any, **keys: object) -> Any:
-    return section.model_copy(update={k: v for k, v in keys.items() if v is not None})
+def spec_with(spec: Spec, **sections: dict[str, object]) -> Spec:
+    """The spec with other values of some keys, by section; they are not checked."""
+    changed = {name: getattr(spec, name).model_copy(update=keys) for name, keys in sections.items()}
+    return spec.model_copy(update=changed)
 
 
 def n_range(first: int, last: int) -> range:

@@ -20,7 +20,7 @@ MAX_AZIMUTHS = 360
 
 @dataclass(frozen=True)
 class Viewpoints:
-    """Viewpoints at some elevations, evenly all round at each.
+    """Viewpoints at some elevations, evenly around the object at each.
 
     Attributes:
         elevation_deg: of each viewpoint, (v,).
@@ -32,7 +32,7 @@ class Viewpoints:
     azimuth_deg: Floats
     distance_mm: float
 
-    def views(self, capture_mm: float) -> list[Camera]:
+    def cameras(self, capture_mm: float) -> list[Camera]:
         """The cameras, 640 x 480, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
         return [
@@ -44,7 +44,7 @@ class Viewpoints:
 def viewpoints_around(
     elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float
 ) -> Viewpoints:
-    """Viewpoints at elevations, so many evenly all round at each.
+    """Viewpoints at some elevations, and at each so many azimuths evenly around the object.
 
     Raises:
         InputError: there are none or too many.
@@ -53,25 +53,25 @@ def viewpoints_around(
         raise InputError(
             f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints all round"
         )
-    turns = np.arange(azimuths) * 360.0 / azimuths
-    elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, turns, indexing="ij"))
+    around = np.arange(azimuths) * 360.0 / azimuths
+    elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, around, indexing="ij"))
     return Viewpoints(elevation, azimuth, distance_mm)
 
 
 def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
     """What a real camera would see from each viewpoint, (h, w, 3)."""
-    pictures = []
+    truths = []
     for k, view in enumerate(views):
         progress(f"truth {k + 1} of {len(views)}")
-        pictures.append(to_bytes(pinhole_picture(scene, view)))
-    return pictures
+        truths.append(to_bytes(pinhole_picture(scene, view)))
+    return truths
 
 
 def view_quality(
     tiles: MirrorTiles,
     scene: Scene,
     views: list[Camera],
-    pictures: list[Bytes],
+    truths: list[Bytes],
     method: Method,
     progress: Progress,
 ) -> Floats:
@@ -81,14 +81,14 @@ def view_quality(
         tiles: the light field.
         scene: the object, whose depth a blend takes.
         views: the viewpoints, v of them.
-        pictures: the truth at each.
+        truths: the ground truth at each.
         method: how the views are made.
-        progress: told how far it has come.
+        progress: called with each step.
     """
     depth = depth_along_rays(scene) if method == "blend" else None
-    found = []
-    for k, (view, truth) in enumerate(zip(views, pictures, strict=True)):
+    qualities = []
+    for k, (view, truth) in enumerate(zip(views, truths, strict=True)):
         progress(f"view {k + 1} of {len(views)}")
-        alike = image_quality(truth, synthesise(tiles, view, method, depth).image)
-        found.append((alike.psnr_db, alike.ssim))
-    return np.array(found)
+        quality = image_quality(truth, synthesise(tiles, view, method, depth).image)
+        qualities.append((quality.psnr_db, quality.ssim))
+    return np.array(qualities)

@@ -20,10 +20,16 @@ from tbcad.simulate.study.elevation import correlation, elevation
 from tbcad.simulate.study.paper import claims
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.plots import Panel, Series, plot_png
-from tbcad.simulate.study.resolution import Ratio, resolution
-from tbcad.simulate.study.study import Study, check_study_folder, study_files, write_study
+from tbcad.simulate.study.resolution import COUNTED, Ratio, resolution
+from tbcad.simulate.study.study import (
+    SUMMARY_COLUMNS,
+    Study,
+    check_study_folder,
+    study_files,
+    write_study,
+)
 from tbcad.simulate.study.sweep import n_range
-from tbcad.simulate.study.tables import SUMMARY, Table, csv_text
+from tbcad.simulate.study.tables import Table, csv_text
 from tbcad.spec.load import load_spec
 
 SMALL = ("n=4", "width_px=208", "height_px=155")
@@ -36,33 +42,26 @@ def small_resolution() -> Study:
     return resolution(load_spec(None, SMALL), range(3, 8), sensors, ratios)
 
 
-def row_of(table: Table, column: str, value: object) -> dict[str, object]:
-    place = table.column(column).index(value)
-    return dict(zip(table.columns, table.rows[place], strict=True))
-
-
 def test_resolution_finds_what_its_rows_say() -> None:
     study = small_resolution()
     swept, balanced, defined = study.tables
     assert len(swept.rows) == 10
-    for row in swept.rows:
-        at = dict(zip(swept.columns, row, strict=True))
+    for at in swept.records():
         assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
         assert at["seeing_average_px"] == at["seeing_px"] / at["virtual_cameras"]
         assert at["seeing_px"] < at["on_mirrors_px"] < 2 * at["width_px"] * at["height_px"]
-    for row in balanced.rows:
-        at = dict(zip(balanced.columns, row, strict=True))
+    for at in balanced.records():
         if at["balanced_n"] is None:
             assert "--from" in at["reason"]
             continue
         aim = {"1:1": 1, "1:4": 0.25}[at["ratio"]]
-        found = [r for r in swept.rows if r[1] == at["width_px"]]
-        column = {"seeing": 6, "on mirrors": 7}[at["pixels_counted"]]
-        above = [r[0] for r in found if r[3] / r[column] > aim]
-        below = [r[0] for r in found if r[3] / r[column] < aim]
+        found = swept.where(width_px=at["width_px"])
+        column = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
+        actual = found.numbers("virtual_cameras") / found.numbers(column[at["pixels_counted"]])
+        above, below = (found.numbers("n")[side] for side in (actual > aim, actual < aim))
         assert max(below) < at["balanced_n"] < min(above)
-    assert any(row[4] is not None for row in balanced.rows)
-    zenith = row_of(defined, "reading", "directions with z > 0")
+    assert np.isfinite(balanced.numbers("balanced_n")).any()
+    (zenith,) = defined.where(definition="directions with z > 0").records()
     assert zenith["value"] == 5 * 16 - 2 * 4 + 1
     assert zenith["paper"] is None  # the paper's figures are of n = 18
 
@@ -79,28 +78,29 @@ def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPa
 
 def test_capture_area_has_the_paper_beside_it() -> None:
     table = (study := capture_area(load_spec(None), range(2, 6))).tables[0]
-    at = row_of(table, "n", 4)
+    (at,) = table.where(n=4).records()
     assert at["paper_claim_flat_mm"] == 21.2
-    assert at["flat_closed_mm"] == pytest.approx(21.0, abs=0.01)  # measured before: 21.0
+    assert at["flat_closed_form_mm"] == pytest.approx(21.0, abs=0.01)  # measured before: 21.0
     half = design(load_spec(None, ["n=4", "radius_rule=paper"])).halves[0]
-    assert at["paper_least_mm"] == half.coverage.min()
-    assert at["paper_short"] == (half.coverage < 59.9994).sum() > 0
-    assert at["traced_least_mm"] > 60.59
-    assert at["traced_short"] == 0
+    assert at["paper_minimum_mm"] == half.coverage.min()
+    assert at["paper_mirrors_short"] == (half.coverage < 59.9994).sum() > 0
+    assert at["traced_minimum_mm"] > 60.59
+    assert at["traced_mirrors_short"] == 0
     assert table.column("paper_claim_flat_mm") == [None, None, 21.2, None]
-    assert study.summary.columns == SUMMARY
-    assert study.summary.rows[0][2:4] == (at["flat_closed_mm"], 21.2)
+    assert study.summary.columns == SUMMARY_COLUMNS
+    assert (study.figures[0].value, study.figures[0].paper) == (at["flat_closed_form_mm"], 21.2)
 
 
 def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(radii, "MAX_ITERATIONS", 2)  # else the search takes ten seconds
     spec = load_spec(None, HOPELESS)
-    at = row_of(capture_area(spec, range(9, 10)).tables[0], "n", 9)
-    assert at["traced_least_mm"] is None
+    (at,) = capture_area(spec, range(9, 10)).tables[0].records()
+    assert at["traced_minimum_mm"] is None
     assert "no radius gives" in str(at["traced_reason"])
     study = resolution(spec, range(9, 10), (Sensor(208, 155),), (Ratio(1, 1),))
-    assert study.tables[0].rows[0][3:10] == (None,) * 7
-    assert "no radius gives" in str(study.tables[0].rows[0][10])
+    (at,) = study.tables[0].records()
+    assert [at[name] for name in COUNTED] == [None] * 7
+    assert "no radius gives" in str(at["reason"])
     assert len(study_files(study)) == 6
 
 
@@ -113,9 +113,8 @@ def test_elevation_of_the_paper_design() -> None:
     assert min(radius) == pytest.approx(8.00, abs=0.005)
     assert max(radius) == pytest.approx(65.4, abs=0.06)
     assert (polar.min(), polar.max()) == (pytest.approx(45), pytest.approx(135))
-    for rule, of, angle, value, _ in correlated.rows:
-        if of == "log radius":
-            assert (abs(value) > 0.97) == (angle == "polar angle"), rule
+    for row in correlated.where(of="log radius").records():
+        assert (abs(row["correlation"]) > 0.97) == (row["with"] == "polar angle"), row["radii"]
 
 
 def test_correlation_is_pearsons() -> None:
@@ -127,22 +126,21 @@ def test_correlation_is_pearsons() -> None:
 def test_elevation_of_few_mirrors() -> None:
     study = elevation(load_spec(None, ["n=1"]))
     assert len(study.tables[0].rows) == 5
-    assert all(math.isfinite(row[3]) for row in study.tables[1].rows)
+    assert np.isfinite(study.tables[1].numbers("correlation")).all()
 
 
 def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
     study = depth_of_field(load_spec(None, ["n=4"]), LensOptions())
-    flat = row_of(study.summary, "quantity", "camera to farthest image, flat radii")
+    (flat,) = study.summary.where(quantity="camera to farthest image, flat radii").records()
     assert flat["tbcad"] == pytest.approx(2 * math.sqrt(15000) + 30, rel=1e-12)
     assert (flat["paper"], flat["where"]) == (250, "section 6")
-    stops = study.tables[1]
-    paper = [row for row in stops.rows if row[0] == "the paper's distances" and row[5] != "x"]
-    assert [row[1:4] for row in paper] == [(150, 250, pytest.approx(187.5))] * 3
+    paper = study.tables[1].where(range="the paper's distances")
+    assert [row[1:4] for row in paper.rows] == [(150, 250, pytest.approx(187.5))] * 3
     # Closed form: with 2080 pixels across 89 degrees a pixel is 2 tan(44.5 deg) / 2080 wide at
     # unit distance, and pupil = 2 pixel / (1/150 - 1/250).
-    limited = next(row for row in paper if row[5] == "blur limited")
+    (limited,) = paper.where(stop="blur limited").records()
     width = 2 * math.tan(math.radians(44.5)) / 2080
-    assert limited[6] == pytest.approx(2 * width / (1 / 150 - 1 / 250), rel=1e-12)
+    assert limited["pupil_mm"] == pytest.approx(2 * width / (1 / 150 - 1 / 250), rel=1e-12)
 
 
 def test_csv_keeps_every_digit() -> None:
@@ -180,7 +178,7 @@ def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
     (tmp_path / "elevation.png").mkdir()
     with pytest.raises(InputError, match="cannot be written"):
         write_study(study, tmp_path)
-    assert not [path for path in tmp_path.iterdir() if path.name.endswith(".new")]
+    assert not list(tmp_path.glob(".tbcad-*"))
 
 
 def test_folder_that_cannot_be(tmp_path: Path) -> None:

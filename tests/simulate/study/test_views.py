@@ -12,8 +12,8 @@ from tbcad.mirrors.array import design
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.prototype_vs_shell import paired_difference, prototype_vs_shell
-from tbcad.simulate.study.ssim import SensorCase, sensor_cases, ssim
+from tbcad.simulate.study.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
+from tbcad.simulate.study.ssim import proportionate_n, ssim
 from tbcad.simulate.study.study import Study, study_files
 from tbcad.simulate.study.viewpoints import viewpoints_around
 from tbcad.spec.errors import SpecError
@@ -29,13 +29,9 @@ def quiet(_: str) -> None:
 
 def test_every_sensor_has_its_own_n() -> None:
     """Four times the sides: sixteen times the pixels, twice the n (designs/sensor-10mp.toml)."""
-    found = sensor_cases(
-        load_spec(None), (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
-    )
-    assert [case.n for case in found] == [18, 36, 24]
-    assert sensor_cases(load_spec(None, SMALL), (Sensor(16, 16),)) == (
-        SensorCase(Sensor(16, 16), 2),
-    )
+    sensors = (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
+    assert [proportionate_n(load_spec(None), sensor) for sensor in sensors] == [18, 36, 24]
+    assert proportionate_n(load_spec(None, SMALL), Sensor(16, 16)) == 2
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +42,7 @@ def study() -> Study:
 
 def test_more_pixels_make_better_views(study: Study) -> None:
     means = study.tables[1]
-    every = [row[6] for row in means.rows if row[3] == "all"]
+    every = means.where(elevation_deg="all").numbers("ssim")
     assert len(every) == 3
     assert every[0] < every[1] < every[2] < 1
 
@@ -54,22 +50,21 @@ def test_more_pixels_make_better_views(study: Study) -> None:
 def test_means_are_those_of_the_views(study: Study) -> None:
     views, means = study.tables[:2]
     assert len(views.rows) == 3 * 4
-    mine = [row for row in views.rows if row[0] == 416 and row[3] == 60.0]
-    (mean,) = [row for row in means.rows if row[0] == 416 and row[3] == 60.0]
-    assert mean[4] == len(mine) == 2
-    assert mean[6] == pytest.approx(np.mean([row[6] for row in mine]))
+    mine = views.where(width_px=416, elevation_deg=60.0).numbers("ssim")
+    (mean,) = means.where(width_px=416, elevation_deg=60.0).records()
+    assert mean["views"] == len(mine) == 2
+    assert mean["ssim"] == pytest.approx(np.mean(mine))
 
 
 def test_fit_is_that_of_the_means(study: Study) -> None:
     means, fits = study.tables[1:]
-    rows = [row for row in means.rows if row[3] == "all"]
-    x = np.log10([row[0] * row[1] for row in rows])
-    y = np.array([row[6] for row in rows])
+    rows = means.where(elevation_deg="all")
+    x, y = np.log10(rows.numbers("width_px") * rows.numbers("height_px")), rows.numbers("ssim")
     slope, intercept = np.polyfit(x, y, 1)
-    (fit,) = [row for row in fits.rows if row[0] == "all"]
-    assert fit[2:4] == pytest.approx((slope, intercept))
+    (fit,) = fits.where(elevation_deg="all").records()
+    assert (fit["slope"], fit["intercept"]) == pytest.approx((slope, intercept))
     rest = y - slope * x - intercept
-    assert fit[4] == pytest.approx(1 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
+    assert fit["r2"] == pytest.approx(1 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
 
 
 def test_the_same_study_gives_the_same_files(study: Study) -> None:
@@ -85,19 +80,21 @@ def test_a_sensor_whose_mirrors_cannot_be_made_has_a_reason() -> None:
     with pytest.raises(SpecError) as refusal:
         design(spec)
     found = ssim(spec, built_in_object(36.0), SENSORS[:1], places, "nearest", quiet)
-    assert [row[-1] for row in found.tables[0].rows] == [str(refusal.value)]
-    assert found.summary.rows == ()
+    assert found.tables[0].column("reason") == [str(refusal.value)]
+    assert found.figures == ()
 
 
 def test_paired_interval_is_students() -> None:
     rng = np.random.default_rng(3)
     one = rng.normal(0.9, 0.05, 20)
     other = one + rng.normal(0.01, 0.01, 20)
-    found = paired_difference(one, other)
-    low, high = ttest_rel(other, one).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((low, high))
-    assert found.significant == bool(ttest_rel(other, one).pvalue < 0.05)
-    assert not paired_difference(one, one[::-1]).significant
+    interval = mean_difference_interval(one, other)
+    difference = other - one
+    half = 2.093024 * difference.std(ddof=1) / np.sqrt(20)  # t at 97.5 %, 19 degrees of freedom
+    assert interval == pytest.approx((difference.mean() - half, difference.mean() + half))
+    low, high = mean_difference_interval(one, one[::-1])
+    assert low < 0 < high
+    assert mean_difference_interval(one[:1], other[:1]) == (-np.inf, np.inf)
 
 
 def test_prototype_against_the_shell(written: Path) -> None:
@@ -105,19 +102,25 @@ def test_prototype_against_the_shell(written: Path) -> None:
     export = read_export(written)
     places = viewpoints_around((20.0, 60.0), 2, 640.0)
     found = prototype_vs_shell(export, built_in_object(60.0), places, "nearest", 2)
-    rows = {row[0]: row[2] for row in found.summary.rows}
+    rows = {figure.quantity: figure.value for figure in found.figures}
     shell, balls = (rows[f"mean SSIM of the {name}'s views"] for name in ("shell", "prototype"))
     assert 0.5 < balls < shell < 1
     assert rows["difference"] == pytest.approx(balls - shell)
     (table,) = found.tables
     assert len(table.rows) == 4
-    assert [row[6] for row in table.rows] == pytest.approx([row[5] - row[4] for row in table.rows])
+    ssim_of = {name: table.numbers(f"{name}_ssim") for name in ("shell", "prototype")}
+    assert table.numbers("ssim_difference") == pytest.approx(
+        ssim_of["prototype"] - ssim_of["shell"]
+    )
+    significant = ttest_rel(*ssim_of.values()).pvalue < 0.05
+    verdict = "significant" if significant else "not significant"
+    assert rows["at 95 % the difference is"] == verdict
 
 
 def test_viewpoints_all_round() -> None:
     places = viewpoints_around((0.0, 45.0), 4, 500.0)
     assert places.azimuth_deg.tolist() == [0, 90, 180, 270] * 2
-    at = np.array([view.pinhole for view in places.views(60.0)])
+    at = np.array([view.pinhole for view in places.cameras(60.0)])
     assert np.linalg.norm(at, axis=1) == pytest.approx(np.full(8, 500.0))
     assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
     with pytest.raises(InputError, match="--azimuths 0"):

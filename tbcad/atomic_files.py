@@ -1,0 +1,40 @@
+"""Files that are replaced together: all are written in full before the first takes its name."""
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from tbcad.errors import InputError
+
+
+def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
+    """Write files into a folder that exists, each replaced as a whole; others are left alone.
+
+    Args:
+        folder: where.
+        contents: of each file, by its name.
+
+    Returns:
+        The paths of the files.
+
+    Raises:
+        InputError: the folder cannot be written; no temporary file is left in it.
+    """
+    with (
+        write_errors_as_input_errors(folder),
+        tempfile.TemporaryDirectory(dir=folder, prefix=".tbcad-") as temporary,
+    ):
+        for name, data in contents.items():
+            Path(temporary, name).write_bytes(data)
+        return [Path(temporary, name).replace(folder / name) for name in contents]
+
+
+@contextmanager
+def write_errors_as_input_errors(folder: Path) -> Iterator[None]:
+    """Raise errors of the file system as an InputError that names the folder."""
+    try:
+        yield
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{folder} cannot be written: {reason}: choose another folder") from error
