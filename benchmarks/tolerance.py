@@ -29,8 +29,8 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage
-from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
+from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, edge_model
 
 COUNTS = (100, 300, 1000)
 MESHED = 10
@@ -48,7 +48,7 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
         meshed: machines that are meshed, once.
     """
     made = design(load_spec(None))
-    a, b = (nominal(at) for at in reflectors(made))
+    a, b = (edge_model(at) for at in reflectors(made))
     task = MonteCarloCase((a, b), ERRORS, SEED)
     fast = in_turns([partial(simulate, task, count) for count in COUNTS], rounds)
     each = [
@@ -74,7 +74,7 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
 
 def _meshes(
     made: MirrorDesign,
-    draws: tuple[Draws, Draws],
+    draws: tuple[ShellDraws, ShellDraws],
     folder: Path,
     halves: tuple[EdgeModel, EdgeModel],
 ) -> tuple[float, float]:
@@ -93,7 +93,7 @@ def _meshes(
     return seconds / count, float(np.abs(found - coverage(halves, draws)[0]).max())
 
 
-def _write(made: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
+def _write(made: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path) -> None:
     """Mesh both shells of a machine, as the exporter does."""
     first, body = made.halves[0], shell_envelope(made)
     for half, drawn in zip(made.halves, draws, strict=True):
@@ -104,7 +104,7 @@ def _write(made: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path)
         write_stl(folder / f"shell_{half.camera_id}.stl", facets)
 
 
-def _cells(half: MirrorArray, draws: Draws, k: int) -> Cells:
+def _cells(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     every, m, radius = half.cells.surfaces, len(half), draws.radius[k]
     apex = half.mirrors.apex + draws.centre[k] + radius[:, None] * half.mirrors.normal
     curvature = half.mirrors.curvature / (1 + radius * half.mirrors.curvature)

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.object import SceneObject
-    from tbcad.tolerance.analysis import Analysis
-    from tbcad.tolerance.analysis import Options as AnalysisOptions
+    from tbcad.tolerance.analysis import Analysis, ToleranceOptions
 
 Settings = Mapping[str, str] | Sequence[str]
 
@@ -184,13 +183,13 @@ def build(
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    from tbcad.output.folder import check_target
+    from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import default_parts
 
     chosen = _spec(spec, None, ())
     asked = tuple(parts) if parts is not None else default_parts(chosen)
     folder = Path(out)
-    check_target(folder, force)
+    check_replaceable(folder, force)
     return _built(chosen, folder, asked, verify, force, progress, detail)
 
 
@@ -204,13 +203,13 @@ def _built(
     detail: Progress,
 ) -> Build:
     """The stages of a build; the files are read back before they replace the old ones."""
-    from tbcad.output.build import export
+    from tbcad.output.build import write_export
     from tbcad.output.folder import replacing
 
     progress("mirrors: radii and cells")
     mirrors = design(spec, detail=detail)
     with replacing(out, force) as folder:
-        export(mirrors, folder, parts, progress)
+        write_export(mirrors, folder, parts, progress)
         report = verify(folder, progress=progress) if verified else None
     return Build(out, mirrors, parts, report)
 
@@ -361,7 +360,7 @@ def analyse(
     object_file: Path | str | None = None,
     *,
     settings: Settings = (),
-    options: "AnalysisOptions | None" = None,
+    options: "ToleranceOptions | None" = None,
     progress: Progress = silent,
     detail: Progress = silent,
 ) -> "Analysis":
@@ -381,11 +380,11 @@ def analyse(
     """
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
-    from tbcad.tolerance.analysis import Options
+    from tbcad.tolerance.analysis import ToleranceOptions
     from tbcad.tolerance.analysis import analyse as analyse_export
     from tbcad.tolerance.process.process import load_process
 
-    asked = (options or Options()).checked()
+    asked = options or ToleranceOptions()
     made_by = load_process(process, list(_texts(settings)))
     progress("record of the export")
     export = read_export(Path(exports))

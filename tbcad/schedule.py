@@ -40,7 +40,7 @@ _CONCERNED = ("numpy", "scipy", "numba")  # packages whose version may change a 
 _ASK = "__import__('tbcad.schedule', fromlist=['versions']).versions()"
 
 
-def nothing(_: object) -> None:
+def ignore_progress(_: object) -> None:
     """Tell nobody."""
 
 
@@ -51,11 +51,11 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def run(
+def run_units(
     work: Callable[[Unit], Result],
     units: Sequence[Unit],
     scheduler: str | None = None,
-    progress: Callable[[Unit], None] = nothing,
+    progress: Callable[[Unit], None] = ignore_progress,
     workers: int | None = None,
     patience: float = PATIENCE,
 ) -> list[Result]:

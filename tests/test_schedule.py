@@ -22,7 +22,7 @@ import pytest
 import tbcad
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.schedule import cores, run, versions
+from tbcad.schedule import cores, run_units, versions
 
 HOST = "127.0.0.1"
 Environment = dict[str, str]
@@ -35,7 +35,7 @@ def drawn(unit: int) -> float:
 
 def refusal(*arguments: object, **options: object) -> str:
     with pytest.raises(InputError) as error:
-        run(*arguments, **options)  # type: ignore[arg-type]
+        run_units(*arguments, **options)  # type: ignore[arg-type]
     text = str(error.value)
     assert text.isprintable()
     assert text.startswith("--scheduler ")
@@ -49,18 +49,18 @@ class TestThreads:
             time.sleep(0.01 * (unit % 3))  # later units overtake
             return drawn(unit)
 
-        assert run(work, range(20), workers=workers) == [drawn(unit) for unit in range(20)]
+        assert run_units(work, range(20), workers=workers) == [drawn(unit) for unit in range(20)]
 
     def test_no_units(self) -> None:
-        assert run(drawn, []) == []
+        assert run_units(drawn, []) == []
 
     def test_as_many_as_cores_work_at_once(self) -> None:
         together = threading.Barrier(cores(), timeout=10)
-        run(lambda _: together.wait(), range(cores()))
+        run_units(lambda _: together.wait(), range(cores()))
 
     def test_progress_is_told_of_each_in_this_thread(self) -> None:
         told = []
-        run(drawn, range(9), progress=lambda unit: told.append((unit, threading.get_ident())))
+        run_units(drawn, range(9), progress=lambda unit: told.append((unit, threading.get_ident())))
         assert sorted(told) == [(unit, threading.get_ident()) for unit in range(9)]
 
     def test_what_work_raises_ends_it(self) -> None:
@@ -71,7 +71,7 @@ class TestThreads:
             raise KeyError(unit)
 
         with pytest.raises(KeyError):
-            run(work, range(1000), workers=1)
+            run_units(work, range(1000), workers=1)
         assert len(begun) < 1000
 
     def test_an_interruption_ends_it(self) -> None:
@@ -85,7 +85,7 @@ class TestThreads:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            run(work, range(1000), progress=interrupted, workers=2)
+            run_units(work, range(1000), progress=interrupted, workers=2)
         assert len(begun) < 100
 
 
@@ -215,7 +215,7 @@ class Marks:
 class TestCluster:
     def test_gives_what_threads_give(self, standing: Cluster, tmp_path: Path) -> None:
         marks, told = Marks(tmp_path / "marks"), []
-        got = run(marks.work(0.05), range(20), standing.address, told.append)
+        got = run_units(marks.work(0.05), range(20), standing.address, told.append)
         assert got == [drawn(unit) for unit in range(20)]
         assert sorted(told) == list(range(20))
         assert all(marks.of("ended", worker.pid) for worker in standing.workers)
@@ -233,7 +233,7 @@ class TestCluster:
                 os.kill(victim, signal.SIGKILL)
                 cut.extend(set(marks.of("begun", victim)) - set(marks.of("ended", victim)))
 
-        got = run(marks.work(0.15), range(24), cluster.address, kill)
+        got = run_units(marks.work(0.15), range(24), cluster.address, kill)
         assert got == [drawn(unit) for unit in range(24)]
         assert len(cut) == 1
         assert cluster.workers[0].wait(5) == -signal.SIGKILL
@@ -248,7 +248,7 @@ class TestCluster:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            run(marks.work(0.1), range(1000), standing.address, interrupted)
+            run_units(marks.work(0.1), range(1000), standing.address, interrupted)
         until(lambda: marks.of("begun") == marks.of("ended"))
         begun = len(marks.of("begun"))
         time.sleep(0.5)
@@ -261,13 +261,13 @@ class TestCluster:
             raise InputError(f"unit {unit}: not allowed")
 
         with pytest.raises(InputError, match=r"^unit 3: not allowed$"):
-            run(work, [3], standing.address)
+            run_units(work, [3], standing.address)
 
         def missing(unit: int) -> None:
             raise FileNotFoundError(unit)  # no lost connection, though both are OSError
 
         with pytest.raises(FileNotFoundError, match="3"):
-            run(missing, [3], standing.address)
+            run_units(missing, [3], standing.address)
 
     def test_what_fails_once_is_tried_again(self, standing: Cluster, tmp_path: Path) -> None:
         mark = str(tmp_path / "mark")
@@ -280,13 +280,13 @@ class TestCluster:
                 raise MemoryError
             return unit
 
-        assert run(work, [5], standing.address) == [5]
+        assert run_units(work, [5], standing.address) == [5]
 
     def test_the_logs_level_is_given_back(self, standing: Cluster) -> None:
         import logging
 
         level = logging.getLogger("distributed").level
-        run(drawn_there(), [1], standing.address)
+        run_units(drawn_there(), [1], standing.address)
         assert logging.getLogger("distributed").level == level
 
 

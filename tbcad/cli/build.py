@@ -83,7 +83,7 @@ def build(
     input, nothing written.
     """
     from tbcad.api import build as build_files
-    from tbcad.output.folder import check_target
+    from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
@@ -93,7 +93,7 @@ def build(
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
     chosen = asked or default_parts(spec)
-    check_target(out, force)
+    check_replaceable(out, force)
     with stages(BUILD_STAGES[chosen] + VERIFY_STAGES * verify + bool(for_process)) as screen:
         if for_process is not None:
             spec = _with_margin(spec, for_process, share, screen)
@@ -118,10 +118,10 @@ def build(
 
 def _with_margin(spec: "Spec", process: str, share: float, screen: Stages) -> "Spec":
     from tbcad.tolerance.process.process import load_process
-    from tbcad.tolerance.process_design import for_process
+    from tbcad.tolerance.process_design import spec_for_process
 
     screen.stage(f"margin for {process}")
-    return for_process(spec, load_process(process), share, screen.detail)
+    return spec_for_process(spec, load_process(process), share, screen.detail)
 
 
 @app.command("verify")

@@ -73,10 +73,10 @@ def capture(
     and mirror of every pixel.
     """
     from tbcad.api import photograph, write_photographs
-    from tbcad.output.folder import check_target
+    from tbcad.output.folder import check_replaceable
 
     geometry = _geometry(mesh, prototype)
-    check_target(out, force)
+    check_replaceable(out, force)
     with stages(3) as screen:
         taken = photograph(
             folder, object_file, geometry, fit, paint.value, samples, screen.stage, screen.detail

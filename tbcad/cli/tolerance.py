@@ -47,10 +47,10 @@ def tolerance(
     """
     from tbcad.api import analyse
     from tbcad.simulate.study.study import check_study_folder, write_study
-    from tbcad.tolerance.analysis import Options
-    from tbcad.tolerance.report import json_text, study, summary_text
+    from tbcad.tolerance.analysis import ToleranceOptions
+    from tbcad.tolerance.report import json_text, summary_text, tolerance_study
 
-    options = Options(builds, seed, share, calibrated_mrad / 1000, scheduler).checked()
+    options = ToleranceOptions(builds, seed, share, calibrated_mrad / 1000, scheduler)
     check_study_folder(out)
     with stages(6) as screen:
         analysis = analyse(
@@ -62,7 +62,8 @@ def tolerance(
             progress=screen.stage,
             detail=screen.detail,
         )
-        files = write_study(study(analysis), out, {"tolerance.json": json_text(analysis).encode()})
+        more = {"tolerance.json": json_text(analysis).encode()}
+        files = write_study(tolerance_study(analysis), out, more)
     typer.echo(summary_text(analysis))
     typer.echo(f"{out}: {', '.join(file.name for file in files)}")
     return 0

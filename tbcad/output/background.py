@@ -9,7 +9,7 @@ from typing import Any
 
 
 @contextmanager
-def beside(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
+def in_background(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
     """Do work in another process while the block runs, and wait for it at the block's end.
 
     A block that fails, or is interrupted, ends the work at once.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
-from tbcad.output.background import beside
+from tbcad.output.background import in_background
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.files.write import export_prototype
@@ -15,7 +15,7 @@ from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
 
-def export(
+def write_export(
     design: MirrorDesign,
     folder: Path,
     parts: Sequence[str] = PARTS,
@@ -40,7 +40,7 @@ def export(
         export_prototype(design, folder, progress)
     else:
         shell_envelope(design)  # flanges that do not fit are told at once
-        with beside(write_shells, design, folder):
+        with in_background(write_shells, design, folder):
             with _or_left_out():
                 export_prototype(design, folder, progress)
             progress("shells")

@@ -17,14 +17,14 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.output.foreign_files import is_file, keep, leftovers
+from tbcad.output.foreign_files import foreign_files, is_file, keep_files
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 _NAMED = 3
 
 
-def check_target(out: Path, force: bool) -> None:
+def check_replaceable(out: Path, force: bool) -> None:
     """Check, before any work, that a folder can be replaced.
 
     Args:
@@ -105,7 +105,7 @@ def _check_writable(out: Path, target: Path) -> None:
 
 def _checked_leftovers(out: Path, target: Path, force: bool) -> list[Path]:
     """Return what in a folder must be kept, when it may be there."""
-    found = leftovers(target) if target.is_dir() else []
+    found = foreign_files(target) if target.is_dir() else []
     if found and not force:
         names = ", ".join(path.name for path in found[:_NAMED])
         more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
@@ -200,7 +200,7 @@ def _runs(process: str) -> bool:
 
 def _finish(out: Path, new: Path, force: bool) -> None:
     target = _target(out)  # again: the user may have been at work since
-    keep(_checked_leftovers(out, target, force), new)
+    keep_files(_checked_leftovers(out, target, force), new)
     if target.is_dir():
         shutil.copymode(target, new)
     _sync(new)

@@ -17,7 +17,7 @@ _MANY_FILES = 10_000
 _SHA256 = re.compile("[0-9a-f]{64}")
 
 
-def leftovers(folder: Path) -> list[Path]:
+def foreign_files(folder: Path) -> list[Path]:
     """Return what stands in a folder that tbcad did not write, sorted.
 
     tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself and
@@ -36,7 +36,7 @@ def leftovers(folder: Path) -> list[Path]:
     ]
 
 
-def keep(paths: list[Path], into: Path) -> None:
+def keep_files(paths: list[Path], into: Path) -> None:
     """Give files, links and folders a second place in another folder, as `.kept` where taken.
 
     Raises:

@@ -1,10 +1,10 @@
-"""What a process makes of a design: yield, sensitivity, what may be looser, what would do."""
+"""Effect of a manufacturing process on a design: yield, sensitivity, and the margin needed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 from tbcad import schedule
@@ -16,248 +16,282 @@ from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
-from tbcad.tolerance.margin import Margin, check_share, margin
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, Result, Yield, simulate, yielded
+from tbcad.tolerance.margin import Margin, WorstCoverageOfDesign, check_yield, margin
+from tbcad.tolerance.montecarlo.builds import (
+    AnyResult,
+    Case,
+    CoverageResult,
+    MonteCarloCase,
+    ShellResult,
+    YieldEstimate,
+    estimate_yield,
+    simulate,
+)
 from tbcad.tolerance.montecarlo.draws import Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominals
-from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect, kinds, one_at_a_time
-from tbcad.tolerance.montecarlo.sharpness import Sharpness, Wanted, sharpness
-from tbcad.tolerance.process.process import BUILT_IN, Process, errors, load_process
-from tbcad.tolerance.prototype import builds
-from tbcad.tolerance.prototype.windows import designed
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.sensitivity import (
+    SingleErrorEffect,
+    WorstCoverage,
+    one_at_a_time,
+    present_kinds,
+)
+from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
+from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
+from tbcad.tolerance.prototype.builds import PrototypeCase
+from tbcad.tolerance.prototype.windows import prototype_model
 from tbcad.types import Floats, Progress
 
-Halves = tuple[EdgeModel, EdgeModel]
-
-# Machines for each step of a search; what is told of the process itself has as many as asked for.
-TRIED = 100
-# Machines whose pictures are taken, and viewpoints of each.
-PICTURED = 2
+# Simulated builds in each step of a search; the process itself has as many as asked for.
+SEARCH_BUILDS = 100
+# Builds whose pictures are simulated; elevations, azimuths and distance of their viewpoints.
+PHOTOGRAPHED_BUILDS = 2
 VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
 # Kinds of error that a shell can have; the others are the prototype's.
-SHELL = (
+SHELL_ERRORS = (
     *("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis", "shell_shift"),
     *("shell_tilt", "camera_shift", "camera_tilt", "camera_focal", "coating", "facets"),
 )
 
 
 @dataclass(frozen=True)
-class Options:
-    """What is asked.
+class ToleranceOptions:
+    """Options of an analysis.
 
     Attributes:
-        machines: how many.
-        seed: of all of them.
-        wanted: share that is to be good.
-        left: what a calibration leaves of a mirror's direction, radians.
+        builds: number of simulated builds, 10 to 1000000.
+        seed: of all random errors, 0 or more.
+        wanted_yield: share of the builds that must be good, above 0, below 1.
+        calibration_residual: error of a mirror's direction after calibration, radians, below 0.1.
         scheduler: address of a Dask scheduler; None for this machine's cores.
+
+    Raises:
+        InputError: a value is not allowed.
     """
 
-    machines: int = 1000
+    builds: int = 1000
     seed: int = 1
-    wanted: float = 0.99
-    left: float = 0.5e-3
+    wanted_yield: float = 0.99
+    calibration_residual: float = 0.5e-3
     scheduler: str | None = None
 
-    def checked(self) -> Options:
-        """These wishes.
-
-        Raises:
-            InputError: what cannot be asked.
-        """
-        if not 10 <= self.machines <= 1_000_000:
-            raise InputError(f"--builds {self.machines}: allowed is 10 to 1000000")
-        check_share(self.wanted)
+    def __post_init__(self) -> None:
+        """Check all values."""
+        if not 10 <= self.builds <= 1_000_000:
+            raise InputError(f"--builds {self.builds}: allowed is 10 to 1000000")
+        check_yield(self.wanted_yield)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: allowed is 0 or more")
-        if not 0 <= self.left < 0.1:
-            raise InputError(f"--calibrated-mrad {1000 * self.left:g}: allowed is 0 to 100")
-        return self
+        if not 0 <= self.calibration_residual < 0.1:
+            raise InputError(
+                f"--calibrated-mrad {1000 * self.calibration_residual:g}: allowed is 0 to 100"
+            )
 
 
 @dataclass(frozen=True)
 class ProcessOption:
-    """A process as a choice for this design.
+    """A process as an alternative for this design.
 
     Attributes:
         name: of the process.
-        yielded: with the design as it is.
+        estimate: yield with the design as it is.
         margin: that it needs for the wanted yield.
     """
 
     name: str
-    yielded: Yield
+    estimate: YieldEstimate
     margin: Margin
 
 
 @dataclass(frozen=True)
 class PrototypeYield:
-    """The prototype, made by the process.
+    """The prototype, built by the process.
 
     Attributes:
-        plain: its machines, taken for the designed ones.
-        known: the same machines, calibrated: windows are where the balls really are.
+        uncalibrated: builds that are assumed to be the designed one.
+        calibrated: the same builds, with windows where the balls are.
     """
 
-    plain: builds.PrototypeResult
-    known: builds.PrototypeResult
+    uncalibrated: CoverageResult
+    calibrated: CoverageResult
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """All that is told.
+    """Result of an analysis.
 
     Attributes:
-        process: that makes the machines.
-        wishes: what was asked.
-        target: coverage of a good machine, mm.
+        process: that makes the builds.
+        options: of the analysis.
+        target: minimum coverage of a good build, mm.
         cameras: camera a and b as designed.
-        halves: the same for the fast model.
-        result: the machines.
-        single_errors: each kind of error by itself, the worst first.
-        choices: every built-in process.
+        edge_models: the same for the fast model.
+        result: of the simulated builds.
+        single_errors: effect of each kind of error by itself, the largest loss first.
+        process_options: every built-in process.
         margin: that this process needs.
         sharpness: of pictures.
-        stands: the prototype; None where the export has none.
+        prototype: None where the export has none.
     """
 
     process: Process
-    wishes: Options
+    options: ToleranceOptions
     target: float
     cameras: tuple[Reflector, Reflector]
-    halves: Halves
-    result: Result
+    edge_models: EdgeModels
+    result: ShellResult
     single_errors: tuple[SingleErrorEffect, ...]
-    choices: tuple[ProcessOption, ...]
+    process_options: tuple[ProcessOption, ...]
     margin: Margin
     sharpness: Sharpness
-    stands: PrototypeYield | None
+    prototype: PrototypeYield | None
 
     @property
-    def yielded(self) -> Yield:
-        """Share of good machines."""
-        return yielded(self.result.worst, self.target)
+    def estimate(self) -> YieldEstimate:
+        """Share of good builds."""
+        return estimate_yield(self.result.worst, self.target)
 
 
 def analyse(
     export: Exported,
     process: Process,
-    subject: SceneObject,
-    wishes: Options,
-    stage: Progress,
+    scene_object: SceneObject,
+    options: ToleranceOptions,
+    progress: Progress,
     detail: Progress,
 ) -> Analysis:
-    """Make many machines after an export by a process, and search what would do.
+    """Simulate many builds of an export by a process, and search for the margin that it needs.
 
     Args:
         export: the design as it was written.
         process: how it is made.
-        subject: what is photographed for the sharpness.
-        wishes: what is asked.
-        stage: told of each stage.
-        detail: told how far a stage has come.
+        scene_object: photographed for the sharpness.
+        options: number of builds, wanted yield, seed ...
+        progress: told of each stage.
+        detail: told of the steps of a stage.
 
     Raises:
         InputError: mirrors are planar, or the scheduler cannot be reached.
     """
-    if not (export.reflectors[0].mirrors.curvature > 0).all():
-        raise InputError(
-            f"{export.folder} has planar mirrors, whose tolerances are not told: build it with "
-            "--radius-rule traced"
-        )
-    made = _errors(export, process)
-    halves = nominals(export.reflectors)
-    each = partial(_each, wishes.scheduler)
-    target = export.capture_mm
-    stage(f"{wishes.machines} machines by {process.name}")
-    result = simulate(MonteCarloCase(halves, made, wishes.seed), wishes.machines, each)
-
-    def worst_of(halves: Halves, errors: Errors) -> Floats:
-        return simulate(MonteCarloCase(halves, errors, wishes.seed), TRIED, each).worst
-
-    # Every kind is held against no error at all, and each search begins where its loss was told.
-    @cache
-    def worst(errors: Errors) -> Floats:
-        return worst_of(halves, errors)
-
-    stage("each kind of error alone")
-    found = [
-        one_at_a_time(made, kind, wishes.wanted, target, _told(worst, detail, kind))
-        for kind in kinds(made)
-        if kind in SHELL
-    ]
-    stage("every process, and the margin it needs")
-
-    def after(design: MirrorDesign, errors: Errors) -> Floats:
-        return worst_of(nominals(reflectors(design)), errors)
-
-    choices = tuple(_choice(export, one, worst, after, wishes, detail) for one in BUILT_IN)
-    own = next((one.margin for one in choices if load_process(one.name) == process), None)
-    needed = own or margin(export.spec, made, wishes.wanted, after, detail)
-    stage("pictures")
-    sharp = _sharpness(export, made, subject, wishes, detail)
-    stands = None
+    _refuse_planar(export)
+    errors = _errors(export, process)
+    simulator = _Simulator(export, options, edge_models(export.reflectors))
+    progress(f"{options.builds} simulated builds by {process.name}")
+    result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
+    progress("each kind of error by itself")
+    # All searches share the builds without errors, and each begins with the builds of its loss.
+    worst = cache(simulator.worst_coverage)
+    single_errors = _single_errors(simulator, errors, worst, detail)
+    progress("every process, and the margin it needs")
+    process_options = tuple(_process_option(simulator, name, worst, detail) for name in BUILT_IN)
+    own_margin = _margin(simulator, process, process_options, detail)
+    progress("pictures")
+    sharp = _sharpness(simulator, errors, scene_object, detail)
+    prototype = None
     if (export.folder / "prototype.json").is_file():
-        stage("prototypes")
-        stands = _stands(export, made, wishes, each)
-    order = sorted(found, key=lambda one: -one.loss)
+        progress("prototypes")
+        prototype = _prototype_yield(simulator, errors)
     return Analysis(
-        process, wishes, target, export.reflectors, halves, result, tuple(order), choices, needed,
-        sharp, stands,
+        process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
+        single_errors, process_options, own_margin, sharp, prototype,
     )  # fmt: skip
 
 
+def _refuse_planar(export: Exported) -> None:
+    if not (export.reflectors[0].mirrors.curvature > 0).all():
+        raise InputError(
+            f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
+            "with --radius-rule traced"
+        )
+
+
 def _errors(export: Exported, process: Process) -> Errors:
-    return errors(process, export.spec.mirrors.coating_um)
+    return process_errors(process, export.spec.mirrors.coating_um)
 
 
-def _each(scheduler: str | None, work: Any, batches: Sequence[range]) -> list[Any]:
-    return schedule.run(work, batches, scheduler)
+@dataclass(frozen=True)
+class _Simulator:
+    """Simulates builds of one export, all with the same seed and scheduler."""
+
+    export: Exported
+    options: ToleranceOptions
+    edge_models: EdgeModels
+
+    def all_builds(self, case: Case[AnyResult]) -> AnyResult:
+        """Result of as many builds as asked for."""
+        return simulate(case, self.options.builds, self._run_batches)
+
+    def worst_coverage(self, errors: Errors) -> Floats:
+        """Minimum coverage of the builds of a search."""
+        return self._worst(self.edge_models, errors)
+
+    def worst_coverage_of_design(self, design: MirrorDesign, errors: Errors) -> Floats:
+        """The same of another design."""
+        return self._worst(edge_models(reflectors(design)), errors)
+
+    def _worst(self, models: EdgeModels, errors: Errors) -> Floats:
+        case = MonteCarloCase(models, errors, self.options.seed)
+        return simulate(case, SEARCH_BUILDS, self._run_batches).worst
+
+    def _run_batches(self, case: Any, batches: Sequence[range]) -> list[Any]:
+        return schedule.run_units(case, batches, self.options.scheduler)
 
 
-def _told(
-    worst: Callable[[Errors], Floats], detail: Progress, kind: str
-) -> Callable[[Errors], Floats]:
-    def asked(errors: Errors) -> Floats:
-        detail(kind)
-        return worst(errors)
+def _single_errors(
+    simulator: _Simulator, errors: Errors, worst: WorstCoverage, detail: Progress
+) -> tuple[SingleErrorEffect, ...]:
+    def effect(kind: str) -> SingleErrorEffect:
+        def reported(errors: Errors) -> Floats:
+            detail(kind)
+            return worst(errors)
 
-    return asked
+        wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
+        return one_at_a_time(errors, kind, wanted, target, reported)
+
+    effects = [effect(kind) for kind in present_kinds(errors) if kind in SHELL_ERRORS]
+    return tuple(sorted(effects, key=lambda one: -one.loss))
 
 
-def _choice(
-    export: Exported,
-    name: str,
-    worst: Callable[[Errors], Floats],
-    after: Callable[[MirrorDesign, Errors], Floats],
-    wishes: Options,
-    detail: Progress,
+def _process_option(
+    simulator: _Simulator, name: str, worst: WorstCoverage, detail: Progress
 ) -> ProcessOption:
-    made = _errors(export, load_process(name))
+    export, process = simulator.export, load_process(name)
     detail(name)
-    share = yielded(worst(made), export.capture_mm)
-    needed = margin(export.spec, made, wishes.wanted, after, lambda text: detail(f"{name}: {text}"))
-    return ProcessOption(name, share, needed)
+    estimate = estimate_yield(worst(_errors(export, process)), export.capture_mm)
+    needed = _margin(simulator, process, (), lambda text: detail(f"{name}: {text}"))
+    return ProcessOption(name, estimate, needed)
+
+
+def _margin(
+    simulator: _Simulator, process: Process, known: Sequence[ProcessOption], detail: Progress
+) -> Margin:
+    """Margin that a process needs, from the built-in processes if it is one of them."""
+    for option in known:
+        if load_process(option.name) == process:
+            return option.margin
+    export, wanted = simulator.export, simulator.options.wanted_yield
+    worst: WorstCoverageOfDesign = simulator.worst_coverage_of_design
+    return margin(export.spec, _errors(export, process), wanted, worst, detail)
 
 
 def _sharpness(
-    export: Exported, made: Errors, subject: SceneObject, wishes: Options, detail: Progress
+    simulator: _Simulator, errors: Errors, scene_object: SceneObject, detail: Progress
 ) -> Sharpness:
-    scene, m = prepared_scene(subject), len(export.reflectors[0])
+    export, options = simulator.export, simulator.options
+    scene = prepared_scene(scene_object)
     views = viewpoints_around(*VIEWPOINTS).cameras(export.capture_mm)
-    wanted = Wanted(export.capture_mm, views, ground_truths(scene, views, detail))
-    machines = draw(made, wishes.seed, range(PICTURED), m)
+    reference = ReferenceViews(export.capture_mm, views, ground_truths(scene, views, detail))
+    builds = draw(errors, options.seed, range(PHOTOGRAPHED_BUILDS), len(export.reflectors[0]))
+    residual = options.calibration_residual
     return sharpness(
-        export.reflectors, machines, scene, wanted, wishes.left, wishes.seed, "nearest", detail
+        export.reflectors, builds, scene, reference, residual, options.seed, progress=detail
     )
 
 
-def _stands(export: Exported, made: Errors, wishes: Options, each: Any) -> PrototypeYield:
-    at = designed(export.reflectors, read_plan(export))
-    plain, known = (
-        builds.simulate(
-            builds.PrototypeWork(at, made, wishes.seed, calibrated), wishes.machines, each
-        )
+def _prototype_yield(simulator: _Simulator, errors: Errors) -> PrototypeYield:
+    export = simulator.export
+    model = prototype_model(export.reflectors, read_plan(export))
+    uncalibrated, calibrated = (
+        simulator.all_builds(PrototypeCase(model, errors, simulator.options.seed, calibrated))
         for calibrated in (False, True)
     )
-    return PrototypeYield(plain, known)
+    return PrototypeYield(uncalibrated, calibrated)

@@ -12,21 +12,21 @@ from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.types import Floats, Progress
 
-WorstOf = Callable[[MirrorDesign, Errors], Floats]
-"""Least coverage, mm, (s,), of machines made after a design with some errors."""
+WorstCoverageOfDesign = Callable[[MirrorDesign, Errors], Floats]
+"""Minimum coverage, mm, (s,), of builds of a design with some errors."""
 
-STEPS = 6
-STEP_MM = 0.01  # margins are told in these, rounded up
-MOST_MM = 20.0  # as in the design's keys
+MAX_TRIES = 6
+STEP_MM = 0.01  # margins are rounded up to a multiple of it
+LARGEST_MARGIN_MM = 20.0  # as in the design's keys
 
 
 @dataclass(frozen=True)
 class Margin:
-    """What a process needs.
+    """The margin that a process needs.
 
     Attributes:
-        mm: margin beyond the capture diameter; None where none that can be made is enough.
-        share: of good machines at that margin, or at the largest one tried.
+        mm: margin beyond the capture diameter; None where no feasible margin is enough.
+        share: of good builds at that margin, or at the last one tried.
         reason: why there is none, else "".
     """
 
@@ -35,50 +35,52 @@ class Margin:
     reason: str = ""
 
 
-def check_share(wanted: float) -> None:
-    """Refuse a share of good machines that cannot be asked for.
+def check_yield(wanted_yield: float) -> None:
+    """Refuse a share of good builds that is not between 0 and 1.
 
     Raises:
-        InputError: it is none.
+        InputError: it is not.
     """
-    if not 0 < wanted < 1:
-        raise InputError(f"--yield {wanted:g}: allowed is above 0, below 1, like 0.99")
+    if not 0 < wanted_yield < 1:
+        raise InputError(f"--yield {wanted_yield:g}: allowed is above 0, below 1, like 0.99")
 
 
 def margin(
     spec: Spec,
     errors: Errors,
-    wanted: float,
-    worst: WorstOf,
+    wanted_yield: float,
+    worst: WorstCoverageOfDesign,
     progress: Progress = lambda _: None,
 ) -> Margin:
-    """The least margin with which the wanted share of machines sees enough.
+    """The minimum margin with which the wanted share of builds covers enough.
 
     Args:
         spec: the design; its radii must follow rule traced.
-        errors: what the process does.
-        wanted: share of good machines.
-        worst: what machines see.
+        errors: of the process.
+        wanted_yield: share of good builds.
+        worst: simulates builds.
         progress: told of each margin.
 
-    What the worst camera loses hardly depends on the margin, so each try starts from what the last
-    one lost; smaller mirrors lose a little more, hence several.
+    The loss of the worst camera hardly depends on the margin, so each try starts from the loss of
+    the last one; smaller mirrors lose a little more, hence several tries.
     """
-    target, now, share = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm, 0.0
-    for _ in range(STEPS):
-        progress(f"margin {now:.2f} mm")
+    target, tried, share = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm, 0.0
+    for _ in range(MAX_TRIES):
+        progress(f"margin {tried:.2f} mm")
         try:
-            seen = worst(design(with_margin(spec, now)), errors)
+            seen = worst(design(with_margin(spec, tried)), errors)
         except SpecError as error:
-            return Margin(None, share, f"mirrors of margin {now:.2f} mm: {error}")
+            return Margin(None, share, f"mirrors of margin {tried:.2f} mm: {error}")
         share = float((seen >= target).mean())
-        lacking = target - coverage_at_yield(seen, wanted)
-        if share >= wanted and (lacking > -STEP_MM or now == 0):
-            return Margin(now, share)
-        now = max(0.0, round(ceil((now + lacking) / STEP_MM - 1e-9) * STEP_MM, 6))
-        if now > MOST_MM:
-            return Margin(None, share, f"it would need more than {MOST_MM:g} mm")
-    return Margin(now, share) if share >= wanted else Margin(None, share, "the tries ran out")
+        shortfall = target - coverage_at_yield(seen, wanted_yield)
+        if share >= wanted_yield and (shortfall > -STEP_MM or tried == 0):
+            return Margin(tried, share)
+        tried = max(0.0, round(ceil((tried + shortfall) / STEP_MM - 1e-9) * STEP_MM, 6))
+        if tried > LARGEST_MARGIN_MM:
+            return Margin(None, share, f"it would need more than {LARGEST_MARGIN_MM:g} mm")
+    if share >= wanted_yield:
+        return Margin(tried, share)
+    return Margin(None, share, f"not found in {MAX_TRIES} tries")
 
 
 def with_margin(spec: Spec, mm: float) -> Spec:

@@ -1,52 +1,55 @@
-"""Plots of an analysis: the yield, what each error costs, and which virtual cameras suffer."""
+"""Plots of an analysis: the yield, the loss by each error, and the coverage of virtual cameras."""
 
 import numpy as np
 
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.tolerance.analysis import Analysis
-from tbcad.tolerance.montecarlo.coverage import virtual
+from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.types import Floats
 
+# Share of the builds whose coverage lies below what the map shows.
+LOW_SHARE = 0.05
 
-def panels(found: Analysis) -> tuple[Panel, ...]:
+
+def panels(analysis: Analysis) -> tuple[Panel, ...]:
     """All plots."""
-    return (_curve(found), _bars(found), _map(found))
+    return (_yield_curve(analysis), _loss_bars(analysis), _coverage_map(analysis))
 
 
-def _curve(found: Analysis) -> Panel:
-    worst = np.sort(found.result.worst)
+def _yield_curve(analysis: Analysis) -> Panel:
+    worst = np.sort(analysis.result.worst)
     share = 1 - np.arange(len(worst)) / len(worst)
-    at = np.array([found.target, found.target])
+    target = np.array([analysis.target, analysis.target])
     series = (
-        Series(found.process.name, worst, 100 * share, "C0-"),
-        Series(f"{found.target:g} mm", at, np.array([0.0, 100.0]), "k--"),
+        Series(analysis.process.name, worst, 100 * share, "C0-"),
+        Series(f"{analysis.target:g} mm", target, np.array([0.0, 100.0]), "k--"),
     )
-    return Panel("Machines whose worst camera sees ...", "... mm or more", "% of machines", series)
+    return Panel("Builds whose worst camera covers ...", "... mm or more", "% of builds", series)
 
 
-def _bars(found: Analysis) -> Panel:
-    loss = np.array([one.loss for one in found.single_errors])
-    names = tuple(in_words(one.kind) for one in found.single_errors)
+def _loss_bars(analysis: Analysis) -> Panel:
+    loss = np.array([effect.loss for effect in analysis.single_errors])
+    names = tuple(in_words(effect.kind) for effect in analysis.single_errors)
     bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
-    return Panel("What each kind of error costs alone", "mm of coverage", "", (bars,), names=names)
+    return Panel("Loss by each kind of error alone", "mm of coverage", "", (bars,), names=names)
 
 
-def _map(found: Analysis) -> Panel:
-    u = directions(found)
-    low = found.result.quantiles((0.05,))[0]
-    away = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
-    flat = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
-    x, y = away * u[:, 0] / flat, away * u[:, 1] / flat
-    dots = Series("", x, y, ".", low, "coverage that 5 % do not reach, mm")
+def _coverage_map(analysis: Analysis) -> Panel:
+    u = directions(analysis)
+    low = analysis.result.quantiles((LOW_SHARE,))[0]
+    from_zenith = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
+    horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
+    x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
+    dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
     return Panel("Virtual cameras, the zenith in the middle", "degrees", "degrees", (dots,))
 
 
-def directions(found: Analysis) -> Floats:
+def directions(analysis: Analysis) -> Floats:
     """Directions of the virtual cameras, (v, 3)."""
-    which = virtual(found.halves)
-    every = np.concatenate([at.u for at in found.cameras])
-    result = np.zeros((int(which.max()) + 1, 3))
-    result[which[::-1]] = every[::-1]  # the first that is of a camera counts
+    number = virtual_camera_numbers(analysis.edge_models)
+    of_mirrors = np.concatenate([camera.u for camera in analysis.cameras])
+    result = np.zeros((int(number.max()) + 1, 3))
+    result[number[::-1]] = of_mirrors[::-1]  # the first mirror of a camera counts
     return result
 
 

@@ -1,4 +1,4 @@
-"""The answer in words, tables, plots and JSON."""
+"""An analysis as a summary in words, tables, plots and JSON."""
 
 from __future__ import annotations
 
@@ -9,245 +9,256 @@ from typing import Any
 import numpy as np
 
 from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.tables import Table
-from tbcad.tolerance.analysis import TRIED, Analysis
-from tbcad.tolerance.montecarlo.builds import Yield, yielded
+from tbcad.simulate.study.tables import Record, Table
+from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis, ProcessOption
+from tbcad.tolerance.montecarlo.builds import CoverageResult, YieldEstimate, estimate_yield
+from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
-from tbcad.tolerance.process.process import process_dict
+from tbcad.tolerance.process.process import ErrorSpec, Process, process_dict
 from tbcad.types import Floats
 
-SCHEMA = "tbcad-tolerance/1"
-SHARES = (0.01, 0.05, 0.5)
+SCHEMA = "tbcad-tolerance/2"
+QUANTILES = (0.01, 0.05, 0.5)
 NOTES = (
-    "Coverage of a virtual camera: twice the least distance from the object's middle of all rays "
-    "camera -> edge of its mirror -> reflected. A machine is good when every virtual camera has "
+    "Coverage of a virtual camera: twice the minimum distance from the object's centre of all rays "
+    "camera -> edge of its mirror -> reflected. A build is good when every virtual camera covers "
     "the capture diameter or more. Intervals of yields: Wilson, 95 %.",
-    "Pointing: distance from the object's middle of the ray of each mirror's middle pixel, as an "
-    "uncalibrated machine takes it. Calibration makes rays known; it does not give coverage back.",
-    "Loosest: what one kind of error, alone, may be multiplied by for the wanted yield.",
+    "Pointing: distance from the object's centre of the ray of each mirror's centre pixel in an "
+    "uncalibrated build. Calibration makes rays known; it does not restore coverage.",
+    "Tolerable factor: factor on one kind of error, without any other, that still gives the wanted "
+    "yield.",
+)
+
+ERROR_COLUMNS = (
+    *("kind", "magnitude", "mean", "loss_mm", "loss_at_yield_mm"),
+    *("tolerable_factor", "tolerable_magnitude", "tolerable_mean"),
 )
 
 
-def summary_text(found: Analysis) -> str:
-    """One paragraph."""
-    process, target = found.process, found.target
-    lines = [
-        f"Made by {process.name} ({process.title}), {_share(found.yielded)} of the machines see "
-        f"{target:g} mm with every virtual camera; the worst camera of a machine sees "
-        f"{np.median(found.result.worst):.2f} mm (median; 1 % see less than "
-        f"{np.quantile(found.result.worst, 0.01):.2f})."
-    ]
-    if found.single_errors:
-        first = found.single_errors[0]
-        lines.append(
-            f"Most is lost by {in_words(first.kind)}: {first.loss:.2f} mm by itself; "
-            f"{_factor(first.times)}."
-        )
-    if found.margin.mm is not None:
-        lines.append(
-            f"A margin of {found.margin.mm:.2f} mm (tbcad build --radius-rule traced --set "
-            f"mirrors.margin_mm={found.margin.mm:.2f}) makes {found.margin.share:.1%} good."
-        )
-    else:
-        lines.append(f"No margin was found that makes it do: {found.margin.reason}.")
-    lines.append(_which(found))
-    sharp = found.sharpness
-    lines.append(
-        f"Pictures: SSIM {sharp.designed.mean():.3f} as designed, {sharp.uncalibrated.mean():.3f} "
-        f"taken for the designed machine, {sharp.calibrated.mean():.3f} once calibrated."
+def summary_text(analysis: Analysis) -> str:
+    """The result in one paragraph."""
+    sentences = (
+        _yield_sentence(analysis),
+        _largest_loss_sentence(analysis),
+        _margin_sentence(analysis),
+        _processes_sentence(analysis),
+        _sharpness_sentence(analysis),
+        _prototype_sentence(analysis),
     )
-    if found.stands is not None:
-        plain, known = (
-            yielded(one.worst, target) for one in (found.stands.plain, found.stands.known)
-        )
-        lines.append(
-            f"Prototype: {_share(plain)} good without calibration, {_share(known)} with it."
-        )
-    return " ".join(lines)
+    return " ".join(filter(None, sentences))
 
 
-def document(found: Analysis) -> dict[str, Any]:
+def _yield_sentence(analysis: Analysis) -> str:
+    process, worst = analysis.process, analysis.result.worst
+    return (
+        f"Built by {process.name} ({process.title}), {_percent(analysis.estimate)} of the builds "
+        f"cover {analysis.target:g} mm with every virtual camera; the worst camera of a build "
+        f"covers {np.median(worst):.2f} mm (median; 1 % cover less than "
+        f"{np.quantile(worst, 0.01):.2f})."
+    )
+
+
+def _largest_loss_sentence(analysis: Analysis) -> str:
+    if not analysis.single_errors:
+        return ""
+    largest = analysis.single_errors[0]
+    factor = largest.tolerable_factor
+    if factor == 0:
+        limit = "the design itself falls short even without errors"
+    elif math.isfinite(factor):
+        limit = f"alone it may be {factor:.2g} times as large"
+    else:
+        limit = "harmless"
+    return f"Largest loss by {in_words(largest.kind)}: {largest.loss:.2f} mm by itself; {limit}."
+
+
+def _margin_sentence(analysis: Analysis) -> str:
+    needed = analysis.margin
+    if needed.mm is None:
+        return f"No margin was found that is enough: {needed.reason}."
+    return (
+        f"A margin of {needed.mm:.2f} mm (tbcad build --radius-rule traced --set "
+        f"mirrors.margin_mm={needed.mm:.2f}) makes {needed.share:.1%} good."
+    )
+
+
+def _processes_sentence(analysis: Analysis) -> str:
+    margins = {option.name: option.margin.mm for option in analysis.process_options}
+    enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
+    none = [name for name, mm in margins.items() if mm is None]
+    wanted = 100 * analysis.options.wanted_yield
+    text = f"Margins needed for {wanted:.6g}%: {', '.join(enough) or 'none found'}"
+    return text + (f"; none was found for {' and '.join(none)}." if none else ".")
+
+
+def _sharpness_sentence(analysis: Analysis) -> str:
+    ssim = analysis.sharpness
+    return (
+        f"Pictures: SSIM {ssim.designed.mean():.3f} as designed, {ssim.uncalibrated.mean():.3f} "
+        f"without calibration, {ssim.calibrated.mean():.3f} with it."
+    )
+
+
+def _prototype_sentence(analysis: Analysis) -> str:
+    if analysis.prototype is None:
+        return ""
+    without, with_it = (
+        _percent(estimate_yield(result.worst, analysis.target))
+        for result in (analysis.prototype.uncalibrated, analysis.prototype.calibrated)
+    )
+    return f"Prototype: {without} good without calibration, {with_it} with it."
+
+
+def json_text(analysis: Analysis) -> str:
+    """tolerance.json as text."""
+    return json.dumps(report_dict(analysis), indent=1, allow_nan=False) + "\n"
+
+
+def report_dict(analysis: Analysis) -> dict[str, Any]:
     """tolerance.json."""
-    worst = found.result.worst
+    sharp, prototype = analysis.sharpness, analysis.prototype
     return {
         "schema": SCHEMA,
-        "words": summary_text(found),
-        "process": process_dict(found.process),
-        "machines": len(worst),
-        "seed": found.wishes.seed,
-        "target_mm": found.target,
-        "wanted_yield": found.wishes.wanted,
-        "yield": _yield(found.yielded),
-        "worst_camera_mm": {f"{share:g}": float(np.quantile(worst, share)) for share in SHARES},
-        "pointing_mm": _pointing(found),
-        "alone": [
-            {"kind": a.kind, "loss_mm": a.loss, "tail_mm": a.tail, "may_be_times": _finite(a.times)}
-            for a in found.single_errors
-        ],
-        "margin_needed_mm": found.margin.mm,
-        "margin_reason": found.margin.reason,
-        "processes": [
-            {
-                "name": choice.name,
-                "machines": TRIED,
-                "yield": _yield(choice.yielded),
-                "margin_needed_mm": choice.margin.mm,
-                "reason": choice.margin.reason,
-            }
-            for choice in found.choices
-        ],
+        "summary": summary_text(analysis),
+        "process": process_dict(analysis.process),
+        "builds": len(analysis.result),
+        "seed": analysis.options.seed,
+        "target_mm": analysis.target,
+        "wanted_yield": analysis.options.wanted_yield,
+        **_result_dict(analysis.result, analysis.target),
+        "single_errors": _error_table(analysis).records(),
+        "margin_needed_mm": analysis.margin.mm,
+        "margin_reason": analysis.margin.reason,
+        "processes": _process_table(analysis).records(),
         "ssim": {
-            "designed": float(found.sharpness.designed.mean()),
-            "uncalibrated": float(found.sharpness.uncalibrated.mean()),
-            "calibrated": float(found.sharpness.calibrated.mean()),
-            "calibration_leaves_mrad": 1000 * found.wishes.left,
+            "designed": float(sharp.designed.mean()),
+            "uncalibrated": float(sharp.uncalibrated.mean()),
+            "calibrated": float(sharp.calibrated.mean()),
+            "calibration_residual_mrad": 1000 * analysis.options.calibration_residual,
         },
-        "prototype": _prototype(found),
+        "prototype": prototype
+        and {
+            "uncalibrated": _result_dict(prototype.uncalibrated, analysis.target),
+            "calibrated": _result_dict(prototype.calibrated, analysis.target),
+        },
     }
 
 
-def study(found: Analysis) -> Study:
+def _result_dict(result: CoverageResult, target: float) -> dict[str, Any]:
+    offset, met = result.offset, np.isfinite(result.offset)
+    estimate = estimate_yield(result.worst, target)
+    return {
+        "yield": {"share": estimate.share, "low": estimate.low, "high": estimate.high},
+        "worst_camera_mm": {f"{q:g}": float(np.quantile(result.worst, q)) for q in QUANTILES},
+        "pointing_mm": {
+            "rms": _rms(offset),
+            "largest_median": float(np.median(np.where(met, offset, 0).max(axis=1))),
+            "rays_lost": float((~met).mean()),
+        },
+    }
+
+
+def tolerance_study(analysis: Analysis) -> Study:
     """Tables and plots."""
-    tables = (_machines(found), _alone(found), _choices(found), _cameras(found))
-    notes = (summary_text(found), *NOTES)
-    return Study("tolerance", _figures(found), tables, panels(found), notes)
+    tables = (
+        _builds_table(analysis),
+        _error_table(analysis),
+        _process_table(analysis),
+        _cameras_table(analysis),
+    )
+    notes = (summary_text(analysis), *NOTES)
+    return Study("tolerance", _figures(analysis), tables, panels(analysis), notes)
 
 
-def json_text(found: Analysis) -> str:
-    """tolerance.json as text."""
-    return json.dumps(document(found), indent=1, allow_nan=False) + "\n"
-
-
-def _figures(found: Analysis) -> tuple[Figure, ...]:
-    worst = found.result.worst
+def _figures(analysis: Analysis) -> tuple[Figure, ...]:
+    worst = analysis.result.worst
+    losses = [
+        Figure(f"loss by {in_words(effect.kind)} alone", "mm", effect.loss)
+        for effect in analysis.single_errors
+    ]
+    yields = [
+        Figure(f"good builds by {option.name}", "%", 100 * option.estimate.share)
+        for option in analysis.process_options
+    ]
     return (
-        Figure("good machines", "%", 100 * found.yielded.share),
+        Figure("good builds", "%", 100 * analysis.estimate.share),
         Figure("worst camera, median", "mm", float(np.median(worst))),
-        Figure("worst camera, 1 % see less", "mm", float(np.quantile(worst, 0.01))),
-        Figure("margin needed", "mm", found.margin.mm),
-        *(Figure(f"loss by {in_words(e.kind)} alone", "mm", e.loss) for e in found.single_errors),
-        *(Figure(f"good machines by {c.name}", "%", 100 * c.yielded.share) for c in found.choices),
+        Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01))),
+        Figure("margin needed", "mm", analysis.margin.mm),
+        *losses,
+        *yields,
     )
 
 
-def _machines(found: Analysis) -> Table:
-    result = found.result
-    offset = np.array([_rms(row) for row in result.offset])
-    columns = zip(result.worst.tolist(), result.worst_camera.tolist(), offset.tolist(), strict=True)
-    rows = tuple((number, *row) for number, row in enumerate(columns))
-    return Table(
-        "tolerance-machines",
-        ("machine", "worst_coverage_mm", "worst_camera", "pointing_rms_mm"),
-        rows,
+def _builds_table(analysis: Analysis) -> Table:
+    result = analysis.result
+    columns = {
+        "build": np.arange(len(result)),
+        "worst_coverage_mm": result.worst,
+        "worst_camera": result.worst_camera,
+        "pointing_rms_mm": np.array([_rms(offset) for offset in result.offset]),
+    }
+    return Table.of_columns("tolerance-builds", columns)
+
+
+def _error_table(analysis: Analysis) -> Table:
+    process, effects = analysis.process, analysis.single_errors
+    keys = {key.rpartition("_")[0]: key for key, _ in process}
+    records = [_error_record(effect, keys[effect.kind], process) for effect in effects]
+    return Table.of_records("tolerance-sensitivity", records, columns=ERROR_COLUMNS)
+
+
+def _error_record(effect: SingleErrorEffect, key: str, process: Process) -> Record:
+    """One kind of error; magnitudes and means are in the unit of the process's key."""
+    error: ErrorSpec = getattr(process, key)
+    factor = effect.tolerable_factor if math.isfinite(effect.tolerable_factor) else None
+    tolerable = [None if factor is None else factor * x for x in (error.magnitude, error.mean)]
+    if effect.kind == "coating":
+        tolerable[1] = None  # the design allows for a part of its mean
+    cells = (
+        *(key, error.magnitude, error.mean, effect.loss, effect.loss_at_yield),
+        *(factor, *tolerable),
     )
+    return dict(zip(ERROR_COLUMNS, cells, strict=True))
 
 
-def _alone(found: Analysis) -> Table:
-    process = dict(found.process)
-    rows = []
-    for one in found.single_errors:
-        key = next((key for key in process if key.rpartition("_")[0] == one.kind), one.kind)
-        now = [float(getattr(process[key], name, math.nan)) for name in ("magnitude", "mean")]
-        may = [None if math.isinf(one.times) else one.times * value for value in now]
-        if one.kind == "coating":
-            may[1] = None  # a part of its mean is what the design allows for
-        rows.append((key, *now, one.loss, one.tail, _finite(one.times), *may))
-    columns = (
-        *("kind", "magnitude", "mean", "loss_mm", "tail_mm"),
-        *("may_be_times", "may_be_magnitude", "may_be_mean"),
-    )
-    return Table("tolerance-sensitivity", columns, tuple(rows))
+def _process_table(analysis: Analysis) -> Table:
+    records = [_process_record(option) for option in analysis.process_options]
+    return Table.of_records("tolerance-processes", records)
 
 
-def _choices(found: Analysis) -> Table:
-    columns = (
-        "process",
-        "machines",
-        "yield",
-        "yield_low",
-        "yield_high",
-        "margin_needed_mm",
-        "reason",
-    )
-    return Table(
-        "tolerance-processes",
-        columns,
-        tuple(
-            (
-                c.name,
-                TRIED,
-                c.yielded.share,
-                c.yielded.low,
-                c.yielded.high,
-                c.margin.mm,
-                c.margin.reason,
-            )
-            for c in found.choices
-        ),
-    )
-
-
-def _cameras(found: Analysis) -> Table:
-    coverage = found.result.coverage
-    low, middle = found.result.quantiles((0.05, 0.5))
-    short = (coverage < found.target).mean(axis=0)
-    u = directions(found)
-    columns = ("virtual_camera", "ux", "uy", "uz", "median_mm", "five_percent_mm", "share_short")
-    numbers = np.column_stack([u, middle, low, short]).tolist()
-    rows = tuple((k, *row) for k, row in enumerate(numbers))
-    return Table("tolerance-cameras", columns, rows)
-
-
-def _pointing(found: Analysis) -> dict[str, float]:
-    offset = found.result.offset
+def _process_record(option: ProcessOption) -> Record:
     return {
-        "rms": _rms(offset),
-        "largest_median": float(np.median(np.where(np.isfinite(offset), offset, 0).max(axis=1))),
-        "rays_lost": float((~np.isfinite(offset)).mean()),
+        "process": option.name,
+        "builds": SEARCH_BUILDS,
+        "yield": option.estimate.share,
+        "yield_low": option.estimate.low,
+        "yield_high": option.estimate.high,
+        "margin_needed_mm": option.margin.mm,
+        "reason": option.margin.reason,
     }
 
 
-def _prototype(found: Analysis) -> dict[str, Any] | None:
-    if found.stands is None:
-        return None
-    return {
-        name: {
-            "yield": _yield(yielded(one.worst, found.target)),
-            "worst_camera_mm": {f"{s:g}": float(np.quantile(one.worst, s)) for s in SHARES},
-            "pointing_rms_mm": _rms(one.offset),
-            "rays_lost": float((~np.isfinite(one.offset)).mean()),
-        }
-        for name, one in (("uncalibrated", found.stands.plain), ("calibrated", found.stands.known))
+def _cameras_table(analysis: Analysis) -> Table:
+    coverage, u = analysis.result.coverage, directions(analysis)
+    low, middle = analysis.result.quantiles((0.05, 0.5))
+    columns = {
+        "virtual_camera": np.arange(len(u)),
+        "ux": u[:, 0],
+        "uy": u[:, 1],
+        "uz": u[:, 2],
+        "median_mm": middle,
+        "five_percent_mm": low,
+        "share_short": (coverage < analysis.target).mean(axis=0),
     }
+    return Table.of_columns("tolerance-cameras", columns)
 
 
 def _rms(offset: Floats) -> float:
-    """Root mean square, mm, of the rays that meet their mirror at all; 0 where none does."""
+    """Root mean square, mm, of the rays that meet their mirror; 0 where none does."""
     met = offset[np.isfinite(offset)]
     return float(np.sqrt((met**2).mean())) if met.size else 0.0
 
 
-def _which(found: Analysis) -> str:
-    """Which processes do, with which margin."""
-    do = [f"{c.name} with {c.margin.mm:.2f} mm" for c in found.choices if c.margin.mm is not None]
-    not_ = [c.name for c in found.choices if c.margin.mm is None]
-    text = f"Margins needed for {100 * found.wishes.wanted:.6g}%: {', '.join(do) or 'none found'}"
-    return text + (f"; none was found for {' and '.join(not_)}." if not_ else ".")
-
-
-def _yield(found: Yield) -> dict[str, float]:
-    return {"share": found.share, "low": found.low, "high": found.high}
-
-
-def _share(found: Yield) -> str:
-    return f"{found.share:.1%} ({found.low:.1%} to {found.high:.1%})"
-
-
-def _factor(times: float) -> str:
-    if times == 0:
-        return "without it and all others the design itself falls short"
-    return f"alone it may be {times:.2g} times what it is" if math.isfinite(times) else "harmless"
-
-
-def _finite(times: float) -> float | None:
-    return times if math.isfinite(times) else None
+def _percent(estimate: YieldEstimate) -> str:
+    return f"{estimate.share:.1%} ({estimate.low:.1%} to {estimate.high:.1%})"

@@ -18,7 +18,7 @@ from tests.prototype_exports import write_export
 
 SMALL = ["camera.width_px=208", "camera.height_px=155"]
 FILES = {
-    "tolerance-cameras.csv", "tolerance-machines.csv", "tolerance-notes.txt",
+    "tolerance-cameras.csv", "tolerance-builds.csv", "tolerance-notes.txt",
     "tolerance-processes.csv", "tolerance-sensitivity.csv", "tolerance-summary.csv",
     "tolerance.json", "tolerance.png",
 }  # fmt: skip
@@ -31,8 +31,8 @@ def _quick() -> Iterator[None]:
     """Fewer machines, pictures, viewpoints and processes."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in {
-            "TRIED": 10,
-            "PICTURED": 1,
+            "SEARCH_BUILDS": 10,
+            "PHOTOGRAPHED_BUILDS": 1,
             "VIEWPOINTS": ((60.0,), 1, 640.0),
             "BUILT_IN": ("sla", "diamond"),
         }.items():
@@ -86,28 +86,32 @@ class TestWritten:
 
     def test_json_agrees_with_tables(self, written: Path) -> None:
         read = json.loads((written / "tolerance.json").read_text())
-        worst = np.array([float(row["worst_coverage_mm"]) for row in table(written, "machines")])
-        assert len(worst) == read["machines"] == 20
+        worst = np.array([float(row["worst_coverage_mm"]) for row in table(written, "builds")])
+        assert len(worst) == read["builds"] == 20
         assert read["yield"]["share"] == (worst >= 60).mean()
         assert read["worst_camera_mm"]["0.5"] == np.median(worst)
         losses = [float(row["loss_mm"]) for row in table(written, "sensitivity")]
-        assert losses == [one["loss_mm"] for one in read["alone"]]
+        assert losses == [one["loss_mm"] for one in read["single_errors"]]
         assert losses == sorted(losses, reverse=True)
 
     def test_what_is_known_of_the_figures(self, written: Path) -> None:
         """Closed forms, and what must be in order."""
         read = json.loads((written / "tolerance.json").read_text())
-        alone = {one["kind"]: one for one in read["alone"]}
+        alone = {one["kind"]: one for one in read["single_errors"]}
         assert len(alone) == 11
-        assert not {"seat", "ball_radius", "rotation_angle"} & set(alone)
-        assert alone["facets"]["loss_mm"] == pytest.approx(0.36, abs=1e-9)
-        assert alone["facets"]["may_be_times"] == pytest.approx(0.6 / 0.36, rel=0.02)
-        assert alone["camera_tilt"]["may_be_times"] is None
+        assert not {"seat_um", "ball_radius_um", "rotation_angle_deg"} & set(alone)
+        assert alone["facets_mm"]["loss_mm"] == pytest.approx(0.36, abs=1e-9)
+        assert alone["facets_mm"]["tolerable_factor"] == pytest.approx(0.6 / 0.36, rel=0.02)
+        assert alone["camera_tilt_mrad"]["tolerable_factor"] is None
         # Together they cost more than the worst of them, less than all after one another.
         lost = 60.6 - read["worst_camera_mm"]["0.5"]
-        assert read["alone"][0]["loss_mm"] < lost < sum(a["loss_mm"] for a in read["alone"])
+        assert (
+            read["single_errors"][0]["loss_mm"]
+            < lost
+            < sum(a["loss_mm"] for a in read["single_errors"])
+        )
         sla, diamond = read["processes"]
-        assert (sla["name"], diamond["name"]) == ("sla", "diamond")
+        assert (sla["process"], diamond["process"]) == ("sla", "diamond")
         assert sla["margin_needed_mm"] > diamond["margin_needed_mm"] > 0.36
         assert read["margin_needed_mm"] == sla["margin_needed_mm"]
         assert read["ssim"]["uncalibrated"] < read["ssim"]["calibrated"]
@@ -116,7 +120,7 @@ class TestWritten:
         read = json.loads((written / "tolerance.json").read_text())["prototype"]
         plain, known = read["uncalibrated"], read["calibrated"]
         assert plain["worst_camera_mm"]["0.5"] < known["worst_camera_mm"]["0.5"] - 1
-        assert known["pointing_rms_mm"] < 1e-6 < plain["pointing_rms_mm"]
+        assert known["pointing_mm"]["rms"] < 1e-6 < plain["pointing_mm"]["rms"]
 
     def test_words_are_shown_and_written(
         self, bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -125,7 +129,7 @@ class TestWritten:
         assert run(["tolerance", str(bare), *FEW, "--out", str(out)]) == 0
         shown = capsys.readouterr().out
         read = json.loads((out / "tolerance.json").read_text())
-        assert shown.startswith(read["words"] + "\n")
+        assert shown.startswith(read["summary"] + "\n")
         assert all(name in shown for name in FILES)
         assert read["prototype"] is None
         assert "Prototype" not in shown
@@ -150,7 +154,7 @@ class TestWritten:
         read = json.loads((tmp_path / "tolerance.json").read_text())
         assert read["process"]["facets_mm"]["mean"] == 1
         assert read["process"]["facets_mm"]["source"] == "set by an option"
-        assert (read["seed"], read["ssim"]["calibration_leaves_mrad"]) == (7, 0)
+        assert (read["seed"], read["ssim"]["calibration_residual_mrad"]) == (7, 0)
         sla, diamond = (one["margin_needed_mm"] for one in read["processes"])
         assert diamond < 1 < read["margin_needed_mm"] < sla
         assert read["yield"]["share"] == 0

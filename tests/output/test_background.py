@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.output.background import beside
+from tbcad.output.background import in_background
 from tbcad.spec.errors import SpecError
 
 
@@ -27,23 +27,23 @@ def wait_and_write(path: Path) -> None:
 
 
 def test_both_are_done(tmp_path: Path) -> None:
-    with beside(write, tmp_path / "there", "x"):
+    with in_background(write, tmp_path / "there", "x"):
         (tmp_path / "here").write_text("y")
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"there": "x", "here": "y"}
 
 
 def test_what_it_raises_is_raised() -> None:
-    with pytest.raises(SpecError, match="too thin"), beside(refuse, "too thin"):
+    with pytest.raises(SpecError, match="too thin"), in_background(refuse, "too thin"):
         pass
 
 
 def test_a_process_that_dies_is_told() -> None:
-    with pytest.raises(RuntimeError, match="ended before"), beside(die):
+    with pytest.raises(RuntimeError, match="ended before"), in_background(die):
         pass
 
 
 def test_a_block_that_fails_ends_the_work(tmp_path: Path) -> None:
-    with pytest.raises(KeyError), beside(wait_and_write, tmp_path / "late"):
+    with pytest.raises(KeyError), in_background(wait_and_write, tmp_path / "late"):
         raise KeyError
     time.sleep(3.5)
     assert not list(tmp_path.iterdir())

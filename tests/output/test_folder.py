@@ -14,7 +14,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.output import folder as folder_module
 from tbcad.output import foreign_files as leftovers_module
-from tbcad.output.folder import check_target, replacing
+from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.manifest import write_manifest
 
 ROOT = Path(__file__).parents[2]
@@ -224,11 +224,11 @@ class TestParents:
         assert list(tmp_path.rglob("*")) == [tmp_path / "a"]
 
     def test_a_check_makes_nothing(self, tmp_path: Path) -> None:
-        check_target(tmp_path / "a" / "b", force=False)
+        check_replaceable(tmp_path / "a" / "b", force=False)
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("refuse", [check_target, export], ids=["check", "replace"])
+@pytest.mark.parametrize("refuse", [check_replaceable, export], ids=["check", "replace"])
 class TestRefused:
     def test_a_file(self, out: Path, refuse: Callable[..., None]) -> None:
         out.write_text("mine")
@@ -331,7 +331,7 @@ class TestRefused:
         with replacing(out, force=False) as new:
             fill(new, 1)
             self.refused(out, refuse, "another tbcad")
-            check_target(out.parent / "elsewhere", force=False)
+            check_replaceable(out.parent / "elsewhere", force=False)
         assert version_of(out) == 1
         export(out, 2)
         assert version_of(out) == 2
@@ -339,7 +339,7 @@ class TestRefused:
     def refused(self, out: Path, refuse: Callable[..., None], words: str) -> None:
         before = tree(self.tmp_path)
         with pytest.raises(InputError, match=words) as error:
-            refuse(out, False) if refuse is check_target else export(out, 9)
+            refuse(out, False) if refuse is check_replaceable else export(out, 9)
         assert "\n" not in str(error.value)
         assert tree(self.tmp_path) == before
 
@@ -356,7 +356,7 @@ def test_the_manifest_that_tbcad_writes_is_known(
         (new / "shell_a.stl").write_text("solid")
         write_manifest(new)
         (new / "verify.json").write_text("{}")
-    check_target(out, force=False)
+    check_replaceable(out, force=False)
 
 
 KILLED = '''

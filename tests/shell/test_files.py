@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
-from tbcad.output.build import export
+from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 from tbcad.spec.load import load_spec, spec_dict
 from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
@@ -17,7 +17,7 @@ from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
 @pytest.fixture(scope="module")
 def exported(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
-    export(small_design, folder, [SHELL])
+    write_export(small_design, folder, [SHELL])
     return folder
 
 
@@ -95,7 +95,7 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
 
 
 def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:
-    export(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path, [SHELL])
+    write_export(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path, [SHELL])
     with (tmp_path / "mirrors.csv").open(newline="") as file:
         row = next(csv.DictReader(file))
     assert row["radius_mm"] == row["cx"] == ""
@@ -114,7 +114,7 @@ def test_manifest_holds_every_file(exported: Path) -> None:
 
 
 def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
-    export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
+    write_export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
     for path in exported.iterdir():
         assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
 
@@ -124,7 +124,7 @@ def test_pcurves_on_request(tmp_path: Path) -> None:
     for wanted in ("false", "true"):
         folder = tmp_path / wanted
         folder.mkdir()
-        export(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder, [SHELL])
+        write_export(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder, [SHELL])
         text = (folder / "shell_a.step").read_text()
         assert ("PCURVE" in text) == (wanted == "true")
         sizes.append(len(text))

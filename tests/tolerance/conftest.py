@@ -4,10 +4,9 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 
 
 @pytest.fixture(scope="session")
-def halves(small_design: MirrorDesign) -> tuple[EdgeModel, EdgeModel]:
-    a, b = (nominal(at) for at in reflectors(small_design))
-    return a, b
+def halves(small_design: MirrorDesign) -> EdgeModels:
+    return edge_models(reflectors(small_design))

@@ -26,12 +26,12 @@ from tbcad.optics.reflection import miss_distances, reflected_rays
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import object_distances, shell_envelope
 from tbcad.shell.mesh import shell_mesh
-from tbcad.tolerance.montecarlo.draws import Draws
+from tbcad.tolerance.montecarlo.draws import ShellDraws
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 
 
-def made(half: MirrorArray, draws: Draws, k: int) -> Cells:
+def made(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     """Cells of machine k before its shell is scaled and moved."""
     every, m = half.cells.surfaces, len(half)
     radius = 1 / every.curvature[:m] + draws.radius[k]
@@ -48,7 +48,7 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
     return replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
 
 
-def slowly(half: MirrorArray, draws: Draws, k: int) -> np.ndarray:
+def slowly(half: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
     """Coverage of each mirror of machine k by tbcad.optics.trace, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
@@ -72,7 +72,9 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mirror[counted], arc[counted]
 
 
-def meshed(design: MirrorDesign, draws: tuple[Draws, Draws], k: int, folder: Path) -> None:
+def meshed(
+    design: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path
+) -> None:
     """Write both shells of machine k as STL files, as the exporter would."""
     first, body = design.halves[0], shell_envelope(design)
     for half, drawn in zip(design.halves, draws, strict=True):
@@ -115,7 +117,7 @@ def _least(bench: OpticalSetup) -> np.ndarray:
     return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 
 
-def brutally(half: MirrorArray, draws: Draws, k: int, mirror: int, ways: int = 4_000) -> float:
+def brutally(half: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000) -> float:
     """Coverage of a mirror of machine k by bisection of where each way from its apex ends, mm.
 
     Every sphere and plane is looked at, scaled as it is, without any circle or corner.

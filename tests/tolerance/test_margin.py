@@ -12,11 +12,11 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.margin import MOST_MM, STEP_MM, Margin, margin, with_margin
+from tbcad.tolerance.margin import LARGEST_MARGIN_MM, STEP_MM, Margin, margin, with_margin
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import nominal
-from tbcad.tolerance.process.process import errors, load_process
+from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.process.process import load_process, process_errors
 
 TARGET = 60.0
 Loss = Callable[[float], np.ndarray]
@@ -52,7 +52,7 @@ def steady(loss: float | np.ndarray) -> Loss:
 
 def brute(lost: np.ndarray, wanted: float) -> float:
     """The least step with which the share is good, all of them tried."""
-    steps = np.arange(round(MOST_MM / STEP_MM) + 1) * STEP_MM
+    steps = np.arange(round(LARGEST_MARGIN_MM / STEP_MM) + 1) * STEP_MM
     good = (TARGET + steps[:, None] - lost >= TARGET).mean(axis=1) >= wanted
     return float(steps[np.argmax(good)])
 
@@ -107,7 +107,7 @@ class TestMadeUpLosses:
             assert found.share >= wanted
 
     def test_too_much(self, spec: Spec) -> None:
-        found = margin(spec, Errors(), 0.99, losing(steady(MOST_MM + 0.001)))
+        found = margin(spec, Errors(), 0.99, losing(steady(LARGEST_MARGIN_MM + 0.001)))
         assert (found.mm, found.share) == (None, 0)
         assert "more than 20 mm" in found.reason
 
@@ -155,14 +155,14 @@ class TestRealDesigns:
 
     @staticmethod
     def worst(made: MirrorDesign, errors: Errors) -> np.ndarray:
-        a, b = (nominal(at) for at in reflectors(made))
-        return simulate(MonteCarloCase((a, b), errors, 1), 40).worst
+        models = edge_models(reflectors(made))
+        return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
     @pytest.mark.parametrize(
         ("n", "process", "wanted"), [(4, "sla", 0.9), (4, "sls", 0.5), (5, "cnc", 0.9)]
     )
     def test_margin_gives_the_yield(self, n: int, process: str, wanted: float) -> None:
-        spec, made = load_spec(None, [f"n={n}"]), errors(load_process(process))
+        spec, made = load_spec(None, [f"n={n}"]), process_errors(load_process(process))
         found = margin(spec, made, wanted, self.worst)
         assert found.mm is not None
 

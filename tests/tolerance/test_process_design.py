@@ -12,30 +12,30 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance import process_design
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
-from tbcad.tolerance.montecarlo.edge_model import nominal
-from tbcad.tolerance.process.process import errors, load_process
-from tbcad.tolerance.process_design import for_process
+from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerance.process_design import spec_for_process
 
 SMALL = ["n=4", "mirrors.margin_mm=0"]
-MACHINES = 60
+BUILDS = 60
 
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process_design, "MACHINES", MACHINES)
+    monkeypatch.setattr(process_design, "BUILDS", BUILDS)
 
 
 def test_the_margin_is_enough_and_a_little_less_is_not() -> None:
     process, wanted = load_process("cnc"), 0.9
-    spec = for_process(load_spec(None, SMALL), process, wanted)
+    spec = spec_for_process(load_spec(None, SMALL), process, wanted)
     found = spec.mirrors.margin_mm
     assert found > 0
     shares = []
     for margin in (found, found - 0.03):
         tried = load_spec(None, ["n=4", f"mirrors.margin_mm={margin}"])
-        a, b = (nominal(at) for at in reflectors(design(tried)))
+        models = edge_models(reflectors(design(tried)))
         worst = simulate(
-            MonteCarloCase((a, b), errors(process), process_design.SEED), MACHINES
+            MonteCarloCase(models, process_errors(process), process_design.SEED), BUILDS
         ).worst
         shares.append((worst >= 60).mean())
     assert shares[0] >= wanted > shares[1]
@@ -44,7 +44,7 @@ def test_the_margin_is_enough_and_a_little_less_is_not() -> None:
 def test_a_looser_process_needs_more() -> None:
     spec = load_spec(None, SMALL)
     margins = [
-        for_process(spec, load_process(name), 0.9).mirrors.margin_mm
+        spec_for_process(spec, load_process(name), 0.9).mirrors.margin_mm
         for name in ("diamond", "cnc", "sla")
     ]
     assert margins == sorted(margins)
@@ -57,13 +57,13 @@ def test_a_looser_process_needs_more() -> None:
 )
 def test_what_cannot_be_asked(settings: list[str], wanted: float, wrong: str) -> None:
     with pytest.raises(InputError, match=wrong):
-        for_process(load_spec(None, [*SMALL, *settings]), load_process("cnc"), wanted)
+        spec_for_process(load_spec(None, [*SMALL, *settings]), load_process("cnc"), wanted)
 
 
 def test_a_process_for_which_there_is_no_margin() -> None:
     rough = load_process("fdm", ["sphere_centre_um=2000"])
     with pytest.raises(InputError, match="with any margin"):
-        for_process(load_spec(None, SMALL), rough, 0.9)
+        spec_for_process(load_spec(None, SMALL), rough, 0.9)
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,13 +16,11 @@ from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import coverage, seen
-from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, axes, nominal
+from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, camera_axes, edge_models
 from tbcad.tolerance.montecarlo.pointing import pointing
 from tests.tolerance.exact_builds import brutally, meshed, proved, slowly
-
-Halves = tuple[EdgeModel, EdgeModel]
 
 # What a careless maker might leave; even scale only, as the slow means know no other.
 COARSE = Errors(
@@ -36,17 +34,16 @@ POSED = replace(COARSE, shell_shift=Error(0.2), shell_tilt=Error(0.002))
 TARGET = 60.0
 
 
-def halves_of(made: MirrorDesign) -> Halves:
-    a, b = (nominal(at) for at in reflectors(made))
-    return a, b
+def halves_of(made: MirrorDesign) -> EdgeModels:
+    return edge_models(reflectors(made))
 
 
 @pytest.fixture(scope="module")
-def halves(small_design: MirrorDesign) -> Halves:
+def halves(small_design: MirrorDesign) -> EdgeModels:
     return halves_of(small_design)
 
 
-def perfect(half: EdgeModel) -> Draws:
+def perfect(half: EdgeModel) -> ShellDraws:
     return draw(Errors(), 1, range(1), len(half))[0]
 
 
@@ -65,9 +62,9 @@ def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     """To the accuracy of the design's own samples, 1e-5 mm; the next test goes farther."""
     made = design(load_spec(None, settings))
     for half, fast in zip(made.halves, halves_of(made), strict=True):
-        one = seen(fast, perfect(fast))
+        one = mirror_coverage(fast, perfect(fast))
         assert one.diameter[0] == pytest.approx(half.coverage, abs=2e-5)
-        assert (one.passes[0, ~fast.halved] % 2 == 1).all()
+        assert (one.crossings[0, ~fast.halved] % 2 == 1).all()
 
 
 def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> None:
@@ -78,7 +75,7 @@ def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> No
     halves = halves_of(paper_design)
     draws = tuple(perfect(fast) for fast in halves)
     for half, fast, drawn in zip(paper_design.halves, halves, draws, strict=True):
-        found = seen(fast, drawn).diameter[0]
+        found = mirror_coverage(fast, drawn).diameter[0]
         assert np.abs(found - slowly(half, drawn, 0)).max() < 1e-6
         assert np.abs(found - half.coverage).max() < 1e-5
     every, _ = coverage(halves, draws)
@@ -89,14 +86,14 @@ def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> No
 # One error whose effect is known
 
 
-def test_what_moves_together_changes_nothing(halves: Halves) -> None:
+def test_what_moves_together_changes_nothing(halves: EdgeModels) -> None:
     """Shell and camera turned about the object's middle; rays then turn by as much."""
     turn, view = row(0.01, -0.02, 0.03), halves[0].view
     rotation = Rotation.from_rotvec(turn[0])
     shift = rotation.apply(view.pinhole) - view.pinhole
     still = perfect(halves[0])
     moved = replace(still, shell_tilt=turn, camera_tilt=turn, camera_shift=shift[None])
-    before, after = seen(halves[0], still), seen(halves[0], moved)
+    before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], moved)
     assert after.diameter == pytest.approx(before.diameter, abs=1e-9)
     assert after.pixels == pytest.approx(before.pixels, rel=1e-9)
     rays = pointing(halves[0], moved)
@@ -109,7 +106,7 @@ def test_what_moves_together_changes_nothing(halves: Halves) -> None:
     assert rays.angle[0] == pytest.approx(turned, abs=1e-9)
 
 
-def test_moved_shell_is_moved_camera_and_object(halves: Halves) -> None:
+def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
     """All rays pass by what is left behind: to first order the shell's shift, across the ray."""
     shift = row(0.3, -0.2, 0.1)
     still = perfect(halves[0])
@@ -121,11 +118,11 @@ def test_moved_shell_is_moved_camera_and_object(halves: Halves) -> None:
 
 
 @pytest.mark.parametrize("size", [0.98, 1.03])
-def test_larger_machine_covers_more_in_proportion(halves: Halves, size: float) -> None:
+def test_larger_machine_covers_more_in_proportion(halves: EdgeModels, size: float) -> None:
     still = perfect(halves[0])
     pinhole = halves[0].view.pinhole
     larger = replace(still, scale=row(size, size, size), camera_shift=(size - 1) * pinhole[None])
-    before, after = seen(halves[0], still), seen(halves[0], larger)
+    before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], larger)
     assert after.diameter == pytest.approx(size * before.diameter, abs=1e-9)
     assert after.pixels == pytest.approx(before.pixels, rel=1e-9)
     rays = pointing(halves[0], larger)
@@ -157,23 +154,23 @@ def lever(half: EdgeModel, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndar
     return np.linalg.norm(moved, axis=1), np.linalg.norm(bent, axis=1)
 
 
-def shifted(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def shifted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
     shift = size * row(1.0, 2.0, -1.0)
     return replace(perfect(half), camera_shift=shift), shift, np.zeros((1, 3))
 
 
-def tilted(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def tilted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
     turn = size / 100 * row(1.0, 2.0, -1.0)
     way = half.table[:-2, :3] - half.view.pinhole
     way /= np.linalg.norm(way, axis=1)[:, None]
     return replace(perfect(half), camera_tilt=turn), np.zeros((1, 3)), np.cross(turn, way)
 
 
-def longer(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]:
+def longer(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
     """A pixel then stands for an angle of lesser tangent from the optical axis."""
     way = half.table[:-2, :3] - half.view.pinhole
     way /= np.linalg.norm(way, axis=1)[:, None]
-    forward = axes(half.view)[2]
+    forward = camera_axes(half.view)[2]
     radial = way - (way @ forward)[:, None] * forward
     turn = -size / 100 * (radial - np.sum(radial * way, axis=1)[:, None] * way)
     return replace(perfect(half), focal=np.array([1 + size / 100])), np.zeros((1, 3)), turn
@@ -181,7 +178,8 @@ def longer(half: EdgeModel, size: float) -> tuple[Draws, np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("error", [shifted, tilted, longer])
 def test_pointing_error_is_the_lever_of_a_curved_mirror(
-    halves: Halves, error: Callable[[EdgeModel, float], tuple[Draws, np.ndarray, np.ndarray]]
+    halves: EdgeModels,
+    error: Callable[[EdgeModel, float], tuple[ShellDraws, np.ndarray, np.ndarray]],
 ) -> None:
     for half in halves:
         draws, start, turn = error(half, 1e-4)
@@ -191,15 +189,15 @@ def test_pointing_error_is_the_lever_of_a_curved_mirror(
         assert found.angle[0] == pytest.approx(angle, rel=1e-3, abs=1e-10)
 
 
-def test_radius_of_one_mirror_alone(halves: Halves, small_design: MirrorDesign) -> None:
+def test_radius_of_one_mirror_alone(halves: EdgeModels, small_design: MirrorDesign) -> None:
     """Its own coverage by brute force; its neighbours see less or more, all others the same."""
     half, alone = small_design.halves[0], 40
     radius = np.zeros((1, len(half)))
     radius[0, alone] = 0.1
     drawn = replace(perfect(halves[0]), radius=radius)
-    found = seen(halves[0], drawn).diameter[0]
+    found = mirror_coverage(halves[0], drawn).diameter[0]
     assert found[alone] == pytest.approx(brutally(half, drawn, 0, alone), abs=1e-4)
-    before = seen(halves[0], perfect(halves[0])).diameter[0]
+    before = mirror_coverage(halves[0], perfect(halves[0])).diameter[0]
     faces = half.cells.arcs.faces
     touched = np.unique(faces[(faces == alone).any(axis=1)])
     others = np.setdiff1d(np.arange(len(half)), touched)
@@ -207,13 +205,13 @@ def test_radius_of_one_mirror_alone(halves: Halves, small_design: MirrorDesign) 
     assert (found[touched[touched < len(half)]] != before[touched[touched < len(half)]]).any()
 
 
-def test_coat_too_thick_is_radii_too_large(halves: Halves) -> None:
+def test_coat_too_thick_is_radii_too_large(halves: EdgeModels) -> None:
     m = len(halves[0])
     coat, _ = draw(Errors(coating=Error(0, 0.03)), 1, range(1), m)
     radii, _ = draw(Errors(sphere_radius=Error(0, 0.03)), 1, range(1), m)
-    both = [seen(halves[0], one).diameter for one in (coat, radii)]
+    both = [mirror_coverage(halves[0], one).diameter for one in (coat, radii)]
     assert np.array_equal(*both)
-    assert (both[0] != seen(halves[0], perfect(halves[0])).diameter).all()
+    assert (both[0] != mirror_coverage(halves[0], perfect(halves[0])).diameter).all()
 
 
 # Random machines
@@ -221,14 +219,14 @@ def test_coat_too_thick_is_radii_too_large(halves: Halves) -> None:
 
 @pytest.mark.parametrize("share", [0.1, 1.0, 4.0])
 def test_random_machines_against_slow_tracing(
-    halves: Halves, small_design: MirrorDesign, share: float
+    halves: EdgeModels, small_design: MirrorDesign, share: float
 ) -> None:
     """20 machines of 2 x 103 mirrors, within 1e-6 mm (asked for: 1e-4)."""
     errors = scaled(POSED, share)
     for half, fast, drawn in zip(
         small_design.halves, halves, draw(errors, 7, range(20), len(halves[0])), strict=True
     ):
-        found = seen(fast, drawn).diameter
+        found = mirror_coverage(fast, drawn).diameter
         slow = np.stack([slowly(half, drawn, k) for k in range(20)])
         assert np.abs(found - slow).max() < 1e-6
         assert np.abs(found - half.coverage).max() > 5 * share  # it is no small thing
@@ -237,7 +235,7 @@ def test_random_machines_against_slow_tracing(
 def test_random_paper_machines_against_slow_tracing(paper_design: MirrorDesign) -> None:
     halves = halves_of(paper_design)
     drawn, _ = draw(POSED, 7, range(3), len(halves[0]))
-    found = seen(halves[0], drawn).diameter
+    found = mirror_coverage(halves[0], drawn).diameter
     slow = np.stack([slowly(paper_design.halves[0], drawn, k) for k in range(3)])
     assert np.abs(found - slow).max() < 1e-6
 
@@ -251,13 +249,13 @@ def scaled(errors: Errors, share: float) -> Errors:
 
 @pytest.mark.parametrize("mirror", [3, 30, 55])
 def test_uneven_scale_against_brute_force(
-    halves: Halves, small_design: MirrorDesign, mirror: int
+    halves: EdgeModels, small_design: MirrorDesign, mirror: int
 ) -> None:
     """Spheres become ellipsoids of up to 1 % out of round."""
     errors = replace(COARSE, camera_shift=Error(), scale_axis=Error(0.01))
     _, drawn = draw(errors, 3, range(1), len(halves[0]))
     assert np.ptp(drawn.scale) > 0.005
-    found = seen(halves[1], drawn).diameter[0, mirror]
+    found = mirror_coverage(halves[1], drawn).diameter[0, mirror]
     assert found == pytest.approx(brutally(small_design.halves[1], drawn, 0, mirror), abs=1e-4)
 
 
@@ -275,7 +273,7 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
 
 @pytest.mark.parametrize(("errors", "machines"), [(COARSE, range(20)), (POSED, range(20, 24))])
 def test_random_machines_against_the_proof_of_their_meshes(
-    halves: Halves, small_design: MirrorDesign, record: Export, errors: Errors, machines: range
+    halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, machines: range
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
 

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.schedule import run
+from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -77,4 +77,4 @@ def for_each_n(
         scheduler: address of a Dask scheduler; None for this machine's cores.
     """
     # The largest take longest, so they are begun first.
-    return run(work, list(reversed(ns)), scheduler, lambda n: progress(f"n = {n}"))[::-1]
+    return run_units(work, list(reversed(ns)), scheduler, lambda n: progress(f"n = {n}"))[::-1]

@@ -10,8 +10,8 @@ third surface of curvature c (tbcad.optics.surfaces), its value at x(t) times w 
 
     f + (g . e) t + (f k^2 / 4 - (g . n) k / 2 + c / 2) t^2,
 
-so what the other mirrors, the seam and the foot leave of an edge are the intervals between roots
-of quadratics, for spheres and planes alike, and no topology is assumed.
+so the parts of an edge that the other mirrors, the seam and the foot leave visible are the
+intervals between roots of quadratics, for spheres and planes alike, and no topology is assumed.
 """
 
 from math import inf, sqrt
@@ -19,18 +19,36 @@ from math import inf, sqrt
 import numpy as np
 
 from tbcad.simulate.parallel import compiled
+from tbcad.tolerance.vectors import (
+    Vector,
+    cross,
+    divided,
+    dot,
+    minus,
+    plus_scaled,
+    scaled,
+    vector,
+)
 from tbcad.types import Bools, Floats, Ints
 
-# Samples of each edge, first over all of it, then about the least; a parabola does the rest.
+# Samples of each edge, first over all of it, then about the minimum; a parabola refines the last.
 SAMPLES = 9
 ROUNDS = 4
-# More stretches than this are never left of one edge.
-STRETCHES = 16
+# Maximum number of visible intervals of one edge.
+INTERVALS = 16
 
-# Columns of a table of surfaces; rows of an edge (its curvature begins the last); rows of a place.
-NORMAL, CURVATURE = 3, 6
-START, ALONG, OUT, BEND = 0, 1, 2, 3
+# Columns of a table of surfaces.
+APEX, NORMAL, CURVATURE = 0, 3, 6
+# Rows of an edge: point x0, unit vectors e and n; its curvature begins the last row.
+START, TANGENT, OUTWARD, BEND = 0, 1, 2, 3
+# Rows of a view; axes of a screen.
 PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
+FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
+# Columns of a sample: the ray's distance squared from the object's centre, its place on the screen
+# and the point's place in the picture.
+DISTANCE, SCREEN_X, SCREEN_Y, PICTURE_X, PICTURE_Y = 0, 1, 2, 3, 4
+# Columns of the result.
+MISS_SQUARED, CROSSINGS, AREA = 0, 1, 2
 
 
 @compiled
@@ -39,51 +57,51 @@ def trace_cell_edges(
     pair: Ints,
     offset: Ints,
     face: Ints,
-    far: Floats,
+    reach: Floats,
     halved: Bools,
-    place: Floats,
+    view: Floats,
     screen: Floats,
 ) -> Floats:
-    """What every mirror of one half sees, from the edges of its cell.
+    """Coverage of every mirror of one half, from the edges of its cell.
 
     Args:
         surfaces: apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7).
-        pair: see tbcad.tolerance.near.Near, as are the next two.
+        pair: see tbcad.tolerance.montecarlo.neighbour_pairs, as for the next three.
         offset: likewise.
         face: likewise.
-        far: how far from its middle each edge may go, mm, (e,).
-        halved: mirrors whose seam edge does not limit what they see, (m,).
-        place: pinhole, object's middle, scale, and the camera's axes right, down, forward, in the
+        reach: likewise.
+        halved: mirrors whose seam edge does not limit their coverage, (m,).
+        view: pinhole, object's centre, scale, and the camera's axes right, down, forward, in the
             frame of the shell, (6, 3).
         screen: for each mirror two axes and the normal of a plane through the object, (m, 3, 3).
 
     Returns:
-        For each mirror (m, 3): the least distance squared of its rays from the object's middle,
-        inf without an edge; how often the outline's image passes the first axis of its screen;
+        For each mirror (m, 3): the minimum distance squared of its rays from the object's centre,
+        inf without an edge; how often the outline's image crosses the first axis of its screen;
         and the area of the cell's picture at unit distance.
     """
-    found = np.zeros((len(surfaces) - 2, 3))
-    found[:, 0] = inf
-    edge, spans, spare = np.empty((4, 3)), np.empty((STRETCHES, 2)), np.empty((STRETCHES, 2))
+    result = np.zeros((len(surfaces) - 2, 3))
+    result[:, MISS_SQUARED] = inf
+    edge, spans, spare = np.empty((4, 3)), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
         p, q = pair[e, 0], pair[e, 1]
         if surfaces[q, CURVATURE] > surfaces[p, CURVATURE]:
             p, q = q, p
         if not _edge(surfaces[p], surfaces[q], edge):
             continue
-        spans[0, 1] = _reach(far[e], edge[BEND, 0])
+        spans[0, 1] = _end_parameter(reach[e], edge[BEND, 0])
         spans[0, 0], count = -spans[0, 1], 1
         for k in face[offset[e] : offset[e + 1]]:
-            a, b, c = _value(surfaces[k], edge)
-            count = _cut(a, b, c, spans, spare, count)
+            a, b, c = _value_along(surfaces[k], edge)
+            count = _visible(a, b, c, spans, spare, count)
             if count == 0:
                 break
         for i, other, sign in ((p, q, 1), (q, p, -1)):
-            if i < len(found):
-                counted = not (halved[i] and other == len(found))
+            if i < len(result):
+                limits = not (halved[i] and other == len(result))
                 for s in range(count):
-                    _trace(surfaces[i], edge, spans[s], place, screen[i], found[i], sign, counted)
-    return found
+                    _trace(surfaces[i], edge, spans[s], view, screen[i], result[i], sign, limits)
+    return result
 
 
 @compiled
@@ -91,61 +109,57 @@ def _edge(p: Floats, q: Floats, edge: Floats) -> bool:
     """Fill in the edge of two surfaces, p's curvature the greater; False where they do not meet."""
     kp, kq = p[CURVATURE], q[CURVATURE]
     ratio = kq / kp if kp > 0 else 0.0
-    ax, ay, az = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    value = q[3] * ax + q[4] * ay + q[5] * az + kq / 2 * (ax * ax + ay * ay + az * az)
-    gx = q[3] + kq * ax - ratio * p[3]
-    gy = q[4] + kq * ay - ratio * p[4]
-    gz = q[5] + kq * az - ratio * p[5]
-    size = sqrt(gx * gx + gy * gy + gz * gz)
+    normal, other_normal = vector(p, NORMAL), vector(q, NORMAL)
+    apart = minus(vector(p, APEX), vector(q, APEX))
+    value = dot(other_normal, apart) + kq / 2 * dot(apart, apart)
+    gradient = plus_scaled(plus_scaled(other_normal, kq, apart), -ratio, normal)
+    size = sqrt(dot(gradient, gradient))
     if size == 0:
         return False
-    gx, gy, gz, away = gx / size, gy / size, gz / size, value / size
-    ex, ey, ez = p[4] * gz - p[5] * gy, p[5] * gx - p[3] * gz, p[3] * gy - p[4] * gx
-    slope = sqrt(ex * ex + ey * ey + ez * ez)
+    gradient, distance = divided(gradient, size), value / size
+    tangent = cross(normal, gradient)
+    slope = sqrt(dot(tangent, tangent))
     if slope == 0:
         return False
-    ex, ey, ez = ex / slope, ey / slope, ez / slope
-    nx, ny, nz = gy * ez - gz * ey, gz * ex - gx * ez, gx * ey - gy * ex
-    height = p[3] * nx + p[4] * ny + p[5] * nz
+    tangent = divided(tangent, slope)
+    outward = cross(gradient, tangent)
+    height = dot(normal, outward)
     if height < 0:
-        nx, ny, nz, height = -nx, -ny, -nz, -height
-    c = kp / 2 * away * away - away * (p[3] * gx + p[4] * gy + p[5] * gz)
+        outward, height = scaled(-1.0, outward), -height
+    c = kp / 2 * distance * distance - distance * dot(normal, gradient)
     root = height * height - 2 * kp * c
     if root <= 0:
         return False
     root = sqrt(root)
-    s = -2 * c / (height + root)
-    edge[START, 0] = p[0] + s * nx - away * gx
-    edge[START, 1] = p[1] + s * ny - away * gy
-    edge[START, 2] = p[2] + s * nz - away * gz
-    edge[ALONG, 0], edge[ALONG, 1], edge[ALONG, 2] = ex, ey, ez
-    edge[OUT, 0], edge[OUT, 1], edge[OUT, 2] = nx, ny, nz
+    start = plus_scaled(vector(p, APEX), -2 * c / (height + root), outward)
+    edge[START] = plus_scaled(start, -distance, gradient)
+    edge[TANGENT] = tangent
+    edge[OUTWARD] = outward
     edge[BEND, 0] = kp / root
     return True
 
 
 @compiled
-def _reach(far: float, bend: float) -> float:
+def _end_parameter(reach: float, bend: float) -> float:
     """Parameter of the point at a distance from x0, of the quarter circle if that is nearer."""
-    share = far * bend / 2
-    return far / sqrt(1 - share * share) if share < sqrt(0.5) else 2 / bend
+    share = reach * bend / 2
+    return reach / sqrt(1 - share * share) if share < sqrt(0.5) else 2 / bend
 
 
 @compiled
-def _value(surface: Floats, edge: Floats) -> tuple[float, float, float]:
+def _value_along(surface: Floats, edge: Floats) -> Vector:
     """Coefficients of a surface's value along an edge, times w."""
-    f, along, out, k, bend = 0.0, 0.0, 0.0, surface[CURVATURE], edge[BEND, 0]
-    for x in range(3):
-        away, n = edge[START, x] - surface[x], surface[NORMAL + x]
-        f += (n + k / 2 * away) * away
-        along += (n + k * away) * edge[ALONG, x]
-        out += (n + k * away) * edge[OUT, x]
-    return f, along, f * bend * bend / 4 - out * bend / 2 + k / 2
+    k, bend = surface[CURVATURE], edge[BEND, 0]
+    normal, away = vector(surface, NORMAL), minus(vector(edge[START]), vector(surface, APEX))
+    value = dot(plus_scaled(normal, k / 2, away), away)
+    gradient = plus_scaled(normal, k, away)
+    along, out = dot(gradient, vector(edge[TANGENT])), dot(gradient, vector(edge[OUTWARD]))
+    return value, along, value * bend * bend / 4 - out * bend / 2 + k / 2
 
 
 @compiled
-def _cut(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int) -> int:
-    """Keep of the spans where a + b t + c t^2 is not negative; how many there are then."""
+def _visible(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int) -> int:
+    """Keep the parts of the spans where a + b t + c t^2 is not negative; return their number."""
     low, high, between = _roots(a, b, c)
     kept = 0
     for s in range(count):
@@ -154,7 +168,7 @@ def _cut(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int)
             begin, end = max(first, low), min(last, high)
             if not between:
                 begin, end = (first, min(last, low)) if side == 0 else (max(first, high), last)
-            if begin < end and kept < STRETCHES:
+            if begin < end and kept < INTERVALS:
                 spare[kept, 0], spare[kept, 1] = begin, end
                 kept += 1
     spans[:kept] = spare[:kept]
@@ -163,7 +177,7 @@ def _cut(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int)
 
 @compiled
 def _roots(a: float, b: float, c: float) -> tuple[float, float, bool]:
-    """Between what ends, or outside of them, a + b t + c t^2 is not negative."""
+    """Ends of the interval where a + b t + c t^2 is not negative, or else of where it is."""
     root = b * b - 4 * a * c
     if root <= 0:
         return inf, inf, a + c < 0
@@ -179,24 +193,27 @@ def _trace(
     surface: Floats,
     edge: Floats,
     span: Floats,
-    place: Floats,
+    view: Floats,
     screen: Floats,
-    found: Floats,
+    result: Floats,
     sign: int,
-    counted: bool,
+    limits: bool,
 ) -> None:
-    """Add a stretch of an edge to what is found of one mirror, whose cell lies on a side of it."""
+    """Add a part of an edge to the result of the mirror on one side of it."""
     sample, low, high = np.empty((SAMPLES, 5)), span[0], span[1]
-    _sample(surface, edge, low, high, place, screen, sample)
-    found[2] += sign * _swept(sample)
-    if not counted:
+    _sample(surface, edge, low, high, view, screen, sample)
+    result[AREA] += sign * _swept_area(sample)
+    if not limits:
         return
-    found[1] += _passes(sample)
+    for s in range(SAMPLES - 1):
+        result[CROSSINGS] += crosses_half_axis(
+            sample[s, SCREEN_X : SCREEN_Y + 1], sample[s + 1, SCREEN_X : SCREEN_Y + 1]
+        )
     for _ in range(ROUNDS - 1):
-        best, step = np.argmin(sample[:, 0]), (high - low) / (SAMPLES - 1)
+        best, step = np.argmin(sample[:, DISTANCE]), (high - low) / (SAMPLES - 1)
         low, high = max(low, low + (best - 1) * step), min(high, low + (best + 1) * step)
-        _sample(surface, edge, low, high, place, screen, sample)
-    found[0] = min(found[0], _lowest(sample[:, 0]))
+        _sample(surface, edge, low, high, view, screen, sample)
+    result[MISS_SQUARED] = min(result[MISS_SQUARED], _parabola_minimum(sample[:, DISTANCE]))
 
 
 @compiled
@@ -205,71 +222,68 @@ def _sample(
     edge: Floats,
     low: float,
     high: float,
-    place: Floats,
+    view: Floats,
     screen: Floats,
     sample: Floats,
 ) -> None:
-    """Fill in rays along an edge: distance squared, place on the screen, place in the picture."""
-    k, bend = surface[CURVATURE], edge[BEND, 0]
+    """Fill in the rays through evenly spaced points of an edge."""
+    bend, scale = edge[BEND, 0], vector(view[SCALE])
     for s in range(SAMPLES):
         t = low + (high - low) * s / (SAMPLES - 1)
         w = 1 + bend * bend * t * t / 4
-        along, out = t / w, -bend * t * t / 2 / w
-        x = edge[0, 0] + along * edge[1, 0] + out * edge[2, 0]
-        y = edge[0, 1] + along * edge[1, 1] + out * edge[2, 1]
-        z = edge[0, 2] + along * edge[1, 2] + out * edge[2, 2]
-        nx = (surface[3] + k * (x - surface[0])) / place[SCALE, 0]
-        ny = (surface[4] + k * (y - surface[1])) / place[SCALE, 1]
-        nz = (surface[5] + k * (z - surface[2])) / place[SCALE, 2]
-        x, y, z = x * place[SCALE, 0], y * place[SCALE, 1], z * place[SCALE, 2]
-        rx, ry, rz = x - place[0, 0], y - place[0, 1], z - place[0, 2]
-        depth = rx * place[5, 0] + ry * place[5, 1] + rz * place[5, 2]
-        sample[s, 3] = (rx * place[3, 0] + ry * place[3, 1] + rz * place[3, 2]) / depth
-        sample[s, 4] = (rx * place[4, 0] + ry * place[4, 1] + rz * place[4, 2]) / depth
-        # Lengths do not matter but in the end: a mirror image is as long as what it shows.
-        turn = 2 * (rx * nx + ry * ny + rz * nz) / (nx * nx + ny * ny + nz * nz)
-        dx, dy, dz = rx - turn * nx, ry - turn * ny, rz - turn * nz
-        x, y, z = x - place[1, 0], y - place[1, 1], z - place[1, 2]
-        cx, cy, cz = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
-        sample[s, 0] = (cx * cx + cy * cy + cz * cz) / (dx * dx + dy * dy + dz * dz)
-        far = -(x * screen[2, 0] + y * screen[2, 1] + z * screen[2, 2])
-        far /= dx * screen[2, 0] + dy * screen[2, 1] + dz * screen[2, 2]
-        x, y, z = x + far * dx, y + far * dy, z + far * dz
-        sample[s, 1] = x * screen[0, 0] + y * screen[0, 1] + z * screen[0, 2]
-        sample[s, 2] = x * screen[1, 0] + y * screen[1, 1] + z * screen[1, 2]
+        chord = plus_scaled(vector(edge[START]), t / w, vector(edge[TANGENT]))
+        point = plus_scaled(chord, -bend * t * t / 2 / w, vector(edge[OUTWARD]))
+        from_apex = minus(point, vector(surface, APEX))
+        gradient = plus_scaled(vector(surface, NORMAL), surface[CURVATURE], from_apex)
+        normal = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
+        point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
+        ray = minus(point, vector(view[PINHOLE]))
+        depth = dot(ray, vector(view[FORWARD]))
+        sample[s, PICTURE_X] = dot(ray, vector(view[RIGHT])) / depth
+        sample[s, PICTURE_Y] = dot(ray, vector(view[DOWN])) / depth
+        # Neither the normal nor the ray has to be of unit length.
+        out = plus_scaled(ray, -(2 * dot(ray, normal) / dot(normal, normal)), normal)
+        from_object = minus(point, vector(view[OBJECT]))
+        moment = cross(from_object, out)
+        sample[s, DISTANCE] = dot(moment, moment) / dot(out, out)
+        facing = vector(screen[FACING])
+        image = plus_scaled(from_object, -dot(from_object, facing) / dot(out, facing), out)
+        sample[s, SCREEN_X] = dot(image, vector(screen[FIRST_AXIS]))
+        sample[s, SCREEN_Y] = dot(image, vector(screen[SECOND_AXIS]))
 
 
 @compiled
-def _passes(sample: Floats) -> int:
-    """How often the samples' line on the screen passes the positive half of the first axis."""
-    count = 0
-    for s in range(SAMPLES - 1):
-        y, after = sample[s, 2], sample[s + 1, 2]
-        if (y > 0) != (after > 0):
-            share = y / (y - after)
-            count += sample[s, 1] + share * (sample[s + 1, 1] - sample[s, 1]) > 0
-    return count
+def crosses_half_axis(a: Floats, b: Floats) -> bool:
+    """Whether the line from a to b (2,) crosses the positive half of the first axis."""
+    if (a[1] > 0) == (b[1] > 0):
+        return False
+    return bool(a[0] + a[1] / (a[1] - b[1]) * (b[0] - a[0]) > 0)
 
 
 @compiled
-def _swept(sample: Floats) -> float:
-    """Area between the picture's middle and the samples' line in it, by Richardson's rule."""
+def _swept_area(sample: Floats) -> float:
+    """Area between the picture's centre and the samples' line in it, by Richardson's rule."""
     fine, coarse = 0.0, 0.0
     for s in range(SAMPLES - 1):
-        fine += sample[s, 3] * sample[s + 1, 4] - sample[s, 4] * sample[s + 1, 3]
+        fine += _parallelogram(sample[s], sample[s + 1])
     for s in range(0, SAMPLES - 2, 2):
-        coarse += sample[s, 3] * sample[s + 2, 4] - sample[s, 4] * sample[s + 2, 3]
-    area: float = (4 * fine - coarse) / 6
+        coarse += _parallelogram(sample[s], sample[s + 2])
+    return (4 * fine - coarse) / 6
+
+
+@compiled
+def _parallelogram(a: Floats, b: Floats) -> float:
+    area: float = a[PICTURE_X] * b[PICTURE_Y] - a[PICTURE_Y] * b[PICTURE_X]
     return area
 
 
 @compiled
-def _lowest(values: Floats) -> float:
-    """Least of even samples, on the parabola through its neighbours."""
+def _parabola_minimum(values: Floats) -> float:
+    """Minimum of even samples, on the parabola through its neighbours."""
     best = np.argmin(values)
-    least: float = values[best]
+    minimum: float = values[best]
     if best in (0, SAMPLES - 1):
-        return least
+        return minimum
     bend = values[best - 1] - 2 * values[best] + values[best + 1]
     slope = values[best + 1] - values[best - 1]
-    return max(least - (slope * slope / (8 * bend) if bend > 0 else 0.0), 0.0)
+    return max(minimum - (slope * slope / (8 * bend) if bend > 0 else 0.0), 0.0)

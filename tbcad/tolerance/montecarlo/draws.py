@@ -1,5 +1,6 @@
-"""Random machines: how far each of many made machines is off, as arrays over machines."""
+"""Random errors of simulated builds: how far each of many builds is off, as arrays over builds."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,6 +9,7 @@ import numpy as np
 from tbcad.types import Floats
 
 Distribution = Literal["normal", "uniform"]
+Shape = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -16,28 +18,28 @@ class Error:
 
     Attributes:
         spread: standard deviation if normal, half width if uniform; in mm, radians or as a share.
-        mean: what is off in every machine, in the same unit.
-        distribution: of what is off beside the mean.
+        mean: error common to all builds, in the same unit.
+        distribution: of the error about its mean.
     """
 
     spread: float = 0.0
     mean: float = 0.0
     distribution: Distribution = "normal"
 
-    def of(self, generator: np.random.Generator, *shape: int) -> Floats:
-        """Errors of a shape, drawn."""
+    def sample(self, generator: np.random.Generator, *shape: int) -> Floats:
+        """Random errors of a shape."""
         normal = self.distribution == "normal"
-        drawn = generator.standard_normal(shape) if normal else generator.uniform(-1, 1, shape)
-        result: Floats = self.mean + self.spread * drawn
+        deviation = generator.standard_normal(shape) if normal else generator.uniform(-1, 1, shape)
+        result: Floats = self.mean + self.spread * deviation
         return result
 
 
-NONE = Error()
+NO_ERROR = Error()
 
 
 @dataclass(frozen=True)
 class Errors:
-    """How exactly a process makes things, one kind a field, mm, radians and shares (1 = 100 %).
+    """Errors of a manufacturing process, one kind a field, in mm, radians and shares (1 = 100 %).
 
     Attributes:
         sphere_centre: of each mirror's centre along each axis, mm.
@@ -45,11 +47,11 @@ class Errors:
         scale_isotropic: share by which a shell is too large, one for each shell.
         scale_axis: share by which both shells are too large along each axis of the frame.
         shell_shift: of a whole shell along each axis, mm.
-        shell_tilt: of a whole shell about each axis through the object's middle, radians.
+        shell_tilt: of a whole shell about each axis through the object's centre, radians.
         camera_shift: of each pinhole along each axis, mm.
         camera_tilt: of each camera about each axis through its pinhole, radians.
         camera_focal: share by which each camera's focal length is too long.
-        coating: by which a shell's coat is too thick, mm.
+        coating: by which a shell's coating is too thick, mm.
         facets: coverage lost where a mirror is cut from flat facets, mm.
         rotation_angle: of the prototype's base at each stop, radians.
         axis_runout: of its axis, sideways, at each stop, mm.
@@ -58,36 +60,36 @@ class Errors:
         seat: of each ball's centre along each axis, mm.
     """
 
-    sphere_centre: Error = NONE
-    sphere_radius: Error = NONE
-    scale_isotropic: Error = NONE
-    scale_axis: Error = NONE
-    shell_shift: Error = NONE
-    shell_tilt: Error = NONE
-    camera_shift: Error = NONE
-    camera_tilt: Error = NONE
-    camera_focal: Error = NONE
-    coating: Error = NONE
-    facets: Error = NONE
-    rotation_angle: Error = NONE
-    axis_runout: Error = NONE
-    axis_tilt: Error = NONE
-    ball_radius: Error = NONE
-    seat: Error = NONE
+    sphere_centre: Error = NO_ERROR
+    sphere_radius: Error = NO_ERROR
+    scale_isotropic: Error = NO_ERROR
+    scale_axis: Error = NO_ERROR
+    shell_shift: Error = NO_ERROR
+    shell_tilt: Error = NO_ERROR
+    camera_shift: Error = NO_ERROR
+    camera_tilt: Error = NO_ERROR
+    camera_focal: Error = NO_ERROR
+    coating: Error = NO_ERROR
+    facets: Error = NO_ERROR
+    rotation_angle: Error = NO_ERROR
+    axis_runout: Error = NO_ERROR
+    axis_tilt: Error = NO_ERROR
+    ball_radius: Error = NO_ERROR
+    seat: Error = NO_ERROR
 
 
 @dataclass(frozen=True)
-class Draws:
-    """One camera's half of s machines: how far each is off, in the order of the machines.
+class ShellDraws:
+    """Errors of one camera's half of the shell in s builds, in the order of the builds.
 
-    A point x of the shell as designed comes to lie at R(shell_tilt) (scale * x) + shell_shift.
+    A point x of the designed shell is moved to R(shell_tilt) (scale * x) + shell_shift.
 
     Attributes:
         centre: of the spheres, mm, (s, m, 3).
-        radius: by which the spheres are too large, coat included, mm, (s, m).
+        radius: by which the spheres are too large, coating included, mm, (s, m).
         scale: size over the designed size along each axis, (s, 3).
         shell_shift: mm, (s, 3).
-        shell_tilt: rotation vectors about the object's middle, radians, (s, 3).
+        shell_tilt: rotation vectors about the object's centre, radians, (s, 3).
         camera_shift: of the pinhole, mm, (s, 3).
         camera_tilt: rotation vectors about the pinhole, radians, (s, 3).
         focal: focal length over the designed one, (s,).
@@ -105,35 +107,27 @@ class Draws:
     facets: Floats
 
     def __len__(self) -> int:
-        """Number of machines."""
+        """Number of builds."""
         return len(self.focal)
 
 
-def draw(errors: Errors, seed: int, machines: range, mirrors: int) -> tuple[Draws, Draws]:
-    """Both halves of some machines out of endlessly many.
-
-    A machine follows from the seed and its number alone, whoever draws it and with which others.
-    Each kind of error has a stream of its own: with one kind made smaller the others stay.
+def draw(
+    errors: Errors, seed: int, builds: Sequence[int], mirrors: int
+) -> tuple[ShellDraws, ShellDraws]:
+    """Errors of both halves of some builds.
 
     Args:
-        errors: how exactly things are made.
-        seed: of all machines.
-        machines: their numbers.
+        errors: of the process.
+        seed: of all builds.
+        builds: numbers of the builds.
         mirrors: m of each half.
     """
-    rows = [_machine(errors, seed, number, mirrors) for number in machines]
-    a, b = (_stacked([row[side] for row in rows], mirrors) for side in range(2))
-    return a, b
+    drawn = draw_kinds(errors, seed, builds, _shapes(mirrors))
+    return _half(drawn, 0), _half(drawn, 1)
 
 
-def _machine(errors: Errors, seed: int, number: int, m: int) -> tuple[dict[str, Floats], ...]:
-    """Both halves of one machine by the names of Draws."""
-    both = {kind: _drawn(errors, kind, seed, number, shape) for kind, shape in _shapes(m).items()}
-    return tuple(_half(both, side) for side in range(2))
-
-
-def _shapes(m: int) -> dict[str, tuple[int, ...]]:
-    """Numbers to be drawn of each kind, in the order of their streams; only append to it."""
+def _shapes(m: int) -> dict[str, Shape]:
+    """Shape of each kind's errors, in the order of their random streams; only append to it."""
     return {
         "sphere_centre": (2, m, 3),
         "sphere_radius": (2, m),
@@ -149,34 +143,56 @@ def _shapes(m: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _drawn(errors: Errors, kind: str, seed: int, number: int, shape: tuple[int, ...]) -> Floats:
-    error: Error = getattr(errors, kind)
-    if error.spread == 0:
-        return np.full(shape, error.mean)
-    return error.of(generator(seed, number, list(_shapes(0)).index(kind)), *shape)
+def _half(drawn: Mapping[str, Floats], side: int) -> ShellDraws:
+    def of(kind: str) -> Floats:
+        return drawn[kind][:, side]
+
+    return ShellDraws(
+        centre=of("sphere_centre"),
+        radius=of("sphere_radius") + of("coating")[:, None],
+        scale=1 + of("scale_isotropic")[:, None] + drawn["scale_axis"],
+        shell_shift=of("shell_shift"),
+        shell_tilt=of("shell_tilt"),
+        camera_shift=of("camera_shift"),
+        camera_tilt=of("camera_tilt"),
+        focal=1 + of("camera_focal"),
+        facets=of("facets"),
+    )
 
 
-def generator(seed: int, number: int, stream: int) -> np.random.Generator:
-    """The random numbers of one machine's one kind of error."""
-    key = np.random.SeedSequence(seed, spawn_key=(number, stream))
-    return np.random.Generator(np.random.Philox(key))
+def draw_kinds(
+    errors: Errors,
+    seed: int,
+    builds: Sequence[int],
+    shapes: Mapping[str, Shape],
+    first_stream: int = 0,
+) -> dict[str, Floats]:
+    """Random errors of each kind for s builds, (s, ...).
 
+    A build depends on the seed and its number alone, not on the others drawn with it. Each kind of
+    error has its own random stream, so that a change of one kind leaves the others as they are.
 
-def _half(both: dict[str, Floats], side: int) -> dict[str, Floats]:
+    Args:
+        errors: of the process.
+        seed: of all builds.
+        builds: numbers of the builds.
+        shapes: shape of each kind's errors in one build, in the order of the streams.
+        first_stream: number of the first kind's stream.
+    """
     return {
-        "centre": both["sphere_centre"][side],
-        "radius": both["sphere_radius"][side] + both["coating"][side],
-        "scale": 1 + both["scale_isotropic"][side] + both["scale_axis"],
-        "shell_shift": both["shell_shift"][side],
-        "shell_tilt": both["shell_tilt"][side],
-        "camera_shift": both["camera_shift"][side],
-        "camera_tilt": both["camera_tilt"][side],
-        "focal": 1 + both["camera_focal"][side],
-        "facets": both["facets"][side],
+        kind: _draw_kind(getattr(errors, kind), seed, builds, first_stream + k, shape)
+        for k, (kind, shape) in enumerate(shapes.items())
     }
 
 
-def _stacked(rows: list[dict[str, Floats]], m: int) -> Draws:
-    names = _half({kind: np.zeros(shape) for kind, shape in _shapes(m).items()}, 0)
-    empty = {name: np.zeros((0, *np.shape(one))) for name, one in names.items()}
-    return Draws(**{n: np.stack([r[n] for r in rows]) if rows else empty[n] for n in names})
+def _draw_kind(error: Error, seed: int, builds: Sequence[int], stream: int, shape: Shape) -> Floats:
+    drawn = np.full((len(builds), *shape), float(error.mean))
+    if error.spread != 0:
+        for row, build in enumerate(builds):
+            drawn[row] = error.sample(_generator(seed, build, stream), *shape)
+    return drawn
+
+
+def _generator(seed: int, build: int, stream: int) -> np.random.Generator:
+    key = np.random.SeedSequence(seed, spawn_key=(build, stream))
+    return np.random.Generator(np.random.Philox(key))

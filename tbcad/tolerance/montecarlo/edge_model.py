@@ -1,6 +1,7 @@
-"""One half of the machine as designed, as the fast model needs it, and where errors put it."""
+"""One half of the shell as designed, as the fast model needs it, and its simulated builds."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,13 +10,16 @@ from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.tolerance.montecarlo.draws import Draws
-from tbcad.tolerance.montecarlo.neighbour_pairs import Near, near
+from tbcad.tolerance.montecarlo.draws import ShellDraws
+from tbcad.tolerance.montecarlo.neighbour_pairs import NeighbourPairs, neighbour_pairs
 from tbcad.types import Bools, Floats
 
-# No symmetry plane of a design holds this direction, so that no corner lies on a screen's axis;
-# for mirrors on the seam it points away from the seam, where both halves' outlines are open.
-ASKEW = np.array([1.0, 0.1234, 0.0567])
+# No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
+# mirrors on the seam it points away from the seam, where both halves' outlines are open.
+ASYMMETRIC = np.array([1.0, 0.1234, 0.0567])
+
+# Columns of a table of surfaces.
+APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
 
 
 @dataclass(frozen=True)
@@ -25,14 +29,15 @@ class EdgeModel:
     Attributes:
         view: the camera.
         table: apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7).
-        near: which of them may meet.
+        pairs: which of them may share an edge.
         halved: mirrors that the seam halves, (m,).
-        screen: two axes and normal u of the plane through the object that each faces, (m, 3, 3).
+        screen: two axes and the normal of a plane through the object for each mirror, (m, 3, 3);
+            the normal is the direction u.
     """
 
     view: Camera
     table: Floats
-    near: Near
+    pairs: NeighbourPairs
     halved: Bools
     screen: Floats
 
@@ -40,56 +45,71 @@ class EdgeModel:
         """Number of mirrors."""
         return len(self.halved)
 
+    @property
+    def apex(self) -> Floats:
+        """Apices of the mirrors, mm, (m, 3)."""
+        return self.table[: len(self), APEX]
 
-def nominal(at: Reflector) -> EdgeModel:
-    """What the fast model needs of one camera with its mirrors."""
-    every = at.cells.surfaces
-    table = np.column_stack([every.apex, every.normal, every.curvature])
-    first = unit(ASKEW - dot(at.u, ASKEW)[:, None] * at.u)
-    screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
-    return EdgeModel(at.camera, table, near(at.cells), every.apex[: len(at), 0] == 0, screen)
+    @property
+    def normal(self) -> Floats:
+        """Unit normals of the mirrors there, (m, 3)."""
+        return self.table[: len(self), NORMAL]
 
 
-def nominals(cameras: tuple[Reflector, Reflector]) -> tuple[EdgeModel, EdgeModel]:
-    """The same of both cameras."""
+EdgeModels: TypeAlias = tuple[EdgeModel, EdgeModel]
+
+
+def edge_models(cameras: tuple[Reflector, Reflector]) -> EdgeModels:
+    """The fast models of both cameras with their mirrors."""
     a, b = cameras
-    return nominal(a), nominal(b)
+    return edge_model(a), edge_model(b)
 
 
-def tables(half: EdgeModel, draws: Draws) -> Floats:
-    """The surfaces of s machines before their shells are scaled and moved, (s, m + 2, 7).
+def edge_model(at: Reflector) -> EdgeModel:
+    """The fast model of one camera with its mirrors."""
+    surfaces = at.cells.surfaces
+    table = np.column_stack([surfaces.apex, surfaces.normal, surfaces.curvature])
+    first = unit(ASYMMETRIC - dot(at.u, ASYMMETRIC)[:, None] * at.u)
+    screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
+    halved = surfaces.apex[: len(at), 0] == 0
+    return EdgeModel(at.camera, table, neighbour_pairs(at.cells), halved, screen)
+
+
+def surface_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
+    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2, 7).
 
     A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
-    thicker coat moves too. Their tilt is no error of its own kind.
+    thicker coating moves too. Their tilt is not an error of its own kind.
 
     Raises:
-        InputError: an error takes all of a mirror's radius.
+        InputError: an error is larger than a mirror's radius.
     """
     table, m = np.repeat(half.table[None], len(draws), axis=0), len(half)
-    normal, curvature = half.table[:m, 3:6], half.table[:m, 6]
+    curvature = half.table[:m, CURVATURE]
     if np.any(draws.radius * curvature <= -1):
         raise InputError(
             f"sphere_radius_um and coating_um leave nothing of a mirror: allowed is less than its "
-            f"radius, {1000 / curvature.max():.0f} um the least: make the errors smaller"
+            f"radius, at minimum {1000 / curvature.max():.0f} um: make the errors smaller"
         )
-    table[:, :m, :3] += draws.centre + draws.radius[:, :, None] * normal
-    table[:, :m, 6] = curvature / (1 + draws.radius * curvature)
+    table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * half.normal
+    table[:, :m, CURVATURE] = curvature / (1 + draws.radius * curvature)
     return table
 
 
-def axes(view: Camera) -> Floats:
+def camera_axes(view: Camera) -> Floats:
     """Right, down and forward of a camera, (3, 3)."""
     return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
 
 
-def places(half: EdgeModel, draws: Draws) -> Floats:
-    """What tbcad.tolerance.edges needs of each machine beside its surfaces, (s, 6, 3).
+def view_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
+    """Camera and object of s builds, in the frame of the shell, (s, 6, 3).
 
-    Camera and object are moved into the frame of the shell instead of the shell out to them.
+    The rows are pinhole, object's centre, scale, and the camera's right, down and forward. Camera
+    and object are moved instead of the shell.
     """
     shell = Rotation.from_rotvec(draws.shell_tilt)
     camera = Rotation.from_rotvec(draws.camera_tilt)
-    turned = [shell.apply(camera.apply(axis), inverse=True) for axis in axes(half.view)]
+    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in camera_axes(half.view)]
     pinhole = half.view.pinhole + draws.camera_shift
-    moved = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
-    return np.stack([*moved, draws.scale, *turned], axis=1)
+    points = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
+    return np.stack([*points, draws.scale, *axes], axis=1)

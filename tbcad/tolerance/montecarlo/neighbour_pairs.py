@@ -1,4 +1,4 @@
-"""Which spheres may come to meet, and which may cover where they do, whatever the errors."""
+"""Pairs of mirrors that may share an edge, and the faces that may cover it, for any errors."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,20 @@ from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
-# An edge goes no farther than this many times the distance of its mirrors' farthest corners from
-# their apices: the spheres that are looked at cover what lies between there and the cells.
+# Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
+# faces of a pair cover what lies between there and the cells.
 REACH = 1.5
 
 
 @dataclass(frozen=True)
-class Near:
+class NeighbourPairs:
     """Pairs of faces that may share an edge, e of them, and the faces that may cut it short.
 
     Attributes:
         pair: a mirror and another mirror or a plane, (e, 2).
         offset: where the faces of each pair begin in `face`, (e + 1,).
-        face: mirrors and planes, those first that are nearest to both of the pair.
-        reach: how far from its middle the pair's edge may go, mm, (e,).
+        face: mirrors and planes, in the order of their distance from both of the pair.
+        reach: maximum distance of the edge's points from its middle, mm, (e,).
     """
 
     pair: Ints
@@ -32,35 +32,34 @@ class Near:
     reach: Floats
 
 
-def near(cells: Cells) -> Near:
+def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     """All pairs that are neighbours or share a neighbour as designed.
 
-    Errors move corners by far less than a cell is wide, so that a mirror meets no other. Seam and
-    foot come first of what cuts an edge short: they are never covered.
+    Errors move corners by far less than a cell is wide, so a mirror meets no other mirror. Seam and
+    foot are the first faces of each pair: they are never covered.
     """
     m = cells.mirrors
-    beside = _beside(cells)
-    reach = csr_array(beside + beside @ beside)
-    first, second = coo_array(reach).coords
+    adjacency = _adjacency(cells)
+    nearby = csr_array(adjacency + adjacency @ adjacency)
+    first, second = coo_array(nearby).coords
     pair = np.column_stack([first, second])[(first < second) & (first < m)].astype(np.int64)
-    rows = [_cutting(reach, cells.surfaces, m, *ends) for ends in pair.tolist()]
+    rows = [_cutting_faces(nearby, cells.surfaces, m, *ends) for ends in pair.tolist()]
     offset = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
-    reach_mm = REACH * np.append(_widths(cells), [0, 0])[pair].max(axis=1)
-    return Near(pair, offset.astype(np.int64), np.concatenate(rows), reach_mm)
+    reach_mm = REACH * np.append(_cell_radii(cells), [0, 0])[pair].max(axis=1)
+    return NeighbourPairs(pair, offset.astype(np.int64), np.concatenate(rows), reach_mm)
 
 
-def _widths(cells: Cells) -> Floats:
+def _cell_radii(cells: Cells) -> Floats:
     """Distance of each mirror's farthest corner from its apex, mm, (m,)."""
-    mirror, which = cells.triangles.ravel(), np.repeat(np.arange(len(cells.corners)), 3)
-    mirror, which = mirror[mirror < cells.mirrors], which[mirror < cells.mirrors]
-    width = np.zeros(cells.mirrors)
-    away = norm(cells.corners[which] - cells.surfaces.apex[mirror])
-    np.maximum.at(width, mirror, away)
-    return width
+    mirror, corner = cells.triangles.ravel(), np.repeat(np.arange(len(cells.corners)), 3)
+    mirror, corner = mirror[mirror < cells.mirrors], corner[mirror < cells.mirrors]
+    radius = np.zeros(cells.mirrors)
+    np.maximum.at(radius, mirror, norm(cells.corners[corner] - cells.surfaces.apex[mirror]))
+    return radius
 
 
-def _beside(cells: Cells) -> csr_array:
-    """Which faces touch, (m + 2, m + 2); the planes are no way from one mirror to another."""
+def _adjacency(cells: Cells) -> csr_array:
+    """Which faces touch, (m + 2, m + 2); mirrors are not neighbours through a plane."""
     m, faces = cells.mirrors, cells.arcs.faces
     both = np.concatenate([faces, faces[:, ::-1]])
     both = both[both[:, 0] < m]
@@ -68,8 +67,8 @@ def _beside(cells: Cells) -> csr_array:
     return csr_array(coo_array((np.ones(len(both), dtype=np.int64), both.T), shape=size))
 
 
-def _cutting(reach: csr_array, surfaces: Surfaces, m: int, i: int, j: int) -> Ints:
-    faces = reach.indices[reach.indptr[i] : reach.indptr[i + 1]].astype(np.int64)
+def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, i: int, j: int) -> Ints:
+    faces = nearby.indices[nearby.indptr[i] : nearby.indptr[i + 1]].astype(np.int64)
     faces = faces[(faces != i) & (faces != j)]
     apart = surfaces.apex[faces][:, None] - surfaces.apex[[i, j if j < m else i]]
     distance = np.linalg.norm(apart, axis=2).sum(axis=1)

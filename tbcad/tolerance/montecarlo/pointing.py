@@ -1,4 +1,4 @@
-"""Where rays go that are taken for the designed ones: what an uncalibrated machine gets wrong."""
+"""Pointing errors of uncalibrated builds: rays that are assumed to be the designed ones."""
 
 from dataclasses import dataclass
 
@@ -6,74 +6,69 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.tolerance.montecarlo.draws import Draws
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, axes, places, tables
+from tbcad.optics.reflection import reflect, reflected_rays
+from tbcad.tolerance.montecarlo.draws import ShellDraws
+from tbcad.tolerance.montecarlo.edge_model import (
+    APEX,
+    CURVATURE,
+    NORMAL,
+    EdgeModel,
+    camera_axes,
+    surface_tables,
+    view_tables,
+)
 from tbcad.types import Floats
 
 
 @dataclass(frozen=True)
 class Pointing:
-    """How far the ray of each mirror's middle pixel is off, of s machines.
+    """Errors of the ray of each mirror's centre pixel, in s builds.
 
-    The middle pixel shows the apex, and its ray, as designed, goes through the object's middle.
+    The centre pixel shows the apex, and its designed ray goes through the object's centre.
 
     Attributes:
-        angle: between the designed and the made ray after the mirror, radians, (s, m).
-        offset: distance of the made ray from the object's middle, mm, (s, m).
+        angle: between the designed and the built ray after the mirror, radians, (s, m).
+        offset: distance of the built ray from the object's centre, mm, (s, m).
     """
 
     angle: Floats
     offset: Floats
 
 
-def pointing(half: EdgeModel, draws: Draws) -> Pointing:
-    """Errors of the rays of one half's middle pixels, for s machines.
+def pointing(half: EdgeModel, draws: ShellDraws) -> Pointing:
+    """Errors of the rays of one half's centre pixels, for s builds.
 
-    A pixel is where it is on the sensor: moved and turned cameras and wrong focal lengths count.
-    NaN where the ray passes the mirror's sphere by.
+    A pixel is a fixed place on the sensor: moved and tilted cameras and wrong focal lengths count.
+    NaN where the ray misses the mirror's sphere.
     """
-    pinhole, middle, scale, *camera = np.moveaxis(places(half, draws)[:, :, None], 1, 0)
-    way = _ways(half, draws, camera)
-    point, normal = _hit(tables(half, draws)[:, : len(half)], pinhole / scale, way / scale)
-    out = _mirrored(way, normal / scale)
+    pinhole, middle, scale, *axes = np.moveaxis(view_tables(half, draws)[:, :, None], 1, 0)
+    ray = _pixel_rays(half, draws, axes)
+    mirrors = surface_tables(half, draws)[:, : len(half)]
+    point, normal = _entry(mirrors, pinhole / scale, ray / scale)
+    out = reflect(unit(ray), unit(normal / scale))
     offset = norm(np.cross(point * scale - middle, out))
-    designed = _mirrored(_rays(half), half.table[: len(half), 3:6])
-    made = np.stack(list(map(_turned, draws.shell_tilt, out)))
-    return Pointing(np.arctan2(norm(np.cross(made, designed)), dot(made, designed)), offset)
+    designed = reflected_rays(half.view.pinhole, half.apex, unit(half.normal))
+    shells = map(Rotation.from_rotvec, draws.shell_tilt)
+    built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
+    return Pointing(np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset)
 
 
-def _rays(half: EdgeModel) -> Floats:
-    """From the pinhole to the apices as designed, (m, 3)."""
-    result: Floats = half.table[: len(half), :3] - half.view.pinhole
+def _pixel_rays(half: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
+    """Rays (s, m, 3) of the same pixels in built cameras, whose axes are three of (s, 1, 3)."""
+    designed = (half.apex - half.view.pinhole) @ camera_axes(half.view).T
+    right, down, forward = designed[..., None].swapaxes(0, 1)
+    focal = draws.focal[:, None, None] * forward
+    result: Floats = axes[2] + axes[0] * right / focal + axes[1] * down / focal
     return result
 
 
-def _ways(half: EdgeModel, draws: Draws, camera: list[Floats]) -> Floats:
-    """Rays of the same pixels of the made cameras, whose axes are three of (s, 1, 3), (s, m, 3)."""
-    across, down, depth = (_rays(half) @ axes(half.view).T)[..., None].swapaxes(0, 1)
-    focal = draws.focal[:, None, None] * depth
-    result: Floats = camera[2] + camera[0] * across / focal + camera[1] * down / focal
-    return result
-
-
-def _hit(table: Floats, origin: Floats, way: Floats) -> tuple[Floats, Floats]:
-    """Where rays enter surfaces (s, m, 7), and the normals there: see tbcad.simulate.scene.rays."""
-    apex, normal, curvature = table[..., :3], table[..., 3:6], table[..., 6:]
+def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
+    """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.simulate.scene.rays."""
+    apex, normal, curvature = table[..., APEX], table[..., NORMAL], table[..., CURVATURE, None]
     away = origin - apex
     c = dot(normal + curvature / 2 * away, away)
-    b = dot(normal + curvature * away, way)
+    b = dot(normal + curvature * away, ray)
     with np.errstate(invalid="ignore"):
-        root = np.sqrt(b * b - 2 * curvature[..., 0] * c * dot(way, way))
-    point = origin + (2 * c / (root - b))[..., None] * way
+        root = np.sqrt(b * b - 2 * curvature[..., 0] * c * dot(ray, ray))
+    point = origin + (2 * c / (root - b))[..., None] * ray
     return point, normal + curvature * (point - apex)
-
-
-def _mirrored(ray: Floats, normal: Floats) -> Floats:
-    ray, normal = unit(ray), unit(normal)
-    result: Floats = ray - 2 * dot(ray, normal)[..., None] * normal
-    return result
-
-
-def _turned(turn: Floats, vectors: Floats) -> Floats:
-    result: Floats = Rotation.from_rotvec(turn).apply(vectors)
-    return result

@@ -1,4 +1,4 @@
-"""Each kind of error alone: what it costs, and how much of it there may be."""
+"""Each kind of error by itself: what it costs, and by which factor it may grow."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -7,95 +7,99 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
-from tbcad.tolerance.montecarlo.draws import NONE, Error, Errors
+from tbcad.tolerance.montecarlo.draws import NO_ERROR, Error, Errors
 from tbcad.types import Floats
 
-Worst = Callable[[Errors], Floats]
-"""Least coverage of each of some machines made with some errors, mm, (s,)."""
+WorstCoverage = Callable[[Errors], Floats]
+"""Minimum coverage of each of some builds with some errors, mm, (s,)."""
 
-# Times what a process has of an error: beyond this a kind is taken not to matter.
-MOST_TIMES = 1000.0
-# How exactly the factor is found, as a share of itself.
-EXACT = 0.02
+# Factor on a process's error beyond which a kind of error is taken not to matter.
+LARGEST_FACTOR = 1000.0
+# Accuracy of the factor, as a share of itself.
+FACTOR_TOLERANCE = 0.02
+# The next factor tried lies beyond the one that a straight line predicts, within these bounds.
+OVERSHOOT, SMALLEST_STEP, LARGEST_STEP = 1.2, 1.5, 10.0
 
 
 @dataclass(frozen=True)
 class SingleErrorEffect:
-    """What one kind of error costs when there is no other.
+    """Effect of one kind of error when there is no other.
 
     Attributes:
         kind: its name, as in Errors.
-        loss: of the worst virtual camera's coverage against the design's, mm, mean of machines.
-        tail: the same in the worst machines that are still to be good, mm.
-        times: what the process has of it may be multiplied by this when there is no other; infinite
-            where it does not matter.
+        loss: coverage of the worst virtual camera lost against the design, mm, mean of the builds.
+        loss_at_yield: the same in the worst build of those that are to be good, mm.
+        tolerable_factor: factor on the process's error up to which the yield is reached when there
+            is no other error; infinite where it does not matter.
     """
 
     kind: str
     loss: float
-    tail: float
-    times: float
+    loss_at_yield: float
+    tolerable_factor: float
 
 
-def kinds(errors: Errors) -> list[str]:
-    """The kinds of error that a shell can have and of which there are any."""
-    return [field.name for field in fields(errors) if getattr(errors, field.name) != NONE]
+def present_kinds(errors: Errors) -> list[str]:
+    """The kinds of error that are not zero."""
+    return [field.name for field in fields(errors) if getattr(errors, field.name) != NO_ERROR]
 
 
-def only(errors: Errors, kind: str) -> Errors:
+def only_kind(errors: Errors, kind: str) -> Errors:
     """One kind of error, and no other."""
     return replace(Errors(), **{kind: getattr(errors, kind)})
 
 
-def scaled(errors: Errors, times: float) -> Errors:
+def scaled(errors: Errors, factor: float) -> Errors:
     """Errors, spread and mean, multiplied."""
-    return replace(errors, **{name: _times(getattr(errors, name), times) for name in kinds(errors)})
+    kinds = present_kinds(errors)
+    return replace(errors, **{kind: _scaled(getattr(errors, kind), factor) for kind in kinds})
 
 
-def _times(error: Error, times: float) -> Error:
-    return replace(error, spread=error.spread * times, mean=error.mean * times)
+def _scaled(error: Error, factor: float) -> Error:
+    return replace(error, spread=error.spread * factor, mean=error.mean * factor)
 
 
 def one_at_a_time(
-    errors: Errors, kind: str, wanted: float, target: float, worst: Worst
+    errors: Errors, kind: str, wanted_yield: float, target: float, worst: WorstCoverage
 ) -> SingleErrorEffect:
-    """One kind of error by itself.
+    """Effect of one kind of error by itself.
 
     Args:
-        errors: all that there are.
+        errors: of the process.
         kind: which of them.
-        wanted: share of machines that are to be good.
-        target: coverage of a good machine, mm.
-        worst: what machines see.
+        wanted_yield: share of builds that are to be good.
+        target: minimum coverage of a good build, mm.
+        worst: simulates builds.
     """
-    mine = only(errors, kind)
-    designed, seen = worst(Errors()), worst(mine)
-    tail = coverage_at_yield(seen, wanted)
+    single = only_kind(errors, kind)
+    designed, seen = worst(Errors()).mean(), worst(single)
     return SingleErrorEffect(
         kind,
-        float(designed.mean() - seen.mean()),
-        float(designed.mean()) - tail,
-        loosest(mine, wanted, target, worst),
+        loss=float(designed - seen.mean()),
+        loss_at_yield=float(designed) - coverage_at_yield(seen, wanted_yield),
+        tolerable_factor=tolerable_factor(single, wanted_yield, target, worst),
     )
 
 
-def loosest(errors: Errors, wanted: float, target: float, worst: Worst) -> float:
-    """How many times errors may be what they are for a yield; 0 where it is missed without them.
+def tolerable_factor(
+    errors: Errors, wanted_yield: float, target: float, worst: WorstCoverage
+) -> float:
+    """Factor on errors up to which the yield is reached; 0 where it is missed without errors.
 
-    The same draws are multiplied, so that what is lost grows steadily with the factor.
+    The same draws are multiplied, so the loss grows steadily with the factor.
     """
 
-    def left(times: float) -> float:
-        return coverage_at_yield(worst(scaled(errors, times)), wanted) - target
+    def excess(factor: float) -> float:
+        return coverage_at_yield(worst(scaled(errors, factor)), wanted_yield) - target
 
-    room = left(0.0)
-    if room < 0:
+    spare = excess(0.0)
+    if spare < 0:
         return 0.0
-    high, here = 1.0, left(1.0)
-    while here >= 0:
-        if high >= MOST_TIMES:
+    high, remaining = 1.0, excess(1.0)
+    while remaining >= 0:
+        if high >= LARGEST_FACTOR:
             return float("inf")
-        # On a straight line it would be reached here; a little beyond brackets it.
-        high *= float(np.clip(1.2 * room / max(room - here, 1e-9), 1.5, 10.0))
-        here = left(high)
-    return float(brentq(left, 0.0, high, xtol=1e-4, rtol=EXACT, maxiter=40))
+        step = OVERSHOOT * spare / max(spare - remaining, 1e-9)
+        high *= float(np.clip(step, SMALLEST_STEP, LARGEST_STEP))
+        remaining = excess(high)
+    return float(brentq(excess, 0.0, high, xtol=1e-4, rtol=FACTOR_TOLERANCE, maxiter=40))

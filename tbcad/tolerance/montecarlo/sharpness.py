@@ -1,7 +1,7 @@
-"""What errors cost in the views: pictures of machines that are off, with rays known or not.
+"""Cost of errors in the views: simulated pictures of builds, with rays known or assumed.
 
-An uncalibrated machine takes every pixel's ray for the designed one. A calibrated one knows where
-its rays go, but for what the calibration leaves.
+An uncalibrated build takes every pixel's ray for the designed one. A calibrated build knows its
+rays, but for the residual of the calibration.
 """
 
 from dataclasses import dataclass, replace
@@ -19,21 +19,21 @@ from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.simulate.study.viewpoints import view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method
-from tbcad.tolerance.montecarlo.draws import Draws
+from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
-# Stream of random numbers, beside those of the kinds of error.
-LEFT_OVER = 2000
+# Random stream of the residual, apart from those of the kinds of error.
+CALIBRATION_STREAM = 2000
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """Views to be made.
+class ReferenceViews:
+    """Views to compare with the truth.
 
     Attributes:
         capture_mm: diameter of the capture sphere.
         views: viewpoints, v of them.
-        truths: what a real camera would see there, (h, w, 3) each.
+        truths: pictures of a real camera there, (h, w, 3) each.
     """
 
     capture_mm: float
@@ -43,12 +43,12 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """SSIM of views against the truth, over s machines and v viewpoints.
+    """SSIM of views against the truth, over s builds and v viewpoints.
 
     Attributes:
-        designed: of the machine as designed, (v,).
-        uncalibrated: with rays taken for the designed ones, (s, v).
-        calibrated: with rays known but for what calibration leaves, (s, v).
+        designed: of the shell as designed, (v,).
+        uncalibrated: with the designed rays, (s, v).
+        calibrated: with rays known but for the residual of the calibration, (s, v).
     """
 
     designed: Floats
@@ -58,126 +58,122 @@ class Sharpness:
 
 def sharpness(
     cameras: tuple[Reflector, Reflector],
-    machines: tuple[Draws, Draws],
+    builds: tuple[ShellDraws, ShellDraws],
     scene: Scene,
-    wanted: Wanted,
-    left: float,
+    reference: ReferenceViews,
+    residual: float,
     seed: int = 1,
     method: Method = "nearest",
     progress: Progress = lambda _: None,
 ) -> Sharpness:
-    """Views of machines that are off, against the truth.
+    """Views of builds with errors, against the truth.
 
     Args:
         cameras: both halves as designed.
-        machines: how far each half of each machine is off.
+        builds: errors of each half of each build.
         scene: the object.
-        wanted: the views.
-        left: what a calibration leaves of a mirror's direction, per axis, radians.
-        seed: of what calibration leaves.
+        reference: the views.
+        residual: of a mirror's direction after calibration, per axis, radians.
+        seed: of the residuals.
         method: how views are made.
-        progress: told how far it has come.
+        progress: told of each build.
     """
-    as_designed = _captured(cameras, scene, wanted.capture_mm)
-    scored = [_ssim(as_designed, scene, wanted, method)]
-    for k in range(len(machines[0])):
-        progress(f"machine {k + 1} of {len(machines[0])}")
-        made = tuple(actual(at, draws, k) for at, draws in zip(cameras, machines, strict=True))
-        taken = _captured((made[0], made[1]), scene, wanted.capture_mm)
-        scored.append(_ssim(_with_rays(taken, as_designed), scene, wanted, method))
-        known = _left_over(taken, left, (seed, k))
-        scored.append(_ssim(known, scene, wanted, method))
-    table = np.array(scored)
+    designed = _light_field(cameras, scene, reference.capture_mm)
+    rows = [_ssim(designed, scene, reference, method)]
+    for k in range(len(builds[0])):
+        progress(f"build {k + 1} of {len(builds[0])}")
+        a, b = (built_reflector(at, draws, k) for at, draws in zip(cameras, builds, strict=True))
+        built = _light_field((a, b), scene, reference.capture_mm)
+        calibrated = _with_residual(built, residual, (seed, k))
+        for light_field in (_with_rays_of(designed, built), calibrated):
+            rows.append(_ssim(light_field, scene, reference, method))
+    table = np.array(rows)
     return Sharpness(table[0], table[1::2], table[2::2])
 
 
 @dataclass(frozen=True)
-class AsMade(SubstitutedReflector):
-    """A camera and its mirrors, where they have come to be.
+class BuiltReflector(SubstitutedReflector):
+    """A camera and its mirrors at their places in a build.
 
-    The cells are those of the design: they only say where in the picture a mirror may be.
+    The cells are those of the design: they only limit where in the picture a mirror may be.
     """
 
     def boxes(self) -> Ints:
         """Columns and rows about each cell, wider by its own size on all sides, (m, 4)."""
         box = super().boxes()
-        room = np.repeat(box[:, 1::2] - box[:, 0::2], 2, axis=1) * [-1, 1, -1, 1]
+        border = np.repeat(box[:, 1::2] - box[:, 0::2], 2, axis=1) * [-1, 1, -1, 1]
         size = np.repeat([self.camera.width_px, self.camera.height_px], 2)
-        wider: Ints = np.clip(box + room, 0, size)
+        wider: Ints = np.clip(box + border, 0, size)
         return wider
 
 
-def actual(at: Reflector, draws: Draws, machine: int) -> AsMade:
-    """One camera and its mirrors as a machine has them.
+def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflector:
+    """One camera and its mirrors as a build has them.
 
-    The mean of the scales along the axes stands for all three: a sphere stays a sphere.
+    The mean of the scales along the axes is used for all three: a sphere stays a sphere.
     """
-    scale = float(draws.scale[machine].mean())
-    turn = Rotation.from_rotvec(draws.shell_tilt[machine])
-    shift = draws.shell_shift[machine]
-    mirrors = at.mirrors
-    radius = mirrors.radius + draws.radius[machine]
-    centre = scale * (mirrors.centre + draws.centre[machine])
-    normal = turn.apply(mirrors.normal)
-    grown = Surfaces(
-        turn.apply(centre) + shift + scale * radius[:, None] * normal, normal, 1 / (scale * radius)
-    )
-    return AsMade(at.camera_id, _view(at.camera, draws, machine), at.u, at.cells, grown)
+    scale = float(draws.scale[build].mean())
+    tilt = Rotation.from_rotvec(draws.shell_tilt[build])
+    radius = at.mirrors.radius + draws.radius[build]
+    centre = tilt.apply(scale * (at.mirrors.centre + draws.centre[build]))
+    normal = tilt.apply(at.mirrors.normal)
+    apex = centre + draws.shell_shift[build] + scale * radius[:, None] * normal
+    surfaces = Surfaces(apex, normal, 1 / (scale * radius))
+    return BuiltReflector(at.camera_id, _view(at.camera, draws, build), at.u, at.cells, surfaces)
 
 
-def _view(view: Camera, draws: Draws, machine: int) -> Camera:
-    turn = Rotation.from_rotvec(draws.camera_tilt[machine])
-    half = np.tan(view.hfov / 2) / draws.focal[machine]
+def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:
+    tilt = Rotation.from_rotvec(draws.camera_tilt[build])
     return replace(
         view,
-        pinhole=view.pinhole + draws.camera_shift[machine],
-        forward=turn.apply(view.forward),
-        right=turn.apply(view.right),
-        hfov=float(2 * np.arctan(half)),
+        pinhole=view.pinhole + draws.camera_shift[build],
+        forward=tilt.apply(view.forward),
+        right=tilt.apply(view.right),
+        hfov=float(2 * np.arctan(np.tan(view.hfov / 2) / draws.focal[build])),
     )
 
 
-def _captured(cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float) -> LightField:
+def _light_field(
+    cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float
+) -> LightField:
     both = {at.camera_id: (at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras}
     return light_field_in_memory(both, capture_mm)
 
 
-def _with_rays(taken: LightField, known: LightField) -> LightField:
+def _with_rays_of(rays: LightField, pictures: LightField) -> LightField:
     """The pictures of one light field with the rays of another."""
     frames = {
         name: replace(
-            known.frames[name],
-            planes={**known.frames[name].planes, "colour": frame.planes["colour"]},
+            frame, planes={**frame.planes, "colour": pictures.frames[name].planes["colour"]}
         )
-        for name, frame in taken.frames.items()
+        for name, frame in rays.frames.items()
     }
-    return replace(taken, frames=frames)
+    return replace(pictures, frames=frames)
 
 
-def _left_over(taken: LightField, left: float, seed: tuple[int, int]) -> LightField:
-    """Every mirror's rays turned by what a calibration leaves, each mirror's by its own."""
-    generator = np.random.default_rng(
-        np.random.SeedSequence(seed[0], spawn_key=(seed[1], LEFT_OVER))
-    )
+def _with_residual(built: LightField, residual: float, seed: tuple[int, int]) -> LightField:
+    """A light field with every mirror's rays turned by a random residual of the calibration."""
+    sequence = np.random.SeedSequence(seed[0], spawn_key=(seed[1], CALIBRATION_STREAM))
+    generator = np.random.default_rng(sequence)
     frames = {
-        name: replace(frame, planes=_turned(frame, left, generator))
-        for name, frame in taken.frames.items()
+        name: replace(frame, planes=_rotated(frame, residual, generator))
+        for name, frame in built.frames.items()
     }
-    return replace(taken, frames=frames)
+    return replace(built, frames=frames)
 
 
-def _turned(frame: Frame, left: float, generator: np.random.Generator) -> dict[str, object]:
-    turn = np.vstack([np.zeros(3), left * generator.standard_normal((len(frame.u), 3))])
-    way, about = frame.planes["direction"], turn[frame.planes["mirror"]]
-    bent = way + np.cross(about, way)
-    length = np.linalg.norm(bent, axis=2)[..., None]
-    unit = np.divide(bent, length, out=np.zeros_like(bent), where=length > 0)
+def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> dict[str, object]:
+    """Planes of a frame whose mirrors' rays are turned by small random angles."""
+    rotation = np.vstack([np.zeros(3), residual * generator.standard_normal((len(frame.u), 3))])
+    direction = frame.planes["direction"]
+    rotated = direction + np.cross(rotation[frame.planes["mirror"]], direction)
+    length = np.linalg.norm(rotated, axis=2)[..., None]
+    unit = np.divide(rotated, length, out=np.zeros_like(rotated), where=length > 0)
     return {**frame.planes, "direction": unit.astype(np.float32)}
 
 
-def _ssim(source: LightField, scene: Scene, wanted: Wanted, method: Method) -> Floats:
+def _ssim(source: LightField, scene: Scene, reference: ReferenceViews, method: Method) -> Floats:
     """SSIM of each view, (v,)."""
-    found = view_quality(
-        MirrorTiles(source), scene, wanted.views, wanted.truths, method, lambda _: None
-    )
-    return found[:, 1]
+    tiles, views = MirrorTiles(source), reference.views
+    quality = view_quality(tiles, scene, views, reference.truths, method, lambda _: None)
+    return quality[:, 1]

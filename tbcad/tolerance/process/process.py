@@ -37,7 +37,7 @@ def _whole(value: object) -> object:
     return value
 
 
-class Kind(Section):
+class ErrorSpec(Section):
     """One kind of error: the same in every machine (mean), and different in each (magnitude)."""
 
     unit: ClassVar[float] = 1.0
@@ -57,7 +57,7 @@ class Kind(Section):
         return Error(self.unit * self.magnitude, self.unit * self.mean, self.distribution)
 
 
-class Micrometres(Kind):
+class Micrometres(ErrorSpec):
     """A kind of error in micrometres."""
 
     unit: ClassVar[float] = MICROMETRE
@@ -68,7 +68,7 @@ class Micrometres(Kind):
     """What is off in every machine."""
 
 
-class Millimetres(Kind):
+class Millimetres(ErrorSpec):
     """A kind of error in millimetres."""
 
     magnitude: float = Field(ge=0, le=100)
@@ -77,7 +77,7 @@ class Millimetres(Kind):
     """What is off in every machine."""
 
 
-class Permille(Kind):
+class Permille(ErrorSpec):
     """A kind of error as a share, in thousandths."""
 
     unit: ClassVar[float] = 1e-3
@@ -88,7 +88,7 @@ class Permille(Kind):
     """What is off in every machine."""
 
 
-class Milliradians(Kind):
+class Milliradians(ErrorSpec):
     """A kind of error in milliradians."""
 
     unit: ClassVar[float] = 1e-3
@@ -99,7 +99,7 @@ class Milliradians(Kind):
     """What is off in every machine."""
 
 
-class Degrees(Kind):
+class Degrees(ErrorSpec):
     """A kind of error in degrees."""
 
     unit: ClassVar[float] = math.radians(1)
@@ -181,7 +181,7 @@ def process_dict(process: Process) -> Table:
     return process.model_dump(mode="json", by_alias=True)
 
 
-def errors(process: Process, known_coating_um: float = 0.0) -> Errors:
+def process_errors(process: Process, known_coating_um: float = 0.0) -> Errors:
     """Return what the process does to a machine, in mm, radians and shares.
 
     Args:
@@ -189,14 +189,14 @@ def errors(process: Process, known_coating_um: float = 0.0) -> Errors:
         known_coating_um: thickness of the coat that the design allows for
             (`mirrors.coating_um`); only what is beyond it is an error.
     """
-    kinds = {key: value for key, value in process if isinstance(value, Kind)}
+    kinds = {key: value for key, value in process if isinstance(value, ErrorSpec)}
     coat = kinds["coating_um"]
     kinds["coating_um"] = coat.model_copy(update={"mean": coat.mean - known_coating_um})
     made = {key.rpartition("_")[0]: kind.error for key, kind in kinds.items()}
-    return Errors(**made, ball_radius=ball_radius(process.ball_grade))
+    return Errors(**made, ball_radius=ball_radius_error(process.ball_grade))
 
 
-def ball_radius(grade: str) -> Error:
+def ball_radius_error(grade: str) -> Error:
     """Return how far radii of bought balls are off, mm.
 
     A lot's diameters differ by at most its variation (ISO 3290-1: V_DwL), and one ball's radius

@@ -1,30 +1,30 @@
-"""Random prototypes: how far base, balls and camera of each of many are off."""
+"""Random errors of simulated prototypes: how far base, balls and camera of each are off."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.tolerance.montecarlo.draws import Error, Errors, generator
+from tbcad.tolerance.montecarlo.draws import Errors, Shape, draw_kinds
 from tbcad.types import Bools, Floats
 
-# Streams of one machine begin here, beyond those of its shells (tbcad.tolerance.draws).
+# Random streams of a build begin here, beyond those of its shells.
 FIRST_STREAM = 1000
 
 
 @dataclass(frozen=True)
 class PrototypeDraws:
-    """How far s prototypes of k balls and t stops are off, in the order of the machines.
+    """Errors of s prototypes of k balls and t stops, in the order of the builds.
 
     The base goes through its stops twice, for camera a's mirrors and for camera b's. A point x of
-    the base as designed comes to lie at R(tilt) R(axis, stop's angle + angle) x + runout.
+    the designed base is moved to R(tilt) R(axis, stop's angle + angle) x + runout.
 
     Attributes:
         radius: by which balls are too large, mm, (s, k).
         seat: of the balls' centres on the base, mm, (s, k, 3).
         angle: of the base at each stop of each run, radians, (s, 2, t).
         runout: of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2).
-        tilt: of the axis about azimuth zero and across it, both through the object's middle,
+        tilt: of the axis about azimuth zero and across it, both through the object's centre,
             radians, (s, 2).
         camera_shift: of the pinhole, mm, (s, 3).
         camera_tilt: rotation vectors about the pinhole, radians, (s, 3).
@@ -41,37 +41,40 @@ class PrototypeDraws:
     focal: Floats
 
     def __len__(self) -> int:
-        """Number of machines."""
+        """Number of builds."""
         return len(self.focal)
 
 
-def draw(
-    errors: Errors, seed: int, machines: Iterable[int], cap: Bools, stops: int
+def draw_prototypes(
+    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, stops: int
 ) -> PrototypeDraws:
-    """Some prototypes out of endlessly many.
+    """Errors of some prototypes; see tbcad.tolerance.montecarlo.draws.draw_kinds.
 
-    A machine follows from the seed and its number alone, and each kind of error has a stream of
-    its own, as in tbcad.tolerance.draws.draw. Bought balls are off as their grade allows, caps as
-    the process makes spheres, each with its centre held.
+    Purchased balls have the errors of their grade, caps those of the process's spheres, each with
+    its centre unchanged.
 
     Args:
-        errors: how exactly things are made.
-        seed: of all machines.
-        machines: their numbers.
-        cap: which of the balls are made, (k,).
+        errors: of the process.
+        seed: of all builds.
+        builds: numbers of the builds.
+        is_cap: which of the balls are made instead of purchased, (k,).
         stops: t of one run.
     """
-    numbers = list(machines)
-    ball, made, seat, angle, runout, tilt, shift, turn, focal = (
-        _drawn(getattr(errors, kind), seed, numbers, FIRST_STREAM + stream, shape)
-        for stream, (kind, shape) in enumerate(_shapes(len(cap), stops).items())
+    drawn = draw_kinds(errors, seed, builds, _shapes(len(is_cap), stops), FIRST_STREAM)
+    return PrototypeDraws(
+        radius=np.where(is_cap, drawn["sphere_radius"], drawn["ball_radius"]),
+        seat=drawn["seat"],
+        angle=drawn["rotation_angle"],
+        runout=drawn["axis_runout"],
+        tilt=drawn["axis_tilt"],
+        camera_shift=drawn["camera_shift"],
+        camera_tilt=drawn["camera_tilt"],
+        focal=1 + drawn["camera_focal"],
     )
-    radius = np.where(cap, made, ball)
-    return PrototypeDraws(radius, seat, angle, runout, tilt, shift, turn, 1 + focal)
 
 
-def _shapes(k: int, t: int) -> dict[str, tuple[int, ...]]:
-    """Numbers to be drawn of each kind, in the order of their streams; only append to it."""
+def _shapes(k: int, t: int) -> dict[str, Shape]:
+    """Shape of each kind's errors, in the order of their random streams; only append to it."""
     return {
         "ball_radius": (k,),
         "sphere_radius": (k,),
@@ -83,14 +86,3 @@ def _shapes(k: int, t: int) -> dict[str, tuple[int, ...]]:
         "camera_tilt": (3,),
         "camera_focal": (),
     }
-
-
-def _drawn(
-    error: Error, seed: int, numbers: list[int], stream: int, shape: tuple[int, ...]
-) -> Floats:
-    """Errors of one kind of all machines, (s, ...)."""
-    drawn = np.full((len(numbers), *shape), error.mean)
-    if error.spread != 0:
-        for row, number in enumerate(numbers):
-            drawn[row] = error.of(generator(seed, number, stream), *shape)
-    return drawn

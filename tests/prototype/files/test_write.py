@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import design
-from tbcad.output.build import export
+from tbcad.output.build import write_export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
 from tbcad.spec.load import load_spec
 from tests.csv_files import Rows, read_csv
@@ -28,7 +28,7 @@ OPTIONS = [
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("prototype")
-    export(design(load_spec(None, OPTIONS)), place, [PROTOTYPE])
+    write_export(design(load_spec(None, OPTIONS)), place, [PROTOTYPE])
     return place
 
 
@@ -161,7 +161,7 @@ def test_the_glb_is_in_metres_and_upright(folder: Path, balls: Rows) -> None:
 
 
 def test_the_same_bytes_again(folder: Path, tmp_path: Path) -> None:
-    export(design(load_spec(None, OPTIONS)), tmp_path, [PROTOTYPE])
+    write_export(design(load_spec(None, OPTIONS)), tmp_path, [PROTOTYPE])
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 

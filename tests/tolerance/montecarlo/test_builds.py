@@ -6,80 +6,80 @@ import numpy as np
 import pytest
 
 from tbcad.tolerance.montecarlo.builds import (
-    BATCH,
+    BUILDS_PER_BATCH,
     MonteCarloCase,
-    Result,
-    Work,
-    joined,
+    ShellResult,
+    estimate_yield,
+    joined_results,
     simulate,
-    wilson,
-    yielded,
+    wilson_interval,
 )
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels
 
-Halves = tuple[EdgeModel, EdgeModel]
 SOME = Errors(sphere_centre=Error(0.02), camera_shift=Error(0.1), scale_axis=Error(0.001))
-MACHINES = 2 * BATCH + 3
+BUILDS = 2 * BUILDS_PER_BATCH + 3
 ARRAYS = ("coverage", "pixels", "angle", "offset")
 
 
 @pytest.fixture(scope="module")
-def task(halves: Halves) -> MonteCarloCase:
+def case(halves: EdgeModels) -> MonteCarloCase:
     return MonteCarloCase(halves, SOME, 11)
 
 
 @pytest.fixture(scope="module")
-def result(task: MonteCarloCase) -> Result:
-    return simulate(task, MACHINES)
+def result(case: MonteCarloCase) -> ShellResult:
+    return simulate(case, BUILDS)
 
 
-def same(one: Result, two: Result) -> bool:
+def same(one: ShellResult, two: ShellResult) -> bool:
     return all(np.array_equal(getattr(one, name), getattr(two, name)) for name in ARRAYS)
 
 
-def alone(work: Work, batches: Sequence[range]) -> list[Result]:
-    return [work(batch) for batch in batches]
+def one_after_another(case: MonteCarloCase, batches: Sequence[range]) -> list[ShellResult]:
+    return [case(batch) for batch in batches]
 
 
-def backward(work: Work, batches: Sequence[range]) -> list[Result]:
+def backward(case: MonteCarloCase, batches: Sequence[range]) -> list[ShellResult]:
     """Three threads that take the batches last first."""
     with ThreadPoolExecutor(3) as pool:
-        return list(pool.map(work, batches[::-1]))[::-1]
+        return list(pool.map(case, batches[::-1]))[::-1]
 
 
-def pickled(work: Work, batches: Sequence[range]) -> list[Result]:
+def pickled(case: MonteCarloCase, batches: Sequence[range]) -> list[ShellResult]:
     """As another process would have it."""
-    return [pickle.loads(pickle.dumps(work))(batch) for batch in batches]
+    return [pickle.loads(pickle.dumps(case))(batch) for batch in batches]
 
 
-@pytest.mark.parametrize("each", [alone, backward, pickled])
-def test_same_figures_whoever_works(task: MonteCarloCase, result: Result, each: object) -> None:
-    assert same(simulate(task, MACHINES, each), result)  # type: ignore[arg-type]
-
-
-def test_same_figures_in_whatever_batches(
-    task: MonteCarloCase, result: Result, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("run_batches", [one_after_another, backward, pickled])
+def test_same_figures_with_any_workers(
+    case: MonteCarloCase, result: ShellResult, run_batches: object
 ) -> None:
-    monkeypatch.setattr("tbcad.tolerance.montecarlo.builds.BATCH", 4)
-    assert same(simulate(task, MACHINES), result)
+    assert same(simulate(case, BUILDS, run_batches), result)  # type: ignore[arg-type]
 
 
-def test_later_machines_continue_earlier_ones(task: MonteCarloCase, result: Result) -> None:
-    parts = [simulate(task, 5), simulate(task, MACHINES - 5, first=5)]
-    assert same(joined(parts), result)
+def test_same_figures_in_any_batches(
+    case: MonteCarloCase, result: ShellResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tbcad.tolerance.montecarlo.builds.BUILDS_PER_BATCH", 4)
+    assert same(simulate(case, BUILDS), result)
 
 
-def test_another_seed_makes_other_machines(halves: Halves, result: Result) -> None:
-    other = simulate(MonteCarloCase(halves, SOME, 12), MACHINES)
+def test_later_builds_continue_earlier_ones(case: MonteCarloCase, result: ShellResult) -> None:
+    parts = [simulate(case, 5), simulate(case, BUILDS - 5, first=5)]
+    assert same(joined_results(parts), result)
+
+
+def test_another_seed_makes_other_builds(halves: EdgeModels, result: ShellResult) -> None:
+    other = simulate(MonteCarloCase(halves, SOME, 12), BUILDS)
     assert not np.any(other.worst == result.worst)
 
 
-def test_worst_and_quantiles(result: Result) -> None:
-    assert len(result) == MACHINES
-    assert result.coverage.shape == result.pixels.shape == (MACHINES, 193)
-    assert result.angle.shape == result.offset.shape == (MACHINES, 206)
-    rows = np.arange(MACHINES)
+def test_worst_and_quantiles(result: ShellResult) -> None:
+    assert len(result) == BUILDS
+    assert result.coverage.shape == result.pixels.shape == (BUILDS, 193)
+    assert result.angle.shape == result.offset.shape == (BUILDS, 206)
+    rows = np.arange(BUILDS)
     assert np.array_equal(result.coverage[rows, result.worst_camera], result.worst)
     assert np.all(result.worst[:, None] <= result.coverage)
     low, middle, high = result.quantiles([0, 0.5, 1])
@@ -88,11 +88,11 @@ def test_worst_and_quantiles(result: Result) -> None:
     assert np.all((low < middle) & (middle < high))
 
 
-def test_machines_without_errors_all_do(halves: Halves) -> None:
+def test_builds_without_errors_are_all_good(halves: EdgeModels) -> None:
     result = simulate(MonteCarloCase(halves, Errors(), 1), 2)
     assert result.offset.max() < 1e-9
     assert result.angle.max() < 1e-9
-    assert yielded(result.worst, 60.0).share == 1
+    assert estimate_yield(result.worst, 60.0).share == 1
 
 
 @pytest.mark.parametrize(
@@ -106,15 +106,15 @@ def test_machines_without_errors_all_do(halves: Halves) -> None:
 )
 def test_interval_of_wilson(good: int, count: int, low: float, high: float) -> None:
     """The last two: R. G. Newcombe, Stat. Med. 17 (1998) 857-872, table I, method 3."""
-    assert wilson(good, count) == pytest.approx((low, high), abs=5e-5)
+    assert wilson_interval(good, count) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_all_good_is_not_surely_all_good() -> None:
-    low, high = wilson(10, 10)
+    low, high = wilson_interval(10, 10)
     assert (high, low) == (1.0, pytest.approx(1 - 0.2775, abs=5e-5))
 
 
-def test_yield_counts_machines_that_just_reach_the_target() -> None:
-    found = yielded(np.array([59.999, 60.0, 61.0, 10.0]), 60.0)
+def test_yield_counts_builds_that_just_reach_the_target() -> None:
+    found = estimate_yield(np.array([59.999, 60.0, 61.0, 10.0]), 60.0)
     assert found.share == 0.5
     assert found.low < 0.5 < found.high

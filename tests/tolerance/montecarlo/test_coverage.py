@@ -11,20 +11,18 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import project_points, reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import coverage, seen, virtual
-from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, nominal
+from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
+from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_model
 from tests.tolerance.exact_builds import surrounded
 
-Halves = tuple[EdgeModel, EdgeModel]
+
+def none(halves: EdgeModels, builds: int = 1) -> tuple[ShellDraws, ShellDraws]:
+    return draw(Errors(), 1, range(builds), len(halves[0]))
 
 
-def none(halves: Halves, machines: int = 1) -> tuple[Draws, Draws]:
-    return draw(Errors(), 1, range(machines), len(halves[0]))
-
-
-def test_virtual_cameras_share_halved_mirrors(halves: Halves) -> None:
-    which, m = virtual(halves), len(halves[0])
+def test_virtual_cameras_share_halved_mirrors(halves: EdgeModels) -> None:
+    which, m = virtual_camera_numbers(halves), len(halves[0])
     halved = halves[0].halved
     assert len(np.unique(which)) == which.max() + 1 == 2 * m - halved.sum() == 193
     assert np.array_equal(which[:m], np.arange(m))
@@ -35,8 +33,8 @@ def test_virtual_cameras_share_halved_mirrors(halves: Halves) -> None:
 def test_pixels_are_those_that_are_counted(small_design: MirrorDesign) -> None:
     """Against one exact ray a pixel, for mirrors whose picture lies inside the frame."""
     a, _ = reflectors(small_design)
-    half = nominal(a)
-    area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+    half = edge_model(a)
+    area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
     numbers = exact_tracer(a)(range(a.camera.height_px), (0.0, 0.0)).mirror
     count = np.bincount(numbers.ravel(), minlength=len(half) + 1)[1:]
     box = a.boxes()
@@ -51,37 +49,37 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
     """To a millionth of a polygon with 512 corners on every edge."""
     a, b = reflectors(small_design)
     for at in (a, b):
-        half, (offsets, sides) = nominal(at), at.cells.rings
+        half, (offsets, sides) = edge_model(at), at.cells.rings
         t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
         t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
         edge = project_points(
             at.camera, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
         )
-        area = seen(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+        area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
         for k, (first, last) in enumerate(pairwise(offsets)):
             x, y = edge[first:last].reshape(-1, 2).T
             polygon = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
             assert area[k] == pytest.approx(polygon, rel=1e-6)
 
 
-def test_longer_focal_length_makes_larger_pictures(halves: Halves) -> None:
+def test_longer_focal_length_makes_larger_pictures(halves: EdgeModels) -> None:
     draws = none(halves)[0]
     longer = replace(draws, focal=np.array([1.01]))
-    ratio = seen(halves[0], longer).pixels / seen(halves[0], draws).pixels
+    ratio = mirror_coverage(halves[0], longer).pixels / mirror_coverage(halves[0], draws).pixels
     assert ratio == pytest.approx(1.01**2, rel=1e-12)
 
 
-def test_facets_cost_what_they_cost(halves: Halves) -> None:
+def test_facets_cost_what_they_cost(halves: EdgeModels) -> None:
     whole, _ = coverage(halves, none(halves))
     less, _ = coverage(halves, draw(Errors(facets=Error(0, 0.4)), 1, range(1), len(halves[0])))
     assert whole - less == pytest.approx(0.4, abs=1e-12)
 
 
-def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: Halves) -> None:
+def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: EdgeModels) -> None:
     a, b = none(halves)
     shrunk = replace(b, radius=np.where(halves[1].halved, 0.2, 0.0)[None])
     both, pixels = coverage(halves, (a, shrunk))
-    one, other = seen(halves[0], a), seen(halves[1], shrunk)
+    one, other = mirror_coverage(halves[0], a), mirror_coverage(halves[1], shrunk)
     halved = halves[0].halved
     lesser = (other.diameter < one.diameter)[0, halved]
     assert 0 < lesser.sum() < halved.sum()
@@ -91,7 +89,7 @@ def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: Halves) -> None:
     assert pixels[0, : len(halved)][halved] == pytest.approx(together, rel=1e-12)
 
 
-def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: Halves) -> None:
+def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: EdgeModels) -> None:
     """Its sphere moved back behind theirs, it has no cell."""
     lost = int(np.flatnonzero(~halves[0].halved)[10])
     a, b = none(halves)
@@ -104,24 +102,24 @@ def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: Halves) -> None
 
 @pytest.mark.parametrize(("shift", "all_look"), [(3.0, True), (45.0, False), (60.0, False)])
 def test_mirror_that_looks_past_the_object_sees_nothing(
-    halves: Halves, small_design: MirrorDesign, shift: float, all_look: bool
+    halves: EdgeModels, small_design: MirrorDesign, shift: float, all_look: bool
 ) -> None:
     """Its rays may miss the middle by far and yet not surround it."""
     a, _ = none(halves)
     moved = replace(a, camera_shift=np.array([[0.0, shift, 0.0]]))
-    one, whole = seen(halves[0], moved), ~halves[0].halved
+    one, whole = mirror_coverage(halves[0], moved), ~halves[0].halved
     wanted = surrounded(small_design.halves[0], moved.camera_shift[0])
-    assert np.array_equal(one.passes[0, whole] % 2 == 1, wanted[whole])
+    assert np.array_equal(one.crossings[0, whole] % 2 == 1, wanted[whole])
     assert wanted[whole].all() == all_look
 
 
-def test_errors_larger_than_a_mirror_are_refused(halves: Halves) -> None:
+def test_errors_larger_than_a_mirror_are_refused(halves: EdgeModels) -> None:
     draws = draw(Errors(sphere_radius=Error(0, -1e3)), 1, range(1), len(halves[0]))
     with pytest.raises(InputError, match=r"sphere_radius_um.*make the errors smaller"):
         coverage(halves, draws)
 
 
-def test_no_machines(halves: Halves) -> None:
+def test_no_builds(halves: EdgeModels) -> None:
     diameter, pixels = coverage(halves, none(halves, 0))
     assert diameter.shape == pixels.shape == (0, 193)
 
@@ -129,7 +127,7 @@ def test_no_machines(halves: Halves) -> None:
 def test_planar_mirrors_with_a_thick_coat_move_and_stay_planar() -> None:
     """Their cells are cut by straight edges; all moved along their normals they stay alike."""
     flat = design(load_spec(None, ["n=4", "radius_rule=flat"]))
-    a, b = (nominal(at) for at in reflectors(flat))
+    a, b = (edge_model(at) for at in reflectors(flat))
     bare, _ = coverage((a, b), draw(Errors(), 1, range(1), len(a)))
     coated, _ = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
     assert bare[0, : len(a)] == pytest.approx(flat.halves[0].coverage, abs=1e-5)

@@ -3,11 +3,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
+from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
 
 M = 4
 ALL = Errors(**{field.name: Error(0.001) for field in fields(Errors)})
-NAMES = [field.name for field in fields(Draws)]
+NAMES = [field.name for field in fields(ShellDraws)]
 
 
 def test_a_machine_is_the_same_alone_or_among_others() -> None:

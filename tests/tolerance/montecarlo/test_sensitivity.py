@@ -6,20 +6,24 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, coverage_at_yield, simulate, yielded
+from tbcad.tolerance.montecarlo.builds import (
+    MonteCarloCase,
+    coverage_at_yield,
+    estimate_yield,
+    simulate,
+)
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels
 from tbcad.tolerance.montecarlo.sensitivity import (
-    EXACT,
-    MOST_TIMES,
-    kinds,
-    loosest,
+    FACTOR_TOLERANCE,
+    LARGEST_FACTOR,
     one_at_a_time,
-    only,
+    only_kind,
+    present_kinds,
     scaled,
+    tolerable_factor,
 )
 
-Halves = tuple[EdgeModel, EdgeModel]
 MIXED = Errors(
     sphere_centre=Error(0.02),
     coating=Error(0.01, 0.03, "uniform"),
@@ -35,19 +39,19 @@ def synthetic(loss: Callable[[float], float]) -> Callable[[Errors], np.ndarray]:
     return lambda errors: np.full(7, TARGET + ROOM - loss(errors.facets.mean))
 
 
-def real(halves: Halves, machines: int) -> Callable[[Errors], np.ndarray]:
-    return lambda errors: simulate(MonteCarloCase(halves, errors, 3), machines).worst
+def real(halves: EdgeModels, builds: int) -> Callable[[Errors], np.ndarray]:
+    return lambda errors: simulate(MonteCarloCase(halves, errors, 3), builds).worst
 
 
 def test_kinds_are_those_of_which_there_are_any() -> None:
-    assert kinds(MIXED) == ["sphere_centre", "coating", "facets", "seat"]
-    assert kinds(Errors()) == []
+    assert present_kinds(MIXED) == ["sphere_centre", "coating", "facets", "seat"]
+    assert present_kinds(Errors()) == []
 
 
 def test_only_leaves_one_kind_as_it_is() -> None:
-    for kind in kinds(MIXED):
-        one = only(MIXED, kind)
-        assert kinds(one) == [kind]
+    for kind in present_kinds(MIXED):
+        one = only_kind(MIXED, kind)
+        assert present_kinds(one) == [kind]
         assert getattr(one, kind) == getattr(MIXED, kind)
 
 
@@ -61,68 +65,73 @@ def test_scaled_multiplies_spread_and_mean_and_nothing_else() -> None:
     assert scaled(MIXED, 1.0) == MIXED
 
 
-@pytest.mark.parametrize("mean", [0.0002 * MOST_TIMES, 0.36, 0.05, 7.0, 600.0])
+@pytest.mark.parametrize("mean", [0.0002 * LARGEST_FACTOR, 0.36, 0.05, 7.0, 600.0])
 def test_linear_loss(mean: float) -> None:
     """What is left is room - times mean: the factor is the one over the other."""
-    found = loosest(Errors(facets=Error(0, mean)), 0.99, TARGET, synthetic(lambda x: x))
-    assert found == pytest.approx(ROOM / mean, rel=EXACT, abs=1e-4)
+    found = tolerable_factor(Errors(facets=Error(0, mean)), 0.99, TARGET, synthetic(lambda x: x))
+    assert found == pytest.approx(ROOM / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
 
 
 @pytest.mark.parametrize("power", [0.5, 2.0, 3.0])
 @pytest.mark.parametrize("mean", [0.02, 0.4, 5.0])
 def test_bent_loss(power: float, mean: float) -> None:
     """The loss is the mean's power: the factor is the root of the room over the mean."""
-    found = loosest(Errors(facets=Error(0, mean)), 0.9, TARGET, synthetic(lambda x: x**power))
-    assert found == pytest.approx(ROOM ** (1 / power) / mean, rel=EXACT, abs=1e-4)
+    found = tolerable_factor(
+        Errors(facets=Error(0, mean)), 0.9, TARGET, synthetic(lambda x: x**power)
+    )
+    assert found == pytest.approx(ROOM ** (1 / power) / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
 
 
 def test_loss_with_a_cliff_is_bracketed() -> None:
     """Nothing is lost up to three times, all beyond: no straight line leads there."""
-    found = loosest(
+    found = tolerable_factor(
         Errors(facets=Error(0, 1.0)), 0.9, TARGET, synthetic(lambda x: 50.0 if x > 3 else 0.0)
     )
-    assert found == pytest.approx(3.0, rel=EXACT)
+    assert found == pytest.approx(3.0, rel=FACTOR_TOLERANCE)
 
 
 @pytest.mark.parametrize("count", [1, 7, 10, 100, 101])
 def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
-    """For every share that so many machines can have, and those between."""
+    """For every share that so many builds can have, and those between."""
     worst = np.random.default_rng(count).normal(TARGET, 1, count)
     for wanted in np.arange(1, 2 * count) / (2 * count):
         for target in worst:
-            good = yielded(worst, target).share >= wanted
+            good = estimate_yield(worst, target).share >= wanted
             assert (coverage_at_yield(worst, wanted) >= target) == good
 
 
 def test_what_costs_nothing_may_be_anything() -> None:
-    assert loosest(Errors(facets=Error(1.0)), 0.99, TARGET, synthetic(lambda _: 0.0)) == np.inf
+    assert (
+        tolerable_factor(Errors(facets=Error(1.0)), 0.99, TARGET, synthetic(lambda _: 0.0))
+        == np.inf
+    )
 
 
 def test_what_costs_far_too_little_may_be_anything() -> None:
     """It would be reached at a million times."""
     slight = Errors(facets=Error(0, ROOM / 1e6))
-    assert loosest(slight, 0.99, TARGET, synthetic(lambda x: x)) == np.inf
+    assert tolerable_factor(slight, 0.99, TARGET, synthetic(lambda x: x)) == np.inf
 
 
 def test_design_that_falls_short_allows_nothing() -> None:
     some = Errors(facets=Error(0, 0.1))
-    assert loosest(some, 0.99, TARGET + ROOM + 0.001, synthetic(lambda x: x)) == 0
-    assert loosest(some, 0.99, TARGET + ROOM - 0.001, synthetic(lambda x: x)) > 0
+    assert tolerable_factor(some, 0.99, TARGET + ROOM + 0.001, synthetic(lambda x: x)) == 0
+    assert tolerable_factor(some, 0.99, TARGET + ROOM - 0.001, synthetic(lambda x: x)) > 0
 
 
-def test_quantile_of_the_machines_decides_not_their_mean() -> None:
+def test_quantile_of_the_builds_decides_not_their_mean() -> None:
     """Machine k of 101 loses k per cent: at a yield of 0.75 the one that loses 75 % counts."""
 
     def worst(errors: Errors) -> np.ndarray:
         return TARGET + ROOM - errors.facets.mean * np.linspace(0, 1, 101)
 
-    found = loosest(Errors(facets=Error(0, 0.4)), 0.75, TARGET, worst)
-    assert found == pytest.approx(ROOM / (0.4 * 0.75), rel=EXACT)
+    found = tolerable_factor(Errors(facets=Error(0, 0.4)), 0.75, TARGET, worst)
+    assert found == pytest.approx(ROOM / (0.4 * 0.75), rel=FACTOR_TOLERANCE)
     one = one_at_a_time(MIXED, "facets", 0.75, TARGET, worst)
     assert one.kind == "facets"
     assert one.loss == pytest.approx(0.36 / 2)
-    assert one.tail == pytest.approx(0.36 * 0.75)
-    assert one.times == pytest.approx(ROOM / (0.36 * 0.75), rel=EXACT)
+    assert one.loss_at_yield == pytest.approx(0.36 * 0.75)
+    assert one.tolerable_factor == pytest.approx(ROOM / (0.36 * 0.75), rel=FACTOR_TOLERANCE)
 
 
 def test_alone_asks_for_no_other_kind() -> None:
@@ -138,37 +147,37 @@ def test_alone_asks_for_no_other_kind() -> None:
         assert replace(errors, coating=Error()) == Errors()
 
 
-def test_facets_of_a_machine_are_linear(halves: Halves) -> None:
+def test_facets_of_a_machine_are_linear(halves: EdgeModels) -> None:
     """They are taken off the coverage, so the factor is what the design has to spare over them."""
     worst = real(halves, 10)
     spare = float(worst(Errors())[0]) - TARGET
     assert spare > 0.5
     one = one_at_a_time(MIXED, "facets", 0.99, TARGET, worst)
     assert one.loss == pytest.approx(0.36, abs=1e-9)
-    assert one.tail == pytest.approx(0.36, abs=1e-9)
-    assert one.times == pytest.approx(spare / 0.36, rel=EXACT)
+    assert one.loss_at_yield == pytest.approx(0.36, abs=1e-9)
+    assert one.tolerable_factor == pytest.approx(spare / 0.36, rel=FACTOR_TOLERANCE)
 
 
 @pytest.mark.parametrize(
     ("kind", "error"),
     [("sphere_centre", Error(0.025)), ("camera_shift", Error(0.11)), ("coating", Error(0, 0.3))],
 )
-def test_machines_with_the_factor_just_do(halves: Halves, kind: str, error: Error) -> None:
+def test_builds_with_the_factor_just_do(halves: EdgeModels, kind: str, error: Error) -> None:
     """A little less makes the wanted share good; a little more does not."""
     worst, errors = real(halves, 20), Errors(**{kind: error})
-    times = loosest(errors, 0.9, TARGET, worst)
-    assert 0 < times < MOST_TIMES
+    times = tolerable_factor(errors, 0.9, TARGET, worst)
+    assert 0 < times < LARGEST_FACTOR
     less, more = (
-        yielded(worst(scaled(errors, times * by)), TARGET).share
-        for by in (1 - 2 * EXACT, 1 + 2 * EXACT)
+        estimate_yield(worst(scaled(errors, times * by)), TARGET).share
+        for by in (1 - 2 * FACTOR_TOLERANCE, 1 + 2 * FACTOR_TOLERANCE)
     )
     assert more < 0.9 <= less
 
 
-def test_camera_that_turns_about_its_pinhole_is_harmless(halves: Halves) -> None:
+def test_camera_that_turns_about_its_pinhole_is_harmless(halves: EdgeModels) -> None:
     """Coverage hangs on places of pinhole and mirrors alone."""
     one = one_at_a_time(
         Errors(camera_tilt=Error(0.003)), "camera_tilt", 0.9, TARGET, real(halves, 10)
     )
     assert one.loss == pytest.approx(0, abs=1e-9)
-    assert one.times == np.inf
+    assert one.tolerable_factor == np.inf

@@ -15,11 +15,17 @@ from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.study.viewpoints import ground_truths
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import seen
-from tbcad.tolerance.montecarlo.draws import Draws, Error, Errors, draw
-from tbcad.tolerance.montecarlo.edge_model import nominal
+from tbcad.tolerance.montecarlo.coverage import mirror_coverage
+from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import edge_model
 from tbcad.tolerance.montecarlo.pointing import pointing
-from tbcad.tolerance.montecarlo.sharpness import AsMade, Sharpness, Wanted, actual, sharpness
+from tbcad.tolerance.montecarlo.sharpness import (
+    BuiltReflector,
+    ReferenceViews,
+    Sharpness,
+    built_reflector,
+    sharpness,
+)
 
 CAPTURE_MM = 60.0
 SIZE = (160, 120)
@@ -52,12 +58,12 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def wanted(scene: Scene) -> Wanted:
+def wanted(scene: Scene) -> ReferenceViews:
     places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
     views: list[Camera] = [
         camera_around_object(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places
     ]
-    return Wanted(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
+    return ReferenceViews(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
 
 
 def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
@@ -68,14 +74,14 @@ def numbers(at: Reflector) -> np.ndarray:
     return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0)).mirror
 
 
-class WholeFrame(AsMade):
+class WholeFrame(BuiltReflector):
     """Looks for every mirror in the whole picture."""
 
     def boxes(self) -> np.ndarray:
         return np.tile([0, self.camera.width_px, 0, self.camera.height_px], (len(self), 1))
 
 
-class OwnCells(AsMade):
+class OwnCells(BuiltReflector):
     """Looks for mirrors no farther than about their designed cells."""
 
     def boxes(self) -> np.ndarray:
@@ -88,7 +94,7 @@ class TestActual:
         self, cameras: tuple[Reflector, Reflector], side: int
     ) -> None:
         at, drawn = cameras[side], machines(cameras, Errors())[side]
-        made = actual(at, drawn, 0)
+        made = built_reflector(at, drawn, 0)
         for name in ("apex", "normal", "curvature"):
             close = pytest.approx(getattr(at.mirrors, name), abs=1e-12)
             assert getattr(made.mirrors, name) == close
@@ -101,7 +107,7 @@ class TestActual:
     ) -> None:
         """A point x comes to lie at R (scale x) + shift (tbcad.tolerance.montecarlo.draws)."""
         at, drawn = cameras[side], machines(cameras, LARGE, 2)[side]
-        made = actual(at, drawn, 1)
+        made = built_reflector(at, drawn, 1)
         scale, turn = drawn.scale[1, 0], Rotation.from_rotvec(drawn.shell_tilt[1])
         centre = at.mirrors.apex - at.mirrors.normal / at.mirrors.curvature[:, None]
         moved = turn.apply(scale * (centre + drawn.centre[1])) + drawn.shell_shift[1]
@@ -112,7 +118,7 @@ class TestActual:
 
     def test_camera_is_where_draws_say(self, cameras: tuple[Reflector, Reflector]) -> None:
         at, drawn = cameras[0], machines(cameras, LARGE)[0]
-        view = actual(at, drawn, 0).camera
+        view = built_reflector(at, drawn, 0).camera
         assert np.array_equal(view.pinhole, at.camera.pinhole + drawn.camera_shift[0])
         angle = np.linalg.norm(drawn.camera_tilt[0])
         axis = drawn.camera_tilt[0] / angle
@@ -128,9 +134,9 @@ class TestActual:
         """One ray a pixel against areas of outlines; of the border half a pixel is uncertain."""
         both, compared = machines(cameras, LARGE, 3), 0
         for at, drawn in zip(cameras, both, strict=True):
-            area = seen(nominal(at), drawn).pixels
+            area = mirror_coverage(edge_model(at), drawn).pixels
             for k in range(3):
-                made = actual(at, drawn, k)
+                made = built_reflector(at, drawn, k)
                 count = np.bincount(numbers(made).ravel(), minlength=len(at) + 1)[1:]
                 box, view = made.boxes(), made.camera
                 inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
@@ -145,14 +151,14 @@ class TestActual:
     ) -> None:
         """The pixels that should show the apices, seen by the made camera off the made mirrors."""
         for at, drawn in zip(cameras, machines(cameras, LARGE), strict=True):
-            made, m = actual(at, drawn, 0), len(at)
+            made, m = built_reflector(at, drawn, 0), len(at)
             ray = at.mirrors.apex - at.camera.pinhole
             old, new = (_axes(view) for view in (at.camera, made.camera))
             way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
             rays = reflect_pixels(made.camera.pinhole, way[None], made.mirrors, mirror)
             missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
-            offset = pointing(nominal(at), drawn).offset[0]
+            offset = pointing(edge_model(at), drawn).offset[0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
             assert missed.min() > 0.01
 
@@ -166,7 +172,7 @@ def test_boxes_hold_all_pixels(cameras: tuple[Reflector, Reflector]) -> None:
     lost = 0
     for at, drawn in zip(cameras, machines(cameras, LARGE, 3), strict=True):
         for k in range(3):
-            made = actual(at, drawn, k)
+            made = built_reflector(at, drawn, k)
             parts = (made.camera_id, made.camera, made.u, made.cells, made.surfaces)
             everywhere = numbers(WholeFrame(*parts))
             assert np.array_equal(numbers(made), everywhere)
@@ -179,14 +185,14 @@ class TestSharpness:
     def found(
         cameras: tuple[Reflector, Reflector],
         scene: Scene,
-        wanted: Wanted,
+        wanted: ReferenceViews,
         errors: Errors,
         left: float = 0.0,
     ) -> Sharpness:
         return sharpness(cameras, machines(cameras, errors, 2), scene, wanted, left)
 
     def test_without_errors_all_are_the_designed_one(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
     ) -> None:
         """But for rounding in the last digit of a ray that decides between two pixels."""
         found = self.found(cameras, scene, wanted, Errors())
@@ -197,7 +203,7 @@ class TestSharpness:
         assert 0.5 < found.designed.min() < found.designed.max() < 1
 
     def test_calibration_gives_back_what_errors_cost(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
     ) -> None:
         found = self.found(cameras, scene, wanted, LARGE, 0.5e-3)
         assert (found.uncalibrated < found.calibrated).all()
@@ -206,7 +212,7 @@ class TestSharpness:
         assert (np.abs(found.calibrated - found.designed) < lost / 2).all()
 
     def test_what_calibration_leaves_counts(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
     ) -> None:
         exactly, roughly = (
             self.found(cameras, scene, wanted, Errors(), left) for left in (0.0, 0.02)
@@ -215,7 +221,7 @@ class TestSharpness:
         assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
 
     def test_same_machines_same_figures(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
     ) -> None:
         one, two = (self.found(cameras, scene, wanted, LARGE, 1e-3) for _ in range(2))
         assert np.array_equal(one.calibrated, two.calibrated)
@@ -223,10 +229,10 @@ class TestSharpness:
         assert not np.array_equal(one.calibrated[0], one.calibrated[1])
 
     def test_each_machine_is_told(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: Wanted
+        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
     ) -> None:
         told: list[str] = []
-        drawn: tuple[Draws, Draws] = machines(cameras, Errors(), 2)
+        drawn: tuple[ShellDraws, ShellDraws] = machines(cameras, Errors(), 2)
         one = replace(wanted, views=wanted.views[:1], truths=wanted.truths[:1])
         sharpness(cameras, drawn, scene, one, 0.0, progress=told.append)
-        assert told == ["machine 1 of 2", "machine 2 of 2"]
+        assert told == ["build 1 of 2", "build 2 of 2"]

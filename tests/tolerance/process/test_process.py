@@ -19,10 +19,10 @@ from tbcad.tolerance.process.process import (
     BUILT_IN,
     BY_USER,
     Process,
-    ball_radius,
-    errors,
+    ball_radius_error,
     load_process,
     process_dict,
+    process_errors,
 )
 
 KINDS = tuple(key for key, field in keys_of(Process) if section_of(field))
@@ -88,9 +88,9 @@ class TestBuiltIn:
         self, name: str, limit_mm: float
     ) -> None:
         """Of a length between two mirrors the maker's limit is two standard deviations."""
-        got, drawing = errors(load_process(name)), np.random.default_rng(7)
-        centres = got.sphere_centre.of(drawing, 2, 400_000)
-        ends = centres + got.sphere_radius.of(drawing, 2, 400_000)
+        got, drawing = process_errors(load_process(name)), np.random.default_rng(7)
+        centres = got.sphere_centre.sample(drawing, 2, 400_000)
+        ends = centres + got.sphere_radius.sample(drawing, 2, 400_000)
         assert 2 * np.std(ends[0] - ends[1]) == pytest.approx(limit_mm, rel=0.01)
 
     @pytest.mark.parametrize("name", BUILT_IN)
@@ -115,7 +115,7 @@ class TestErrors:
 
     def test_units(self, file: Path) -> None:
         file.write_text(table(2, 1))
-        got = errors(load_process(str(file)))
+        got = process_errors(load_process(str(file)))
         thousandth, degree = Error(0.002, 0.001), math.pi / 180
         per_thousand = ("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis")
         per_thousand += ("shell_shift", "shell_tilt", "camera_shift", "camera_tilt")
@@ -127,19 +127,21 @@ class TestErrors:
 
     def test_distribution_is_kept(self) -> None:
         changed = load_process("cnc", ["seat_um.distribution=uniform", "seat_um=10"])
-        assert errors(changed).seat == Error(0.01, 0.0, "uniform")
+        assert process_errors(changed).seat == Error(0.01, 0.0, "uniform")
 
     def test_of_the_coat_only_what_the_design_does_not_know(self) -> None:
         process = load_process("fdm", ["coating_um.mean=40", "coating_um=15"])
-        assert errors(process).coating == Error(0.015, 0.04)
-        assert errors(process, known_coating_um=30).coating.mean == pytest.approx(0.01)
-        assert errors(process, known_coating_um=50).coating.mean == pytest.approx(-0.01)
+        assert process_errors(process).coating == Error(0.015, 0.04)
+        assert process_errors(process, known_coating_um=30).coating.mean == pytest.approx(0.01)
+        assert process_errors(process, known_coating_um=50).coating.mean == pytest.approx(-0.01)
 
     def test_balls_are_those_of_iso_3290(self) -> None:
         """G40: form 1 um of radius over the ball, lot 2 um of diameter; G10: 0.25 and 0.5."""
-        assert ball_radius("G40") == Error(pytest.approx(1.0e-3), 0.0, "uniform")
-        assert ball_radius("G10") == Error(pytest.approx(0.25e-3), 0.0, "uniform")
-        assert errors(load_process("sla", ["ball_grade=G10"])).ball_radius == ball_radius("G10")
+        assert ball_radius_error("G40") == Error(pytest.approx(1.0e-3), 0.0, "uniform")
+        assert ball_radius_error("G10") == Error(pytest.approx(0.25e-3), 0.0, "uniform")
+        assert process_errors(
+            load_process("sla", ["ball_grade=G10"])
+        ).ball_radius == ball_radius_error("G10")
 
 
 class TestOwnFile:

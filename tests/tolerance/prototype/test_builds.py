@@ -15,11 +15,12 @@ from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
+from tbcad.tolerance.montecarlo.builds import CoverageResult, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.prototype.builds import PrototypeResult, PrototypeWork, simulate
-from tbcad.tolerance.prototype.draws import PrototypeDraws, draw
+from tbcad.tolerance.prototype.builds import PrototypeCase
+from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.rays import highlights
-from tbcad.tolerance.prototype.windows import Designed, designed, seen
+from tbcad.tolerance.prototype.windows import PrototypeModel, coverage_and_offsets, prototype_model
 from tests.prototype_exports import plan_of
 
 OPTIONS = ["n=6", "prototype.k=5"]
@@ -57,8 +58,8 @@ def plan(made: PrototypeLayout) -> Plan:
 
 
 @pytest.fixture(scope="module")
-def at(little: MirrorDesign, plan: Plan) -> Designed:
-    return designed(reflectors(little), plan)
+def at(little: MirrorDesign, plan: Plan) -> PrototypeModel:
+    return prototype_model(reflectors(little), plan)
 
 
 @pytest.fixture(scope="module")
@@ -66,8 +67,8 @@ def both(little: MirrorDesign, plan: Plan) -> tuple[PrototypeRun, PrototypeRun]:
     return prototype_runs(reflectors(little), plan)
 
 
-def machines(at: Designed, count: int, **errors: Error) -> PrototypeDraws:
-    return draw(Errors(**errors), 7, range(count), at.cap, len(at.plan.angle))
+def machines(at: PrototypeModel, count: int, **errors: Error) -> PrototypeDraws:
+    return draw_prototypes(Errors(**errors), 7, range(count), at.is_cap, len(at.plan.angle))
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +85,7 @@ def pictures(both: tuple[PrototypeRun, PrototypeRun]) -> list[Picture]:
 
 
 def slow(
-    at: Designed,
+    at: PrototypeModel,
     both: tuple[PrototypeRun, PrototypeRun],
     pictures: list[Picture],
     draws: PrototypeDraws,
@@ -105,7 +106,7 @@ def slow(
 
 
 def balls(
-    at: Designed, run: PrototypeRun, draws: PrototypeDraws, machine: int, half: int
+    at: PrototypeModel, run: PrototypeRun, draws: PrototypeDraws, machine: int, half: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centre and radius of the ball in each window."""
     frame, centre = at.plan.frame, np.empty((len(run.at), 3))
@@ -122,15 +123,17 @@ def balls(
 
 
 class TestCoverage:
-    def test_without_errors_it_is_the_record(self, at: Designed, made: PrototypeLayout) -> None:
-        diameter, offset = seen(at, machines(at, 1))
+    def test_without_errors_it_is_the_record(
+        self, at: PrototypeModel, made: PrototypeLayout
+    ) -> None:
+        diameter, offset = coverage_and_offsets(at, machines(at, 1))
         m = len(made.half)
         assert diameter[0, :m] == pytest.approx(made.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
 
-    def test_both_runs_are_alike(self, at: Designed, made: PrototypeLayout) -> None:
+    def test_both_runs_are_alike(self, at: PrototypeModel, made: PrototypeLayout) -> None:
         """Mirror i of camera a and its twin of camera b are shown by the same ball."""
-        diameter = seen(at, machines(at, 1))[0][0]
+        diameter = coverage_and_offsets(at, machines(at, 1))[0][0]
         a, b = diameter[at.virtual].reshape(2, -1)
         whole = ~at.runs[0].halved
         assert a[whole] == pytest.approx(b[made.twin][whole], abs=1e-6)
@@ -138,30 +141,32 @@ class TestCoverage:
     @pytest.mark.parametrize("kind", SPREAD)
     def test_each_error_against_the_slow_model(
         self,
-        at: Designed,
+        at: PrototypeModel,
         both: tuple[PrototypeRun, PrototypeRun],
         pictures: list[Picture],
         kind: str,
     ) -> None:
         draws = machines(at, 1, **{kind: SPREAD[kind]})
-        diameter, _ = seen(at, draws)
-        still, _ = seen(at, machines(at, 1))
+        diameter, _ = coverage_and_offsets(at, draws)
+        still, _ = coverage_and_offsets(at, machines(at, 1))
         assert np.abs(diameter - still).max() > 20 * SAMPLED_MM
         assert diameter[0] == pytest.approx(slow(at, both, pictures, draws), abs=SAMPLED_MM)
 
     def test_all_errors_together_against_the_slow_model(
-        self, at: Designed, both: tuple[PrototypeRun, PrototypeRun], pictures: list[Picture]
+        self, at: PrototypeModel, both: tuple[PrototypeRun, PrototypeRun], pictures: list[Picture]
     ) -> None:
         draws = machines(at, 2, **SPREAD)
-        diameter, _ = seen(at, draws)
+        diameter, _ = coverage_and_offsets(at, draws)
         for machine in range(2):
             expected = slow(at, both, pictures, draws, machine)
             assert diameter[machine] == pytest.approx(expected, abs=SAMPLED_MM)
 
-    def test_a_window_that_does_not_hold_the_middle_covers_nothing(self, at: Designed) -> None:
+    def test_a_window_that_does_not_hold_the_middle_covers_nothing(
+        self, at: PrototypeModel
+    ) -> None:
         """As wide as the windows are, the camera is turned."""
         draws = machines(at, 1, camera_tilt=Error(mean=0.3))
-        diameter, _ = seen(at, draws)
+        diameter, _ = coverage_and_offsets(at, draws)
         assert (diameter == 0).all()
 
 
@@ -175,107 +180,119 @@ def test_highlights_show_the_middle_of_the_object() -> None:
 
 
 class TestMotions:
-    def test_moving_all_alike_about_the_middle_changes_nothing(self, at: Designed) -> None:
+    def test_moving_all_alike_about_the_middle_changes_nothing(self, at: PrototypeModel) -> None:
         """The axis tilted, and the camera with it."""
         draws = machines(at, 1, axis_tilt=Error(5e-3), seat=Error(0.1))
         vector = draws.tilt @ at.plan.frame[1:]
         shift = Rotation.from_rotvec(vector).apply(at.pinhole) - at.pinhole
         moved = replace(draws, camera_tilt=vector, camera_shift=shift)
         still = replace(draws, tilt=np.zeros((1, 2)))
-        assert seen(at, moved)[0] == pytest.approx(seen(at, still)[0], abs=1e-9)
-        assert np.abs(seen(at, draws)[0] - seen(at, still)[0]).max() > 0.5
+        assert coverage_and_offsets(at, moved)[0] == pytest.approx(
+            coverage_and_offsets(at, still)[0], abs=1e-9
+        )
+        assert (
+            np.abs(coverage_and_offsets(at, draws)[0] - coverage_and_offsets(at, still)[0]).max()
+            > 0.5
+        )
 
-    def test_a_base_turned_on_is_a_camera_turned_back(self, at: Designed) -> None:
+    def test_a_base_turned_on_is_a_camera_turned_back(self, at: PrototypeModel) -> None:
         """The pinhole lies on the axis."""
         delta = 3e-3
         base = machines(at, 1, rotation_angle=Error(mean=delta))
         camera = replace(machines(at, 1), camera_tilt=-delta * at.plan.frame[:1])
-        assert seen(at, base)[0] == pytest.approx(seen(at, camera)[0], abs=1e-9)
+        assert coverage_and_offsets(at, base)[0] == pytest.approx(
+            coverage_and_offsets(at, camera)[0], abs=1e-9
+        )
 
     def test_a_base_turned_on_moves_the_ray_as_a_closed_form_says(
-        self, at: Designed, plan: Plan
+        self, at: PrototypeModel, plan: Plan
     ) -> None:
         """A ball moved by e across the plane of incidence turns its normal by e / r there, the
         ray by 2 cos(i) as much across that plane: 2 rho cos(i) e / r at the distance rho."""
         delta = 1e-6
-        _, offset = seen(at, machines(at, 1, rotation_angle=Error(mean=delta)))
+        _, offset = coverage_and_offsets(at, machines(at, 1, rotation_angle=Error(mean=delta)))
         rho, axis = norm(plan.apex), plan.frame[0]
         sideways = delta * norm(np.cross(axis, plan.centre))
         cosine = -(plan.normal * plan.apex).sum(axis=1) / rho
         expected = 2 * rho * cosine * sideways / plan.radius
         assert offset[0] == pytest.approx(expected[plan.ball].ravel(), rel=1e-4)
 
-    def test_known_motions_of_the_camera_about_its_pinhole_cost_nothing(self, at: Designed) -> None:
+    def test_known_motions_of_the_camera_about_its_pinhole_cost_nothing(
+        self, at: PrototypeModel
+    ) -> None:
         draws = machines(at, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
-        exact, _ = seen(at, machines(at, 1))
-        fixed, _ = seen(at, draws)
-        known, offset = seen(at, draws, known=True)
+        exact, _ = coverage_and_offsets(at, machines(at, 1))
+        fixed, _ = coverage_and_offsets(at, draws)
+        known, offset = coverage_and_offsets(at, draws, calibrated=True)
         assert known == pytest.approx(exact, abs=1e-6)
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
 
-    def test_known_errors_cost_less(self, at: Designed) -> None:
+    def test_known_errors_cost_less(self, at: PrototypeModel) -> None:
         draws = machines(at, 2, **SPREAD)
-        fixed, known = (seen(at, draws, known=known)[0].min(axis=1) for known in (False, True))
+        fixed, known = (
+            coverage_and_offsets(at, draws, calibrated=known)[0].min(axis=1)
+            for known in (False, True)
+        )
         assert (fixed < known).all()
 
 
 class TestDraws:
-    def test_a_machine_is_the_same_alone_and_among_others(self, at: Designed) -> None:
-        cap, stops = at.cap, len(at.plan.angle)
-        many = draw(Errors(**SPREAD), 3, range(5), cap, stops)
-        one = draw(Errors(**SPREAD), 3, [4], cap, stops)
+    def test_a_machine_is_the_same_alone_and_among_others(self, at: PrototypeModel) -> None:
+        cap, stops = at.is_cap, len(at.plan.angle)
+        many = draw_prototypes(Errors(**SPREAD), 3, range(5), cap, stops)
+        one = draw_prototypes(Errors(**SPREAD), 3, [4], cap, stops)
         for field in fields(PrototypeDraws):
             assert (getattr(many, field.name)[4] == getattr(one, field.name)[0]).all()
 
-    def test_one_kind_leaves_the_others_alone(self, at: Designed) -> None:
+    def test_one_kind_leaves_the_others_alone(self, at: PrototypeModel) -> None:
         every = machines(at, 2, **SPREAD)
         fewer = machines(at, 2, **{**SPREAD, "axis_runout": Error()})
         assert (every.seat == fewer.seat).all()
         assert (every.camera_tilt == fewer.camera_tilt).all()
         assert not fewer.runout.any()
 
-    def test_kinds_are_drawn_apart(self, at: Designed) -> None:
+    def test_kinds_are_drawn_apart(self, at: PrototypeModel) -> None:
         draws = machines(at, 1, camera_shift=Error(1.0), camera_tilt=Error(1.0))
         assert not np.isin(draws.camera_shift, draws.camera_tilt).any()
 
     def test_caps_are_off_as_made_and_balls_as_bought(self) -> None:
         cap = np.array([True, False])
         errors = Errors(sphere_radius=Error(mean=0.3), ball_radius=Error(mean=0.002))
-        assert draw(errors, 1, range(2), cap, 3).radius.tolist() == [[0.3, 0.002]] * 2
+        assert draw_prototypes(errors, 1, range(2), cap, 3).radius.tolist() == [[0.3, 0.002]] * 2
 
-    def test_stops_of_both_runs_are_apart(self, at: Designed) -> None:
+    def test_stops_of_both_runs_are_apart(self, at: PrototypeModel) -> None:
         angle = machines(at, 400, rotation_angle=Error(2e-3)).angle
         assert angle.std() == pytest.approx(2e-3, rel=0.03)
         assert abs(np.corrcoef(angle[:, 0].ravel(), angle[:, 1].ravel())[0, 1]) < 0.03
 
 
 class TestMonteCarlo:
-    def test_split_as_one_likes(self, at: Designed) -> None:
-        work = PrototypeWork(at, Errors(**SPREAD), 5)
+    def test_split_as_one_likes(self, at: PrototypeModel) -> None:
+        work = PrototypeCase(at, Errors(**SPREAD), 5)
         whole = simulate(work, 23)
-        alone = simulate(work, 23, each=lambda work, batches: [work(batch) for batch in batches])
+        alone = simulate(
+            work, 23, run_batches=lambda case, batches: [case(batch) for batch in batches]
+        )
         later = simulate(work, 6, first=17)
-        for field in fields(PrototypeResult):
+        for field in fields(CoverageResult):
             expected = getattr(whole, field.name)
             assert (getattr(alone, field.name) == expected).all()
             assert (getattr(later, field.name) == expected[17:]).all()
 
     def test_results_say_what_is_in_them(self) -> None:
         coverage = np.array([[61.0, 60.0, 62.0], [63.0, 64.0, 59.0]])
-        result = PrototypeResult(coverage, np.array([[3.0, 4.0], [0.0, 2.0]]))
+        result = CoverageResult(coverage, np.array([[3.0, 4.0], [0.0, 2.0]]))
         assert len(result) == 2
         assert result.worst.tolist() == [60, 59]
         assert result.worst_camera.tolist() == [1, 2]
-        assert result.offset_rms == pytest.approx([12.5**0.5, 2**0.5])
-        assert result.offset_worst.tolist() == [4, 2]
         assert result.quantiles([0, 0.5])[1].tolist() == [62, 62, 60.5]
 
 
 def test_windows_left_in_their_places_see_less(
-    little: MirrorDesign, plan: Plan, at: Designed
+    little: MirrorDesign, plan: Plan, at: PrototypeModel
 ) -> None:
     """Balls then stand aside of their windows' middles though nothing is off."""
-    fixed = designed(reflectors(little), replace(plan, moved=False))
-    apart, together = (seen(one, machines(one, 1))[0] for one in (fixed, at))
+    fixed = prototype_model(reflectors(little), replace(plan, moved=False))
+    apart, together = (coverage_and_offsets(one, machines(one, 1))[0] for one in (fixed, at))
     assert np.median(apart) < np.median(together) - 10
