@@ -16,7 +16,7 @@ from tbcad.cad.brep import Solid
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded_triangulation
-from tbcad.shell.envelope import envelope
+from tbcad.shell.envelope import closing_envelope
 from tbcad.shell.solid import shell_solid
 from tbcad.spec.load import load_spec
 
@@ -70,7 +70,7 @@ def shells(made: MirrorDesign) -> list[Solid]:
         faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0)
     )
     cells = cells_of(half.modelled_cells.surfaces, boundary, triangles)
-    closing = envelope(made.spec.shell, cells, half.ellipsoid)
+    closing = closing_envelope(made.spec.shell, cells, half.ellipsoid)
     return [
         shell_solid(
             f"shell_{one.camera_id}", one.ids, cells, closing, mirrored=one.camera_id == "b"

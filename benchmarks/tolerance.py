@@ -23,7 +23,7 @@ from tbcad.mirrors.record import write_record
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.surfaces import Surfaces
 from tbcad.output.manifest import write_manifest
-from tbcad.shell.files import object_distances, shell_envelope
+from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
@@ -99,7 +99,7 @@ def _write(made: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, fol
     for half, drawn in zip(made.halves, draws, strict=True):
         cells = _cells(half, drawn, k)
         cells = cells if half is first else cells.mirrored()
-        facets = shell_mesh(made.spec, cells, body, object_distances(first))
+        facets = shell_mesh(made.spec, cells, body, first.apex_distance)
         facets = facets if half is first else facets.mirrored()
         write_stl(folder / f"shell_{half.camera_id}.stl", facets)
 

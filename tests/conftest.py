@@ -3,7 +3,8 @@
 import pytest
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.shell.envelope import Envelope, envelope
+from tbcad.shell.envelope import Envelope
+from tbcad.shell.files import shell_envelope
 from tbcad.spec.load import load_spec
 
 
@@ -30,6 +31,5 @@ def small_half(small_design: MirrorDesign) -> MirrorArray:
 
 
 @pytest.fixture(scope="session")
-def small_body(small_design: MirrorDesign) -> Envelope:
-    half = small_design.halves[0]
-    return envelope(small_design.spec.shell, half.modelled_cells, half.ellipsoid)
+def small_envelope(small_design: MirrorDesign) -> Envelope:
+    return shell_envelope(small_design)

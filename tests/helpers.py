@@ -17,14 +17,7 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.shell.envelope import Envelope, envelope
-from tbcad.shell.files import object_distances
-from tbcad.shell.mesh import shell_mesh
-from tbcad.shell.solid import shell_solid
 
 
 @dataclass(frozen=True)
@@ -99,21 +92,3 @@ def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
     triangles = np.array([list(t.Indices) for t in part.GetTriangleIndices()])
     assert not objects.MoveNext()
     return vertices, triangles
-
-
-def solid_of(made: MirrorDesign, which: int) -> Solid:
-    half = made.halves[which]
-    name = f"shell_{half.camera_id}"
-    return shell_solid(
-        name, half.ids, made.halves[0].modelled_cells, body_of(made), mirrored=which == 1
-    )
-
-
-def body_of(made: MirrorDesign) -> Envelope:
-    half = made.halves[0]
-    return envelope(made.spec.shell, half.modelled_cells, half.ellipsoid)
-
-
-def mesh_of(made: MirrorDesign) -> Mesh:
-    half: MirrorArray = made.halves[0]
-    return shell_mesh(made.spec, half.modelled_cells, body_of(made), object_distances(half))

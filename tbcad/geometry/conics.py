@@ -9,6 +9,12 @@ from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, perpendicular_axes
 from tbcad.types import Floats
 
+MAX_ITERATIONS = 50
+CONVERGED_MM = 1e-12
+# Chords along an arc whose length is measured, and angles of a quarter of a spheroid's meridian.
+LENGTH_SAMPLES = 2001
+SUPPORT_SAMPLES = 1001
+
 
 @dataclass(frozen=True)
 class Ellipse:
@@ -26,14 +32,14 @@ class Ellipse:
 
     def at(self, t: ArrayLike) -> Floats:
         """Points (..., 3) at parameters t (...), radians."""
-        turn: Floats = np.asarray(t, dtype=float)[..., None]
-        return self.centre + np.cos(turn) * self.major + np.sin(turn) * self.minor
+        angle: Floats = np.asarray(t, dtype=float)[..., None]
+        return self.centre + np.cos(angle) * self.major + np.sin(angle) * self.minor
 
     def parameter(self, point: Floats) -> float:
         """Parameter t of a point (3,) on the ellipse, radians."""
-        away = point - self.centre
-        cosine = away @ self.major / (self.major @ self.major)
-        sine = away @ self.minor / (self.minor @ self.minor)
+        from_centre = point - self.centre
+        cosine = from_centre @ self.major / (self.major @ self.major)
+        sine = from_centre @ self.minor / (self.minor @ self.minor)
         return float(np.arctan2(sine, cosine))
 
     def moved(self, shift: Floats) -> "Ellipse":
@@ -71,20 +77,22 @@ class EllipseArc:
 
     def by_length(self, share: ArrayLike) -> Floats:
         """Points (..., 3) at shares (...) of the arc's length, to a part in 10^4."""
-        dense = np.linspace(0, 1, 2001)
-        steps = norm(np.diff(self.at(dense), axis=0))
-        length = np.concatenate([[0], np.cumsum(steps)])
+        dense = np.linspace(0, 1, LENGTH_SAMPLES)
+        length = np.concatenate([[0], np.cumsum(self._chords())])
         return self.at(np.interp(np.asarray(share) * length[-1], length, dense))
 
     @property
     def length(self) -> float:
         """Length of the arc, mm."""
-        return float(norm(np.diff(self.at(np.linspace(0, 1, 2001)), axis=0)).sum())
+        return float(self._chords().sum())
+
+    def _chords(self) -> Floats:
+        return norm(np.diff(self.at(np.linspace(0, 1, LENGTH_SAMPLES)), axis=0))
 
 
 @dataclass(frozen=True)
 class Spheroid:
-    """An ellipsoid's outward neighbour with the same centre and axis, each semi-axis longer.
+    """The spheroid outside an ellipsoid with the same centre and axis, both semi-axes longer.
 
     Attributes:
         ellipsoid: the optical ellipsoid.
@@ -111,6 +119,10 @@ class Spheroid:
         major, minor = self.semi_axes
         return major * along + minor * (np.eye(3) - along)
 
+    def widened(self, offset: float) -> "Spheroid":
+        """The spheroid with both semi-axes longer by an offset, mm."""
+        return Spheroid(self.ellipsoid, self.offset + offset)
+
     def section(self, normal: Floats, height: float) -> Ellipse:
         """Ellipse in the plane normal . x = height.
 
@@ -118,23 +130,24 @@ class Spheroid:
             ValueError: when the plane misses the spheroid.
         """
         matrix = self.from_sphere
-        across = matrix @ normal
-        size = float(np.linalg.norm(across))
-        offset = (height - normal @ self.centre) / size
-        if abs(offset) >= 1:
+        # The plane in the space where the spheroid is the unit sphere.
+        scaled = matrix @ normal
+        length = float(np.linalg.norm(scaled))
+        distance = (height - normal @ self.centre) / length
+        if abs(distance) >= 1:
             raise ValueError("the plane does not meet the ellipsoid")
-        across = across / size
-        first, second = -perpendicular_axes(across)
-        radius = np.sqrt(1 - offset**2)
+        axis = scaled / length
+        first, second = -perpendicular_axes(axis)
+        radius = np.sqrt(1 - distance**2)
         p, q = radius * matrix @ first, radius * matrix @ second
         # Conjugate half-diameters p, q to principal ones.
-        turn = np.arctan2(2 * p @ q, p @ p - q @ q) / 2
-        major = np.cos(turn) * p + np.sin(turn) * q
-        minor = -np.sin(turn) * p + np.cos(turn) * q
-        return Ellipse(self.centre + offset * matrix @ across, major, minor)
+        angle = np.arctan2(2 * p @ q, p @ p - q @ q) / 2
+        major = np.cos(angle) * p + np.sin(angle) * q
+        minor = -np.sin(angle) * p + np.cos(angle) * q
+        return Ellipse(self.centre + distance * matrix @ axis, major, minor)
 
     def crossing(self, x: float, z: float) -> Floats:
-        """The two points (2, 3) with given x and z, lower y first.
+        """The two points (2, 3) at given x and z, mm, lower y first.
 
         Raises:
             ValueError: when there are none.
@@ -150,38 +163,40 @@ class Spheroid:
 
 
 def enclosing_offset(ellipsoid: Ellipsoid, points: Floats) -> float:
-    """Least offset of a spheroid that holds all points (k, 3), mm."""
-    away = points - ellipsoid.pinhole / 2
-    along = away @ ellipsoid.axis
-    across = np.sqrt(np.maximum(dot(away, away) - along**2, 0))
+    """Smallest offset of a spheroid that encloses all points (k, 3), mm.
+
+    Newton's method on the offset of the spheroid through each point.
+    """
+    from_centre = points - ellipsoid.pinhole / 2
+    along = from_centre @ ellipsoid.axis
+    across = np.sqrt(np.maximum(dot(from_centre, from_centre) - along**2, 0))
     offset = np.zeros(len(points))
-    for _ in range(50):
+    for _ in range(MAX_ITERATIONS):
         major, minor = ellipsoid.semi_major + offset, ellipsoid.semi_minor + offset
         value = (along / major) ** 2 + (across / minor) ** 2 - 1
         slope = -2 * (along**2 / major**3 + across**2 / minor**3)
         step = value / slope
         offset = offset - step
-        if np.abs(step).max() < 1e-12:
+        if np.abs(step).max() < CONVERGED_MM:
             break
     return float(offset.max())
 
 
 def wall_offset(ellipsoid: Ellipsoid, inner: float, wall: float) -> float:
-    """Least offset of a spheroid that keeps a wall (mm) everywhere from the spheroid at inner.
+    """Smallest offset of a spheroid that leaves a wall (mm) to the spheroid at an inner offset.
 
-    Both are convex: their least distance is the least difference of their support functions.
+    Both are convex: their smallest distance is the smallest difference of their support functions.
     """
-    angle = np.linspace(0, np.pi / 2, 1001)
-    cosine, sine = np.cos(angle), np.sin(angle)
+    angle = np.linspace(0, np.pi / 2, SUPPORT_SAMPLES)
 
     def support(offset: float) -> Floats:
-        major, minor = ellipsoid.semi_major + offset, ellipsoid.semi_minor + offset
-        return np.hypot(major * cosine, minor * sine)
+        major, minor = Spheroid(ellipsoid, offset).semi_axes
+        return np.hypot(major * np.cos(angle), minor * np.sin(angle))
 
     outer = inner + wall
-    for _ in range(50):
-        short = wall - float(np.min(support(outer) - support(inner)))
-        outer += short
-        if abs(short) < 1e-12:
+    for _ in range(MAX_ITERATIONS):
+        shortfall = wall - float(np.min(support(outer) - support(inner)))
+        outer += shortfall
+        if abs(shortfall) < CONVERGED_MM:
             break
     return outer

@@ -79,6 +79,11 @@ class MirrorArray:
         return self.cells.mirror_surfaces
 
     @property
+    def apex_distance(self) -> Floats:
+        """Distance rho of each apex from the origin, mm, (m,)."""
+        return self.ellipsoid.radial_distance(self.u)
+
+    @property
     def foot(self) -> float:
         """Height z of the foot plane, mm."""
         return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import FLIP_X, dot
+from tbcad.geometry.vectors import FLIP_X, dot, norm
 from tbcad.types import Floats, Ints
 
 
@@ -68,6 +68,13 @@ class Surfaces:
     def gradient(self, i: Ints, x: Floats) -> Floats:
         """Gradient of f_i at x (..., 3); on the surface itself the unit normal toward the light."""
         return self.normal[i] + self.curvature[i][..., None] * (x - self.apex[i])
+
+    def projected(self, i: Ints, x: Floats) -> Floats:
+        """Points x (k, 3) moved onto the spheres i (k,) along their radii."""
+        centre = self.centre[i]
+        from_centre = x - centre
+        from_centre *= (self.radius[i] / norm(from_centre))[:, None]
+        return centre + from_centre
 
     def subset(self, which: slice | Ints) -> "Surfaces":
         """Some of the surfaces, by a slice or by indices."""

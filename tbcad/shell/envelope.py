@@ -1,4 +1,4 @@
-"""The body behind the mirrors: back, flanges and holes, as points and exact curves.
+"""What closes the mirrors to a solid: back, flanges and holes, as points and exact curves.
 
 Every edge is a straight line, a circle, or a plane section of a spheroid, so that the solid and
 the mesh are both built from the same closed forms and no boolean operation is needed.
@@ -15,11 +15,14 @@ from tbcad.spec.design import FlangeSpec, ShellSpec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
-X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+X, _, Z = np.eye(3)
 # The foot flange reaches past the ends of the seam flange, which stands on it, by this much.
 STEP_MM = 1.0
 # Points on each arc that are looked at for the deepest valley.
 VALLEY_SAMPLES = 5
+# Distance of a point that only says on which side an arc lies.
+FAR_MM = 1e6
+MAX_WIDENINGS = 100
 
 
 @dataclass(frozen=True)
@@ -74,18 +77,17 @@ class Envelope:
         return self.foot_holes.direction
 
 
-def envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
+def closing_envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
     """Back, flanges and holes round camera a's cells.
 
     Raises:
         SpecError: when holes or flanges do not fit.
     """
     foot = float(cells.surfaces.apex[cells.boundary.foot, 2])
-    deepest = enclosing_offset(ellipsoid, _valleys(cells))
+    deepest = enclosing_offset(ellipsoid, _arc_points(cells))
     back = Spheroid(ellipsoid, wall_offset(ellipsoid, deepest, shell.wall_mm))
-    x, z = shell.seam_flange.thickness_mm, foot + shell.foot_flange.thickness_mm
     try:
-        return _flanged(shell, back, foot, x, z)
+        return _flanged(shell, back, foot)
     except ValueError as error:
         raise SpecError(
             f"the flanges miss the shell ({error}): make shell.seam_flange.thickness_mm and "
@@ -93,65 +95,66 @@ def envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
         ) from None
 
 
-def _valleys(cells: Cells) -> Floats:
+def _arc_points(cells: Cells) -> Floats:
     arcs = cells.arcs
     t = np.linspace(0, 1, VALLEY_SAMPLES)
-    arc, share = np.broadcast_arrays(np.arange(len(arcs))[:, None], t)
-    return arcs.at(arc, share).reshape(-1, 3)
+    arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], t)
+    return arcs.at(arc, t).reshape(-1, 3)
 
 
-def _flanged(shell: ShellSpec, back: Spheroid, foot: float, x: float, z: float) -> Envelope:
-    seam, base = shell.seam_flange, shell.foot_flange
-    rim = _wider(back, seam.width_mm)
-    outer = _wider(back, _foot_width(base, back, rim, foot, x, z))
+def _flanged(shell: ShellSpec, back: Spheroid, foot: float) -> Envelope:
+    """The envelope; x and z are where the flanges' far faces are.
+
+    Raises:
+        ValueError: when the flanges' far faces miss the back.
+    """
+    seam_flange, foot_flange = shell.seam_flange, shell.foot_flange
+    x, z = seam_flange.thickness_mm, foot + foot_flange.thickness_mm
+
+    def over(width: float) -> EllipseArc:
+        return _arc_over_top(back.widened(width), x, z).moved(-x * X)
+
+    def around(width: float, start_x: float) -> EllipseArc:
+        return _arc_around(back.widened(width), start_x, foot, foot)
+
+    foot_width = _foot_width(foot_flange, back, seam_flange.width_mm, foot, x, z)
+    foot_holes = around(foot_flange.width_mm / 2, x + seam_flange.width_mm / 2)
     return Envelope(
         back=back,
         foot=foot,
-        seam_back=_over(back, x, z),
-        foot_back=_round(back, x, z, z),
-        seam_rim=_over(rim, x, z).moved(-x * X),
-        foot_rim=_round(outer, 0.0, foot, foot),
-        seam_holes=_holes(
-            seam, _over(_wider(back, seam.width_mm / 2), x, z).moved(-x * X), x * X, seam.width_mm
-        ),
-        foot_holes=_holes(
-            base,
-            _round(_wider(back, base.width_mm / 2), x + seam.width_mm / 2, foot, foot),
-            (z - foot) * Z,
-            base.width_mm / 2,
-        ),
+        seam_back=_arc_over_top(back, x, z),
+        foot_back=_arc_around(back, x, z, z),
+        seam_rim=over(seam_flange.width_mm),
+        foot_rim=around(foot_width, 0.0),
+        seam_holes=_holes(seam_flange, over(seam_flange.width_mm / 2), x * X, seam_flange.width_mm),
+        foot_holes=_holes(foot_flange, foot_holes, (z - foot) * Z, foot_flange.width_mm / 2),
     )
 
 
-def _wider(back: Spheroid, width: float) -> Spheroid:
-    return Spheroid(back.ellipsoid, back.offset + width)
-
-
-def _over(spheroid: Spheroid, x: float, z: float) -> EllipseArc:
+def _arc_over_top(spheroid: Spheroid, x: float, z: float) -> EllipseArc:
     """Arc over the top in the plane x, between the points at height z."""
     low, high = spheroid.crossing(x, z)
-    top = spheroid.centre + 1e6 * Z
-    return spheroid.section(X, x).arc(low, high, top)
+    return spheroid.section(X, x).arc(low, high, spheroid.centre + FAR_MM * Z)
 
 
-def _round(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
+def _arc_around(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
     """Arc round the mirrors in the plane z = plane, between the points at x."""
     low, high = spheroid.crossing(x, z)
-    return spheroid.section(Z, plane).arc(low, high, spheroid.centre + 1e6 * X)
+    return spheroid.section(Z, plane).arc(low, high, spheroid.centre + FAR_MM * X)
 
 
 def _foot_width(
-    base: FlangeSpec, back: Spheroid, rim: Spheroid, foot: float, x: float, z: float
+    flange: FlangeSpec, back: Spheroid, seam_width: float, foot: float, x: float, z: float
 ) -> float:
     """Width of the foot flange, at least so much that the seam flange stands on it."""
-    low, high = rim.crossing(x, z)[:, 1]
-    width = base.width_mm
-    for _ in range(100):
-        ends = _wider(back, width).crossing(0.0, foot)[:, 1]
-        short = max(high - ends[1], ends[0] - low) + STEP_MM
-        if short <= 0:
+    low, high = back.widened(seam_width).crossing(x, z)[:, 1]
+    width = flange.width_mm
+    for _ in range(MAX_WIDENINGS):
+        ends = back.widened(width).crossing(0.0, foot)[:, 1]
+        shortfall = max(high - ends[1], ends[0] - low) + STEP_MM
+        if shortfall <= 0:
             return width
-        width += short
+        width += shortfall
     raise SpecError(
         "the seam flange does not stand on the foot flange: make shell.seam_flange.width_mm "
         "smaller or shell.foot_flange.width_mm larger"

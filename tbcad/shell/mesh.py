@@ -1,12 +1,14 @@
-"""Triangles of a whole half: mirrors' facets and the body's, on shared vertices."""
+"""Triangles of a whole half: mirrors' facets and the casing's, on shared vertices."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
 
 from tbcad.cad.mesh import Mesh
 from tbcad.geometry.conics import EllipseArc, Spheroid
+from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import boundary_chain
@@ -15,97 +17,66 @@ from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
-LEAST_AROUND_HOLE = 24
+MIN_HOLE_SEGMENTS = 24
+# Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
+ROUNDED_DIGITS = 12
+
+X, Y, Z = np.eye(3)
+# Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
+FROM_X, FROM_Z = [1, 2], [0, 1]
+LOW, HIGH = [0], [-1]
 
 
-def shell_mesh(spec: Spec, cells: Cells, body: Envelope, distance: Floats) -> Mesh:
+def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:
     """Mesh of camera a's half.
 
     Args:
         spec: design with the mesh tolerances.
         cells: camera a's cells of the modelled surfaces.
-        body: what closes them.
+        envelope: what closes them.
         distance: from each mirror to the object, mm, (m,).
     """
     front = mirror_facets(spec, cells, distance)
-    skin = _Skin(spec.mesh.structure_error_mm, cells, front, body)
-    points = np.concatenate([front.vertices, *skin.points])
-    # Joining faces are flat to the last bit: rounding noise of 1e-15 mm is no geometry.
-    return Mesh(np.round(points, 12) + 0.0, np.concatenate([front.triangles, *skin.triangles]))
+    builder = _MeshBuilder(front, spec.mesh.structure_error_mm)
+    _add_casing(builder, cells, front, envelope)
+    return builder.mesh()
 
 
-class _Skin:
-    """Vertices and triangles of the body, collected face by face."""
+class _MeshBuilder:
+    """Vertices and triangles, collected face by face; curves within a chord error, mm."""
 
-    def __init__(self, error: float, cells: Cells, front: Facets, body: Envelope) -> None:
-        self.error, self.points, self.triangles = error, [front.vertices[:0]], [front.triangles[:0]]
-        self.front, self.count = front, len(front.vertices)
-        seam, foot = body.seam_thickness, body.foot_thickness
-        plan_x, plan_z = [1, 2], [0, 1]  # (y, z) seen from +x and (x, y) from +z turn left
+    def __init__(self, front: Facets, error: float) -> None:
+        self.error, self.points, self.triangles = error, front.vertices, [front.triangles]
 
-        ends = self.add(body.seam_back.at(np.array([0.0, 1.0])))
-        steps = max(self.steps(arc) for arc in (body.seam_back, body.foot_back))
-        seam_back, foot_back = (
-            self.between(ends, arc, steps) for arc in (body.seam_back, body.foot_back)
-        )
-        seam_rim, seam_rim_back = self.pair(body.seam_rim, seam)
-        foot_rim, foot_rim_top = self.pair(body.foot_rim, foot)
-        self.grid(body.back, foot_back, seam_back)
-        self.strip(seam_rim, seam_rim_back)
-        self.strip(foot_rim_top, foot_rim)
-
-        seam_near, seam_far = self.bores(body.seam_holes, np.array([[0, 1.0, 0], [0, 0, 1.0]]))
-        foot_near, foot_far = self.bores(body.foot_holes, np.array([[1.0, 0, 0], [0, 1.0, 0]]))
-        seam_front = front.along(boundary_chain(cells, cells.boundary.seam))
-        foot_front = front.along(boundary_chain(cells, cells.boundary.foot))
-        low, high = [0], [-1]
-        joined = np.concatenate
-        self.plane(plan_x, [joined([seam_back, seam_rim_back[::-1]]), *seam_far])
-        top = [
-            foot_rim_top,
-            seam_rim[high],
-            seam_rim_back[high],
-            foot_back[::-1],
-            seam_rim_back[low],
-            seam_rim[low],
-        ]
-        self.plane(plan_z, [joined(top), *foot_far])
-        wall = [
-            foot_rim[low],
-            seam_front,
-            foot_rim[high],
-            foot_rim_top[high],
-            seam_rim[::-1],
-            foot_rim_top[low],
-        ]
-        self.plane(plan_x, [joined(wall), *seam_near], turned=True)
-        self.plane(plan_z, [joined([foot_rim, foot_front[::-1]]), *foot_near], turned=True)
+    def mesh(self) -> Mesh:
+        """The mesh of all faces."""
+        vertices = np.round(self.points, ROUNDED_DIGITS) + 0.0
+        return Mesh(vertices, np.concatenate(self.triangles))
 
     def add(self, points: Floats) -> Ints:
         """Indices of new vertices (k, 3)."""
-        self.points.append(points)
-        self.count += len(points)
-        return np.arange(self.count - len(points), self.count)
+        first = len(self.points)
+        self.points = np.concatenate([self.points, points])
+        return np.arange(first, len(self.points))
 
-    def vertices(self, ids: Ints) -> Floats:
-        """Points of vertices by index."""
-        result: Floats = np.concatenate([self.front.vertices, *self.points])[ids]
-        return result
+    def segments(self, angle: float, radius: float) -> int:
+        """Segments for an arc of an angle (radians) and a radius (mm) within the chord error."""
+        return int(np.ceil(angle * np.sqrt(radius / (8 * self.error))))
 
-    def steps(self, arc: EllipseArc) -> int:
-        """Segments for an elliptic arc within the tolerance."""
+    def arc_segments(self, arc: EllipseArc) -> int:
+        """Segments for an elliptic arc within the chord error."""
         longest = float(np.linalg.norm(arc.ellipse.major))
-        return int(np.ceil(abs(arc.last - arc.first) * np.sqrt(longest / (8 * self.error))))
+        return self.segments(abs(arc.last - arc.first), longest)
 
-    def between(self, ends: Ints, arc: EllipseArc, steps: int) -> Ints:
-        """Vertices along an arc whose ends are there already."""
-        inner = self.add(arc.at(np.arange(1, steps) / steps))
+    def arc_between(self, ends: Ints, arc: EllipseArc, segments: int) -> Ints:
+        """Vertices along an arc whose two ends are there already."""
+        inner = self.add(arc.at(np.arange(1, segments) / segments))
         return np.concatenate([ends[:1], inner, ends[1:]])
 
-    def pair(self, arc: EllipseArc, along: Floats) -> tuple[Ints, Ints]:
-        """Vertices along an arc and along the same arc moved through a flange."""
-        steps = self.steps(arc)
-        points = arc.at(np.arange(steps + 1) / steps)
+    def arc_pair(self, arc: EllipseArc, along: Floats) -> tuple[Ints, Ints]:
+        """Vertices along an arc, and along the same arc moved by a vector (3,)."""
+        segments = self.arc_segments(arc)
+        points = arc.at(np.arange(segments + 1) / segments)
         return self.add(points), self.add(points + along)
 
     def strip(self, first: Ints, second: Ints) -> None:
@@ -113,13 +84,12 @@ class _Skin:
         a, b, c, d = first[:-1], first[1:], second[1:], second[:-1]
         self.triangles += [np.column_stack([a, d, c]), np.column_stack([a, c, b])]
 
-    def grid(self, back: Spheroid, low: Ints, high: Ints) -> None:
+    def spheroid(self, back: Spheroid, low: Ints, high: Ints) -> None:
         """The back between two lines that share their ends, by great circles of its sphere."""
         to_sphere = np.linalg.inv(back.from_sphere)
-        a = (self.vertices(low[1:-1]) - back.centre) @ to_sphere
-        b = (self.vertices(high[1:-1]) - back.centre) @ to_sphere
+        a, b = ((self.points[line[1:-1]] - back.centre) @ to_sphere for line in (low, high))
         angle = np.arccos(np.clip(dot(a, b), -1, 1))[:, None]
-        rows = int(np.ceil(angle.max() * np.sqrt(back.semi_axes[0] / (8 * self.error))))
+        rows = self.segments(angle.max(), back.semi_axes[0])
         lines = [low]
         for share in np.arange(1, rows) / rows:
             point = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
@@ -130,26 +100,107 @@ class _Skin:
             for k in (-2, -1):  # quads at the shared ends are triangles
                 self.triangles[k] = _proper(self.triangles[k])
 
-    def bores(self, holes: Holes, axes: Floats) -> tuple[list[Ints], list[Ints]]:
+    def holes(self, holes: Holes, axes: Floats) -> tuple[list[Ints], list[Ints]]:
         """Cylinders of holes; rings on the joining face and on the far one, turning right."""
         near, far = [], []
         for centre, radius in zip(holes.centre, holes.radius, strict=True):
-            count = max(
-                LEAST_AROUND_HOLE, int(np.ceil(2 * np.pi * np.sqrt(radius / (8 * self.error))))
-            )
-            turn = -2 * np.pi * np.arange(count) / count
-            ring = centre + radius * np.column_stack([np.cos(turn), np.sin(turn)]) @ axes
+            count = max(MIN_HOLE_SEGMENTS, self.segments(2 * np.pi, radius))
+            ring = centre + radius * unit_circle(-even_angles(count)) @ axes
             near.append(self.add(ring))
             far.append(self.add(ring + holes.direction))
             self.strip(np.append(far[-1], far[-1][0]), np.append(near[-1], near[-1][0]))
         return near, far
 
-    def plane(self, plan: Sequence[int], rings: Sequence[Ints], turned: bool = False) -> None:
-        """A planar face: outer ring turning left, holes right, in two of the coordinates."""
-        ids = np.concatenate(rings)
-        polygons = [self.vertices(ring)[:, plan] for ring in rings]
-        triangles = ids[np.asarray(manifold3d.triangulate(polygons))]
-        self.triangles.append(triangles[:, ::-1] if turned else triangles)
+    def plane(
+        self, view: list[int], outline: Sequence[Ints], holes: list[Ints], away: bool = False
+    ) -> None:
+        """A planar face with holes.
+
+        Args:
+            view: the two coordinates in which the outline turns left and the holes right.
+            outline: lines of vertices that follow each other round the face.
+            holes: a ring of vertices for each.
+            away: whether the face looks away from that view.
+        """
+        rings = [np.concatenate(outline), *holes]
+        polygons = [self.points[ring][:, view] for ring in rings]
+        triangles = np.concatenate(rings)[np.asarray(manifold3d.triangulate(polygons))]
+        self.triangles.append(triangles[:, ::-1] if away else triangles)
+
+
+@dataclass(frozen=True)
+class _CasingLines:
+    """Vertices along the edges of the casing, named as in Envelope, from low to high y.
+
+    seam_rim_back is the seam flange's outer edge on its other face, foot_rim_top the foot
+    flange's. seam_front and foot_front are where the mirrors end.
+    """
+
+    seam_back: Ints
+    foot_back: Ints
+    seam_rim: Ints
+    seam_rim_back: Ints
+    foot_rim: Ints
+    foot_rim_top: Ints
+    seam_front: Ints
+    foot_front: Ints
+
+
+def _add_casing(builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope) -> None:
+    """Back, flanges, rims and holes: all faces but the mirrors'."""
+    lines = _casing_lines(builder, cells, front, envelope)
+    builder.spheroid(envelope.back, lines.foot_back, lines.seam_back)
+    builder.strip(lines.seam_rim, lines.seam_rim_back)
+    builder.strip(lines.foot_rim_top, lines.foot_rim)
+    seam_near, seam_far = builder.holes(envelope.seam_holes, np.stack([Y, Z]))
+    foot_near, foot_far = builder.holes(envelope.foot_holes, np.stack([X, Y]))
+    builder.plane(FROM_X, [lines.seam_back, lines.seam_rim_back[::-1]], seam_far)
+    builder.plane(FROM_Z, _foot_flange(lines), foot_far)
+    builder.plane(FROM_X, _seam_face(lines), seam_near, away=True)
+    builder.plane(FROM_Z, [lines.foot_rim, lines.foot_front[::-1]], foot_near, away=True)
+
+
+def _casing_lines(
+    builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope
+) -> _CasingLines:
+    backs = envelope.seam_back, envelope.foot_back
+    ends = builder.add(envelope.seam_back.at(np.array([0.0, 1.0])))
+    segments = max(builder.arc_segments(arc) for arc in backs)
+    seam_back, foot_back = (builder.arc_between(ends, arc, segments) for arc in backs)
+    return _CasingLines(
+        seam_back,
+        foot_back,
+        *builder.arc_pair(envelope.seam_rim, envelope.seam_thickness),
+        *builder.arc_pair(envelope.foot_rim, envelope.foot_thickness),
+        *(
+            front.outlines.along(boundary_chain(cells, plane))
+            for plane in (cells.boundary.seam, cells.boundary.foot)
+        ),
+    )
+
+
+def _foot_flange(lines: _CasingLines) -> list[Ints]:
+    """Round the foot flange's top, on which the seam flange stands."""
+    return [
+        lines.foot_rim_top,
+        lines.seam_rim[HIGH],
+        lines.seam_rim_back[HIGH],
+        lines.foot_back[::-1],
+        lines.seam_rim_back[LOW],
+        lines.seam_rim[LOW],
+    ]
+
+
+def _seam_face(lines: _CasingLines) -> list[Ints]:
+    """Round the joining face x = 0."""
+    return [
+        lines.foot_rim[LOW],
+        lines.seam_front,
+        lines.foot_rim[HIGH],
+        lines.foot_rim_top[HIGH],
+        lines.seam_rim[::-1],
+        lines.foot_rim_top[LOW],
+    ]
 
 
 def _proper(triangles: Ints) -> Ints:

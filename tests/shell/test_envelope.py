@@ -3,12 +3,13 @@ import pytest
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.shell.envelope import Envelope, envelope
+from tbcad.shell.envelope import Envelope, closing_envelope
+from tbcad.shell.files import shell_envelope
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 
 
-def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Envelope) -> None:
+def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_envelope: Envelope) -> None:
     """Least distance from any corner or arc to the back is the wall, within the samples."""
     arcs = small_half.modelled_cells.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, 9))
@@ -16,49 +17,47 @@ def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_body: Env
     rng = np.random.default_rng(3)
     unit = rng.normal(size=(400_000, 3))
     unit /= norm(unit)[:, None]
-    back = small_body.back.centre + unit @ small_body.back.from_sphere
+    back = small_envelope.back.centre + unit @ small_envelope.back.from_sphere
     from scipy.spatial import cKDTree
 
     least = cKDTree(back).query(valley)[0].min()
     assert 3.0 - 1e-6 < least < 3.3
 
 
-def test_ends_meet(small_body: Envelope) -> None:
+def test_ends_meet(small_envelope: Envelope) -> None:
     ends = np.array([0.0, 1.0])
-    assert small_body.seam_back.at(ends) == pytest.approx(small_body.foot_back.at(ends))
-    seam, foot = small_body.seam_rim.at(ends), small_body.foot_rim.at(ends)
+    assert small_envelope.seam_back.at(ends) == pytest.approx(small_envelope.foot_back.at(ends))
+    seam, foot = small_envelope.seam_rim.at(ends), small_envelope.foot_rim.at(ends)
     assert np.abs(seam[:, 0]).max() < 1e-9
-    assert foot[:, 2] == pytest.approx(small_body.foot)
+    assert foot[:, 2] == pytest.approx(small_envelope.foot)
     # the seam flange stands on the foot flange
     assert foot[1, 1] >= seam[1, 1] + 1 - 1e-9
     assert foot[0, 1] <= seam[0, 1] - 1 + 1e-9
 
 
 @pytest.mark.parametrize("which", ["seam", "foot"])
-def test_holes_stay_inside_their_flange(small_body: Envelope, which: str) -> None:
-    holes = getattr(small_body, f"{which}_holes")
-    inner = getattr(small_body, f"{which}_back").at(np.linspace(0, 1, 4001))
-    outer = getattr(small_body, f"{which}_rim").at(np.linspace(0, 1, 4001))
+def test_holes_stay_inside_their_flange(small_envelope: Envelope, which: str) -> None:
+    holes = getattr(small_envelope, f"{which}_holes")
+    inner = getattr(small_envelope, f"{which}_back").at(np.linspace(0, 1, 4001))
+    outer = getattr(small_envelope, f"{which}_rim").at(np.linspace(0, 1, 4001))
     plane = [1, 2] if which == "seam" else [0, 1]
     for centre, radius in zip(holes.centre, holes.radius, strict=True):
         for line in (inner, outer):
             assert norm(line[:, plane] - centre[plane]).min() > radius + 1.0
 
 
-def test_holes_by_kind(small_body: Envelope) -> None:
-    assert sorted(small_body.seam_holes.radius) == [2.0] * 2 + [2.15] * 6
-    assert sorted(small_body.foot_holes.radius) == [2.0] * 2 + [2.15] * 5
+def test_holes_by_kind(small_envelope: Envelope) -> None:
+    assert sorted(small_envelope.seam_holes.radius) == [2.0] * 2 + [2.15] * 6
+    assert sorted(small_envelope.foot_holes.radius) == [2.0] * 2 + [2.15] * 5
 
 
 def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     spec = load_spec(None, ["shell.seam_flange.bolts=60"])
     with pytest.raises(SpecError, match="holes") as caught:
-        envelope(spec.shell, small_half.modelled_cells, small_half.ellipsoid)
+        closing_envelope(spec.shell, small_half.modelled_cells, small_half.ellipsoid)
     assert "lower bolts" in str(caught.value)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 30])
-def test_every_n_gets_a_body(n: int) -> None:
-    made = design(load_spec(None, [f"n={n}"]))
-    half = made.halves[0]
-    assert envelope(made.spec.shell, half.modelled_cells, half.ellipsoid).back.offset > 0
+def test_every_n_gets_an_envelope(n: int) -> None:
+    assert shell_envelope(design(load_spec(None, [f"n={n}"]))).back.offset > 0

@@ -10,8 +10,9 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
+from tbcad.shell.files import camera_a_mesh, camera_solid
 from tbcad.spec.load import load_spec, spec_dict
-from tests.helpers import area, mesh_of, read_mesh, read_step, solid_of, volume
+from tests.helpers import area, read_mesh, read_step, volume
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,7 @@ def test_all_files_are_there(exported: Path) -> None:
 def test_step_round_trip(exported: Path, small_design: MirrorDesign, which: int) -> None:
     half = small_design.halves[which]
     content = read_step(exported / f"shell_{half.camera_id}.step")
-    built = solid_of(small_design, which)
+    built = camera_solid(small_design, half)
     assert content.solids == 1
     assert content.valid
     assert volume(content.shape) == pytest.approx(volume(built.shape), rel=1e-9)
@@ -72,11 +73,11 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Mir
 def test_mesh_round_trip(
     exported: Path, small_design: MirrorDesign, camera: str, kind: str
 ) -> None:
-    made, read = mesh_of(small_design), read_mesh(exported / f"shell_{camera}.{kind}")
-    assert len(read.faces) == len(made.triangles)
+    mesh, read = camera_a_mesh(small_design), read_mesh(exported / f"shell_{camera}.{kind}")
+    assert len(read.faces) == len(mesh.triangles)
     assert read.is_watertight
     assert read.is_winding_consistent
-    assert read.volume == pytest.approx(made.volume, rel=1e-6)
+    assert read.volume == pytest.approx(mesh.volume, rel=1e-6)
 
 
 def test_record(exported: Path, small_design: MirrorDesign) -> None:

@@ -3,8 +3,9 @@ import pytest
 from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.shell.files import camera_a_mesh, camera_solid, shell_envelope
 from tbcad.spec.load import load_spec
-from tests.helpers import area, body_of, mesh_of, solid_of, volume
+from tests.helpers import area, volume
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -26,30 +27,29 @@ from tests.helpers import area, body_of, mesh_of, solid_of, volume
 def test_solid_is_valid_and_has_the_volume_of_its_mesh(options: list[str], which: int) -> None:
     """The mesh is built without the kernel: two ways to one volume."""
     fine = [*options, "structure_error_mm=0.002", "chord_error_mm=0.001"]
-    made = design(load_spec(None, fine))
-    solid = solid_of(made, which)
+    mirrors = design(load_spec(None, fine))
+    solid = camera_solid(mirrors, mirrors.halves[which])
     assert BRepCheck_Analyzer(solid.shape).IsValid()
-    assert volume(solid.shape) == pytest.approx(mesh_of(made).volume, rel=3e-4)
+    assert volume(solid.shape) == pytest.approx(camera_a_mesh(mirrors).volume, rel=3e-4)
 
 
 @pytest.mark.parametrize("rule", ["traced", "paper", "flat"])
 def test_each_face_has_its_cells_area(rule: str) -> None:
     """A face that is the complement of its cell is valid too: only the area tells."""
-    made = design(load_spec(None, ["n=7", f"radius_rule={rule}"]))
-    half = made.halves[0]
-    for which in (0, 1):
-        faces = solid_of(made, which).faces[: len(half)]
+    mirrors = design(load_spec(None, ["n=7", f"radius_rule={rule}"]))
+    for half in mirrors.halves:
+        faces = camera_solid(mirrors, half).faces[: len(half)]
         assert [area(face) for _, face in faces] == pytest.approx(half.area, rel=1e-6)
 
 
 def test_paper_design_areas(paper_design: MirrorDesign) -> None:
     half = paper_design.halves[0]
-    faces = solid_of(paper_design, 0).faces[: len(half)]
+    faces = camera_solid(paper_design, half).faces[: len(half)]
     assert sum(area(face) for _, face in faces) == pytest.approx(half.area.sum(), rel=1e-6)
 
 
 def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> None:
-    names = [name for name, _ in solid_of(small_design, 1).faces]
+    names = [name for name, _ in camera_solid(small_design, small_design.halves[1]).faces]
     count = len(small_design.halves[1])
     assert names[:count] == small_design.halves[1].ids
     assert names[0] == "b0001"
@@ -61,10 +61,10 @@ def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> 
 
 def test_holes_go_through(small_design: MirrorDesign) -> None:
     """Area of each hole's wall: circumference times thickness of its flange."""
-    made = body_of(small_design)
-    faces = dict(solid_of(small_design, 0).faces)
+    envelope = shell_envelope(small_design)
+    faces = dict(camera_solid(small_design, small_design.halves[0]).faces)
     for kind in ("seam", "foot"):
-        holes = getattr(made, f"{kind}_holes")
+        holes = getattr(envelope, f"{kind}_holes")
         thickness = np.linalg.norm(holes.direction)
         for k, radius in enumerate(holes.radius):
             wall = area(faces[f"{kind}_hole_{k + 1:02d}"])

@@ -24,7 +24,7 @@ from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.reflection import miss_distances, reflected_rays
 from tbcad.optics.surfaces import Surfaces
-from tbcad.shell.files import object_distances, shell_envelope
+from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 
@@ -80,7 +80,7 @@ def meshed(
     for half, drawn in zip(design.halves, draws, strict=True):
         own = made(half, drawn, k)
         facets = shell_mesh(
-            design.spec, own if half is first else own.mirrored(), body, object_distances(first)
+            design.spec, own if half is first else own.mirrored(), body, first.apex_distance
         )
         facets = facets if half is first else facets.mirrored()
         turn = Rotation.from_rotvec(drawn.shell_tilt[k])

@@ -8,6 +8,7 @@ import trimesh
 
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorDesign
+from tbcad.shell.files import camera_a_mesh
 from tbcad.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.object import built_in_object
@@ -15,7 +16,6 @@ from tbcad.simulate.scene.ray_casting import Scene, cast_rays, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
-from tests.helpers import mesh_of
 
 Cameras = tuple[Reflector, Reflector]
 
@@ -99,7 +99,7 @@ def with_meshes(
     little: MirrorDesign, record: Path, exported: Exported, tmp_path_factory: pytest.TempPathFactory
 ) -> Exported:
     """The record with shells beside it, as STL."""
-    folder, made = tmp_path_factory.mktemp("meshes"), mesh_of(little)
+    folder, made = tmp_path_factory.mktemp("meshes"), camera_a_mesh(little)
     write_stl(folder / "shell_a.stl", made)
     write_stl(folder / "shell_b.stl", made.mirrored())
     return exported.model_copy(update={"folder": folder})
