@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 # None for a planar mirror, whose cell is empty.
 Radius = Annotated[
     Annotated[float, Field(gt=0, allow_inf_nan=False)] | None,
-    BeforeValidator(lambda cell: cell or None),
+    BeforeValidator(lambda cell: None if cell == "" else cell),
 ]
 
 
