@@ -37,14 +37,14 @@ def flange(corners: int = 64, radius: float = 2.0) -> trimesh.Trimesh:
 
 @pytest.mark.parametrize("sides", [(30, 20, 2), (30, 0.05, 20), (1, 1, 1)])
 def test_a_plate_is_as_thick_as_its_least_side(sides: tuple[float, float, float]) -> None:
-    assert shape(box(*sides)).walls.least == pytest.approx(min(sides), abs=COARSE)
+    assert shape(box(*sides)).walls.minimum == pytest.approx(min(sides), abs=COARSE)
 
 
 def test_the_thin_side_of_a_hollow_box_and_where() -> None:
     """20 outside; the hollow, 14 x 16 x 16, lies 1 nearer to +x: walls of 4, 2 and 2."""
     hollow = turned_inside_out(box(14, 16, 16, at=(2, 0, 0)))
     found = shape(box(20, 20, 20), hollow)
-    assert found.walls.least == pytest.approx(1, abs=COARSE)
+    assert found.walls.minimum == pytest.approx(1, abs=COARSE)
     assert found.walls.where[0] == pytest.approx(9.5, abs=COARSE)
     # Seen from both sides of that wall: 20 x 20 less a rim that looks past the hollow, and 16 x 16.
     assert thin_area(found.walls, 1.5) == pytest.approx(2 * 256, rel=0.05)
@@ -55,7 +55,7 @@ def test_the_thin_side_of_a_hollow_box_and_where() -> None:
 def test_a_tube() -> None:
     """Facets of the bore and of the outside are parallel: thinner than the radii's difference."""
     found = shape(plate(ring(10, 72), [ring(9.2, 72)], 15))
-    assert found.walls.least == pytest.approx(0.8 * np.cos(np.pi / 72), abs=COARSE)
+    assert found.walls.minimum == pytest.approx(0.8 * np.cos(np.pi / 72), abs=COARSE)
     assert found.holes.diameter == pytest.approx([18.4], abs=COARSE)
     assert found.holes.middle[:, 0] == pytest.approx([0, 0, 7.5], abs=COARSE)
     assert np.abs(found.holes.axis[:, 0]) == pytest.approx([0, 0, 1], abs=1e-6)
@@ -67,7 +67,7 @@ def test_a_spherical_shell() -> None:
     inner = turned_inside_out(trimesh.creation.icosphere(3, 19))
     found = shape(outer, inner)
     apothem = (outer.triangles_center * outer.face_normals).sum(1).min() / 20
-    assert found.walls.least == pytest.approx(apothem, abs=1e-4)
+    assert found.walls.minimum == pytest.approx(apothem, abs=1e-4)
     assert (found.pieces.solids, found.pieces.cavities) == (1, 1)
 
 
@@ -75,7 +75,7 @@ def test_a_spherical_shell() -> None:
 def test_a_wedge_is_a_wall_only_when_sharp(degrees: float, is_wall: bool) -> None:
     """Towards its edge thickness tends to nought: by nature, or as a wall that runs out."""
     rise = 20 * np.tan(np.radians(degrees))
-    least = shape(prism([(0, 0), (20, 0), (20, rise)], 20)).walls.least
+    least = shape(prism([(0, 0), (20, 0), (20, rise)], 20)).walls.minimum
     assert (least < 0.5) == is_wall
     if not is_wall:  # the upright face and the prism's ends remain
         assert least == pytest.approx(20, abs=COARSE) or least > rise / 3
@@ -84,20 +84,20 @@ def test_a_wedge_is_a_wall_only_when_sharp(degrees: float, is_wall: bool) -> Non
 def test_the_web_between_a_hole_and_a_side() -> None:
     found = shape(flange())
     facets = 2 * (1 - np.cos(np.pi / 64))  # the hole's corners are on its circle: sides lie deeper
-    assert 1.5 - COARSE < found.walls.least < 1.5 + facets
+    assert 1.5 - COARSE < found.walls.minimum < 1.5 + facets
     assert found.walls.where[:2] == pytest.approx([3, 9.25], abs=0.15)
 
 
 def test_the_bottom_of_a_groove() -> None:
     """Both sides of the groove look past the 1 mm below it."""
     outline = [(-10, 0), (10, 0), (10, 5), (4, 5), (0, 1), (-4, 5), (-10, 5)]
-    assert shape(prism(outline, 30)).walls.least == pytest.approx(1, abs=COARSE)
+    assert shape(prism(outline, 30)).walls.minimum == pytest.approx(1, abs=COARSE)
 
 
 def test_the_web_between_two_grooves() -> None:
     outline = [(-10, -5), (-4, -5), (0, -0.4), (4, -5), (10, -5)]
     outline += [(-x, -z) for x, z in outline]
-    assert shape(prism(outline, 30)).walls.least == pytest.approx(0.8, abs=COARSE)
+    assert shape(prism(outline, 30)).walls.minimum == pytest.approx(0.8, abs=COARSE)
 
 
 def test_slivers_do_not_see_their_neighbours() -> None:
@@ -113,7 +113,7 @@ def test_slivers_do_not_see_their_neighbours() -> None:
         n = len(points) - 1
         faces += [[a, b, n], [b, c, n], [c, a, n]]
     found = shape(trimesh.Trimesh(points, faces, process=False))
-    assert found.walls.least == pytest.approx(10, abs=1e-3)
+    assert found.walls.minimum == pytest.approx(10, abs=1e-3)
 
 
 def test_a_needle_that_looks_askance_is_passed_over() -> None:
@@ -128,7 +128,7 @@ def test_a_needle_that_looks_askance_is_passed_over() -> None:
         rest += [[a, a + 7, b], [b, a + 7, b + 7]]
     found = shape(trimesh.Trimesh(points, top + rest, process=False))
     assert found.status == "NoError"
-    assert found.walls.least == pytest.approx(10, abs=1e-4)
+    assert found.walls.minimum == pytest.approx(10, abs=1e-4)
 
 
 def test_an_open_surface_has_no_wall() -> None:
@@ -137,7 +137,7 @@ def test_an_open_surface_has_no_wall() -> None:
     lid = trimesh.Trimesh(half.vertices, half.faces[half.face_normals[:, 2] > 0.5])
     lid.vertices[0, 2] += 1  # so that it spans a hull
     found = shape(lid)
-    assert found.walls.least == np.inf
+    assert found.walls.minimum == np.inf
     assert found.status != "NoError"
 
 
@@ -228,7 +228,7 @@ def test_a_rigid_motion_changes_no_figure(
     solid.apply_transform(matrix)
     found = shape(solid)
     # A corner 500 mm away is rounded by 1.5e-5 mm on each axis.
-    assert found.walls.least == pytest.approx(BASE.walls.least, abs=5e-4)
+    assert found.walls.minimum == pytest.approx(BASE.walls.minimum, abs=5e-4)
     assert np.sort(found.holes.diameter) == pytest.approx(np.sort(BASE.holes.diameter), abs=2e-4)
     assert found.mass.volume == pytest.approx(BASE.mass.volume, rel=1e-5)
     at = matrix @ [*BASE.holes.middle[:, BASE.holes.diameter.argmin()], 1]
@@ -239,7 +239,7 @@ def test_a_rigid_motion_changes_no_figure(
 @settings(max_examples=25, deadline=None)
 def test_scaling_scales(scale: float) -> None:
     found = shape(flange().apply_scale(scale))
-    assert found.walls.least == pytest.approx(scale * BASE.walls.least, rel=1e-5)
+    assert found.walls.minimum == pytest.approx(scale * BASE.walls.minimum, rel=1e-5)
     diameters = np.sort(found.holes.diameter)
     assert diameters == pytest.approx(scale * np.sort(BASE.holes.diameter), rel=1e-5)
     assert found.mass.volume == pytest.approx(scale**3 * BASE.mass.volume, rel=1e-5)
@@ -247,7 +247,7 @@ def test_scaling_scales(scale: float) -> None:
 
 def test_the_same_mesh_gives_the_same_bits() -> None:
     again = shape(flange())
-    assert again.walls.least == BASE.walls.least
+    assert again.walls.minimum == BASE.walls.minimum
     np.testing.assert_array_equal(again.walls.thickness, BASE.walls.thickness)
     np.testing.assert_array_equal(again.walls.where, BASE.walls.where)
     np.testing.assert_array_equal(again.holes.middle, BASE.holes.middle)

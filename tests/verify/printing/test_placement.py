@@ -18,7 +18,7 @@ from tbcad_verify.printing.overhang import overhang_area
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.printing.rotating_callipers import best_turn
+from tbcad_verify.printing.rotating_callipers import best_rotation
 from tbcad_verify.report.checks import all_passed
 
 from tests.verify.printing.printing_meshes import (
@@ -129,7 +129,7 @@ def test_no_turn_beats_the_one_found(
 ) -> None:
     """Against every twentieth of a degree."""
     flat = np.array([*corners, (-9, -8), (9, -7), (8, 9)]).T
-    angle, sides = best_turn(flat, width, depth, 1e-9)
+    angle, sides = best_rotation(flat, width, depth, 1e-9)
     tried = np.linspace(0, np.pi, 3601)
     x = np.cos(tried)[:, None] * flat[0] - np.sin(tried)[:, None] * flat[1]
     y = np.sin(tried)[:, None] * flat[0] + np.cos(tried)[:, None] * flat[1]
@@ -168,7 +168,7 @@ def test_what_lies_on_the_bed_does_not_hang() -> None:
 
 def test_no_overhang_where_none_needs_support() -> None:
     found = assess("t.stl", shape(tee()), load("sls"))
-    assert found.placing.overhang is None
+    assert found.placement.overhang is None
     assert to_row(found)["overhang_share"] is None
 
 
@@ -180,12 +180,12 @@ def test_a_good_part() -> None:
     found = assess("b.stl", shape(box(20, 10, 5)), fdm())
     assert found.problems == ()
     assert found.mass_g == pytest.approx(1.24)
-    (told,) = checks([found], wanted=False)
-    assert (told.name, told.file, told.unit) == ("print fdm", "b.stl", "problems")
-    assert (told.measured, told.limit, told.passed) == (0, None, True)
-    assert told.detail == "fits: -z down, 1 g PLA"
-    (held,) = checks([found], wanted=True)
-    assert (held.measured, held.limit, held.passed) == (0, 0, True)
+    (info,) = checks([found], required=False)
+    assert (info.name, info.file, info.unit) == ("print fdm", "b.stl", "problems")
+    assert (info.measured, info.limit, info.passed) == (0, None, True)
+    assert info.detail == "fits: -z down, 1 g PLA"
+    (failing,) = checks([found], required=True)
+    assert (failing.measured, failing.limit, failing.passed) == (0, 0, True)
 
 
 def bad() -> PartMeasures:
@@ -199,19 +199,19 @@ def test_every_problem_is_named_with_figure_and_limit() -> None:
     machine = load("sla").model_copy(update={"max_triangles": 100, "hole_mm": 1.5})
     found = assess("bad.stl", bad(), machine)
     solids, cavities, triangles, wall, hole, size = found.problems
-    assert solids == "2 separate solids, 1 wanted"
-    assert cavities == "1 closed cavities, none wanted"
+    assert solids == "2 separate solids, 1 allowed"
+    assert cavities == "1 closed cavities, none allowed"
     assert triangles == f"{len(bad().mesh.faces)} triangles, at most 100 are read"
-    assert wall.startswith("least wall 0.5 mm, 0.8 needed, at (")
-    assert hole == "smallest hole 1 mm, 1.5 needed, at (0.0, 0.0, 0.2)"
+    assert wall.startswith("minimum wall 0.5 mm, 0.8 required, at (")
+    assert hole == "smallest hole 1 mm, 1.5 required, at (0.0, 0.0, 0.2)"
     assert "mm too large: " in size
     assert size.endswith("the bed is 145 x 145 x 175 less 0.2 at the rim")
-    (told,) = checks([found], wanted=False)
-    assert told.passed
-    assert told.measured == 6
-    (held,) = checks([found], wanted=True)
-    assert held.passed is False
-    assert held.detail == told.detail == "; ".join(found.problems)
+    (info,) = checks([found], required=False)
+    assert info.passed
+    assert info.measured == 6
+    (failing,) = checks([found], required=True)
+    assert failing.passed is False
+    assert failing.detail == info.detail == "; ".join(found.problems)
 
 
 def test_an_open_mesh_is_a_problem() -> None:
@@ -223,7 +223,7 @@ def test_an_open_mesh_is_a_problem() -> None:
 def test_a_cavity_is_a_problem_only_where_something_is_trapped() -> None:
     hollow = shape(box(20, 20, 20), turned_inside_out(box(10, 10, 10)))
     assert assess("h.stl", hollow, fdm()).problems == ()
-    assert assess("h.stl", hollow, load("sls")).problems == ("1 closed cavities, none wanted",)
+    assert assess("h.stl", hollow, load("sls")).problems == ("1 closed cavities, none allowed",)
 
 
 def test_limits_that_are_just_met_are_met() -> None:
@@ -241,11 +241,11 @@ def test_what_a_round_tool_leaves_in_inner_edges() -> None:
 
     def length(tolerance: float) -> float | None:
         machine = mill.model_copy(update={"tolerance_mm": tolerance})
-        return assess("t.stl", part, machine).inner_edges_mm
+        return assess("t.stl", part, machine).uncut_mm
 
     assert length(left - 0.01) == pytest.approx(60, abs=1e-4)
     assert length(left + 0.01) == 0
-    assert assess("t.stl", part, fdm()).inner_edges_mm is None
+    assert assess("t.stl", part, fdm()).uncut_mm is None
 
 
 def test_rows_are_json_and_the_same_every_time() -> None:
@@ -258,4 +258,4 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     assert row["wall_mm"] is None
     assert row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
-    assert not all_passed(checks([assess("lid.stl", shape(lid), fdm())], wanted=True))
+    assert not all_passed(checks([assess("lid.stl", shape(lid), fdm())], required=True))

@@ -12,6 +12,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from tbcad_verify.mesh.mass import mass_properties
+from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
     axis,
@@ -22,10 +23,10 @@ from tbcad_verify.prototype import (
     ray_transfer,
     seats,
     swing,
-    triangle_distances,
 )
 from tbcad_verify.prototype.caps import measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.distances import distance_to_facets
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
     joined_meshes,
@@ -43,68 +44,73 @@ from tests.verify.prototype.synthetic_prototype import Machine, balls, export, s
 from tests.verify.synthetic_export import Cells, poses, sign
 
 
-def view_of(folder: Path) -> PrototypeContext:
+def context_of(folder: Path) -> PrototypeContext:
     record = read_export(folder)
     assert record.prototype is not None
     return PrototypeContext(record, record.prototype)
 
 
-def bodies_of(view: PrototypeContext) -> list[MeasuredPart]:
-    folder = view.export.folder
-    return [measure_part(part, parse(read(folder, part.stl))) for part in view.prototype.parts]
+def parts_of(context: PrototypeContext) -> list[MeasuredPart]:
+    folder = context.export.folder
+    return [measure_part(part, parse(read(folder, part.stl))) for part in context.prototype.parts]
 
 
-def rig_of(view: PrototypeContext) -> MeasuredPrototype:
-    bodies = bodies_of(view)
-    held = seats.measure_seats(view, joined_meshes(of_roles(bodies, "base"))[0])
-    caps = [measure_cap(view, one) for one in of_roles(bodies, "cap")]
-    return measure_prototype(view, held, caps, bodies)
-
-
-@pytest.fixture(scope="module")
-def view(machine: Path) -> PrototypeContext:
-    return view_of(machine)
+def measured_of(context: PrototypeContext) -> MeasuredPrototype:
+    parts = parts_of(context)
+    held = seats.measure_seats(context, joined_meshes(of_roles(parts, "base"))[0])
+    caps = [measure_cap(context, one) for one in of_roles(parts, "cap")]
+    return measure_prototype(context, held, caps, parts)
 
 
 @pytest.fixture(scope="module")
-def ready(view: PrototypeContext) -> MeasuredPrototype:
-    return rig_of(view)
+def context(machine: Path) -> PrototypeContext:
+    return context_of(machine)
 
 
-def test_centres_are_where_the_pads_were_put(ready: MeasuredPrototype) -> None:
+@pytest.fixture(scope="module")
+def measured(context: PrototypeContext) -> MeasuredPrototype:
+    return measured_of(context)
+
+
+def test_centres_are_where_the_pads_were_put(measured: MeasuredPrototype) -> None:
     made = balls(Machine())
-    np.testing.assert_allclose(ready.body.T, [ball.b for ball in made], atol=1e-5)
-    np.testing.assert_allclose(ready.centre.T, [ball.c for ball in made], atol=2e-4)
-    np.testing.assert_allclose(ready.radius, [ball.radius for ball in made], atol=2e-4)
+    np.testing.assert_allclose(measured.body.T, [ball.b for ball in made], atol=1e-5)
+    np.testing.assert_allclose(measured.centre.T, [ball.c for ball in made], atol=2e-4)
+    np.testing.assert_allclose(measured.radius, [ball.radius for ball in made], atol=2e-4)
 
 
 def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
     """The centre moves along the line that both other planes leave it."""
-    view = view_of(export(tmp_path / "x", Machine(pads={(1, 2): 0.02})))
-    base, _ = joined_meshes(of_roles(bodies_of(view), "base"))
+    context = context_of(export(tmp_path / "x", Machine(pads={(1, 2): 0.02})))
+    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
     ball = balls(Machine())[1]
     shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
-    np.testing.assert_allclose(seats.measure_seats(view, base).centre[1], ball.b + shift, atol=1e-5)
+    np.testing.assert_allclose(
+        seats.measure_seats(context, base).centre[1], ball.b + shift, atol=1e-5
+    )
     assert np.linalg.norm(shift) > 0.02
 
 
-def test_pads_are_found_without_the_contacts_being_right(view: PrototypeContext) -> None:
-    base, _ = joined_meshes(of_roles(bodies_of(view), "base"))
-    made = view.prototype
+def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
+    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    recorded = context.prototype
     moved = [
-        seat.model_copy(update={"contacts": seat.contacts + 0.3 * seat.axis}) for seat in made.seats
+        seat.model_copy(update={"contacts": seat.contacts + 0.3 * seat.axis})
+        for seat in recorded.seats
     ]
-    near = replace(view, prototype=made.model_copy(update={"seats": moved}))
+    near = replace(context, prototype=recorded.model_copy(update={"seats": moved}))
     np.testing.assert_allclose(
-        seats.measure_seats(near, base).centre, made.balls.columns("bx", 3).T, atol=1e-5
+        seats.measure_seats(near, base).centre, recorded.balls.columns("bx", 3).T, atol=1e-5
     )
 
 
 def test_sphere_on_three_planes() -> None:
     normals = [np.eye(3)[k] for k in range(3)]
-    np.testing.assert_allclose(seats.touching(normals, [1.0, 2.0, 3.0], 0.5), [1.5, 2.5, 3.5])
+    np.testing.assert_allclose(
+        seats.touching_sphere(normals, [1.0, 2.0, 3.0], 0.5), [1.5, 2.5, 3.5]
+    )
     with pytest.raises(Unknown, match="do not meet"):
-        seats.touching([normals[0]] * 3, [1.0, 2.0, 3.0], 0.5)
+        seats.touching_sphere([normals[0]] * 3, [1.0, 2.0, 3.0], 0.5)
 
 
 def test_distances_from_triangles_by_brute_force() -> None:
@@ -115,48 +121,54 @@ def test_distances_from_triangles_by_brute_force() -> None:
     a, b, c = corners
     tried = a[:, :, None] + s * (b - a)[:, :, None] + t * (c - a)[:, :, None]
     brute = np.linalg.norm(tried - point[:, None, None], axis=0).min(axis=1)
-    found = triangle_distances.distances(point, (a, b, c))
+    mesh = indexed_mesh(corners.transpose(2, 0, 1).reshape(-1, 3), np.arange(120).reshape(-1, 3))
+    found = np.array([distance_to_facets(point, mesh, np.array([k])) for k in range(40)])
     assert (found <= brute + 1e-12).all()
     np.testing.assert_allclose(found, brute, atol=0.02)
 
 
-def test_turns_about_the_axis(view: PrototypeContext) -> None:
+def test_turns_about_the_axis(context: PrototypeContext) -> None:
     x = np.random.default_rng(2).normal(size=(3, 5))
     for angle in (-70.0, 33.0):
-        found = axis.turned(x, view.frame[0][:, None], np.radians(np.full(5, angle)))
+        found = context.base_rotation(np.radians(np.full(5, angle))).apply(x.T).T
         wanted = np.stack([turned(one, angle) for one in x.T], axis=1)
         np.testing.assert_allclose(found, wanted, atol=1e-12)
-        before, after = axis.angles(view.frame, x), axis.angles(view.frame, found)
+        before, after = (axis.polar_and_azimuth(context.frame, d) for d in (x, found))
         np.testing.assert_allclose(before[0], after[0], atol=1e-12)
         np.testing.assert_allclose(
             axis.wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
         )
 
 
-def test_outlines_are_those_of_cells_cut_by_hand(view: PrototypeContext) -> None:
+def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> None:
     """`Cells` goes through all pairs of cutting planes, with no camera."""
     design = shell_of(Machine())
     hand = Cells(design, poses(design))
-    found = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(view))
+    found = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
     for k, outline in hand.outlines.items():
         # What lies on the seam is no edge of a halved mirror.
-        points = np.array([point for point, other in outline if other != -1 or not view.halved[k]])
-        d = points.T - view.pinhole[:, None]
+        points = np.array(
+            [point for point, other in outline if other != -1 or not context.halved[k]]
+        )
+        d = points.T - context.pinhole[:, None]
         chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
         first, second = pinhole_cells.tangent_basis(chief)
-        angle = axis.between(chief, d)
+        angle = axis.angles_between(chief, d)
         turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
-        low = np.floor(turn / (2 * np.pi) * pinhole_cells.AROUND).astype(int) % pinhole_cells.AROUND
-        both = np.stack([low, (low + 1) % pinhole_cells.AROUND])
-        own = found.own[k, both].all(axis=0)
+        low = (
+            np.floor(turn / (2 * np.pi) * pinhole_cells.OUTLINE_DIRECTIONS).astype(int)
+            % pinhole_cells.OUTLINE_DIRECTIONS
+        )
+        both = np.stack([low, (low + 1) % pinhole_cells.OUTLINE_DIRECTIONS])
+        own = found.is_edge[k, both].all(axis=0)
         near, far = found.angle[k, both].min(axis=0)[own], found.angle[k, both].max(axis=0)[own]
         assert own.sum() > 20
         assert (angle[own] > 0.998 * near).all()
         assert (angle[own] < 1.08 * far).all()  # a corner between two directions stands out
 
 
-def test_first_mirrors_by_brute_force(view: PrototypeContext) -> None:
-    shell = pinhole_cells.mirror_spheres(view)
+def test_first_mirrors_by_brute_force(context: PrototypeContext) -> None:
+    shell = pinhole_cells.mirror_spheres(context)
     d = np.random.default_rng(3).normal(size=(3, 4000)) + np.array([[-1.0], [0], [2]])
     found = pinhole_cells.first_mirrors(shell, d)
     assert (found >= 0).sum() > 100
@@ -174,14 +186,14 @@ def test_first_mirrors_by_brute_force(view: PrototypeContext) -> None:
 
 
 def test_the_window_goes_along_with_its_ball(
-    view: PrototypeContext, ready: MeasuredPrototype
+    context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
     """Each mirror's middle is moved to its ball's apex, which shows the origin."""
-    ways = ray_transfer.ray_transfer(ready)
-    shell = pinhole_cells.mirror_spheres(view)
+    transfer = ray_transfer.ray_transfer(measured)
+    shell = pinhole_cells.mirror_spheres(context)
     chief = pinhole_cells.cell_outlines(shell).chief
-    _, lines = ways.lines(np.arange(chief.shape[1]), chief)
-    apex = view.prototype.balls.columns("px", 3)[:, view.ball]
+    _, lines = transfer.reflected(np.arange(chief.shape[1]), chief)
+    apex = context.prototype.balls.columns("px", 3)[:, context.ball]
     np.testing.assert_allclose(lines.point, apex, atol=1e-3)
     away = (
         lines.point
@@ -191,27 +203,27 @@ def test_the_window_goes_along_with_its_ball(
 
 
 def test_coverage_by_rays_on_a_fine_outline(
-    view: PrototypeContext, ready: MeasuredPrototype
+    context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
     """One mirror by a plain loop over many directions, its ball turned and not the rays."""
-    shown = ball_views.ball_views(ready)
-    edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(view))
-    ways = ray_transfer.ray_transfer(ready)
+    shown = ball_views.ball_views(measured)
+    edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
+    transfer = ray_transfer.ray_transfer(measured)
     for i in (5, 20, 40):
-        ball, angle = int(view.ball[i]), float(np.degrees(view.angle[i]))
+        ball, angle = int(context.ball[i]), float(np.degrees(context.angle[i]))
         made = balls(Machine())[ball]
         centre = turned(made.c, angle)
         least = np.inf
-        middle = ways.moved[:, :, i] @ edge.chief[:, i]
-        for d in edge.direction[:, i].T[edge.own[i]]:
-            way = ways.moved[:, :, i] @ d
-            away = view.pinhole - centre
+        middle = transfer.merged[:, :, i] @ edge.chief[:, i]
+        for d in edge.direction[:, i].T[edge.is_edge[i]]:
+            way = transfer.merged[:, :, i] @ d
+            away = context.pinhole - centre
             b, c = way @ away, away @ away - made.radius**2
             while b * b <= c:  # beside the ball: back to where it ends
                 way = way + 1e-4 * (middle - way)
                 way /= np.linalg.norm(way)
                 b = way @ away
-            point = view.pinhole + (-b - np.sqrt(b * b - c)) * way
+            point = context.pinhole + (-b - np.sqrt(b * b - c)) * way
             normal = (point - centre) / made.radius
             out = way - 2 * (way @ normal) * normal
             at = point + max(-(point @ out), 0) * out
@@ -219,60 +231,62 @@ def test_coverage_by_rays_on_a_fine_outline(
         assert shown.coverage[i] == pytest.approx(least, rel=5e-3)
 
 
-def test_twins_are_turned_about_z(view: PrototypeContext) -> None:
-    rows = view.export.mirrors
+def test_twins_are_turned_about_z(context: PrototypeContext) -> None:
+    rows = context.export.mirrors
     u = rows.columns("ux", 3)
     np.testing.assert_allclose(
-        u[:, plan_checks.twins(view)], u[:, view.mine] * [[-1], [-1], [1]], atol=1e-12
+        u[:, plan_checks.twins(context)], u[:, context.mirror_rows] * [[-1], [-1], [1]], atol=1e-12
     )
 
 
 def test_a_program_is_followed_as_controllers_do() -> None:
-    found = gcode.run("(G1 X9)\ng92 x5\nG1 X1.5 F9 ; G1 X3\nm8\nM9\nG1X-.5\nM8\n")
+    found = gcode.run_program("(G1 X9)\ng92 x5\nG1 X1.5 F9 ; G1 X3\nm8\nM9\nG1X-.5\nM8\n")
     assert found.moves.tolist() == [1.5, -0.5]
     assert found.photographs.tolist() == [1.5, -0.5]
     assert found.faults == ()
-    pauses = gcode.run("M0\nG1 A0\nG1 A1\nM0\nG1 A0\nM0 (turn)\nG1 A1\nM0\n")
+    pauses = gcode.run_program("M0\nG1 A0\nG1 A1\nM0\nG1 A0\nM0 (turn)\nG1 A1\nM0\n")
     assert pauses.photographs.tolist() == [1.0, 1.0]
-    assert gcode.run("G91\nG1 X1\nwhat?").faults == (
+    assert gcode.run_program("G91\nG1 X1\nwhat?").faults == (
         "line 1 is in inches or relative",
         "line 3 is no G-code",
     )
 
 
-def test_no_step_of_the_swing_is_too_large(ready: MeasuredPrototype) -> None:
+def test_no_step_of_the_swing_is_too_large(measured: MeasuredPrototype) -> None:
     """A rod that the base passes at one angle only is found, however thin."""
     import manifold3d
 
     arm = manifold3d.Manifold.cube([100.0, 2.0, 2.0]).translate([0, 80, 0])
     rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate([5.0, 0, 0])
-    rows = ready.context.frame
+    rows = measured.context.frame
     arm = arm.transform(np.hstack([rows[[1, 2, 0]].T, np.zeros((3, 1))]))
     for turn, meets in ((0.0, True), (170.0, False)):
         at = turned(rows.T @ np.array([0.3, 85.0, 80.7]), turn)
         standing = rod.translate(at - np.array([5.2, 0.2, 0.2]))
         found = swing.sweep(
-            ready, swing._mover(ready, "arm", arm), swing._mover(ready, "rod", standing)
+            measured,
+            swing.axial_solid(measured, "arm", arm),
+            swing.axial_solid(measured, "rod", standing),
         )
         assert (found.volume > swing.TOUCH_MM3) == meets
-        assert found.looks > 5
+        assert found.samples > 5
 
 
-def test_one_look_does_where_nothing_can_ever_meet(ready: MeasuredPrototype) -> None:
+def test_one_look_does_where_nothing_can_ever_meet(measured: MeasuredPrototype) -> None:
     """Cubes at 20 and 30 mm along the axis keep 8 mm; one inside of the other shares its room."""
     import manifold3d
 
     def at(along: float, out: float, size: float) -> swing.AxialSolid:
         cube = manifold3d.Manifold.cube([size] * 3, center=True).translate([along, out, 0])
-        placed = cube.transform(np.hstack([ready.context.frame.T, np.zeros((3, 1))]))
-        return swing._mover(ready, "cube", placed)
+        placed = cube.transform(np.hstack([measured.context.frame.T, np.zeros((3, 1))]))
+        return swing.axial_solid(measured, "cube", placed)
 
-    found = swing.sweep(ready, at(20, 30, 2), at(30, 30, 2))
-    assert (found.looks, found.volume) == (1, 0.0)
+    found = swing.sweep(measured, at(20, 30, 2), at(30, 30, 2))
+    assert (found.samples, found.volume) == (1, 0.0)
     assert 5 < found.gap <= 8
-    inside = swing.sweep(ready, at(20, 30, 20), at(20, 30, 2))
+    inside = swing.sweep(measured, at(20, 30, 20), at(20, 30, 2))
     assert inside.volume == pytest.approx(8, rel=1e-6)
-    assert inside.looks > 1
+    assert inside.samples > 1
 
 
 def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
@@ -295,11 +309,11 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
 
 
 def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None:
-    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
-    masses = {one.part.name: one.placed_mass for one in bodies_of(view) if one.placed_mass}
+    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
     checks = {
         check.name: check
-        for check in part_step_checks(view.export, masses, read_step_files(view.export, 60))
+        for check in part_step_checks(context.export, masses, read_step_files(context.export, 60))
     }
     assert [name for name, check in checks.items() if not check.passed] == ["step properties"]
     assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
@@ -314,15 +328,15 @@ def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
             {"step box", "step centroid", "step properties", "step volume", "step area"},
         ),
     ):
-        view = view_of(stepped(made, low, high))
-        masses = {one.part.name: one.placed_mass for one in bodies_of(view) if one.placed_mass}
-        checks = part_step_checks(view.export, masses, read_step_files(view.export, 60))
+        context = context_of(stepped(made, low, high))
+        masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
+        checks = part_step_checks(context.export, masses, read_step_files(context.export, 60))
         assert {check.name for check in checks if not check.passed} == names
 
 
 def test_one_broken_step_file_leaves_the_others_known(made: Path) -> None:
-    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
-    good = load(view.export.folder, "stage.step")
+    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    good = load(context.export.folder, "stage.step")
     (made / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
     bad = load(made, "bad.step")
     found = examine_all([bad, good, bad], 60)
@@ -345,15 +359,15 @@ def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
         [command[0], "-c", "import os; os.abort()"], place, limits
     )
     monkeypatch.setattr(step_file, "run", killed)
-    view = view_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
-    good = load(view.export.folder, "stage.step")
+    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    good = load(context.export.folder, "stage.step")
     found = examine_all([good, good], 60)
     assert [isinstance(one, StepFile) for one in found] == [True, True]
 
 
-def test_the_bend_of_a_cube_is_its_edges(view: PrototypeContext) -> None:
+def test_the_bend_of_a_cube_is_its_edges(context: PrototypeContext) -> None:
     """Twelve edges at a right angle, of 8, 8 and 2 mm."""
-    stage = next(one for one in bodies_of(view) if one.part.name == "stage")
+    stage = next(one for one in parts_of(context) if one.part.name == "stage")
     assert stage.placed_mass is not None
     assert stage.placed_mass.bend == pytest.approx(4 * 18 * np.pi / 2, rel=1e-5)
     assert mass_properties(stage.placed_mesh).volume == pytest.approx(128, rel=1e-6)

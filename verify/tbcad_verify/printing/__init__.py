@@ -1,1 +1,1 @@
-"""Whether a part can be made: its mesh measured once, and held against profiles of printers."""
+"""Printability: each part is measured once, and compared with the profiles of printers."""

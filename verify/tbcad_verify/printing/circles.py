@@ -39,10 +39,10 @@ def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floa
 
 
 def widest_gaps(angle: Floats, group: Groups, count: int) -> Floats:
-    """(G,) the widest gap between neighbouring angles (N,) of each group, rad; empty ones: a turn.
+    """(G,) the widest gap between neighbouring angles of each group, rad; 2 pi of empty groups.
 
     Args:
-        angle: (N,) from -pi to pi; those that are not finite are passed over.
+        angle: (N,) from -pi to pi; those that are not finite are left out.
         group: (N,) 0 ... G - 1.
         count: G.
     """

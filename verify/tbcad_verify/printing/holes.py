@@ -19,10 +19,10 @@ Groups = NDArray[np.int32]
 # Neighbours in a hole's wall bend by no more than this: an octagon, 45 degrees, is a coarse hole; a
 # hexagon, 60, is a nut's pocket.
 BEND_RAD = math.radians(50)
-BENDS = 5  # the fewest between facets of a patch: three quarters of an octagon
-UPRIGHT = 0.1  # most cosine between a wall's normals and its axis
-ROUND = 0.02  # most deviation from the circle, of its radius
-GAP_RAD = math.pi / 2 + 1e-3  # what may be missing of the turn
+MIN_BENDS = 5  # between facets of a patch: three quarters of an octagon
+UPRIGHT_COS = 0.1  # maximum, between a wall's normals and its axis
+ROUND = 0.02  # maximum deviation from the circle, of its radius
+GAP_RAD = math.pi / 2 + 1e-3  # that may be missing of the full turn
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class RoundHoles:
 
     Attributes:
         diameter: (H,) mm of the circle through the corners; facets bulge inside it.
-        middle: (3, H) mm, half way down.
-        axis: (3, H) unit, either way.
+        middle: (3, H) mm, at half depth.
+        axis: (3, H) unit, of either sign.
         depth: (H,) mm, of the cylinder.
     """
 
@@ -40,6 +40,11 @@ class RoundHoles:
     middle: Floats
     axis: Floats
     depth: Floats
+
+    @property
+    def smallest(self) -> int | None:
+        """Index of the hole with the smallest diameter; None without holes."""
+        return int(self.diameter.argmin()) if self.diameter.size else None
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class FacetPatches:
 
 
 def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
-    """Find every round hole that keeps three quarters of its turn.
+    """Find every round hole of which three quarters of the full turn are there.
 
     Args:
         mesh: a closed solid, outward.
@@ -69,8 +74,8 @@ def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
     links = np.concatenate([half, edges.half[_flat(edges)]])
     links = np.stack([links // 3, mesh.twin[links] // 3])
     hollow = _bending(_joined(len(mesh.faces), links, np.arange(len(mesh.faces))), half // 3)
-    axis = _straight(mesh, half, bend, _label(hollow, len(mesh.faces)), hollow.count)
-    upright = np.abs(dot(_normals(mesh, hollow), axis[:, hollow.group])) < UPRIGHT
+    axis = _axes(mesh, half, bend, _label(hollow, len(mesh.faces)), hollow.count)
+    upright = np.abs(dot(_normals(mesh, hollow), axis[:, hollow.group])) < UPRIGHT_COS
     return _round(mesh, _joined(len(mesh.faces), links, hollow.facet[upright]))
 
 
@@ -97,7 +102,7 @@ def _joined(size: int, links: Ints, facet: Ints) -> FacetPatches:
 
 def _bending(patches: FacetPatches, bent: Ints) -> FacetPatches:
     """The patches with enough bends; `bent` has a facet of every bent edge."""
-    enough = np.bincount(patches.group[bent], minlength=patches.count) >= BENDS
+    enough = np.bincount(patches.group[bent], minlength=patches.count) >= MIN_BENDS
     mine = enough[patches.group]
     number = (np.cumsum(enough) - 1).astype(np.int32)
     return FacetPatches(patches.facet[mine], number[patches.group[mine]], int(enough.sum()))
@@ -110,7 +115,7 @@ def _label(patches: FacetPatches, size: int) -> Groups:
     return label
 
 
-def _straight(mesh: Mesh, half: Ints, bend: Floats, label: Groups, count: int) -> Floats:
+def _axes(mesh: Mesh, half: Ints, bend: Floats, label: Groups, count: int) -> Floats:
     """(3, G) the direction along which each patch does not bend.
 
     Source: D. Cohen-Steiner, J.-M. Morvan, Restricted Delaunay Triangulations and Normal Cycle,
@@ -137,9 +142,9 @@ def _normals(mesh: Mesh, patches: FacetPatches) -> Floats:
 
 
 def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
-    """Look along each patch, fit a circle, and keep those that are the walls of round holes.
+    """Project each patch along its axis, fit a circle, and keep the walls of round holes.
 
-    They bend inward, or they would not be patches: their normals point to the axis.
+    Patches bend inward, so their normals point to the axis.
     """
     normal, group = _normals(mesh, patches), np.repeat(patches.group, 3)
     spread = _outer(normal, norm(mesh.area[:, patches.facet]), patches.group, patches.count)

@@ -1,4 +1,4 @@
-"""How a part can lie: on the faces of its convex hull, along the file's axes, or tilted."""
+"""Orientations to try: on the faces of the convex hull, along the file's axes, or tilted."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tbcad_verify.mesh.vectors import norm, tangent_basis
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats
 
-MOST = 24  # faces of the hull that are tried, the largest first
-LEAST_SHARE = 0.002  # of the hull's area, of a face to rest on
+MAX_FACES = 24  # of the hull that are tried, the largest first
+MIN_SHARE = 0.002  # of the hull's area, for a face to rest on
 GRID = 1 / 256  # side of the cells of directions whose facets are merged
 SAME_COS = np.cos(np.radians(0.1))  # directions closer than this are one
 AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file has it
@@ -26,7 +26,7 @@ class PartHull:
     Attributes:
         points: (3, V) its corners, mm.
         down: (3, D) unit directions which can point down: large faces, then the axes.
-        tilted: (3, T) further ones, tried when nothing else fits.
+        tilted: (3, T) others, tried when nothing else fits.
     """
 
     points: Floats
@@ -45,7 +45,7 @@ def part_hull(points: Floats) -> PartHull:
     except (QhullError, ValueError) as error:
         raise Unknown("the part is flat: its points lie in one plane") from error
     faces = _faces(hull, points)
-    down = _each_once(np.hstack([faces, AXES]))
+    down = _distinct(np.hstack([faces, AXES]))
     return PartHull(points[hull.vertices].T, down, _tilted(down[:, 0]))
 
 
@@ -58,17 +58,17 @@ def _faces(hull: ConvexHull, points: Floats) -> Floats:
     cell = np.rint(normal[:, order] / GRID).astype(np.int64)
     _, first, group = np.unique(cell, axis=1, return_index=True, return_inverse=True)
     size = np.bincount(group.ravel(), area[order])
-    best = np.lexsort((first, -size))[:MOST]
-    best = best[size[best] > LEAST_SHARE * area.sum()]
+    best = np.lexsort((first, -size))[:MAX_FACES]
+    best = best[size[best] > MIN_SHARE * area.sum()]
     return np.asarray(normal[:, order[first[best]]])
 
 
-def _each_once(directions: Floats) -> Floats:
-    kept: list[Floats] = []
+def _distinct(directions: Floats) -> Floats:
+    distinct: list[Floats] = []
     for d in directions.T:
-        if all(float((d * other).sum()) < SAME_COS for other in kept):
-            kept.append(d)
-    return np.array(kept).T
+        if all(float((d * other).sum()) < SAME_COS for other in distinct):
+            distinct.append(d)
+    return np.array(distinct).T
 
 
 def _tilted(down: Floats) -> Floats:

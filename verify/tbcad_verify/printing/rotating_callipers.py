@@ -1,4 +1,4 @@
-"""The turn about the vertical by which a part fits a rectangle, by rotating callipers."""
+"""The rotation about the vertical by which a part fits a rectangle, by rotating callipers."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from scipy.spatial import ConvexHull
 from tbcad_verify.types import Floats
 
 
-def best_turn(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
-    """The best turn, and the sides of the box then.
+def best_rotation(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
+    """The best rotation, and the sides of the box after it.
 
-    The least of the enclosing rectangles that fit; if none of those with a side along an edge
-    fits, the turn by which the larger excess over width or depth is least.
+    The smallest of the enclosing rectangles that fit; if none of those with a side along an edge
+    fits, the rotation with the smallest excess over width or depth, whichever is larger.
 
     Args:
         points: (2, N) seen from above, mm.
@@ -33,38 +33,39 @@ def best_turn(points: Floats, width: float, depth: float, slack: float) -> tuple
         area = np.where(fits, sides[0] * sides[1], np.inf)
         k = int(np.argmax(area <= area.min() * (1 + 1e-9)))
         return float(edges[k]), sides[:, k]
-    turns = _canonical(np.concatenate([edges, _balanced(rim, edges, width - depth)]))
-    sides = _sides(rim, turns)
+    angles = _canonical(np.concatenate([edges, _balanced(rim, edges, width - depth)]))
+    sides = _sides(rim, angles)
     excess = np.maximum(sides[0] - width, sides[1] - depth)
     k = int(np.argmax(excess <= excess.min() + 1e-9 * np.abs(sides).max()))
-    return float(turns[k]), sides[:, k]
+    return float(angles[k]), sides[:, k]
 
 
 def _edges(rim: Floats) -> Floats:
-    """Turns that bring an edge of the rim to lie along x or y, ascending."""
+    """Rotations that bring an edge of the rim to lie along x or y, ascending."""
     edge = np.roll(rim, -1, axis=1) - rim
     across = np.mod(-np.arctan2(edge[1], edge[0]), np.pi / 2)
     return _canonical(np.concatenate([across, across + np.pi / 2]))
 
 
 def _canonical(turns: Floats) -> Floats:
-    """Each turn once, from 0 to below pi; what rounding leaves below pi is 0."""
+    """Each rotation once, from 0 to below pi; rounding errors below pi become 0."""
     turns = np.mod(turns, np.pi)
     return np.unique(np.where(turns > np.pi - 1e-9, 0, turns))
 
 
 def _sides(rim: Floats, turns: Floats) -> Floats:
-    """(2, K) extents along x and y of the rim, turned by each of (K,) angles."""
+    """(2, K) extents along x and y of the rim, rotated by each of (K,) angles."""
     cos, sin = np.cos(turns)[:, None], np.sin(turns)[:, None]
     x, y = cos * rim[0] - sin * rim[1], sin * rim[0] + cos * rim[1]
     return np.stack([np.ptp(x, axis=1), np.ptp(y, axis=1)])
 
 
 def _balanced(rim: Floats, edges: Floats, difference: float) -> Floats:
-    """Turns at which the extents along x and y differ by so much: the other minima of excess.
+    """Rotations at which the extents along x and y differ by this: other minima of the excess.
 
-    Between two turns at which an edge lies along an axis, the outermost points stay the same, so
-    both extents are sines, and bulge: their larger excess is least at an end or where they cross.
+    Between two rotations at which an edge lies along an axis, the outermost points stay the same.
+    Both extents are concave sines there: the larger excess is smallest at an end or where the
+    excesses are equal.
     """
     between = (edges + np.append(edges[1:], edges[0] + np.pi)) / 2
     cos, sin = np.cos(between)[:, None], np.sin(between)[:, None]
@@ -73,9 +74,9 @@ def _balanced(rim: Floats, edges: Floats, difference: float) -> Floats:
     # width = a0 cos - a1 sin, depth = b0 sin + b1 cos
     p, q = a[0] - b[1], -a[1] - b[0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        swing = np.arccos(difference / np.hypot(p, q))
-    found = np.arctan2(q, p) + np.stack([swing, -swing])
-    return np.asarray(found[np.isfinite(found)])
+        offset = np.arccos(difference / np.hypot(p, q))
+    angles = np.arctan2(q, p) + np.stack([offset, -offset])
+    return np.asarray(angles[np.isfinite(angles)])
 
 
 def _chord(rim: Floats, height: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Wall thickness by rays: from the surface inward to where they leave the part again."""
+"""Wall thickness by rays from the surface inward to where they leave the part again."""
 
 from __future__ import annotations
 
@@ -14,57 +14,57 @@ from tbcad_verify.mesh.segments import Edges, half_edge_vectors, rounding
 from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
 from tbcad_verify.types import Bools, Floats, Ints
 
-# How squarely the far side must look back at a ray. Where a wall between smooth sides is thinnest,
-# they look straight at each other, or the thickness would still fall to one side. Facets of a round
-# hole of eight sides are off by 22.5 degrees at most. Beyond 30 the sides meet in an edge, where
-# thickness tends to nought by nature; an edge sharper than 30 degrees is a wall that runs out.
+# Maximum angle between a ray and the outward normal where it leaves. Where a wall between smooth
+# sides is thinnest, they are parallel, or the thickness would decrease to one side. Facets of a
+# round hole of eight sides are off by 22.5 degrees at most. Beyond 30 the sides meet in an edge,
+# where thickness tends to zero anyway; an edge sharper than 30 degrees is a wall that tapers off.
 SQUARE_COS = math.cos(math.radians(30))
 # A ray from the bottom of a groove bisects its sides and meets a groove of 90 degrees on the other
-# side at 45. No edge is near, so no thickness tends to nought there.
+# side at 45. No edge is near, so thickness does not tend to zero there.
 GROOVE_COS = math.cos(math.radians(50))
 GROOVE_RAD = 0.1  # a concave edge beyond this is the bottom of a groove
-# Facets whose normal rounding may have tilted more than this are neither measured from nor to:
-# a sliver that looks askance sees its own neighbours.
+# Facets whose normal rounding may have tilted more than this are neither start nor end of a ray:
+# a ray from a tilted sliver hits the sliver's own neighbours.
 SOUND_RAD = 0.05
 STEP = 0.01  # of the box's diagonal: facets longer than this are measured in several places
 INSET = 0.01  # how far samples keep from a facet's rim, of its size
-LATTICES = (16, 8, 4, 2, 1)  # most steps along a side of a facet; the first that is affordable
-RAYS = 1_500_000  # affordable, beyond one a facet
-LIFT = 8  # units in the last place by which rays start below the surface: float32 cannot tell less
+LATTICES = (16, 8, 4, 2, 1)  # maximum steps along a side of a facet: the first within MAX_RAYS
+MAX_RAYS = 1_500_000  # beyond one a facet
+LIFT_ULP = 8  # of float32, by which rays start below the surface
 
 
 @dataclass(frozen=True)
 class WallThickness:
-    """Thickness wherever it was measured.
+    """Thickness at S samples.
 
     Attributes:
-        thickness: (S,) mm; infinite where no wall is: nothing looks back.
-        share: (S,) mm^2 of surface that a sample stands for; 0 in grooves.
-        least: mm; infinite if there is no wall at all.
+        thickness: (S,) mm; infinite where no opposite side faces the ray.
+        share: (S,) mm^2 of surface that a sample represents; 0 in grooves.
+        minimum: mm; infinite if there is no wall at all.
         where: (3,) middle of the thinnest wall, mm.
     """
 
     thickness: Floats
     share: Floats
-    least: float
+    minimum: float
     where: Floats
 
 
 @dataclass(frozen=True)
 class ThicknessRays:
-    """Where rays start, and which way they go.
+    """Start points and directions of S rays.
 
     Attributes:
         start: (3, S) on the surface, mm.
         inward: (3, S) unit.
         share: (S,) mm^2.
-        square: least cosine between the ray and the outward normal that it meets.
+        min_cosine: between the ray and the outward normal that it meets.
     """
 
     start: Floats
     inward: Floats
     share: Floats
-    square: float
+    min_cosine: float
 
 
 def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
@@ -76,7 +76,7 @@ def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
         scene: of the mesh.
     """
     longest = _longest(mesh)
-    # Twice the area over the longest side is the least height; both ends of it are rounded.
+    # Twice the area over the longest side is the smallest height; both ends of it are rounded.
     sound = norm(mesh.area) * SOUND_RAD > 2 * rounding(mesh) * longest
     step = STEP * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     probes = [*_from_facets(mesh, sound, longest, step), *_from_grooves(mesh, edges, sound, step)]
@@ -85,9 +85,9 @@ def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
     return _walls(probes, thickness, best)
 
 
-def thin_area(found: WallThickness, limit: float) -> float:
+def thin_area(walls: WallThickness, limit: float) -> float:
     """Surface over walls thinner than a limit, mm^2; walls of two sides count twice."""
-    return float(found.share[found.thickness < limit].sum())
+    return float(walls.share[walls.thickness < limit].sum())
 
 
 def _walls(probes: list[ThicknessRays], thickness: list[Floats], best: int) -> WallThickness:
@@ -95,22 +95,24 @@ def _walls(probes: list[ThicknessRays], thickness: list[Floats], best: int) -> W
     if not np.isfinite(depths).any():
         return WallThickness(depths, shares, math.inf, np.full(3, np.nan))
     k = int(thickness[best].argmin())
-    least = float(thickness[best][k])
+    minimum = float(thickness[best][k])
     probe = probes[best]
-    return WallThickness(depths, shares, least, probe.start[:, k] + least / 2 * probe.inward[:, k])
+    return WallThickness(
+        depths, shares, minimum, probe.start[:, k] + minimum / 2 * probe.inward[:, k]
+    )
 
 
 def _measure(scene: RayScene, sound: Bools, probe: ThicknessRays) -> Floats:
-    """(S,) distances to walls that look back; infinite where none does."""
-    lift = LIFT * float(np.spacing(np.float32(np.abs(probe.start).max(initial=1e-30))))
+    """(S,) distances to opposite sides that face the ray; infinite where none does."""
+    lift = LIFT_ULP * float(np.spacing(np.float32(np.abs(probe.start).max(initial=1e-30))))
 
     def part(these: slice) -> Floats:
         start, d = probe.start[:, these], probe.inward[:, these]
         facet = first_hits(scene, start + lift * d, d)
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = distances_to_planes(scene, facet, start, d)
-        looks_back = dot(np.take(scene.planes[:, :3], facet, axis=0).T, d) >= probe.square
-        return np.where((facet >= 0) & sound[facet] & looks_back, np.maximum(depth, 0), np.inf)
+        faces_ray = dot(np.take(scene.planes[:, :3], facet, axis=0).T, d) >= probe.min_cosine
+        return np.where((facet >= 0) & sound[facet] & faces_ray, np.maximum(depth, 0), np.inf)
 
     return np.concatenate(in_threads(part, chunks(probe.share.size)) or [np.empty(0)])
 
@@ -129,11 +131,11 @@ def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iter
 
 
 def _steps(length: Floats, step: float) -> Ints:
-    """(N,) into how many steps a length is divided, of `LATTICES`, such that all is affordable."""
-    wanted = 2 ** np.ceil(np.log2(np.maximum(length / step, 1)))
+    """(N,) into how many steps a length is divided, of `LATTICES`, within `MAX_RAYS` in all."""
+    ideal = 2 ** np.ceil(np.log2(np.maximum(length / step, 1)))
     for most in LATTICES:
-        size = np.minimum(wanted, most).astype(np.intp)
-        if ((size > 1) * (size + 1) * (size + 2) / 2).sum() <= RAYS:
+        size = np.minimum(ideal, most).astype(np.intp)
+        if ((size > 1) * (size + 1) * (size + 2) / 2).sum() <= MAX_RAYS:
             return np.asarray(size)
     return np.ones(length.size, dtype=np.intp)
 
@@ -158,7 +160,7 @@ def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> ThicknessRays:
 
 
 def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterator[ThicknessRays]:
-    """Facets beside a groove look past the thinnest place below it; its bottom does not."""
+    """From the bottoms of grooves: rays from facets beside one miss the thin wall below it."""
     half = edges.half[edges.angle < -(GROOVE_RAD + edges.noise)]
     half = half[sound[half // 3] & sound[mesh.twin[half] // 3]]
     start, edge = half_edge_vectors(mesh, half)

@@ -1,4 +1,4 @@
-"""The machine with balls: whether its files show every mirror, with the whole object, unhindered.
+"""Verification of the prototype: whether its files show every mirror, unobstructed, in full.
 
-Like all of the proof it takes from the record only what was asked for and where to begin looking.
+As everywhere in the verification, the record gives only the requirements and starting values.
 """

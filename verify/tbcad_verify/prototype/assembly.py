@@ -1,7 +1,7 @@
-"""The whole rig in one file to look at: is everything where its own file and the record have it?
+"""The assembly file: every part must be drawn where its own file and the record have it.
 
-Purchased parts have no file of their own; their shapes are taken from here, and must not be in the
-base's way.
+Purchased parts have no file of their own. Their shapes are taken from the assembly, and must not
+obstruct the base.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Floats, Ints
 
-Shapes = dict[str, tuple[Floats, NDArray[np.int64]]]
+Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
-CHECK = ("assembly", "mm")
-OFF_MM = 0.25  # it is meshed coarsely
+CHECKS = {"assembly": "mm"}
+OFF_MM = 0.25  # the assembly is meshed coarsely
 METRE_MM = 1000.0
 # glTF's y is up: rows that its x, y and z are in the frame of the shell.
 UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
-def assembly_meshes(context: PrototypeContext) -> Shapes:
-    """Corners (V, 3) in mm and facets (F, 3) of all bodies by name, in the frame of the shell.
+def assembly_meshes(context: PrototypeContext) -> dict[str, Shape]:
+    """Shapes of all bodies by name, in the frame of the shell.
 
     Raises:
         Unknown: there is no GLB, or it cannot be read.
@@ -38,70 +38,68 @@ def assembly_meshes(context: PrototypeContext) -> Shapes:
     if not name:
         raise Unknown("there is no GLB of the assembly")
     data = read(context.export.folder, name).data.tobytes()
-    return {title: _merged(*mesh) for title, mesh in _bodies(data)}
+    return {title: _welded(*shape) for title, shape in _shapes(data)}
 
 
-def check(
-    name: CheckName, context: PrototypeContext, bodies: list[MeasuredPart], found: Shapes
-) -> Check:
-    """Every part's and every ball's box, against its own mesh's or the record's."""
-    placed = of_roles(bodies, "base", "cap", "stage", "frame")
-    boxes = {one.part.name: _box(one.placed_mesh.points) for one in placed}
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    parts: list[MeasuredPart],
+    drawn: dict[str, Shape],
+) -> list[Check]:
+    """The box of every part and ball, against its own mesh's or the record's."""
+    placed = of_roles(parts, "base", "cap", "stage", "frame")
+    boxes = {part.part.name: _box(part.placed_mesh.points) for part in placed}
     balls = context.prototype.balls
     for k in np.flatnonzero(~balls.cap).tolist():
         middle, radius = balls.columns("bx", 3)[:, k], balls.body_radius_mm[k]
         boxes[f"ball_{k + 1}"] = np.stack([middle - radius, middle + radius])
-    off = {title: _off(box, found.get(title)) for title, box in boxes.items()}
-    off |= {one.name: 0.0 if one.name in found else np.inf for one in context.prototype.bought}
-    wrong = sorted(title for title, away in off.items() if away > OFF_MM)
-    return at_most(name, max(off.values()), OFF_MM, f"missing or elsewhere: {short_list(wrong)}")
+    error = {title: _box_error(box, drawn.get(title)) for title, box in boxes.items()}
+    error |= {one.name: 0.0 if one.name in drawn else np.inf for one in context.prototype.bought}
+    wrong = sorted(title for title, value in error.items() if value > OFF_MM)
+    detail = f"missing or elsewhere: {short_list(wrong)}"
+    return [at_most(names[0], max(error.values()), OFF_MM, detail)]
 
 
-def standing_solids(context: PrototypeContext, found: Shapes) -> list[tuple[str, Any]]:
-    """Purchased parts that stand still, as manifold3d has them.
+def fixed_solids(context: PrototypeContext, drawn: dict[str, Shape]) -> list[tuple[str, Any]]:
+    """Names and manifold3d solids of the purchased parts that do not rotate with the base.
 
     Raises:
         Unknown: one is missing, or no closed solid.
     """
     names = [one.name for one in context.prototype.bought if not one.turns]
-    if lost := [name for name in names if name not in found]:
-        raise Unknown(f"the assembly lacks {short_list(lost)}")
-    return [(name, _solid(name, *found[name])) for name in names]
+    if missing := [name for name in names if name not in drawn]:
+        raise Unknown(f"the assembly lacks {short_list(missing)}")
+    solids = [(name, manifold(*drawn[name])) for name in names]
+    for name, solid in solids:
+        if solid.status().name != "NoError":
+            raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
+    return solids
 
 
-def _bodies(data: bytes) -> Iterable[tuple[str, tuple[Floats, NDArray[np.int64]]]]:
+def _shapes(data: bytes) -> Iterable[tuple[str, Shape]]:
     import trimesh
 
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
         for node in sorted(scene.graph.nodes_geometry):
-            place, geometry = scene.graph[node]
+            transform, geometry = scene.graph[node]
             mesh = scene.geometry[geometry]
-            points = trimesh.transform_points(mesh.vertices, place)
+            points = trimesh.transform_points(mesh.vertices, transform)
             yield str(node), (METRE_MM * points @ UP, np.asarray(mesh.faces, dtype=np.int64))
     except Exception as error:
         raise Unknown(f"the GLB cannot be read ({type(error).__name__}: {error})") from error
 
 
-def _merged(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """Corners that are the same made one: shading wants them apart."""
-    corners, of = np.unique(points, axis=0, return_inverse=True)
-    return corners, of.reshape(-1)[faces]
-
-
-def _solid(name: str, points: Floats, faces: NDArray[np.int64]) -> Any:
-    import manifold3d
-
-    mesh = manifold3d.Mesh64(np.ascontiguousarray(points), faces.astype(np.uint64))
-    solid = manifold3d.Manifold(mesh)
-    if solid.status() != manifold3d.Error.NoError:
-        raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
-    return solid
+def _welded(points: Floats, faces: NDArray[np.int64]) -> Shape:
+    """Equal corners as one: shading needs them apart."""
+    corners, index = np.unique(points, axis=0, return_inverse=True)
+    return corners, index.reshape(-1)[faces]
 
 
 def _box(points: Floats) -> Floats:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _off(box: Floats, shape: tuple[Floats, NDArray[np.int64]] | None) -> float:
+def _box_error(box: Floats, shape: Shape | None) -> float:
     return float(np.abs(_box(shape[0]) - box).max()) if shape is not None else float("inf")

@@ -1,14 +1,14 @@
-"""The axis that the base turns about: polar angles, azimuths and turns, in columns (3, N)."""
+"""Polar angles and azimuths about the axis that the base rotates on; vectors as columns (3, N)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tbcad_verify.mesh.vectors import cross, dot, norm, unit
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.types import Floats
 
 
-def frame_of(pinhole: Floats) -> Floats:
+def axis_frame(pinhole: Floats) -> Floats:
     """(3, 3) rows: axis from the origin to the pinhole, azimuth zero (the zenith's), third."""
     axis = pinhole / np.sqrt((pinhole**2).sum())
     up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
@@ -16,20 +16,10 @@ def frame_of(pinhole: Floats) -> Floats:
     return np.stack([axis, up, np.cross(axis, up)])
 
 
-def angles(frame: Floats, d: Floats) -> tuple[Floats, Floats]:
+def polar_and_azimuth(frame: Floats, d: Floats) -> tuple[Floats, Floats]:
     """Polar angles and azimuths (N,) of directions d (3, N), radians."""
     along, zero, third = (dot(np.broadcast_to(row[:, None], d.shape), d) for row in frame)
     return np.arctan2(np.hypot(zero, third), along), np.arctan2(third, zero)
-
-
-def turned(d: Floats, axis: Floats, angle: Floats) -> Floats:
-    """Columns d (3, N) turned about unit axes (3, N) or (3, 1) by angles (N,) or (), radians.
-
-    Source: Rodrigues' formula.
-    """
-    axes = np.broadcast_to(axis, d.shape)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.asarray(cosine * d + sine * cross(axes, d) + (1 - cosine) * dot(axes, d) * axes)
 
 
 def wrapped(angle: Floats) -> Floats:
@@ -37,7 +27,10 @@ def wrapped(angle: Floats) -> Floats:
     return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))
 
 
-def between(a: Floats, b: Floats) -> Floats:
-    """(N,) angles between columns, radians; exact for small ones too."""
+def angles_between(a: Floats, b: Floats) -> Floats:
+    """(N,) angles between columns, radians; exact for small ones too.
+
+    Source: W. Kahan, How Futile are Mindless Assessments of Roundoff, 2006, section 12.
+    """
     one, two = unit(a), unit(b)
     return np.asarray(2 * np.arctan2(norm(one - two), norm(one + two)))

@@ -1,4 +1,4 @@
-"""What every mirror's ball shows at its stop: coverage, and a free way for the light."""
+"""What every mirror's ball shows at its stop: coverage, and an unobstructed path for the light."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays, reflect
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.blocked_rays import blocked_rays
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.distances import distances_to_segments
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.prototype.pinhole_cells import (
-    AROUND,
     INSIDE,
+    OUTLINE_DIRECTIONS,
     CellOutlines,
     MirrorSpheres,
     cell_outlines,
@@ -23,33 +25,48 @@ from tbcad_verify.prototype.pinhole_cells import (
 )
 from tbcad_verify.prototype.ray_transfer import (
     RayTransfer,
-    lengths,
+    nearest_on_rays,
     nearest_points,
-    nearest_to_origin,
     ray_transfer,
     rotated,
 )
-from tbcad_verify.prototype.triangle_distances import to_segments
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_least,
+    at_most,
+    informative,
+    short_list,
+    worst_offenders,
+)
 from tbcad_verify.types import Bools, Floats, Ints
 
+CHECKS = {
+    "cells": "directions",
+    "coverage, balls": "mm",
+    "coverage, balls, off the record": "mm",
+    "light of the balls": "blocked rays",
+    "rays of the balls": "rays",
+    "pixels kept by the balls": "% of the shell's",
+}
 HALVINGS = 26
-RINGS = (0.25, 0.5, 0.75)  # of the way to the rim, each with one direction in EACH
-EACH = 4
-ROUND = 0.25  # by which turns about the origin may differ from one
+RINGS = (0.25, 0.5, 0.75)  # of the angle to the rim, each with one direction in RING_STEP
+RING_STEP = 4
+TURNS = 0.25  # by which turns about the origin may differ from one
 
 
 @dataclass(frozen=True)
 class BallViews:
-    """What is found for each of m mirrors.
+    """The view of each of m mirrors.
 
     Attributes:
         coverage: (m,) mm; 0 where the ball does not show the object's middle in the window.
-        hidden: (m,) directions just inside the cell that another mirror of the shell takes.
-        rays: (m,) looked at: pixels, and rings out to the rim of the capture sphere.
-        blocked: (m,) of them that something stops, or that fall beside the ball.
+        hidden: (m,) directions just inside the cell in which another mirror of the shell is seen.
+        rays: (m,) that were traced: pixels, and rings out to the rim of the capture sphere.
+        blocked: (m,) of them that something stops, or that miss the ball.
         blockers: what stops them, each once.
-        pixels: (m,) whose ray meets the capture sphere off the ball.
-        pixels_shell: (m,) off the mirror.
+        pixels: (m,) whose ray meets the capture sphere after the ball.
+        pixels_shell: (m,) after the mirror.
     """
 
     coverage: Floats
@@ -63,113 +80,166 @@ class BallViews:
 
 def ball_views(measured: MeasuredPrototype) -> BallViews:
     """Trace all mirrors of the camera, each on its ball at its stop."""
-    shell, ready = mirror_spheres(measured.context), ray_transfer(measured)
-    cell = cell_outlines(shell)
-    edge, miss = _on_balls(ready, cell)
-    rim, mirror = _rim(ready, edge, miss)
-    pixel, seen, weight, shell_weight = _pixels(ready, shell)
-    stopped, blockers = blocked_rays(ready, np.append(mirror, seen), np.hstack([rim, pixel]))
-    count = shell.radius.size
-    every = np.append(mirror, seen)
+    shell, transfer = mirror_spheres(measured.context), ray_transfer(measured)
+    cells = cell_outlines(shell)
+    outlines, nearest = _ended_on_balls(transfer, cells)
+    rim, rim_mirror = _rim_rays(transfer, outlines, nearest)
+    pixel, pixel_mirror, weight, pixels_shell = _pixel_rays(transfer, shell)
+    mirror, count = np.append(rim_mirror, pixel_mirror), shell.radius.size
+    blocked, blockers = blocked_rays(transfer, mirror, np.hstack([rim, pixel]))
     return BallViews(
-        _coverage(ready, edge, miss),
-        _hidden(shell, cell),
-        np.bincount(every, minlength=count),
-        np.bincount(every[stopped], minlength=count),
+        _coverage(transfer, outlines, nearest),
+        _hidden(shell, cells),
+        np.bincount(mirror, minlength=count),
+        np.bincount(mirror[blocked], minlength=count),
         blockers,
-        np.bincount(seen, weight, count).astype(np.float64),
-        shell_weight,
+        np.bincount(pixel_mirror, weight, count).astype(np.float64),
+        pixels_shell,
     )
 
 
-def _on_balls(transfer: RayTransfer, edge: CellOutlines) -> tuple[CellOutlines, Floats]:
-    """Outlines drawn in to where a ball ends before its mirror's cell does, and their misses."""
-    miss = nearest_points(transfer, np.arange(edge.own.shape[0]), edge.direction)
-    beside = np.isnan(miss[0])
+def checks(names: list[CheckName], context: PrototypeContext, views: BallViews) -> list[Check]:
+    """Every mirror's ball shows the whole object at its stop, and nothing obstructs the light."""
+    cells, covers, off_record, light, rays, pixels = names
+    ids, target = context.mirror_ids, context.export.target_mm
+    hidden, blocked = views.hidden.astype(float), views.blocked.astype(float)
+    worst = np.argsort(views.coverage, kind="stable")
+    short = worst[views.coverage[worst] < target]
+    balls, moved = context.prototype.balls, context.prototype.moved
+    minimum = ball_coverage(context, views.coverage)
+    recorded = balls.coverage_mm if moved else balls.coverage_fixed_mm
+    error = np.where(np.isfinite(minimum), np.abs(minimum - recorded), 0)
+    k = int(error.argmax())
+    return [
+        at_most(cells, hidden.sum(), 0, f"another mirror covers {_ray_counts(ids, hidden)}"),
+        at_least(
+            covers,
+            float(views.coverage.min()),
+            target,
+            "shows too little: " + worst_offenders(ids, views.coverage, "mm", short),
+        ),
+        informative(off_record, float(error[k]), f"ball {k + 1} shows {minimum[k]:.3f}"),
+        at_most(
+            light,
+            blocked.sum(),
+            0,
+            f"{_ray_counts(ids, blocked)}; blocked by {short_list(views.blockers)}",
+        ),
+        informative(rays, float(views.rays.sum()), "traced, before and after the ball"),
+        informative(
+            pixels,
+            100 * float(views.pixels.sum() / max(views.pixels_shell.sum(), 1)),
+            f"{views.pixels.sum():.0f} of {views.pixels_shell.sum():.0f} px, from a sample",
+        ),
+    ]
+
+
+def ball_coverage(context: PrototypeContext, coverage: Floats) -> Floats:
+    """(K,) minimum coverage of the mirrors that each ball substitutes for; inf without any."""
+    minimum = np.full(len(context.prototype.balls), np.inf)
+    np.minimum.at(minimum, context.ball, coverage)
+    return minimum
+
+
+def _ray_counts(ids: list[str], counts: Floats) -> str:
+    worst = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
+    return worst_offenders(ids, counts, "rays", worst, ".0f")
+
+
+def _ended_on_balls(transfer: RayTransfer, cells: CellOutlines) -> tuple[CellOutlines, Floats]:
+    """Outlines drawn in to where a ball ends before its mirror's cell does.
+
+    Returns:
+        The outlines, and where their reflected rays are nearest to the origin.
+    """
+    nearest = nearest_points(transfer, np.arange(cells.is_edge.shape[0]), cells.direction)
+    beside = np.isnan(nearest[0])
     some = np.flatnonzero(beside.any(axis=1))
     share = np.ones(beside.shape)
-    share[some] = _largest(transfer, edge, some, beside[some], np.inf)
+    share[some] = _largest_share(transfer, cells, some, beside[some], np.inf)
     share = np.where(beside, share, 1.0)
-    drawn = replace(edge, direction=edge.toward(share), angle=share * edge.angle)
-    miss[:, some] = nearest_points(transfer, some, drawn.direction[:, some])
-    return drawn, miss
+    drawn = replace(cells, direction=cells.at_share(share), angle=share * cells.angle)
+    nearest[:, some] = nearest_points(transfer, some, drawn.direction[:, some])
+    return drawn, nearest
 
 
-def _largest(
-    transfer: RayTransfer, edge: CellOutlines, some: Ints, search: Bools, radius: float
+def _largest_share(
+    transfer: RayTransfer, outlines: CellOutlines, some: Ints, search: Bools, radius: float
 ) -> Floats:
-    """(s, AROUND) share of the way to the outline up to which rays pass within a radius, mm.
+    """(s, directions) share of the angle to the outline up to which rays pass within a radius.
 
     Args:
-        transfer: ready for rays.
-        edge: all outlines.
+        transfer: to the balls.
+        outlines: of all cells.
         some: (s,) mirrors.
-        search: (s, AROUND) where not all of the way is.
-        radius: about the origin; infinite: as long as they meet the ball.
+        search: (s, directions) where it is less than one.
+        radius: about the origin, mm; infinite: as long as rays meet the ball.
     """
-    mine = CellOutlines(
-        edge.chief[:, some], edge.direction[:, some], edge.angle[some], edge.own[some]
-    )
+    mine = outlines.take(some)
     low, high = np.where(search, 0.0, 1.0), np.ones(search.shape)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        good = lengths(nearest_points(transfer, some, mine.toward(middle))) <= radius
+        nearest = nearest_points(transfer, some, mine.at_share(middle))
+        good = np.linalg.norm(nearest, axis=0) <= radius
         low, high = np.where(good, middle, low), np.where(good, high, middle)
     return low
 
 
-def _coverage(transfer: RayTransfer, edge: CellOutlines, miss: Floats) -> Floats:
-    """(m,) twice the least distance of the outline's image from the origin, mm.
+def _coverage(transfer: RayTransfer, outlines: CellOutlines, nearest: Floats) -> Floats:
+    """(m,) twice the minimum distance of the outline's image from the origin, mm.
 
-    Zero where the outline does not run round the direction in which the ball shows the origin,
-    once, or for a halved mirror by half, without its cut.
+    Zero where the outline does not run once round the direction in which the ball shows the
+    origin; a halved mirror's outline without its cut runs half round it.
     """
-    context, both = transfer.measured.context, edge.own & np.roll(edge.own, -1, axis=1)
-    flat = [x.reshape(3, -1) for x in (miss, np.roll(miss, -1, axis=2))]
-    away = to_segments(np.zeros_like(flat[0]), *flat).reshape(both.shape)
-    # What passes the ball by shows nothing, so it takes nothing away.
-    least = 2 * np.where(both & np.isfinite(away), away, np.inf).min(axis=1)
+    context = transfer.measured.context
+    both = outlines.is_edge & np.roll(outlines.is_edge, -1, axis=1)
+    ends = [x.reshape(3, -1) for x in (nearest, np.roll(nearest, -1, axis=2))]
+    distance = distances_to_segments(np.zeros_like(ends[0]), *ends).reshape(both.shape)
+    # A ray that misses the ball shows nothing, so it takes nothing away.
+    diameter = 2 * np.where(both & np.isfinite(distance), distance, np.inf).min(axis=1)
     apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
-    middle = tangent_basis(unit(apex - context.pinhole[:, None]))
-    way = np.einsum("ijm,jms->ims", transfer.on_base, edge.direction)
-    angle = np.arctan2(*((side[:, :, None] * way).sum(axis=0) for side in reversed(middle)))
+    first, second = tangent_basis(unit(apex - context.pinhole[:, None]))
+    d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
+    angle = np.arctan2(*((side[:, :, None] * d).sum(axis=0) for side in (second, first)))
     step = axis.wrapped(np.roll(angle, -1, axis=1) - angle)
     turns = np.abs(np.where(both, step, 0).sum(axis=1)) / (2 * np.pi)
-    wanted = np.where(context.halved, 0.5, 1.0)
-    return np.where(np.abs(turns - wanted) <= ROUND, least, 0.0)
+    expected = np.where(context.halved, 0.5, 1.0)
+    return np.where(np.abs(turns - expected) <= TURNS, diameter, 0.0)
 
 
-def _hidden(shell: MirrorSpheres, edge: CellOutlines) -> Ints:
+def _hidden(shell: MirrorSpheres, cells: CellOutlines) -> Ints:
     """(m,) directions of each cell, a little inside, along which another mirror comes first."""
-    share = np.full(edge.angle.shape, INSIDE)
-    found = first_mirrors(shell, edge.toward(share).reshape(3, -1)).reshape(edge.own.shape)
-    wrong = (found != np.arange(shell.radius.size)[:, None]) & edge.own
+    inside = cells.at_share(np.full(cells.angle.shape, INSIDE))
+    first = first_mirrors(shell, inside.reshape(3, -1)).reshape(cells.is_edge.shape)
+    wrong = (first != np.arange(shell.radius.size)[:, None]) & cells.is_edge
     return np.asarray(wrong.sum(axis=1))
 
 
-def _rim(transfer: RayTransfer, edge: CellOutlines, miss: Floats) -> tuple[Floats, Ints]:
-    """Rays (3, N) that graze the capture sphere off the balls, and whose they are.
+def _rim_rays(
+    transfer: RayTransfer, outlines: CellOutlines, nearest: Floats
+) -> tuple[Floats, Ints]:
+    """Rays (3, N) that graze the capture sphere after the balls, and their mirrors (N,).
 
-    They lie between the middle of the cell and its outline, or on that where it sees too little;
-    the middle and a few rings within them go along, for what stands where no pixel looks.
+    They lie between the middle of the cell and its outline, or on the outline where it sees too
+    little. The middle and a few rings are added, for obstacles where no pixel looks.
     """
-    every, radius = np.arange(edge.own.shape[0]), transfer.measured.context.radius
-    share = _largest(transfer, edge, every, lengths(miss) > radius, radius)
-    found = [edge.toward(share)[:, edge.own], edge.chief]
-    mirror = [np.repeat(every[:, None], AROUND, axis=1)[edge.own], every]
-    some = edge.own & (np.arange(AROUND) % EACH == 0)
-    for ring in RINGS:
-        found.append(edge.toward(ring * share)[:, some])
-        mirror.append(np.repeat(every[:, None], AROUND, axis=1)[some])
-    return np.concatenate(found, axis=1), np.concatenate(mirror)
+    every, radius = np.arange(outlines.is_edge.shape[0]), transfer.measured.context.radius
+    beyond = np.linalg.norm(nearest, axis=0) > radius
+    share = _largest_share(transfer, outlines, every, beyond, radius)
+    mirror = np.repeat(every[:, None], OUTLINE_DIRECTIONS, axis=1)
+    some = outlines.is_edge & (np.arange(OUTLINE_DIRECTIONS) % RING_STEP == 0)
+    rays = [outlines.at_share(share)[:, outlines.is_edge], outlines.chief]
+    rays += [outlines.at_share(ring * share)[:, some] for ring in RINGS]
+    mirrors = [mirror[outlines.is_edge], every, *[mirror[some]] * len(RINGS)]
+    return np.concatenate(rays, axis=1), np.concatenate(mirrors)
 
 
-def _pixels(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, Floats, Floats]:
-    """Rays of sampled pixels that meet the capture sphere off their ball, in the shell's picture.
+def _pixel_rays(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, Floats, Floats]:
+    """Rays of sampled pixels that meet the capture sphere after their ball.
 
     Returns:
-        Directions (3, N), mirrors (N,), pixels that each stands for in the prototype's picture
-        (N,), and pixels of the shell's picture by mirror (m,).
+        Directions (3, N) in the shell's picture, mirrors (N,), pixels of the prototype's picture
+        that each represents (N,), and pixels of the shell's picture by mirror (m,).
     """
     camera, radius = transfer.measured.context.camera, transfer.measured.context.radius
     d, step = sampled_pixels(camera)
@@ -177,16 +247,14 @@ def _pixels(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, 
     on = np.flatnonzero(mirror >= 0)
     d, mirror = d[:, on], mirror[on]
     normal = unit(shell.apex - shell.centre)
-    balls = Surfaces(shell.centre + shell.radius * normal, normal, 1 / shell.radius)
-    straight = (
-        norm(nearest_to_origin(reflect(prepare_for_rays(shell.pinhole, balls), mirror, d)))
-        <= radius
-    )
-    way = rotated(transfer.moved[:, :, mirror], d)
-    meets = norm(nearest_to_origin(transfer.lines(mirror, d)[1])) <= radius
-    depth = dot(way, np.broadcast_to(camera.forward[:, None], way.shape))
-    # Turned toward the frame's edge, the same cone of rays fills more pixels.
-    dense = np.asarray(step**2 / np.maximum(depth, 1e-3) ** 3, dtype=np.float64)
-    area = np.full(int(straight.sum()), float(step**2))
-    shell_count = np.bincount(mirror[straight], area, shell.radius.size).astype(np.float64)
-    return d[:, meets], mirror[meets], dense[meets], shell_count
+    spheres = Surfaces(shell.centre + shell.radius * normal, normal, 1 / shell.radius)
+    by_mirror = reflect(prepare_for_rays(shell.pinhole, spheres), mirror, d)
+    in_shell = norm(nearest_on_rays(by_mirror)) <= radius
+    in_prototype = norm(nearest_on_rays(transfer.reflected(mirror, d)[1])) <= radius
+    merged = rotated(transfer.merged[:, :, mirror], d)
+    depth = dot(merged, np.broadcast_to(camera.forward[:, None], merged.shape))
+    # Rotated toward the frame's edge, the same cone of rays fills more pixels.
+    weight = np.asarray(step**2 / np.maximum(depth, 1e-3) ** 3, dtype=np.float64)
+    area = np.full(int(in_shell.sum()), float(step**2))
+    shell_count = np.bincount(mirror[in_shell], area, shell.radius.size).astype(np.float64)
+    return d[:, in_prototype], mirror[in_prototype], weight[in_prototype], shell_count

@@ -11,16 +11,18 @@ from tbcad_verify.mesh.segments import rounding
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart
-from tbcad_verify.report.checks import Check, Unknown, at_most
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most
 from tbcad_verify.types import Floats
 
-# Facets may be a sphere's if their corners are this near to the recorded one, and face outward.
+# Facets may be a sphere's if their corners are this near to it and they face outward. Each round
+# starts from the fit of the one before.
 NEAR_MM = (0.1, 0.03, 0.01, 0.003)
-MOST_OF = 90  # percent of the vertices, whose form counts
-FACING = 0.9
-STEPS = 8
-LEAST = 8  # vertices
+FORM_PERCENTILE = 90  # of the vertices' distances
+FACING_COS = 0.9
+NEWTON_STEPS = 8
+MIN_VERTICES = 8
 CENTRE_UM = 5.0
+FORM_UM = 1.0
 CHECKS = {"cap fronts": "um", "cap bodies": "um", "cap form": "um"}
 
 
@@ -50,18 +52,18 @@ class MeasuredCap:
     body: FittedSphere
 
 
-def measure_cap(context: PrototypeContext, body: MeasuredPart) -> MeasuredCap:
+def measure_cap(context: PrototypeContext, part: MeasuredPart) -> MeasuredCap:
     """Fit both spheres of a cap.
 
     Raises:
         Unknown: there is no such surface, or no mesh.
     """
-    balls, k = context.prototype.balls, body.part.ball
-    centre, middle = balls.columns("cx", 3)[:, k], balls.columns("bx", 3)[:, k]
-    front = fit_sphere(body.placed_mesh, centre, float(balls.radius_mm[k]))
-    return MeasuredCap(
-        k, front, fit_sphere(body.placed_mesh, middle, float(balls.body_radius_mm[k]))
+    balls, k, mesh = context.prototype.balls, part.part.ball, part.placed_mesh
+    front, body = (
+        fit_sphere(mesh, balls.columns(centre, 3)[:, k], float(radius[k]))
+        for centre, radius in (("cx", balls.radius_mm), ("bx", balls.body_radius_mm))
     )
+    return MeasuredCap(k, front, body)
 
 
 def fit_sphere(mesh: Mesh, centre: Floats, radius: float) -> FittedSphere:
@@ -70,83 +72,66 @@ def fit_sphere(mesh: Mesh, centre: Floats, radius: float) -> FittedSphere:
     Facets beyond the rim, where both surfaces run close together, drop out round after round.
 
     Raises:
-        Unknown: fewer than `LEAST` vertices lie there.
+        Unknown: fewer than `MIN_VERTICES` vertices lie there.
     """
-    guess, first, points = np.append(centre, radius), np.zeros((3, 0)), np.zeros((3, 0))
-    inverse = np.zeros((4, 4))
+    sphere, inverse = np.append(centre, radius), np.zeros((4, 4))
+    candidates: list[Floats] = []
     for near in NEAR_MM:
-        points = _near(mesh, guess, near)
-        if points.shape[1] < LEAST:
+        candidates.append(_vertices_near(mesh, sphere, near))
+        if candidates[-1].shape[1] < MIN_VERTICES:
             raise Unknown(f"no sphere of radius {radius:.3f} mm where the record has one")
-        first = first if first.size else points
-        guess, inverse = _fitted(points, guess)
-    off = np.abs(norm(first - guess[:3, None]) - guess[3])
+        sphere, inverse = _least_squares(candidates[-1], sphere)
+    off = np.abs(norm(candidates[0] - sphere[:3, None]) - sphere[3])
     blur = 6 * rounding(mesh) / np.sqrt(3) * float(np.sqrt(np.trace(inverse)))
-    return FittedSphere(guess[:3], float(guess[3]), float(np.percentile(off, MOST_OF)), blur)
+    form = float(np.percentile(off, FORM_PERCENTILE))
+    return FittedSphere(sphere[:3], float(sphere[3]), form, blur)
 
 
-def _near(mesh: Mesh, guess: Floats, near: float) -> Floats:
+def _vertices_near(mesh: Mesh, sphere: Floats, near: float) -> Floats:
     """(3, P) vertices of facets that lie near a sphere and face as it does."""
-    away = np.linalg.norm(mesh.points - guess[:3], axis=1) - guess[3]
-    facets = (np.abs(away) < near)[mesh.faces].all(axis=1)
-    out = mesh.points[mesh.faces].mean(axis=1).T - guess[:3, None]
-    facets &= dot(unit(out), unit(mesh.area)) > FACING
+    height = np.linalg.norm(mesh.points - sphere[:3], axis=1) - sphere[3]
+    facets = (np.abs(height) < near)[mesh.faces].all(axis=1)
+    out = mesh.points[mesh.faces].mean(axis=1).T - sphere[:3, None]
+    facets &= dot(unit(out), unit(mesh.area)) > FACING_COS
     return np.asarray(mesh.points[np.unique(mesh.faces[facets])].T)
 
 
-def _fitted(points: Floats, guess: Floats) -> tuple[Floats, Floats]:
-    """Centre and radius by Gauss and Newton, and the inverse of the normal equations."""
+def _least_squares(points: Floats, sphere: Floats) -> tuple[Floats, Floats]:
+    """Centre and radius by Gauss-Newton steps, and the inverse of the normal equations."""
     matrix = np.eye(4)
-    for _ in range(STEPS):
-        toward = points - guess[:3, None]
-        length = norm(toward)
-        slope = np.vstack([toward / length, np.ones(length.size)])
+    for _ in range(NEWTON_STEPS):
+        spoke = points - sphere[:3, None]
+        length = norm(spoke)
+        slope = np.vstack([spoke / length, np.ones(length.size)])
         matrix = np.einsum("in,jn->ij", slope, slope)
-        guess = guess + np.linalg.solve(matrix, np.einsum("in,n->i", slope, length - guess[3]))
-    return guess, np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+        residual = np.einsum("in,n->i", slope, length - sphere[3])
+        sphere = sphere + np.linalg.solve(matrix, residual)
+    return sphere, np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
-def checks(context: PrototypeContext, caps: list[MeasuredCap], files: str) -> list[Check]:
+def checks(
+    names: list[CheckName], context: PrototypeContext, caps: list[MeasuredCap]
+) -> list[Check]:
     """Fronts and bodies against the record."""
-    front, body, form = ((name, files, unit_) for name, unit_ in CHECKS.items())
-    balls = context.prototype.balls
+    front, body, form = names
+    balls, which = context.prototype.balls, [cap.ball for cap in caps]
+    fronts, bodies = [cap.front for cap in caps], [cap.body for cap in caps]
+    worst = 1000 * max(sphere.form for sphere in fronts + bodies)
     return [
-        _held(
-            front,
-            [(one.ball, one.front) for one in caps],
-            balls.columns("cx", 3),
-            balls.radius_mm,
-        ),
-        _held(
-            body,
-            [(one.ball, one.body) for one in caps],
-            balls.columns("bx", 3),
-            balls.body_radius_mm,
-        ),
-        at_most(
-            form,
-            1000 * max(max(one.front.form, one.body.form) for one in caps),
-            1.0,
-            "vertices do not lie on a sphere",
-        ),
+        _fit_check(front, which, fronts, balls.columns("cx", 3), balls.radius_mm),
+        _fit_check(body, which, bodies, balls.columns("bx", 3), balls.body_radius_mm),
+        at_most(form, worst, FORM_UM, "vertices do not lie on a sphere"),
     ]
 
 
-def _held(
-    name: tuple[str, str, str],
-    found: list[tuple[int, FittedSphere]],
-    centre: Floats,
-    radius: Floats,
+def _fit_check(
+    name: CheckName, balls: list[int], fits: list[FittedSphere], centre: Floats, radius: Floats
 ) -> Check:
-    """Centre and radius errors less what float32 leaves in doubt."""
-    errors = [
-        1000
-        * max(float(np.linalg.norm(one.centre - centre[:, k])), abs(one.radius - float(radius[k])))
-        for k, one in found
-    ]
-    over = [
-        max(error - 1000 * one.blur, 0.0) for error, (_, one) in zip(errors, found, strict=True)
-    ]
-    worst = int(np.argmax(over))
-    detail = f"ball {found[worst][0] + 1}: centre or radius {errors[worst]:.3g} um off"
-    return at_most(name, over[worst], CENTRE_UM, detail)
+    """Errors of centre and radius, less the uncertainty of float32."""
+    off = [np.linalg.norm(fit.centre - centre[:, k]) for k, fit in zip(balls, fits, strict=True)]
+    size = np.abs([fit.radius - radius[k] for k, fit in zip(balls, fits, strict=True)])
+    errors = 1000 * np.maximum(off, size)
+    over = np.maximum(errors - 1000 * np.array([fit.blur for fit in fits]), 0)
+    k = int(over.argmax())
+    detail = f"ball {balls[k] + 1}: centre or radius {errors[k]:.3g} um off"
+    return at_most(name, float(over[k]), CENTRE_UM, detail)

@@ -1,4 +1,4 @@
-"""The export from the prototype's side: its record, its camera, and the mirrors it serves."""
+"""An export as the prototype's checks use it: its record, its camera, and the mirrors it serves."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tbcad_verify.prototype import axis
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import HALVED
 from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.types import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class PrototypeContext:
     """One export with a prototype.
 
     Attributes:
-        export: all of it.
-        prototype: its's record.
+        export: the whole record.
+        prototype: the record of the prototype.
     """
 
     export: Export
@@ -40,55 +40,61 @@ class PrototypeContext:
 
     @property
     def semi_minor(self) -> float:
-        """Of the ellipsoid, mm."""
+        """Semi-minor axis of the ellipsoid, mm."""
         return float(self.export.spec["optics"]["semi_minor_mm"])
 
     @property
     def radius(self) -> float:
-        """Of the capture sphere, mm."""
+        """Radius of the capture sphere, mm."""
         return self.export.target_mm / 2
 
     @cached_property
     def frame(self) -> Floats:
         """(3, 3) rows axis, azimuth zero, third: from the camera, not from the record."""
-        return axis.frame_of(self.pinhole)
+        return axis.axis_frame(self.pinhole)
+
+    def base_rotation(self, angle: Floats) -> Rotation:
+        """Rotations of the base by angles (N,), radians: from its own frame to the ground's."""
+        return Rotation.from_rotvec(angle[:, None] * self.frame[0])
 
     @cached_property
-    def mine(self) -> Ints:
+    def mirror_rows(self) -> Ints:
         """(m,) rows of mirrors.csv that are this camera's mirrors."""
         return np.flatnonzero(self.export.mirrors.camera == self.prototype.camera)
 
-    @cached_property
-    def halved(self) -> NDArray[np.bool_]:
-        """(m,) mirrors that the seam cuts."""
-        return np.asarray(np.abs(self.export.mirrors.ux[self.mine]) < HALVED)
+    @property
+    def mirror_ids(self) -> list[str]:
+        """Ids of the m mirrors."""
+        return [self.export.mirrors.ids[k] for k in self.mirror_rows.tolist()]
 
     @cached_property
-    def pictures(self) -> Ints:
+    def halved(self) -> Bools:
+        """(m,) mirrors that the seam cuts."""
+        return np.asarray(np.abs(self.export.mirrors.ux[self.mirror_rows]) < HALVED)
+
+    @cached_property
+    def plan_rows(self) -> Ints:
         """(m,) row of the plan that shows each of this camera's mirrors, the object not turned.
 
         Raises:
-            Unknown: a mirror has none, or a row names a ball or stop that there is not.
+            Unknown: a mirror has none, or a row names a ball that does not exist.
         """
-        plan, ids = self.prototype.plan, self.export.mirrors.ids
-        straight = np.flatnonzero(plan.turn == 0).tolist()
-        row = {plan.mirror[k]: k for k in straight}
-        missing = [ids[k] for k in self.mine.tolist() if ids[k] not in row]
+        plan, ids = self.prototype.plan, self.mirror_ids
+        row = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == 0).tolist()}
+        missing = [name for name in ids if name not in row]
         if missing:
             raise Unknown(f"the plan shows no {missing[0]} ({len(missing)} mirrors missing)")
-        found = np.array([row[ids[k]] for k in self.mine.tolist()], dtype=np.int64)
-        if not (
-            (plan.ball[found] >= 1).all() and (plan.ball[found] <= len(self.prototype.balls)).all()
-        ):
-            raise Unknown("the plan names balls that there are not")
-        return found
+        rows = np.array([row[name] for name in ids], dtype=np.int64)
+        if not np.isin(plan.ball[rows], 1 + np.arange(len(self.prototype.balls))).all():
+            raise Unknown("the plan names balls that do not exist")
+        return rows
 
     @property
     def ball(self) -> Ints:
-        """(m,) ball that stands in for each mirror, from 0."""
-        return self.prototype.plan.ball[self.pictures] - 1
+        """(m,) ball that substitutes for each mirror, from 0."""
+        return self.prototype.plan.ball[self.plan_rows] - 1
 
     @property
     def angle(self) -> Floats:
         """(m,) base angle at which it does, radians."""
-        return np.radians(self.prototype.plan.angle[self.pictures])
+        return np.radians(self.prototype.plan.angle[self.plan_rows])

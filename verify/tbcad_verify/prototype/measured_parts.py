@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties, mass_properties
 from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes, mesh_from_facets
@@ -14,39 +13,49 @@ from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, me
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype import Printed
-from tbcad_verify.report.checks import Check, Unknown, at_most, check_names, guarded, reason_of
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    check_names,
+    guarded,
+    reason_of,
+    unknown,
+)
 from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
+from tbcad_verify.types import Floats, Ints
 
-ROTATION = 1e-9
+ROTATION = 1e-9  # largest deviation of the axes from a rotation
 BED_MM = 0.05
-# Round bosses meet ribs in grooves that run out to a few degrees; what is closer is a fold.
+# Round bosses meet ribs in grooves that run out to a few degrees; a sharper bend is a fold.
 FOLD_RAD = 0.02
 POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 
 @dataclass(frozen=True)
 class MeasuredPart:
-    """One part.
+    """One part; what could not be measured is None.
 
     Attributes:
         part: its record.
-        mesh: as it lies on the bed; None where it could not be made out.
+        checks: of mesh and pose.
+        reason: why something is None.
+        mesh: as it lies on the bed.
         placed: the same in the frame of the shell, the base at angle zero.
         topology: of the mesh.
         mass: of the mesh on the bed.
         placed_mass: of the placed mesh.
-        checks: of mesh and pose.
-        reason: why something is None.
     """
 
     part: Printed
-    mesh: Mesh | None
-    placed: Mesh | None
-    topology: Topology | None
-    mass: MassProperties | None
-    placed_mass: MassProperties | None
     checks: list[Check]
-    reason: str
+    reason: str = ""
+    mesh: Mesh | None = None
+    placed: Mesh | None = None
+    topology: Topology | None = None
+    mass: MassProperties | None = None
+    placed_mass: MassProperties | None = None
 
     @property
     def placed_mesh(self) -> Mesh:
@@ -62,22 +71,21 @@ class MeasuredPart:
 
 def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
     """Measure one part's mesh."""
+    solid, pose = check_names(TOPOLOGY | FOLDS, part.stl), check_names(POSE, part.stl)
     try:
         mesh = mesh_from_facets(facets)
         edges = measure_edges(mesh)
-        found = examine_topology(mesh, facets)
+        topology = examine_topology(mesh, facets)
         placed = put_back(mesh, part)
-        lump = replace(mass_properties(placed), bend=_bend(mesh, edges))
+        placed_mass = replace(mass_properties(placed), bend=_bend(mesh, edges))
     except Exception as error:
-        return MeasuredPart(
-            part, None, None, None, None, None, _unknown(part, error), reason_of(error)
-        )
-    checks = _checks(
-        part,
-        lambda: [*mesh_checks(part.stl, found), fold_check(part.stl, count_folds(edges, FOLD_RAD))],
-    )
-    checks += guarded(check_names(POSE, part.stl), lambda: pose_checks(part, mesh))
-    return MeasuredPart(part, mesh, placed, found, mass_properties(mesh), lump, checks, "")
+        reason = reason_of(error)
+        return MeasuredPart(part, [unknown(name, reason) for name in solid + pose], reason)
+    folds = fold_check(part.stl, count_folds(edges, FOLD_RAD))
+    checks = guarded(solid, lambda: [*mesh_checks(part.stl, topology), folds])
+    checks += guarded(pose, lambda: pose_checks(pose, part, mesh))
+    mass = mass_properties(mesh)
+    return MeasuredPart(part, checks, "", mesh, placed, topology, mass, placed_mass)
 
 
 def put_back(mesh: Mesh, part: Printed) -> Mesh:
@@ -87,46 +95,47 @@ def put_back(mesh: Mesh, part: Printed) -> Mesh:
     return replace(mesh, points=points, area=area)
 
 
-def pose_checks(part: Printed, mesh: Mesh) -> list[Check]:
-    """The pose is a rotation, without mirroring, and the part lies on the bed and not in it."""
+def pose_checks(names: list[CheckName], part: Printed, mesh: Mesh) -> list[Check]:
+    """The pose is a rotation without mirroring, and the part touches the bed from above."""
+    rotation, bed = names
     gram = np.abs(part.axes @ part.axes.T - np.eye(3)).max()
-    turn, bed = check_names(POSE, part.stl)
-    off = max(float(gram), abs(float(np.linalg.det(part.axes)) - 1))
+    error = max(float(gram), abs(float(np.linalg.det(part.axes)) - 1))
     low = float(mesh.points[:, 2].min())
     return [
-        at_most(turn, off, ROTATION, "axes are no rotation"),
+        at_most(rotation, error, ROTATION, "axes are no rotation"),
         at_most(bed, abs(low), BED_MM, f"the lowest point lies at z = {low:.3f} mm"),
     ]
 
 
-def of_roles(bodies: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
-    """Those of some roles."""
-    return [one for one in bodies if one.part.role in roles]
+def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
+    """The parts of some roles."""
+    return [part for part in parts if part.part.role in roles]
 
 
-def joined_meshes(bodies: list[MeasuredPart]) -> tuple[Mesh, NDArray[np.intp]]:
-    """Placed meshes as one, and which body each facet is of.
+def stl_names(parts: list[MeasuredPart], *roles: str) -> str:
+    """Names of the STL files of some roles, as checks name several files."""
+    return ", ".join(part.part.stl for part in of_roles(parts, *roles))
+
+
+def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
+    """Placed meshes as one, and the part that each facet belongs to.
 
     Raises:
-        Unknown: one could not be made out.
+        Unknown: one could not be measured.
     """
-    meshes = [one.placed_mesh for one in bodies]
+    meshes = [part.placed_mesh for part in parts]
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     return join_meshes(meshes), owner
+
+
+def manifold(points: Floats, faces: Any) -> Any:
+    """The solid that manifold3d makes of points (V, 3), mm, and facets (F, 3)."""
+    import manifold3d
+
+    mesh = manifold3d.Mesh64(np.ascontiguousarray(points), faces.astype(np.uint64))
+    return manifold3d.Manifold(mesh)
 
 
 def _bend(mesh: Mesh, edges: Edges) -> float:
     length = norm(half_edge_vectors(mesh, edges.half)[1])
     return float((length * np.abs(edges.angle)).sum())
-
-
-def _checks(part: Printed, work: Callable[[], list[Check]]) -> list[Check]:
-    return guarded(check_names({**TOPOLOGY, **FOLDS}, part.stl), work)
-
-
-def _unknown(part: Printed, error: Exception) -> list[Check]:
-    def broken() -> list[Check]:
-        raise error
-
-    names = check_names({**TOPOLOGY, **FOLDS, **POSE}, part.stl)
-    return guarded(names, broken)

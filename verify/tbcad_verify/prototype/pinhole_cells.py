@@ -1,7 +1,7 @@
 """The mirrors' cells in the camera's picture, from mirrors.csv alone.
 
-What the pinhole sees first of the union of all balls is worked out ray by ray, and each cell's
-outline by halving angles about the direction of the mirror's apex.
+The mirror that the pinhole sees first along a ray is found among all spheres, and each cell's
+outline by bisection of angles about the direction of the mirror's apex.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Bools, Floats, Ints
 
-AROUND = 96  # directions of an outline
+OUTLINE_DIRECTIONS = 96
 NEIGHBOURS = 20
 HALVINGS = 34
-WIDEST = 1.2  # rad, from a mirror's apex to its outline, as the pinhole sees them
-INSIDE = 0.98  # of the way to the outline, where the mirror itself must be seen
-CHUNK = 1 << 12  # rays against all balls at once
-PIXELS = 100_000  # of the sensor are looked at, about
+MAX_ANGLE = 1.2  # rad, from a mirror's apex to its outline, as the pinhole sees them
+INSIDE = 0.98  # of the angle to the outline, where the mirror itself must be seen
+CHUNK = 1 << 12  # rays against all spheres at once
+PIXELS = 100_000  # of the sensor are sampled, about
 
 
 @dataclass(frozen=True)
 class MirrorSpheres:
-    """The reflecting balls of m mirrors, as one pinhole sees them, coats included.
+    """The reflecting spheres of m mirrors, coats included.
 
     Attributes:
         pinhole: (3,) mm.
@@ -52,22 +52,27 @@ class MirrorSpheres:
 
 @dataclass(frozen=True)
 class CellOutlines:
-    """Cells' edges: AROUND directions for each of m mirrors, in order round the apex.
+    """Cells' edges: OUTLINE_DIRECTIONS directions for each of m mirrors, in order round the apex.
 
     Attributes:
         chief: (3, m) unit, to the apices.
-        direction: (3, m, AROUND) unit.
-        angle: (m, AROUND) from the chief, rad.
-        own: (m, AROUND) false where a halved mirror goes on beyond the seam.
+        direction: (3, m, OUTLINE_DIRECTIONS) unit.
+        angle: (m, OUTLINE_DIRECTIONS) from the chief, rad.
+        is_edge: (m, OUTLINE_DIRECTIONS) false where a halved mirror goes on beyond the seam.
     """
 
     chief: Floats
     direction: Floats
     angle: Floats
-    own: Bools
+    is_edge: Bools
 
-    def toward(self, share: Floats) -> Floats:
-        """(3, m, AROUND) unit directions at shares (m, AROUND) of the way to the outline."""
+    def take(self, mirror: Ints) -> CellOutlines:
+        """The cells of some mirrors."""
+        chief, direction = self.chief[:, mirror], self.direction[:, mirror]
+        return CellOutlines(chief, direction, self.angle[mirror], self.is_edge[mirror])
+
+    def at_share(self, share: Floats) -> Floats:
+        """(3, m, OUTLINE_DIRECTIONS) directions at shares (m, ...) of the angle to the outline."""
         edge = self.direction - np.cos(self.angle) * self.chief[:, :, None]
         edge /= np.maximum(np.sin(self.angle), 1e-300)
         angle = share * self.angle
@@ -75,13 +80,13 @@ class CellOutlines:
 
 
 def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:
-    """The balls of the camera that the prototype serves."""
-    rows = context.export.mirrors.take(context.mine)
+    """The spheres of the camera that the prototype serves."""
+    rows = context.export.mirrors.take(context.mirror_rows)
     return MirrorSpheres(
         context.pinhole,
         rows.columns("px", 3),
         rows.columns("cx", 3),
-        rows.radius_mm,
+        rows.columns("radius_mm")[0],
         float(np.sign(context.pinhole[0])),
         context.export.foot_z_mm,
         context.halved,
@@ -89,28 +94,28 @@ def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:
 
 
 def cell_outlines(shell: MirrorSpheres) -> CellOutlines:
-    """Edges of all cells; an apex that is not in its own cell has its edge on it."""
+    """Outlines of all cells; of one that does not contain its own apex, the apex itself."""
     chief = unit(shell.apex - shell.pinhole[:, None])
     first, second = tangent_basis(chief)
-    turn = 2 * np.pi * np.arange(AROUND) / AROUND
-    out = first[:, :, None] * np.cos(turn) + second[:, :, None] * np.sin(turn)
+    around = 2 * np.pi * np.arange(OUTLINE_DIRECTIONS) / OUTLINE_DIRECTIONS
+    out = first[:, :, None] * np.cos(around) + second[:, :, None] * np.sin(around)
     near = _neighbours(shell)
-    low = np.zeros((shell.radius.size, AROUND))
-    high = np.full_like(low, WIDEST)
+    low = np.zeros((shell.radius.size, OUTLINE_DIRECTIONS))
+    high = np.full_like(low, MAX_ANGLE)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         d = np.cos(middle) * chief[:, :, None] + np.sin(middle) * out
         inside = _inside(shell, near, d)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     d = np.cos(low) * chief[:, :, None] + np.sin(low) * out
-    own = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
-    return CellOutlines(chief, d, low, own)
+    is_edge = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
+    return CellOutlines(chief, d, low, is_edge)
 
 
 def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
     """(N,) the mirror that the pinhole sees first along d (3, N); -1 for none.
 
-    What lies beyond the seam or below the foot is no mirror.
+    Beyond the seam and below the foot there is no mirror.
     """
     chunks = [d[:, k : k + CHUNK] for k in range(0, d.shape[1], CHUNK)]
     if not chunks:
@@ -130,32 +135,32 @@ def _rows(camera: Camera, step: int) -> Iterator[Floats]:
 
 
 def _first(shell: MirrorSpheres, d: Floats) -> Ints:
-    away = shell.pinhole[:, None] - shell.centre
+    offset = shell.pinhole[:, None] - shell.centre
     # No BLAS, whose rounding depends on the number of threads.
-    b = np.einsum("in,im->nm", d, away, optimize=False)
+    b = np.einsum("in,im->nm", d, offset, optimize=False)
     square = dot(d, d)[:, None]
-    under = b * b - square * (dot(away, away) - shell.radius**2)
+    under = b * b - square * (dot(offset, offset) - shell.radius**2)
     with np.errstate(invalid="ignore"):
         reach = np.where(under >= 0, -b - np.sqrt(under), np.inf)
     mirror = reach.argmin(axis=1)
-    least = reach[np.arange(mirror.size), mirror] / square[:, 0]
-    point = shell.pinhole[:, None] + np.where(np.isfinite(least), least, 0) * d
-    good = np.isfinite(least) & (shell.side * point[0] >= 0) & (point[2] >= shell.foot)
+    nearest = reach[np.arange(mirror.size), mirror] / square[:, 0]
+    point = shell.pinhole[:, None] + np.where(np.isfinite(nearest), nearest, 0) * d
+    good = np.isfinite(nearest) & (shell.side * point[0] >= 0) & (point[2] >= shell.foot)
     return np.where(good, mirror, -1)
 
 
 def _neighbours(shell: MirrorSpheres) -> Ints:
     """(m, NEIGHBOURS) the mirrors nearest to each, without itself."""
     count = min(NEIGHBOURS + 1, shell.radius.size)
-    found = cKDTree(unit(shell.apex).T).query(unit(shell.apex).T, k=count)[1]
-    return np.asarray(found, dtype=np.int64).reshape(shell.radius.size, count)[:, 1:]
+    nearest = cKDTree(unit(shell.apex).T).query(unit(shell.apex).T, k=count)[1]
+    return np.asarray(nearest, dtype=np.int64).reshape(shell.radius.size, count)[:, 1:]
 
 
 def _points(shell: MirrorSpheres, d: Floats) -> Floats:
     """(3, m, s) where rays d meet their own mirrors' balls first; NaN where they miss."""
-    away = (shell.pinhole[:, None] - shell.centre)[:, :, None]
-    b = (d * away).sum(axis=0)
-    rest = (away**2).sum(axis=0) - shell.radius[:, None] ** 2
+    offset = (shell.pinhole[:, None] - shell.centre)[:, :, None]
+    b = (d * offset).sum(axis=0)
+    rest = (offset**2).sum(axis=0) - shell.radius[:, None] ** 2
     with np.errstate(invalid="ignore"):
         return np.asarray(shell.pinhole[:, None, None] + (-b - np.sqrt(b * b - rest)) * d)
 
@@ -169,8 +174,8 @@ def _inside(shell: MirrorSpheres, near: Ints, d: Floats) -> Bools:
     power = (centre**2).sum(axis=0) - radius**2
     for k in range(near.shape[1]):
         other = near[:, k]
-        # Within the other ball: beyond the plane of all points with the same power.
-        way = 2 * (centre[:, other] - centre)
+        # Inside the other sphere: beyond the radical plane, where both powers are equal.
+        across = 2 * (centre[:, other] - centre)
         level = power[other] - power
-        good &= (way[:, :, None] * point).sum(axis=0) <= level[:, None]
+        good &= (across[:, :, None] * point).sum(axis=0) <= level[:, None]
     return np.asarray(good)

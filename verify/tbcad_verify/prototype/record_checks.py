@@ -1,9 +1,8 @@
-"""The record of a prototype against itself: frame, seats, and balls on the ellipsoid."""
+"""The record of a prototype checked by itself: frame, seats, and balls on the ellipsoid."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype import axis
@@ -15,13 +14,13 @@ from tbcad_verify.report.checks import (
     Check,
     CheckName,
     at_most,
-    guarded,
+    guarded_each,
     short_list,
     worst_offenders,
 )
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Bools, Floats
 
-ANGLE = 1e-9  # radians, and of unit vectors
+TOLERANCE = 1e-9  # mm, radians, and of unit vectors
 CHECKS = (
     ("prototype requirements", RECORD, "unlike the design"),
     ("ball places", BALLS, "mm off"),
@@ -30,19 +29,14 @@ CHECKS = (
 
 
 def checks(context: PrototypeContext) -> list[Check]:
-    """The frame is the camera's, and every ball stands where it must."""
-    work = (_asked, _places, _sizes)
-    return [
-        check
-        for name, job in zip(CHECKS, work, strict=True)
-        for check in guarded([name], lambda name=name, job=job: [job(name, context)])  # type: ignore[misc]
-    ]
+    """The frame is the camera's, and every ball is where it must be."""
+    return guarded_each(CHECKS, (_requirements, _positions, _sizes), context)
 
 
-def _asked(name: CheckName, context: PrototypeContext) -> Check:
+def _requirements(name: CheckName, context: PrototypeContext) -> Check:
     """Target and frame, against the design that the export carries."""
     prototype, export = context.prototype, context.export
-    wanted = {
+    errors = {
         "target_mm": abs(prototype.target_mm - export.target_mm),
         "frame": float(np.abs(prototype.frame.rows - context.frame).max()),
         "seats": _off_unit(np.array([seat.axis for seat in prototype.seats])),
@@ -50,16 +44,16 @@ def _asked(name: CheckName, context: PrototypeContext) -> Check:
     }
     spec = export.spec.get("prototype")
     if isinstance(spec, dict) and "picture" in spec:
-        wanted["picture"] = float((spec["picture"] == "moved") != prototype.moved)
-    odd = sorted(what for what, away in wanted.items() if not away <= ANGLE)
-    return at_most(name, len(odd), 0, f"not as designed: {short_list(odd)}")
+        errors["picture"] = float((spec["picture"] == "moved") != prototype.moved)
+    wrong = sorted(what for what, error in errors.items() if not error <= TOLERANCE)
+    return at_most(name, len(wrong), 0, f"not as designed: {short_list(wrong)}")
 
 
 def _off_unit(vectors: Floats) -> float:
     return float(np.abs(np.linalg.norm(vectors, axis=-1) - 1).max())
 
 
-def _places(name: CheckName, context: PrototypeContext) -> Check:
+def _positions(name: CheckName, context: PrototypeContext) -> Check:
     errors = position_errors(context)
     worst = np.argsort(-errors, kind="stable")
     worst = worst[~(errors[worst] <= POSE_MM)]
@@ -77,14 +71,14 @@ def _places(name: CheckName, context: PrototypeContext) -> Check:
 def position_errors(context: PrototypeContext) -> Floats:
     """(K,) largest deviation of each ball from the design, mm; angles as lengths at 1 mm.
 
-    Checked: the apex lies on the ellipsoid, at the recorded polar angle and azimuth; the normal
-    is unit and bisects the ways to both foci; the reflecting sphere's centre lies one radius
-    behind the apex on it, and that of the body on it too.
+    The apex lies on the ellipsoid, at the recorded polar angle and azimuth; the normal is a unit
+    vector and bisects the directions to both foci; the reflecting sphere's centre lies on it, one
+    radius behind the apex, and so does that of the body.
     """
     balls, pinhole = context.prototype.balls, context.pinhole[:, None]
     p, n, c, b = (balls.columns(key, 3) for key in ("px", "nx", "cx", "bx"))
     double_a = 2 * np.sqrt(context.semi_minor**2 + (context.pinhole**2).sum() / 4)
-    polar, azimuth = axis.angles(context.frame, p)
+    polar, azimuth = axis.polar_and_azimuth(context.frame, p)
     depth = dot(p - b, n)
     worst = np.max(
         [
@@ -102,11 +96,13 @@ def position_errors(context: PrototypeContext) -> Floats:
 
 def _sizes(name: CheckName, context: PrototypeContext) -> Check:
     balls = context.prototype.balls
-    bad = np.flatnonzero(~_sized(balls))
-    return at_most(name, bad.size, 0, f"no ball, or no cap, of its diameter: {listed_of(bad)}")
+    bad = np.flatnonzero(~_has_its_size(balls))
+    return at_most(
+        name, bad.size, 0, f"no ball, or no cap, of its diameter: {short_list(balls.names(bad))}"
+    )
 
 
-def _sized(balls: Balls) -> NDArray[np.bool_]:
+def _has_its_size(balls: Balls) -> Bools:
     """(K,) a ball reflects with all of its diameter; a cap's front is flatter than its body."""
     radius, body, half = balls.radius_mm, balls.body_radius_mm, balls.diameter_mm / 2
     p, c, b = (balls.columns(key, 3) for key in ("px", "cx", "bx"))
@@ -116,8 +112,3 @@ def _sized(balls: Balls) -> NDArray[np.bool_]:
     cap = (np.abs(body - half) <= POSE_MM) & (body <= radius)
     cap &= (depth > 0) & (depth <= body + POSE_MM)
     return np.where(balls.cap, cap, ball)
-
-
-def listed_of(which: NDArray[np.intp]) -> str:
-    """Some balls by number, from 1."""
-    return short_list([f"ball {k + 1}" for k in which.tolist()])

@@ -5,32 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.mesh import Mesh, connected_groups
+from tbcad_verify.mesh.segments import half_edge_vectors
+from tbcad_verify.mesh.vectors import cross, dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.triangle_distances import Corners, distances, to_segments
+from tbcad_verify.prototype.distances import distance_to_facets, distances_to_segments
 from tbcad_verify.report.checks import (
     Check,
+    CheckName,
     Unknown,
     at_least,
     at_most,
-    guarded,
     informative,
     worst_offenders,
 )
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.types import Bools, Floats, Ints
 
 # A facet may be a pad's if it faces the ball to within this, near where the record has the pad.
-FACING = np.cos(np.radians(5.0))
+FACING_COS = np.cos(np.radians(5.0))
 NEAR_MM = 1.0
 # Facets of one plane: all their corners are this near to it.
 FLAT_MM = 2e-3
-# The ball touches a pad at least this share of the pad's radius inside its edge.
+# The ball must touch a pad at least this share of the pad's radius inside its edge.
 INSIDE = 0.5
 SUNK_MM = 1e-3
-ROOM_MM = 2.0  # beyond the ball, in which facets are looked at
+SEARCH_MM = 2.0  # beyond the ball, in which facets are searched
+MIN_DETERMINANT = 1e-3  # of the pads' normals, for the planes to meet in a point
+LISTED = 3  # balls without three pads
 CHECKS = {
     "ball centres": "um",
     "pads": "mm",
@@ -40,15 +42,25 @@ CHECKS = {
 
 
 @dataclass(frozen=True)
-class MeasuredSeats:
-    """Where the pads put K balls.
+class MeasuredSeat:
+    """Where the pads put one ball.
 
     Attributes:
-        centre: (K, 3) mm; NaN where no three pads were found.
-        margin: (K,) least distance of a contact from the edge of its pad less what is wanted, mm.
-        clear: (K,) least distance of the ball from all of the base but its pads, mm.
-        reason: K texts, why a centre is not known.
+        centre: (3,) mm; NaN where no three pads were found.
+        margin: minimum distance of a contact from the edge of its pad less the required one, mm.
+        clear: minimum distance of the ball from all of the base but its pads, mm.
+        reason: why the centre is not known; empty where it is.
     """
+
+    centre: Floats
+    margin: float
+    clear: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class MeasuredSeats:
+    """The figures of `MeasuredSeat` for K balls: (K, 3), (K,), (K,), and K texts."""
 
     centre: Floats
     margin: Floats
@@ -56,100 +68,103 @@ class MeasuredSeats:
     reason: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Pad:
+    """A plane n.x = d, n toward the ball, and its facets."""
+
+    normal: Floats
+    offset: float
+    facets: Ints
+
+
 def measure_seats(context: PrototypeContext, base: Mesh) -> MeasuredSeats:
-    """Recover the balls' centres from the mesh of all base parts, in the frame."""
-    found = [_one(context, base, k) for k in range(len(context.prototype.balls))]
+    """Recover the balls' centres from the mesh of all base parts, in the frame of the shell."""
+    seats = [_seat(context, base, k) for k in range(len(context.prototype.balls))]
     return MeasuredSeats(
-        np.array([one[0] for one in found]),
-        np.array([one[1] for one in found]),
-        np.array([one[2] for one in found]),
-        tuple(one[3] for one in found),
+        np.array([seat.centre for seat in seats]),
+        np.array([seat.margin for seat in seats]),
+        np.array([seat.clear for seat in seats]),
+        tuple(seat.reason for seat in seats),
     )
 
 
-def checks(context: PrototypeContext, held: MeasuredSeats, files: str) -> list[Check]:
+def checks(names: list[CheckName], context: PrototypeContext, seats: MeasuredSeats) -> list[Check]:
     """Centres against the record, contacts against the pads, balls against the base."""
-    centre, pads, clear, room = ((name, files, unit) for name, unit in CHECKS.items())
-    away = 1000 * norm(held.centre.T - context.prototype.balls.columns("bx", 3))
-    lost = [f"ball {k + 1}: {why}" for k, why in enumerate(held.reason) if why]
-    limit = context.prototype.pad_um
+    centre, pads, clear, clearance = names
+    balls, limit = context.prototype.balls, context.prototype.pad_um
+    error = 1000 * norm(seats.centre.T - balls.columns("bx", 3))
+    missing = [f"ball {k + 1}: {reason}" for k, reason in enumerate(seats.reason) if reason]
+
+    def worst(values: Floats, bad: Bools, unit: str = "mm") -> str:
+        order = np.argsort(-values, kind="stable")
+        ids = balls.names(np.arange(values.size))
+        return worst_offenders(ids, values, unit, order[bad[order]], ".3g")
+
     return [
         at_most(
             centre,
-            np.inf if lost else float(away.max()),
+            np.inf if missing else float(error.max()),
             limit,
-            "; ".join(lost[:3]) or _worst(context, away, away > limit, "um"),
+            "; ".join(missing[:LISTED]) or worst(error, error > limit, "um"),
         ),
-        at_least(pads, float(held.margin.min()), 0, _worst(context, -held.margin, held.margin < 0)),
-        at_least(
-            clear, float(held.clear.min()), -SUNK_MM, _worst(context, -held.clear, held.clear < 0)
-        ),
-        informative(room, float(held.clear.min())),
+        at_least(pads, float(seats.margin.min()), 0, worst(-seats.margin, seats.margin < 0)),
+        at_least(clear, float(seats.clear.min()), -SUNK_MM, worst(-seats.clear, seats.clear < 0)),
+        informative(clearance, float(seats.clear.min())),
     ]
 
 
-def _worst(
-    context: PrototypeContext, values: Floats, bad: NDArray[np.bool_], unit_: str = "mm"
-) -> str:
-    order = np.argsort(-values, kind="stable")
-    names = context.prototype.balls.names(np.arange(values.size))
-    return worst_offenders(names, values, unit_, order[bad[order]], ".3g")
-
-
-def _one(context: PrototypeContext, base: Mesh, k: int) -> tuple[Floats, float, float, str]:
-    """Centre, margin and clearance of one ball; or why they are not known."""
+def _seat(context: PrototypeContext, base: Mesh, k: int) -> MeasuredSeat:
     balls, seat = context.prototype.balls, context.prototype.seats[k]
-    radius = float(balls.body_radius_mm[k])
+    radius, pad_radius = float(balls.body_radius_mm[k]), seat.pad / 2
     try:
-        near = _around(base, balls.columns("bx", 3)[:, k], radius + ROOM_MM)
-        pads = [_pad(base, near, seat.contacts[j], seat.normals[j], seat.pad / 2) for j in range(3)]
-        centre = touching([pad[0] for pad in pads], [pad[1] for pad in pads], radius)
+        near = _facets_near(base, balls.columns("bx", 3)[:, k], radius + SEARCH_MM)
+        pads = [
+            _pad(base, near, contact, normal, pad_radius)
+            for contact, normal in zip(seat.contacts, seat.normals, strict=True)
+        ]
+        centre = touching_sphere([p.normal for p in pads], [p.offset for p in pads], radius)
     except Unknown as error:
-        return np.full(3, np.nan), -np.inf, -np.inf, str(error)
-    wanted = INSIDE * seat.pad / 2
-    margin = min(_margin(base, facets, normal, centre) for normal, _, facets in pads) - wanted
-    others = np.setdiff1d(near, np.concatenate([facets for _, _, facets in pads]))
-    clear = float(distances(centre, _corners(base, others)).min(initial=np.inf)) - radius
-    return centre, margin, clear, ""
+        return MeasuredSeat(np.full(3, np.nan), -np.inf, -np.inf, str(error))
+    margin = min(_margin(base, pad, centre) for pad in pads) - INSIDE * pad_radius
+    others = np.setdiff1d(near, np.concatenate([pad.facets for pad in pads]))
+    return MeasuredSeat(centre, margin, distance_to_facets(centre, base, others) - radius)
 
 
-def touching(normals: list[Floats], offsets: list[float], radius: float) -> Floats:
+def touching_sphere(normals: list[Floats], offsets: list[float], radius: float) -> Floats:
     """(3,) centre of the sphere that lies on three planes n.x = d, on the sides n points to.
 
     Raises:
         Unknown: the planes do not meet in a point.
     """
     matrix = np.array(normals)
-    if abs(float(np.linalg.det(matrix))) < 1e-3:
+    if abs(float(np.linalg.det(matrix))) < MIN_DETERMINANT:
         raise Unknown("the pads' planes do not meet in a point")
     return np.asarray(np.linalg.solve(matrix, np.array(offsets) + radius))
 
 
-def _around(mesh: Mesh, middle: Floats, reach: float) -> Ints:
-    """Facets whose box comes nearer to a point than this."""
+def _facets_near(mesh: Mesh, point: Floats, distance: float) -> Ints:
+    """Facets whose box is nearer to a point than a distance, mm."""
     corners = mesh.points[mesh.faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    gap = np.maximum(np.maximum(low - middle, middle - high), 0)
-    return np.flatnonzero((gap**2).sum(axis=1) < reach**2)
+    gap = np.maximum(np.maximum(low - point, point - high), 0)
+    return np.flatnonzero((gap**2).sum(axis=1) < distance**2)
 
 
-def _pad(
-    mesh: Mesh, near: Ints, contact: Floats, normal: Floats, radius: float
-) -> tuple[Floats, float, Ints]:
-    """Plane n.x = d of one pad as its facets have it, and these facets.
+def _pad(mesh: Mesh, near: Ints, contact: Floats, normal: Floats, radius: float) -> Pad:
+    """One pad as its facets have it.
 
-    The record says only where to begin: the largest facet there that faces the ball. All facets
-    in its plane that hang together with it are the pad.
+    The record gives only the starting point: the largest facet there that faces the ball. All
+    facets in its plane that are connected with it are the pad.
 
     Raises:
         Unknown: nothing there faces the ball.
     """
-    own = unit(mesh.area[:, near])
-    middle = mesh.points[mesh.faces[near]].mean(axis=1) - contact
-    along = middle @ normal
-    across = np.linalg.norm(middle - along[:, None] * normal, axis=1)
-    facing = (dot(own, np.broadcast_to(normal[:, None], own.shape)) > FACING) & (across < radius)
-    facing &= np.abs(along) < NEAR_MM
+    normals = unit(mesh.area[:, near])
+    offset = mesh.points[mesh.faces[near]].mean(axis=1) - contact
+    height = offset @ normal
+    aside = np.linalg.norm(offset - height[:, None] * normal, axis=1)
+    facing = dot(normals, np.broadcast_to(normal[:, None], normals.shape)) > FACING_COS
+    facing &= (aside < radius) & (np.abs(height) < NEAR_MM)
     if not facing.any():
         raise Unknown("no pad where the record has one")
     candidates = near[facing]
@@ -159,55 +174,37 @@ def _pad(
     # A second round, with the plane of all facets instead of the first one's.
     for _ in range(2):
         level = (mesh.points[mesh.faces[near]] - mesh.points[mesh.faces[seed, 0]]) @ n
-        flat = near[(np.abs(level) < FLAT_MM).all(axis=1) & (own.T @ n > 0)]
-        facets = _linked(mesh, flat, seed)
+        flat = near[(np.abs(level) < FLAT_MM).all(axis=1) & (normals.T @ n > 0)]
+        facets = _connected(mesh, flat, seed)
         n = unit(mesh.area[:, facets].sum(axis=1)[:, None])[:, 0]
     points = mesh.points[np.unique(mesh.faces[facets])]
-    return n, float((points @ n).mean()), facets
+    return Pad(n, float((points @ n).mean()), facets)
 
 
-def _linked(mesh: Mesh, facets: Ints, seed: np.intp) -> Ints:
-    """Those of some facets that hang together with one."""
-    allowed = set(facets.tolist())
-    found, todo = {int(seed)}, [int(seed)]
-    while todo:
-        here = todo.pop()
-        for half in mesh.twin[3 * here : 3 * here + 3].tolist():
-            other = half // 3
-            if half >= 0 and other in allowed and other not in found:
-                found.add(other)
-                todo.append(other)
-    return np.array(sorted(found), dtype=np.intp)
+def _connected(mesh: Mesh, facets: Ints, seed: np.intp) -> Ints:
+    """Those of some facets (F,) that are connected with one of them, ascending."""
+    number = np.full(len(mesh.faces), -1)
+    number[facets] = np.arange(facets.size)
+    half, other = _sides(mesh, facets)
+    inner = (other >= 0) & (number[other] >= 0)
+    label = connected_groups(facets.size, number[half[inner] // 3], number[other[inner]])[1]
+    return np.asarray(facets[label == label[number[seed]]])
 
 
-def _margin(mesh: Mesh, facets: Ints, normal: Floats, centre: Floats) -> float:
-    """Distance of where a ball touches a pad from the pad's edge, mm; negative outside."""
+def _sides(mesh: Mesh, facets: Ints) -> tuple[Ints, Ints]:
+    """(3 F,) half-edges of some facets, and the facet beyond each; -1 for none."""
     half = (3 * facets[:, None] + np.arange(3)).ravel()
-    rim = half[~np.isin(mesh.twin[half] // 3, facets)]
-    start = mesh.points[mesh.faces.ravel()[rim]].T
-    end = mesh.points[np.roll(mesh.faces, -1, axis=1).ravel()[rim]].T
-    level = float(start.T[0] @ normal)
-    foot = centre + (level - float(centre @ normal)) * normal
-    away = float(to_segments(np.broadcast_to(foot[:, None], start.shape), start, end).min())
-    a, b = start - foot[:, None], end - foot[:, None]
-    turn = np.arctan2(normal @ np.cross(a.T, b.T).T, dot(a, b)).sum() / (2 * np.pi)
-    return away if abs(turn) > 0.5 else -away
+    return half, mesh.twin[half] // 3
 
 
-def _corners(mesh: Mesh, facets: Ints) -> Corners:
-    a, b, c = (mesh.points[mesh.faces[facets, k]].T for k in range(3))
-    return a, b, c
-
-
-def seat_checks(
-    context: PrototypeContext, base: Mesh, files: str
-) -> tuple[MeasuredSeats | None, list[Check]]:
-    """Both, guarded."""
-    found: list[MeasuredSeats] = []
-
-    def work() -> list[Check]:
-        found.append(measure_seats(context, base))
-        return checks(context, found[0], files)
-
-    made = guarded([(name, files, unit_) for name, unit_ in CHECKS.items()], work)
-    return (found[0] if found else None), made
+def _margin(mesh: Mesh, pad: Pad, centre: Floats) -> float:
+    """Distance of where a ball touches a pad from the pad's edge, mm; negative outside."""
+    half, other = _sides(mesh, pad.facets)
+    start, edge = half_edge_vectors(mesh, half[~np.isin(other, pad.facets)])
+    contact = centre + (start.T[0] - centre) @ pad.normal * pad.normal
+    x = np.broadcast_to(contact[:, None], start.shape)
+    distance = float(distances_to_segments(x, start, start + edge).min())
+    a, b = start - x, start + edge - x
+    angle = np.arctan2(pad.normal @ cross(a, b), dot(a, b))
+    turns = angle.sum() / (2 * np.pi)
+    return distance if abs(turns) > 0.5 else -distance

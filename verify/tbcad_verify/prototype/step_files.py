@@ -1,4 +1,4 @@
-"""STEP files of printed parts, read by other processes and held against the meshes."""
+"""STEP files of printed parts, read by other processes and compared with the meshes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Printed
-from tbcad_verify.report.checks import Check, Unknown, guarded
+from tbcad_verify.report.checks import Check, Unknown, check_names, guarded
 from tbcad_verify.step.part_checks import UNITS, PartComparison, comparison_checks
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
-AT_ONCE = 2  # processes, each with its share of the files
-CLAIM_SHARE = 1e-5
+PROCESSES = 2  # each with its share of the files
+CLAIM_SHARE = 1e-5  # see `PartComparison.claim`
 
 
 def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
@@ -27,10 +27,10 @@ def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unkn
         BadExport: a file is missing, foreign or truncated.
     """
     parts = _parts(export)
-    # The largest first, so that both processes have about as much to do.
+    # The largest first, so that the processes take about equally long.
     blobs = [load(export.folder, part.step) for part in parts]
     order = sorted(range(len(parts)), key=lambda k: (-blobs[k].data.size, k))
-    shares = [order[k::AT_ONCE] for k in range(AT_ONCE) if order[k::AT_ONCE]]
+    shares = [order[k::PROCESSES] for k in range(PROCESSES) if order[k::PROCESSES]]
     answers = in_threads(lambda share: examine_all([blobs[k] for k in share], seconds), shares)
     return {
         parts[k].name: answer
@@ -63,11 +63,10 @@ def _parts(export: Export) -> list[Printed]:
 def _part(
     export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
-    names = [(name, part.step, unit) for name, unit in UNITS.items()]
-    return guarded(names, partial(_known, export, part, found, mass))
+    return guarded(check_names(UNITS, part.step), partial(_compared, export, part, found, mass))
 
 
-def _known(
+def _compared(
     export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
     if isinstance(found, Unknown):

@@ -1,4 +1,4 @@
-"""The base goes through its swing and touches nothing that stands still."""
+"""The base rotates through its swing and touches nothing that is fixed."""
 
 from __future__ import annotations
 
@@ -8,22 +8,31 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
 
-from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.prototype import axis
-from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
-from tbcad_verify.report.checks import Check, at_least, at_most, informative, short_list
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_least,
+    at_most,
+    informative,
+    short_list,
+)
 from tbcad_verify.types import Floats
 
-SEARCH_MM = 8.0  # clearances beyond this are not told apart
-LEAST_RAD = np.radians(0.5)  # between two looks, however near things are
+SEARCH_MM = 8.0  # larger clearances are all reported as this
+MIN_STEP_RAD = np.radians(0.5)  # between two samples, however near things are
 TOUCH_MM3 = 0.01
-# Faces that lie on each other, as screwed parts do, overlap by what facets and float32 make of it.
+# Faces in contact, as of screwed parts, overlap by the error of facets and float32.
 CONTACT_MM3 = 1.0
-CORNERS = 64  # round a ball
+BALL_SEGMENTS = 64
 GRAIN_MM = 2.0  # of points on surfaces
-CLEAR_MM = 1.0  # that keeps parts apart without a second look
+CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
+MIN_LEVER_MM = 1e-9
+FAR_MM = 1e3  # reported of a prototype with one ball
+NAMED = 3  # pairs of parts
 CHECKS = {
     "swing": "mm^3",
     "swing clearance": "mm",
@@ -32,6 +41,8 @@ CHECKS = {
     "balls apart": "mm",
 }
 
+NamedSolids = list[tuple[str, Any]]  # name and manifold3d solid
+
 
 @dataclass(frozen=True)
 class AxialSolid:
@@ -39,9 +50,10 @@ class AxialSolid:
 
     Attributes:
         name: of the part.
-        solid: at angle zero.
-        reach: largest distance from the axis, mm.
-        profile: (P, 2) place along the axis and distance from it of points all over the surface.
+        solid: at angle zero, as manifold3d has it.
+        reach: maximum distance from the axis, mm.
+        profile: (P, 2) position along the axis and distance from it of points all over the
+            surface, mm.
     """
 
     name: str
@@ -52,180 +64,178 @@ class AxialSolid:
 
 @dataclass(frozen=True)
 class PairSweep:
-    """What one pair of a turning and a standing part comes to.
+    """The sweep of one rotating part past one fixed part.
 
     Attributes:
         names: of both.
-        volume: largest they share, mm^3.
-        gap: least distance, mm; at most `SEARCH_MM`.
+        volume: maximum that they share, mm^3.
+        gap: minimum distance, mm; at most `SEARCH_MM`.
         at: base angle of the worse of both, rad.
-        looks: angles looked at.
-        blind: largest turn between two looks beyond what their distance allows, rad; 0: none.
+        samples: number of angles.
+        blind: by how much a step exceeded what the distance allows, at most, rad; 0: never.
     """
 
     names: tuple[str, str]
     volume: float
     gap: float
     at: float
-    looks: int
+    samples: int
     blind: float
+
+    @property
+    def pair(self) -> str:
+        """Both names."""
+        return " and ".join(self.names)
 
 
 def checks(
+    names: list[CheckName],
     measured: MeasuredPrototype,
-    bodies: list[MeasuredPart],
-    bought: list[tuple[str, Any]],
-    files: str,
+    parts: list[MeasuredPart],
+    bought: NamedSolids,
 ) -> list[Check]:
-    """Turn the base from end to end of its swing, and look whether parts fit at angle zero.
+    """Rotate the base from end to end of its swing, and test whether parts fit at angle zero.
 
     Args:
+        names: of the checks.
         measured: the prototype.
-        bodies: printed parts.
-        bought: solids of purchased parts that stand still, by name.
-        files: that all of this is from.
+        parts: printed.
+        bought: purchased parts that are fixed.
     """
-    swing, clearance, looks, apart, balls = ((name, files, unit) for name, unit in CHECKS.items())
-    turning = [(one.part.name, one.placed_mesh) for one in of_roles(bodies, "base", "cap")]
-    standing = [(one.part.name, one.placed_mesh) for one in of_roles(bodies, "stage", "frame")]
-    moving = [_mover(measured, name, solid_of(mesh)) for name, mesh in turning] + _balls(measured)
-    solids = [(name, solid_of(mesh)) for name, mesh in standing]
-    still = [_mover(measured, name, solid) for name, solid in [*solids, *bought]]
-    found = [sweep(measured, one, two) for one in moving for two in still]
-    volume = max((one.volume for one in found), default=0.0)
-    least = min(found, key=lambda one: one.gap, default=None)
+    swing, clearance, samples, apart, balls = names
+    rotating, fixed = _solids(parts, "base", "cap"), _solids(parts, "stage", "frame")
+    moving = [axial_solid(measured, *one) for one in [*rotating, *_ball_solids(measured)]]
+    still = [axial_solid(measured, *one) for one in [*fixed, *bought]]
+    sweeps = [sweep(measured, one, two) for one in moving for two in still]
+    volume = max((one.volume for one in sweeps), default=0.0)
+    nearest = min(sweeps, key=lambda one: one.gap, default=None)
     hits = [
-        f"{one.names[0]} and {one.names[1]} share {one.volume:.3g} mm^3 "
-        f"at {np.degrees(one.at):.1f} deg"
-        for one in sorted(found, key=lambda one: -one.volume)
+        f"{one.pair} share {one.volume:.3g} mm^3 at {np.degrees(one.at):.1f} deg"
+        for one in sorted(sweeps, key=lambda one: -one.volume)
         if one.volume > TOUCH_MM3
     ]
     return [
         at_most(swing, volume, TOUCH_MM3, short_list(hits)),
-        informative(clearance, least.gap if least else SEARCH_MM, _nearest(least)),
-        informative(looks, sum(one.looks for one in found), _how(found)),
-        _apart(apart, [turning, standing]),
-        _room(balls, measured),
+        informative(clearance, nearest.gap if nearest else SEARCH_MM, _clearance_text(nearest)),
+        informative(samples, sum(one.samples for one in sweeps), _step_text(sweeps)),
+        _parts_apart(apart, [rotating, fixed]),
+        _balls_apart(balls, measured),
     ]
 
 
 def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> PairSweep:
-    """Turn one solid past another, each step no larger than their distance allows.
+    """Rotate one solid past another, each step no larger than their distance allows.
 
-    What comes to touch lies no farther from the axis than either of both: no point of it moves
-    more than that distance times the step. No step is smaller than `LEAST_RAD`. Where even their
-    distances from the axis and along it keep both apart, one look does.
+    Where both touch is no farther from the axis than either of them reaches, so no point of it
+    moves more than that distance times the step. No step is smaller than `MIN_STEP_RAD`. Where
+    their positions along the axis and distances from it keep both apart, one sample is enough.
 
     Args:
         measured: the prototype; its swing and its axis.
         moving: at angle zero.
-        still: what stands.
+        still: fixed.
     """
-    low, high = np.radians(measured.context.prototype.swing)
-    lever = max(min(moving.reach, still.reach), 1e-9)
-    apart = _apart_anyhow(moving, still)
-    at, looks, blind = float(low), 0, 0.0
-    worst, where, gap = 0.0, float(low), min(SEARCH_MM, apart) if apart >= CLEAR_MM else SEARCH_MM
+    low, high = np.radians(measured.context.prototype.swing).tolist()
+    lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
+    bound = _distance_at_any_angle(moving, still)
+    names = (moving.name, still.name)
+    if bound >= CLEAR_MM:
+        shared = (_rotated(measured, moving, low) ^ still.solid).volume()
+        return PairSweep(names, shared, min(SEARCH_MM, bound), low, 1, 0.0)
+    at, samples, blind = low, 0, 0.0
+    volume, worst, gap = 0.0, low, SEARCH_MM
     while True:
-        solid = moving.solid.transform(_turn(measured, at))
-        shared = float((solid ^ still.solid).volume())
-        looks += 1
-        if apart >= CLEAR_MM:
-            return PairSweep((moving.name, still.name), shared, gap, at, looks, 0.0)
-        away = float(solid.min_gap(still.solid, SEARCH_MM))
-        if shared > worst or (worst == 0 and away < gap):
-            where = at
-        worst, gap = max(worst, shared), min(gap, away)
+        solid = _rotated(measured, moving, at)
+        shared, distance = (solid ^ still.solid).volume(), solid.min_gap(still.solid, SEARCH_MM)
+        samples += 1
+        if shared > volume or (volume == 0 and distance < gap):
+            worst = at
+        volume, gap = max(volume, shared), min(gap, distance)
         if at >= high:
-            break
-        step = max(away / lever, LEAST_RAD)
-        blind = max(blind, min(step, high - at) - away / lever)
-        at = min(at + step, float(high))
-    return PairSweep((moving.name, still.name), worst, gap, where, looks, max(blind, 0.0))
+            return PairSweep(names, volume, gap, worst, samples, blind)
+        step = max(distance / lever, MIN_STEP_RAD)
+        blind = max(blind, min(step, high - at) - distance / lever)
+        at = min(at + step, high)
 
 
-def _mover(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSolid:
+def _rotated(measured: MeasuredPrototype, moving: AxialSolid, angle: float) -> Any:
+    """The solid at a base angle, rad."""
+    rotation = measured.context.base_rotation(np.array([angle])).as_matrix()[0]
+    return moving.solid.transform(np.hstack([rotation, np.zeros((3, 1))]))
+
+
+def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSolid:
+    """Measure a solid about the base's axis."""
     points = solid.refine_to_length(GRAIN_MM).to_mesh64().vert_properties[:, :3]
     along = points @ measured.context.frame[0]
     out = np.linalg.norm(np.cross(points, measured.context.frame[0]), axis=1)
     return AxialSolid(name, solid, float(out.max(initial=0)), np.stack([along, out], axis=1))
 
 
-def _apart_anyhow(one: AxialSolid, two: AxialSolid) -> float:
-    """Distance that two solids keep however they are turned about the axis, mm; may be negative.
+def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
+    """Distance that two solids keep at any angle about the axis, mm; may be negative.
 
     No point of a facet is farther from a corner than 1/sqrt(3) of its longest edge.
     """
-    away = np.asarray(cKDTree(one.profile).query(two.profile)[0])
-    return float(away.min()) - 2 * GRAIN_MM / float(np.sqrt(3))
+    distance = np.asarray(cKDTree(one.profile).query(two.profile)[0])
+    return float(distance.min()) - 2 * GRAIN_MM / float(np.sqrt(3))
 
 
-def solid_of(mesh: Mesh) -> Any:
-    """A mesh as manifold3d has it."""
-    import manifold3d
+def _solids(parts: list[MeasuredPart], *roles: str) -> NamedSolids:
+    return [
+        (part.part.name, manifold(part.placed_mesh.points, part.placed_mesh.faces))
+        for part in of_roles(parts, *roles)
+    ]
 
-    points = np.ascontiguousarray(mesh.points)
-    return manifold3d.Manifold(manifold3d.Mesh64(points, mesh.faces.astype(np.uint64)))
 
-
-def _balls(measured: MeasuredPrototype) -> list[AxialSolid]:
-    """All bought balls as one body of polyhedra that hold them."""
+def _ball_solids(measured: MeasuredPrototype) -> NamedSolids:
+    """All purchased balls as one solid of polyhedra that contain them."""
     import manifold3d
 
     which = np.flatnonzero(~measured.context.prototype.balls.cap)
     if not which.size:
         return []
-    grown = 1 / np.cos(np.pi / CORNERS) ** 2
-    solids = [
-        manifold3d.Manifold.sphere(grown * measured.body_radius[k], CORNERS).translate(
-            measured.body[:, k]
-        )
-        for k in which.tolist()
+    radius = measured.body_radius[which] / np.cos(np.pi / BALL_SEGMENTS) ** 2
+    polyhedra = [
+        manifold3d.Manifold.sphere(r, BALL_SEGMENTS).translate(centre)
+        for r, centre in zip(radius.tolist(), measured.body.T[which], strict=True)
     ]
-    return [_mover(measured, "the balls", manifold3d.Manifold.compose(solids))]
+    return [("the balls", manifold3d.Manifold.compose(polyhedra))]
 
 
-def _turn(measured: MeasuredPrototype, angle: float) -> Floats:
-    """(3, 4) the base's turn by an angle."""
-    turned = axis.turned(np.eye(3), measured.context.frame[0][:, None], np.array(angle))
-    return np.hstack([turned, np.zeros((3, 1))])
-
-
-def _nearest(least: PairSweep | None) -> str:
-    if least is None:
-        return "nothing stands beside the base"
-    if least.gap >= SEARCH_MM:
+def _clearance_text(nearest: PairSweep | None) -> str:
+    if nearest is None:
+        return "nothing is fixed beside the base"
+    if nearest.gap >= SEARCH_MM:
         return "or more everywhere"
-    return f"{least.names[0]} to {least.names[1]} at {np.degrees(least.at):.1f} deg"
+    return f"{' to '.join(nearest.names)} at {np.degrees(nearest.at):.1f} deg"
 
 
-def _how(found: list[PairSweep]) -> str:
-    blind = [one for one in found if one.blind > 0]
+def _step_text(sweeps: list[PairSweep]) -> str:
+    blind = [one for one in sweeps if one.blind > 0]
     if not blind:
-        return "no step turns farther than the parts are apart"
-    said = ", ".join(f"{one.names[0]} and {one.names[1]}" for one in blind[:3])
-    return f"steps of {np.degrees(LEAST_RAD):g} deg where {said} are nearer than that allows"
+        return "no step moves a point farther than the parts are apart"
+    pairs = ", ".join(one.pair for one in blind[:NAMED])
+    return f"steps of {np.degrees(MIN_STEP_RAD):g} deg where {pairs} are nearer than that allows"
 
 
-def _apart(name: tuple[str, str, str], groups: list[list[tuple[str, Mesh]]]) -> Check:
-    """Parts that are put together share no room, at angle zero."""
-    shared = []
-    for group in groups:
-        solids = [(title, solid_of(mesh)) for title, mesh in group]
-        for (one, a), (two, b) in combinations(solids, 2):
-            shared.append(((a ^ b).volume(), f"{one} and {two}"))
+def _parts_apart(name: CheckName, groups: list[NamedSolids]) -> Check:
+    """Parts that are assembled overlap nowhere, at angle zero."""
+    shared = [
+        (float((a ^ b).volume()), f"{one} and {two}")
+        for group in groups
+        for (one, a), (two, b) in combinations(group, 2)
+    ]
     worst = sorted((pair for pair in shared if pair[0] > CONTACT_MM3), reverse=True)
-    most = max((volume for volume, _ in shared), default=0.0)
-    said = [f"{names} {volume:.3g} mm^3" for volume, names in worst]
-    return at_most(name, most, CONTACT_MM3, f"share room: {short_list(said)}")
+    texts = [f"{pair} {volume:.3g} mm^3" for volume, pair in worst]
+    volume = max((volume for volume, _ in shared), default=0.0)
+    return at_most(name, volume, CONTACT_MM3, f"share room: {short_list(texts)}")
 
 
-def _room(name: tuple[str, str, str], measured: MeasuredPrototype) -> Check:
-    """Least distance between two balls, or caps' bodies."""
-    k = np.arange(measured.body_radius.size)
-    one, two = (index.ravel() for index in np.meshgrid(k, k, indexing="ij"))
-    away = np.linalg.norm(measured.body[:, one] - measured.body[:, two], axis=0)
-    away = np.where(one < two, away - measured.body_radius[one] - measured.body_radius[two], np.inf)
-    worst = int(away.argmin())
-    least = float(min(away[worst], 1e3))
-    return at_least(name, least, 0, f"balls {one[worst] + 1} and {two[worst] + 1} overlap")
+def _balls_apart(name: CheckName, measured: MeasuredPrototype) -> Check:
+    """Minimum distance between two balls, or caps' bodies."""
+    radius = measured.body_radius
+    one, two = np.triu_indices(radius.size, 1)
+    gap = pdist(measured.body.T) - radius[one] - radius[two]
+    texts = [f"balls {one[k] + 1} and {two[k] + 1} overlap" for k in np.flatnonzero(gap < 0)]
+    return at_least(name, float(gap.min(initial=FAR_MM)), 0, short_list(texts))
