@@ -8,11 +8,10 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from tbcad.spec.errors import SpecError, shown
+from tbcad.spec.files import read_text
 
 Row = dict[str, str]
 """Cells by column."""
-
-_MAX_CHARACTERS = 1_000_000  # of a file; tables of parts have a few thousand
 
 
 def read_rows(
@@ -28,7 +27,7 @@ def read_rows(
     Raises:
         SpecError: when the file cannot be read or is not such a table; it names the line.
     """
-    reader = csv.reader(io.StringIO(_text(file, name), newline=""), strict=True)
+    reader = csv.reader(io.StringIO(read_text(file, name, "list"), newline=""), strict=True)
     try:
         header = [cell.strip() for cell in next(reader, [])]
         if header != list(columns):
@@ -41,18 +40,6 @@ def read_rows(
                 yield where, dict(zip(columns, map(str.strip, cells), strict=True))
     except csv.Error as error:
         raise SpecError(f"{name}, line {reader.line_num}: {error}: correct it") from None
-
-
-def _text(file: Path | Traversable, name: str) -> str:
-    try:
-        text = file.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SpecError(f"{name}: cannot be read: {error.strerror}: check the file") from None
-    except ValueError:
-        raise SpecError(f"{name}: cannot be read: not UTF-8 text: check the file") from None
-    if len(text) > _MAX_CHARACTERS:
-        raise SpecError(f"{name}: over 1 MB, too large for a list: name another file")
-    return text.removeprefix("\ufeff")
 
 
 def required_text(where: str, row: Row, column: str) -> str:

@@ -29,7 +29,7 @@ def test_rows_with_their_places(tmp_path: Path) -> None:
         (b"mass_g,part\n", "list.csv, line 1: the columns must be part,mass_g"),
         (b"part,mass_g\na,1\nb\n", "list.csv, line 3: 1 columns, not 2"),
         (b'part,mass_g\n"a"b,1\n', "list.csv, line 2: "),
-        (b"\xff", "list.csv: cannot be read: not UTF-8 text"),
+        (b"\xff", "list.csv: not UTF-8 text (line 1)"),
         (b"a" * 1_000_001, "list.csv: over 1 MB"),
     ],
 )

@@ -215,7 +215,7 @@ class TestOwnFile:
             (b"name = ", "not valid TOML"),
             (b"name = '\xff'", "not UTF-8 text"),
             (b"a = " + b"[" * 100_000, "nested too deeply"),
-            (b"#" * 1_000_001, "over 1 MB, no process"),
+            (b"#" * 1_000_001, "over 1 MB, too large for a process"),
         ],
     )
     def test_that_is_no_toml(self, file: Path, data: bytes, said: str) -> None:
