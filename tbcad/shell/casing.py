@@ -16,19 +16,20 @@ from OCP.TopoDS import TopoDS_Face
 
 from tbcad.cad.brep import Maker, Ring, Side
 from tbcad.geometry.conics import EllipseArc
-from tbcad.shell.bores import bores
+from tbcad.shell.bores import hole_faces
 from tbcad.shell.boundary import boundary_chain, chain_ends
 from tbcad.shell.envelope import Envelope
-from tbcad.shell.front import Front
+from tbcad.shell.front import FrontEdges
 from tbcad.types import Floats
 
-Pair = tuple[Side, Side]
+EndPair = tuple[Side, Side]
+"""Two sides at the low and the high end."""
 
 X, Y, Z = np.eye(3)
 
 
 @dataclass(frozen=True)
-class Edges:
+class CasingEdges:
     """Edges of the casing; arcs run from low to high y.
 
     Attributes:
@@ -51,40 +52,53 @@ class Edges:
     seam_rim_back: Side
     foot_rim: Side
     foot_rim_top: Side
-    seam_end: Pair
-    foot_end: Pair
-    seam_step: Pair
-    foot_step: Pair
-    wall: Pair
+    seam_end: EndPair
+    foot_end: EndPair
+    seam_step: EndPair
+    foot_step: EndPair
+    wall: EndPair
 
 
-def casing_faces(front: Front, body: Envelope) -> list[tuple[str, TopoDS_Face]]:
+def casing_faces(front: FrontEdges, envelope: Envelope) -> list[tuple[str, TopoDS_Face]]:
     """Names and faces of everything but the mirrors."""
-    maker, e = front.maker, _edges(front, body)
-    seam_holes = bores(maker, body.seam_holes, Y, Z)
-    foot_holes = bores(maker, body.foot_holes, X, Y)
-    seam, foot, base = body.seam_thickness, body.foot_thickness, body.foot * Z
-    seam_face = [reversed_ring(_seam_outline(front, e)), *seam_holes.near]
-    foot_face = [reversed_ring(_foot_outline(front, e)), *foot_holes.near]
+    maker, edges = front.maker, _edges(front, envelope)
+    seam_holes = hole_faces(maker, envelope.seam_holes, Y, Z)
+    foot_holes = hole_faces(maker, envelope.foot_holes, X, Y)
+    seam, foot, base = envelope.seam_thickness, envelope.foot_thickness, envelope.foot * Z
+
+    def plane(point: Floats, normal: Floats, *rings: Ring) -> TopoDS_Face:
+        return maker.face(maker.plane(point, normal), rings, natural=True)
+
     return [
-        ("back", _back(maker, body, e)),
-        ("seam", maker.face(maker.plane(0 * X, -X), seam_face, natural=True)),
-        ("foot", maker.face(maker.plane(base, -Z), foot_face, natural=True)),
-        (
-            "seam_flange",
-            maker.face(maker.plane(seam, X), [_seam_flange(e), *seam_holes.far], natural=True),
-        ),
-        (
-            "foot_flange",
-            maker.face(maker.plane(base + foot, Z), [_foot_flange(e), *foot_holes.far], True),
-        ),
+        ("back", _back(maker, envelope, edges)),
+        ("seam", plane(0 * X, -X, reversed_ring(_seam_outline(front, edges)), *seam_holes.near)),
+        ("foot", plane(base, -Z, reversed_ring(_foot_outline(front, edges)), *foot_holes.near)),
+        ("seam_flange", plane(seam, X, _seam_flange(edges), *seam_holes.far)),
+        ("foot_flange", plane(base + foot, Z, _foot_flange(edges), *foot_holes.far)),
         (
             "seam_rim",
-            _rim(maker, body.seam_rim, seam, (e.seam_rim, e.seam_rim_back), e.seam_end, Z),
+            _rim(
+                maker,
+                envelope.seam_rim,
+                seam,
+                (edges.seam_rim, edges.seam_rim_back),
+                edges.seam_end,
+                outward=Z,
+            ),
         ),
-        ("foot_rim", _rim(maker, body.foot_rim, foot, (e.foot_rim, e.foot_rim_top), e.foot_end, X)),
-        *((f"seam_hole_{k + 1:02d}", face) for k, face in enumerate(seam_holes.faces)),
-        *((f"foot_hole_{k + 1:02d}", face) for k, face in enumerate(foot_holes.faces)),
+        (
+            "foot_rim",
+            _rim(
+                maker,
+                envelope.foot_rim,
+                foot,
+                (edges.foot_rim, edges.foot_rim_top),
+                edges.foot_end,
+                outward=X,
+            ),
+        ),
+        *((f"seam_hole_{k + 1:02d}", face) for k, face in enumerate(seam_holes.walls)),
+        *((f"foot_hole_{k + 1:02d}", face) for k, face in enumerate(foot_holes.walls)),
     ]
 
 
@@ -98,35 +112,36 @@ def reversed_ring(ring: Ring) -> list[Side]:
     return [reversed_side(side) for side in reversed(ring)]
 
 
-def _edges(front: Front, body: Envelope) -> Edges:
+def _edges(front: FrontEdges, envelope: Envelope) -> CasingEdges:
     maker, cells = front.maker, front.cells
-    seam_back = body.seam_rim.moved(body.seam_thickness)
-    foot_top = body.foot_rim.moved(body.foot_thickness)
-    corners = chain_ends(cells, boundary_chain(cells, cells.boundary.seam))
-    points = {
-        "front": [cells.corners[corner] for corner in corners],
-        "back": _ends(body.seam_back),
-        "seam": _ends(body.seam_rim),
-        "seam_back": _ends(seam_back),
-        "foot": _ends(body.foot_rim),
-        "foot_top": _ends(foot_top),
+    seam_rim_back = envelope.seam_rim.moved(envelope.seam_thickness)
+    foot_rim_top = envelope.foot_rim.moved(envelope.foot_thickness)
+    arcs = {
+        "back": envelope.seam_back,
+        "seam": envelope.seam_rim,
+        "seam_back": seam_rim_back,
+        "foot": envelope.foot_rim,
+        "foot_top": foot_rim_top,
     }
-    vertices = {name: [maker.vertex(p) for p in pair] for name, pair in points.items()}
+    corners = chain_ends(cells, boundary_chain(cells, cells.boundary.seam))
+    points = {name: _ends(arc) for name, arc in arcs.items()}
+    vertices = {name: [maker.vertex(end) for end in ends] for name, ends in points.items()}
+    points["front"] = [cells.corners[corner] for corner in corners]
     vertices["front"] = [front.vertices[corner] for corner in corners]
 
-    def lines(a: str, b: str) -> Pair:
+    def lines(a: str, b: str) -> EndPair:
         low, high = (
             maker.line(points[a][k], points[b][k], vertices[a][k], vertices[b][k]) for k in (0, 1)
         )
         return (low, True), (high, True)
 
-    return Edges(
-        seam_back=maker.ellipse_edge(body.seam_back, *vertices["back"]),
-        foot_back=maker.ellipse_edge(body.foot_back, *vertices["back"]),
-        seam_rim=maker.ellipse_edge(body.seam_rim, *vertices["seam"]),
-        seam_rim_back=maker.ellipse_edge(seam_back, *vertices["seam_back"]),
-        foot_rim=maker.ellipse_edge(body.foot_rim, *vertices["foot"]),
-        foot_rim_top=maker.ellipse_edge(foot_top, *vertices["foot_top"]),
+    return CasingEdges(
+        seam_back=maker.ellipse_edge(envelope.seam_back, *vertices["back"]),
+        foot_back=maker.ellipse_edge(envelope.foot_back, *vertices["back"]),
+        seam_rim=maker.ellipse_edge(envelope.seam_rim, *vertices["seam"]),
+        seam_rim_back=maker.ellipse_edge(seam_rim_back, *vertices["seam_back"]),
+        foot_rim=maker.ellipse_edge(envelope.foot_rim, *vertices["foot"]),
+        foot_rim_top=maker.ellipse_edge(foot_rim_top, *vertices["foot_top"]),
         seam_end=lines("seam", "seam_back"),
         foot_end=lines("foot", "foot_top"),
         seam_step=lines("seam_back", "back"),
@@ -139,63 +154,63 @@ def _ends(arc: EllipseArc) -> list[Floats]:
     return list(arc.at(np.array([0.0, 1.0])))
 
 
-def _back(maker: Maker, body: Envelope, e: Edges) -> TopoDS_Face:
-    ring = [e.foot_back, reversed_side(e.seam_back)]
-    face = maker.face(maker.spheroid(body.back), [ring], natural=False)
+def _back(maker: Maker, envelope: Envelope, edges: CasingEdges) -> TopoDS_Face:
+    ring = [edges.foot_back, reversed_side(edges.seam_back)]
+    face = maker.face(maker.spheroid(envelope.back), [ring], natural=False)
     maker.add_pcurves(face, ring)
     return face
 
 
-def _seam_outline(front: Front, e: Edges) -> Ring:
+def _seam_outline(front: FrontEdges, edges: CasingEdges) -> Ring:
     """Round the joining face x = 0, counter-clockwise from +x."""
     return [
-        e.wall[0],
+        edges.wall[0],
         *front.chain(front.cells.boundary.seam),
-        reversed_side(e.wall[1]),
-        e.foot_end[1],
-        reversed_side(e.foot_step[1]),
-        reversed_side(e.seam_rim),
-        e.foot_step[0],
-        reversed_side(e.foot_end[0]),
+        reversed_side(edges.wall[1]),
+        edges.foot_end[1],
+        reversed_side(edges.foot_step[1]),
+        reversed_side(edges.seam_rim),
+        edges.foot_step[0],
+        reversed_side(edges.foot_end[0]),
     ]
 
 
-def _foot_outline(front: Front, e: Edges) -> Ring:
+def _foot_outline(front: FrontEdges, edges: CasingEdges) -> Ring:
     """Round the joining face z = foot, counter-clockwise from +z."""
     return [
-        e.foot_rim,
-        e.wall[1],
+        edges.foot_rim,
+        edges.wall[1],
         *reversed_ring(front.chain(front.cells.boundary.foot)),
-        reversed_side(e.wall[0]),
+        reversed_side(edges.wall[0]),
     ]
 
 
-def _seam_flange(e: Edges) -> Ring:
+def _seam_flange(edges: CasingEdges) -> Ring:
     """Round the seam flange's face toward the back."""
     return [
-        e.seam_step[0],
-        e.seam_back,
-        reversed_side(e.seam_step[1]),
-        reversed_side(e.seam_rim_back),
+        edges.seam_step[0],
+        edges.seam_back,
+        reversed_side(edges.seam_step[1]),
+        reversed_side(edges.seam_rim_back),
     ]
 
 
-def _foot_flange(e: Edges) -> Ring:
+def _foot_flange(edges: CasingEdges) -> Ring:
     """Round the foot flange's top, on which the seam flange stands."""
     return [
-        e.foot_rim_top,
-        reversed_side(e.foot_step[1]),
-        e.seam_end[1],
-        e.seam_step[1],
-        reversed_side(e.foot_back),
-        reversed_side(e.seam_step[0]),
-        reversed_side(e.seam_end[0]),
-        e.foot_step[0],
+        edges.foot_rim_top,
+        reversed_side(edges.foot_step[1]),
+        edges.seam_end[1],
+        edges.seam_step[1],
+        reversed_side(edges.foot_back),
+        reversed_side(edges.seam_step[0]),
+        reversed_side(edges.seam_end[0]),
+        edges.foot_step[0],
     ]
 
 
 def _rim(
-    maker: Maker, arc: EllipseArc, along: Floats, rims: Pair, ends: Pair, outward: Floats
+    maker: Maker, arc: EllipseArc, along: Floats, rims: EndPair, ends: EndPair, outward: Floats
 ) -> TopoDS_Face:
     """Outer face of a flange, part of an elliptic cylinder; its middle looks outward."""
     middle = (arc.first + arc.last) / 2

@@ -14,12 +14,12 @@ from tbcad.types import Floats
 
 
 @dataclass(frozen=True)
-class Front:
+class FrontEdges:
     """Kernel vertices and edges of camera a's cells.
 
     Attributes:
         maker: that made them.
-        cells: they are of.
+        cells: of the mirrors.
         vertices: by corner index.
         edges: by arc index.
     """
@@ -31,9 +31,9 @@ class Front:
 
     def faces(self) -> list[TopoDS_Face]:
         """One face for each cell, on its sphere or plane, in the order of the mirrors."""
-        surfaces = self.cells.surfaces
-        poses = zip(surfaces.apex, surfaces.normal, surfaces.radius, strict=True)
-        return [self._face(*pose, ring) for pose, ring in zip(poses, self._rings(), strict=False)]
+        mirrors = self.cells.mirror_surfaces
+        poses = zip(mirrors.apex, mirrors.normal, mirrors.radius, self._rings(), strict=True)
+        return [self._face(*pose) for pose in poses]
 
     def _rings(self) -> list[list[Side]]:
         """Edges round each cell, counter-clockwise seen from the light, the solid's outer side."""
@@ -55,7 +55,7 @@ class Front:
         return [(self.edges[arc], forward) for arc, forward in boundary_chain(self.cells, plane)]
 
 
-def build_front(maker: Maker, cells: Cells) -> Front:
+def front_edges(maker: Maker, cells: Cells) -> FrontEdges:
     """Vertices at the corners and an edge for each arc."""
     arcs = cells.arcs
     used = np.unique(np.concatenate([arcs.start, arcs.end])).tolist()
@@ -63,10 +63,10 @@ def build_front(maker: Maker, cells: Cells) -> Front:
     circles = _circles(arcs)
     ends = zip(arcs.start.tolist(), arcs.end.tolist(), strict=True)
     edges = [
-        _edge(maker, circles, arcs.points[k], k, vertices[start], vertices[end])
+        _edge(maker, circles, arcs, k, vertices[start], vertices[end])
         for k, (start, end) in enumerate(ends)
     ]
-    return Front(maker, cells, vertices, edges)
+    return FrontEdges(maker, cells, vertices, edges)
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,12 @@ class _Circles:
 
 
 def _edge(
-    maker: Maker, c: _Circles, points: Floats, k: int, start: TopoDS_Vertex, end: TopoDS_Vertex
+    maker: Maker, circles: _Circles, arcs: Arcs, k: int, start: TopoDS_Vertex, end: TopoDS_Vertex
 ) -> TopoDS_Edge:
-    if c.angle[k] == 0:
-        return maker.line(points[0], points[2], start, end)
-    return maker.circle(c.centre[k], c.x[k], c.y[k], c.radius[k], c.angle[k], start, end)
+    if circles.angle[k] == 0:
+        return maker.line(arcs.points[k, 0], arcs.points[k, 2], start, end)
+    frame = circles.centre[k], circles.x[k], circles.y[k]
+    return maker.circle(*frame, circles.radius[k], circles.angle[k], start, end)
 
 
 def _circles(arcs: Arcs) -> _Circles:
