@@ -8,8 +8,8 @@ from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Printed
-from tbcad_verify.report.checks import Check, Unknown, check_names, guarded
-from tbcad_verify.step.part_checks import UNITS, PartComparison, comparison_checks
+from tbcad_verify.report.checks import Check, Unknown, guarded
+from tbcad_verify.step.part_checks import CHECKS, PartComparison, names_of, run_checks
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
 PROCESSES = 2  # each with its share of the files
@@ -63,7 +63,7 @@ def _parts(export: Export) -> list[Printed]:
 def _part(
     export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
-    return guarded(check_names(UNITS, part.step), partial(_compared, export, part, found, mass))
+    return guarded(names_of(CHECKS, part.step), partial(_compared, export, part, found, mass))
 
 
 def _compared(
@@ -71,5 +71,5 @@ def _compared(
 ) -> list[Check]:
     if isinstance(found, Unknown):
         raise found
-    lump = PartComparison(part.name, found, mass, export.mesh_error_mm, CLAIM_SHARE)
-    return comparison_checks(part.step, lump)
+    comparison = PartComparison(part.name, found, mass, export.mesh_error_mm, CLAIM_SHARE)
+    return run_checks(CHECKS, part.step, comparison)

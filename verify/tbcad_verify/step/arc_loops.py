@@ -1,7 +1,7 @@
-"""Arcs that follow one another: loops, and which of them bound the cell that faces the light.
+"""Loops of arcs, and those that bound the cell that faces the light.
 
-A ball that is much larger than its neighbours may come out behind them too, far from its apex.
-That is the back of the union, a piece of its own, and not the mirror.
+A ball that is much larger than its neighbours may emerge behind them too, far from its apex. That
+is the back of the union, a piece of its own, and not the mirror.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from scipy.sparse.csgraph import connected_components
 from tbcad_verify.step.map_arcs import MapArcs, arc_length, quadratic_roots
 from tbcad_verify.types import Bools, Floats, Ints
 
-CLOSED = 1e-8  # of the spread: how far apart one corner may be in two arcs
-RAY = np.array([0.8137159, 0.5812531])  # no direction that a symmetric design prefers
+CLOSED = 1e-8  # of the spread: maximum distance of one corner in two arcs
+RAY = np.array([0.8137159, 0.5812531])  # not a direction of symmetry of any design
 
 
 @dataclass(frozen=True)
 class ArcLoops:
-    """How N arcs, in ascending order of mirror, hang together.
+    """Loops that N arcs, in ascending order of mirror, form.
 
     Attributes:
         label: (N,) number of the arc's loop.
@@ -36,13 +36,13 @@ def arc_loops(arcs: MapArcs, spread: float) -> ArcLoops:
     """Follow arcs, in ascending order of mirror, from end to start."""
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
     index, other = _partners(arcs.mirror, arcs.mirror)
-    away = np.abs(start[:, other] - end[:, index]).max(axis=0)
-    order = np.lexsort((away, index))
+    gap = np.abs(start[:, other] - end[:, index]).max(axis=0)
+    order = np.lexsort((gap, index))
     best = order[np.unique(index[order], return_index=True)[1]]
     count = len(arcs.mirror)
     graph = coo_array((np.ones(count, dtype=np.int8), (index[best], other[best])), (count, count))
     label = connected_components(graph, directed=False)[1].astype(np.intp)
-    return ArcLoops(label, ~(away[best] <= CLOSED * spread))
+    return ArcLoops(label, ~(gap[best] <= CLOSED * spread))
 
 
 def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
@@ -57,15 +57,15 @@ def front_pieces(arcs: MapArcs, spread: float) -> MapArcs:
     """Of each mirror only the piece nearest to its apex: its outer loop, and the holes in it."""
     label = arc_loops(arcs, spread).label
     outer = np.bincount(label, _swept(arcs))[label] > 0
-    least = np.hypot(*arcs.point(np.clip(0, *arcs.s)))
-    order = np.lexsort((least, arcs.mirror))
+    distance = np.hypot(*arcs.point(np.clip(0, *arcs.s)))
+    order = np.lexsort((distance, arcs.mirror))
     order = order[outer[order]]
     nearest = order[np.unique(arcs.mirror[order], return_index=True)[1]]
     main = np.isin(label, label[nearest])
     hole = np.flatnonzero(~outer)
     y = arcs.take(hole).point(arcs.s[0, hole])
-    held = hole[inside(arcs.take(main), arcs.mirror[hole], y)]
-    return arcs.take(main | np.isin(label, label[held]))
+    enclosed = hole[inside(arcs.take(main), arcs.mirror[hole], y)]
+    return arcs.take(main | np.isin(label, label[enclosed]))
 
 
 def _swept(arcs: MapArcs) -> Floats:

@@ -1,8 +1,8 @@
-"""Cells of many surfaces at once: which circles matter, and the arcs they leave.
+"""Cells of many surfaces at once: the circles that bound them, and the arcs.
 
-a circle farther from the apex than every arc found without it cannot matter. So each mirror starts
-with its nearest circles and takes more only until the rest are all beyond its cell; that is exact,
-whatever the mirrors' sizes.
+A circle farther from the apex than every arc found without it does not bound the cell. So each
+mirror starts with its nearest circles, and takes more only until all others are beyond its cell.
+This is exact, whatever the mirrors' sizes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tbcad_verify.step.stereographic import (
 )
 from tbcad_verify.types import Bools, Floats, Ints
 
-FIRST = 20
+FIRST = 20  # circles that each mirror starts with
 MOST_NUMBERS = 1_000_000  # in one array of intermediate results
 
 
@@ -37,7 +37,7 @@ class CellBoundaries:
         arcs: in ascending order of mirror; `circle` is the number of the other surface: mirrors,
             walls, then the horizon.
         whole: (M,) a whole sphere that no other one cuts.
-        spread: mm, how far apart things lie.
+        spread: extent of all surfaces, mm.
     """
 
     maps: SurfaceMaps
@@ -48,7 +48,7 @@ class CellBoundaries:
 
 @dataclass(frozen=True)
 class MapBatch:
-    """Some mirrors' maps (M) with all that may cut them (T, and the horizon last).
+    """Some mirrors' maps (M) with all surfaces that may cut them (T, and the horizon last).
 
     Attributes:
         index: (M,) the mirrors' numbers.
@@ -66,9 +66,9 @@ class MapBatch:
 
 
 def cell_boundaries(mirrors: Surfaces, walls: Surfaces, front: bool) -> CellBoundaries:
-    """The cells of mirrors in each other's company, cut by walls.
+    """The cells that mirrors leave each other, cut by walls.
 
-    With `front`, of each only what lies on the half that bulges along its normal.
+    With `front`, only those parts of them that lie on the half toward the normal.
     """
     spread, others = _spread(mirrors, walls), joined_surfaces(mirrors, walls)
     maps = surface_maps(mirrors if front else with_apex_uncovered(mirrors, others), front, spread)
@@ -92,7 +92,7 @@ def joined_surfaces(one: Surfaces, other: Surfaces) -> Surfaces:
 
 
 def _spread(mirrors: Surfaces, walls: Surfaces) -> float:
-    """How far apart things lie, mm: the unit in which sizes are compared."""
+    """Extent of all surfaces, mm: the unit in which sizes are compared."""
     offset = (walls.normal * walls.point).sum(axis=0)
     away = np.abs(np.einsum("iw,im->wm", walls.normal, mirrors.point) - offset[:, None])
     curved = mirrors.curvature[mirrors.curvature > 0]

@@ -1,4 +1,4 @@
-"""Exact bounding boxes of cells: corners, arcs' extreme points, poles inside."""
+"""Exact bounding boxes of cells: corners, extreme points of arcs, and poles inside."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tbcad_verify.step.map_arcs import MapArcs, arc_length, quadratic_roots
 from tbcad_verify.step.stereographic import SurfaceMaps, to_surface
 from tbcad_verify.types import Floats
 
-BEHIND = -1 + 1e-9  # the point that no map shows
+OPPOSITE_COS = -1 + 1e-9  # the point opposite the apex, which no map shows
 
 
 def cell_boxes(maps: SurfaceMaps, arcs: MapArcs) -> Floats:
-    """(M, 2, 3) least and greatest x, y, z of the cells of M maps, mm; (inf, -inf) for none."""
+    """(M, 2, 3) minimum and maximum x, y, z of the cells of M maps, mm; (inf, -inf) for none."""
     mine = maps.take(arcs.mirror)
     box = np.empty((len(maps.reach), 2, 3))
     box[:, 0], box[:, 1] = np.inf, -np.inf
@@ -28,7 +28,7 @@ def cell_boxes(maps: SurfaceMaps, arcs: MapArcs) -> Floats:
 
 
 def _grow(box: Floats, mirror: NDArray[np.intp], x: Floats) -> None:
-    """Take points (3, N) of the mirrors (N,) into their boxes."""
+    """Extend the boxes of mirrors (N,) to points (3, N)."""
     np.minimum.at(box[:, 0], mirror, x.T)
     np.maximum.at(box[:, 1], mirror, x.T)
 
@@ -36,7 +36,8 @@ def _grow(box: Floats, mirror: NDArray[np.intp], x: Floats) -> None:
 def _grow_by_arcs(box: Floats, maps: SurfaceMaps, arcs: MapArcs, axis: int) -> None:
     """Both points of each circle where this coordinate is extreme, if they lie on the arc.
 
-    Along the circle the coordinate is a quotient of quadratics; its derivative is one more.
+    Along the circle the coordinate is a quotient of quadratics, and the numerator of its derivative
+    a quadratic.
     """
     mine = maps.take(arcs.mirror)
     k, zero = mine.surfaces.curvature, np.zeros_like(arcs.bend)
@@ -55,7 +56,7 @@ def _grow_by_pole(box: Floats, maps: SurfaceMaps, arcs: MapArcs, axis: int, sign
     """The point of the sphere that is farthest along an axis, if it lies in the cell."""
     s = maps.surfaces
     right, up, normal = (sign * e[axis] for e in (maps.right, maps.up, s.normal))
-    index = np.flatnonzero((s.curvature > 0) & (normal > BEHIND))
+    index = np.flatnonzero((s.curvature > 0) & (normal > OPPOSITE_COS))
     y = np.stack([right, up])[:, index] * 2 / (s.curvature * (1 + normal))[index]
     within = inside(arcs, index, y)
     _grow(box, index[within], to_surface(maps.take(index[within]), y[:, within]))

@@ -25,7 +25,7 @@ from tbcad_verify.step.stereographic import SurfaceMaps
 from tbcad_verify.types import Floats
 
 NODES = 20
-MOST_PIECES = 64
+MAX_PIECES = 64
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class CellMoments:
 
 
 def cell_moments(maps: SurfaceMaps, arcs: MapArcs) -> CellMoments:
-    """Integrals over the cells of M maps by Gauss and Legendre along their arcs."""
+    """Integrals over the cells of M maps by Gauss-Legendre quadrature along their arcs."""
     k = maps.surfaces.curvature
     total = np.zeros((10, len(k)))
     for part in chunks(len(arcs.mirror), 1 << 13):
@@ -67,12 +67,12 @@ def whole_sphere(k: Floats) -> CellMoments:
 
 
 def _pieces(arcs: MapArcs, k: Floats) -> MapArcs:
-    """Arcs cut so that each turns by 90 degrees at most and is short against what varies there."""
+    """Arcs cut so that each turns by 90 degrees at most and is short where the integrands vary."""
     nearest = np.clip(0, *arcs.s)
     square = (arcs.point(nearest) ** 2).sum(axis=0)
-    pole = np.hypot(2, k[arcs.mirror] * np.sqrt(square))  # k times the way to where w has its pole
+    pole = np.hypot(2, k[arcs.mirror] * np.sqrt(square))  # k times the distance to the pole of w
     share = arcs.length * np.maximum(np.abs(arcs.bend) * 2 / np.pi, k[arcs.mirror] / pole)
-    count = np.clip(np.ceil(share), 1, MOST_PIECES).astype(np.intp)
+    count = np.clip(np.ceil(share), 1, MAX_PIECES).astype(np.intp)
     index = np.repeat(np.arange(len(count)), count)
     step = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
     start = arcs.s[0, index] + arcs.length[index] * step / count[index]

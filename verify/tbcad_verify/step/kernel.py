@@ -1,4 +1,4 @@
-"""What the CAD kernel makes of a STEP file: the one module of the proof that imports a kernel.
+"""A STEP file as the CAD kernel reads it; no other module of the verification imports a kernel.
 
 It runs in a process of its own: native code that reads a foreign file may hang or crash.
 """
@@ -41,14 +41,14 @@ from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 
 Row = dict[str, Any]
 
-GREATEST = 1  # of all tolerances, in the kernel's words
+MAXIMUM = 1  # of all tolerances: a mode of the kernel
 NEAR_MM = 1e-6  # of a point to a face that it is on
-TURN, SLACK = 2 * np.pi, 1e-9
+FULL_TURN, SLACK = 2 * np.pi, 1e-9
 FAR_MM = 1e4  # farther than any part, near enough for the digits
 
 
 def read_solid(path: Path) -> Row:
-    """Counts, measures and faces of a STEP file, as plain numbers and words; mm.
+    """Counts, measures and faces of a STEP file, as plain numbers and texts; mm.
 
     Raises:
         ValueError: the kernel cannot read it, or finds no shape in it.
@@ -61,7 +61,7 @@ def read_solid(path: Path) -> Row:
         "shells": _count(shape, TopAbs_SHELL),
         "open_edges": _open_edges(shape),
         "valid": bool(BRepCheck_Analyzer(shape).IsValid()),
-        "gap": ShapeAnalysis_ShapeTolerance().Tolerance(shape, GREATEST),
+        "gap": ShapeAnalysis_ShapeTolerance().Tolerance(shape, MAXIMUM),
         "volume": volume.Mass(),
         "centroid": _point(volume.CentreOfMass()),
         "box": _box(shape),
@@ -92,7 +92,7 @@ def _count(shape: TopoDS_Shape, kind: Any) -> int:
 
 
 def _open_edges(shape: TopoDS_Shape) -> int:
-    """Edges without exactly two sides; seams are both their own, and poles are points."""
+    """Edges without exactly two sides; a seam has both its own, and a pole is a point."""
     sides = TopTools_IndexedDataMapOfShapeListOfShape()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, sides)
     return sum(
@@ -113,7 +113,7 @@ def _face(face: TopoDS_Face) -> Row:
 
 
 def _surface(face: TopoDS_Face) -> Row:
-    """Kind and figures; `outward` is whether the natural normal points out of the solid."""
+    """Kind and figures; `outward`: whether the natural normal points out of the solid."""
     surface = BRepAdaptor_Surface(face)
     forward = face.Orientation() == TopAbs_FORWARD
     if surface.GetType() == GeomAbs_Sphere:
@@ -141,31 +141,30 @@ def _point(point: gp_Pnt) -> list[float]:
 
 
 def _box(shape: TopoDS_Shape) -> list[list[float]]:
-    """Least and greatest x, y, z: by the distance to far walls, on all six sides.
+    """Minimum and maximum x, y, z, from the distances to far walls on all six sides.
 
-    The kernel's own boxes are those of whole surfaces, so that a patch of a spheroid fills too
-    much.
+    The kernel's own boxes are those of whole surfaces, too large for a patch of a spheroid.
     """
-    greatest = [_reach(shape, *axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-    least = [-_reach(shape, *axis) for axis in ((-1, 0, 0), (0, -1, 0), (0, 0, -1))]
-    return [least, greatest]
+    maximum = [_reach(shape, *axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    minimum = [-_reach(shape, *axis) for axis in ((-1, 0, 0), (0, -1, 0), (0, 0, -1))]
+    return [minimum, maximum]
 
 
 def _reach(shape: TopoDS_Shape, x: int, y: int, z: int) -> float:
-    """How far the shape reaches along an axis, mm."""
+    """The shape's extreme along an axis, mm."""
     wall = gp_Pln(gp_Pnt(x * FAR_MM, y * FAR_MM, z * FAR_MM), gp_Dir(x, y, z))
     face = BRepBuilderAPI_MakeFace(wall, -FAR_MM, FAR_MM, -FAR_MM, FAR_MM).Face()
     distance = BRepExtrema_DistShapeShape(shape, face)
     if not distance.IsDone():
         return float("nan")
-    found: float = FAR_MM - distance.Value()
-    return max([found, *_tops(shape, np.array([x, y, z], dtype=np.float64), found)])
+    extreme: float = FAR_MM - distance.Value()
+    return max([extreme, *_tops(shape, np.array([x, y, z], dtype=np.float64), extreme)])
 
 
 def _tops(shape: TopoDS_Shape, axis: NDArray[np.float64], beyond: float) -> Iterator[float]:
-    """Where spheres reach farther than this along an axis, within their faces, mm.
+    """Extremes of spheres that are beyond this along an axis, within their faces, mm.
 
-    The kernel's distance to a wall misses them now and then.
+    The kernel's distance to a wall sometimes misses them.
     """
     for face in map(TopoDS.Face_s, _each(shape, TopAbs_FACE)):
         surface = BRepAdaptor_Surface(face)
@@ -177,16 +176,18 @@ def _tops(shape: TopoDS_Shape, axis: NDArray[np.float64], beyond: float) -> Iter
 
 
 def _is_on(face: TopoDS_Face, point: NDArray[np.float64]) -> bool:
-    """Whether a point of a face's sphere is on the face: in parameters, of which u goes round."""
+    """Whether a point of a face's sphere is on the face: in parameters, of which u is periodic."""
     around, up = (
         ShapeAnalysis_Surface(BRep_Tool.Surface_s(face))
         .ValueOfUV(gp_Pnt(*point.tolist()), NEAR_MM)
         .Coord()
     )
     low, high, _, _ = BRepTools.UVBounds_s(face)
-    turns = np.arange(np.ceil((low - around) / TURN - SLACK), (high - around) / TURN + SLACK)
+    turns = np.arange(
+        np.ceil((low - around) / FULL_TURN - SLACK), (high - around) / FULL_TURN + SLACK
+    )
     return any(
-        BRepClass_FaceClassifier(face, gp_Pnt2d(around + k * TURN, up), NEAR_MM).State()
+        BRepClass_FaceClassifier(face, gp_Pnt2d(around + k * FULL_TURN, up), NEAR_MM).State()
         in (TopAbs_IN, TopAbs_ON)
         for k in turns.tolist()
     )

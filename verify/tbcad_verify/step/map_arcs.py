@@ -1,12 +1,12 @@
-"""What is left free on a map: the arcs that bound it.
+"""The arcs on a map that bound what is left of a mirror.
 
-On each circle every other circle forbids an interval, in closed form. What no interval forbids are
-the arcs; their ends are the corners. Nothing is assumed about how many loops a cell has.
+On each circle every other circle covers an interval, in closed form. The arcs are what no interval
+covers; their ends are the corners. Nothing is assumed about the number of loops of a cell.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +19,16 @@ SAME_CIRCLE = 1e-11
 
 @dataclass(frozen=True)
 class MapArcs:
-    """N arcs on maps, what is free to their left.
+    """N arcs on maps, with the uncovered side to their left.
 
-    A circle is followed from its point nearest the apex; an arc that passes the farthest one is
+    A circle is followed from its point nearest the apex; an arc that passes the farthest point is
     two arcs.
 
     Attributes:
         mirror: (N,) number of the map.
         circle: (N,) column of the circle.
         near: (2, N) mm, the circle's nearest point.
-        inward: (2, N) unit, toward what is free, there.
+        inward: (2, N) unit, there, toward the uncovered side.
         bend: (N,) 1/mm, the circle's signed curvature; 0 for lines.
         t: (2, N) both ends, mm: twice the tangent of half the angle from `near`, over the bend.
         s: (2, N) both ends, mm of arc length from `near`.
@@ -44,15 +44,7 @@ class MapArcs:
 
     def take(self, index: NDArray[np.generic]) -> MapArcs:
         """The arcs with these numbers, or for which a mask holds."""
-        return MapArcs(
-            self.mirror[index],
-            self.circle[index],
-            self.near[:, index],
-            self.inward[:, index],
-            self.bend[index],
-            self.t[:, index],
-            self.s[:, index],
-        )
+        return MapArcs(*(getattr(self, field.name)[..., index] for field in fields(self)))
 
     @property
     def length(self) -> Floats:
@@ -96,21 +88,18 @@ def joined_arcs(parts: list[MapArcs]) -> MapArcs:
     none, no = np.zeros((2, 0)), np.zeros(0, dtype=np.intp)
     every = [MapArcs(no, no, none, none, none[0], none, none), *parts]
     return MapArcs(
-        np.concatenate([a.mirror for a in every]),
-        np.concatenate([a.circle for a in every]),
-        np.concatenate([a.near for a in every], axis=1),
-        np.concatenate([a.inward for a in every], axis=1),
-        np.concatenate([a.bend for a in every]),
-        np.concatenate([a.t for a in every], axis=1),
-        np.concatenate([a.s for a in every], axis=1),
+        *(
+            np.concatenate([getattr(arcs, field.name) for arcs in every], axis=-1)
+            for field in fields(MapArcs)
+        )
     )
 
 
 def free_arcs(circles: MapCircles, spread: float) -> MapArcs:
-    """The arcs that no circle forbids, of all maps."""
+    """The arcs that no circle covers, of all maps."""
     near = _near(circles)
     inward = circles.beta + 2 * circles.alpha * near
-    low, high = _forbidden(circles, near, inward, spread)
+    low, high = _covered(circles, near, inward, spread)
     start, end = _gaps(low, high)
     cut = circles.real & ~np.any(circles.covers, axis=1, keepdims=True)
     free = (end > start) & cut[..., None]
@@ -122,7 +111,7 @@ def free_arcs(circles: MapCircles, spread: float) -> MapArcs:
 
 
 def _near(circles: MapCircles) -> Floats:
-    """(2, M, K) the point of each circle that is nearest the apex; any where all are as near."""
+    """(2, M, K) the point of each circle that is nearest the apex; any if all are equally near."""
     size = np.hypot(*circles.beta)
     tiny = size < np.finfo(np.float64).eps
     toward = np.where(tiny, np.array([1.0, 0.0])[:, None, None], circles.beta)
@@ -148,10 +137,10 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[0] * b[0] + a[1] * b[1])
 
 
-def _forbidden(
+def _covered(
     circles: MapCircles, near: Floats, inward: Floats, spread: float
 ) -> tuple[Floats, Floats]:
-    """(M, K, 2 K) intervals of t on each circle that the others forbid; none: (inf, inf)."""
+    """(M, K, 2 K) intervals of t on each circle that the others cover; none: (inf, inf)."""
     form = (circles.alpha[:, None], circles.beta[:, :, None], circles.gamma[:, None])
     c = form_along_circles(near[..., None], inward[..., None], 2 * circles.alpha[..., None], form)
     first, last = quadratic_roots(c)
@@ -169,7 +158,7 @@ def _forbidden(
 def _uncrossed(
     circles: MapCircles, inward: Floats, c: Floats, spread: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(M, K, K) circles that lie wholly where another forbids, and wholly where it does not.
+    """(M, K, K) circles that another covers completely, and those that it does not cover at all.
 
     Of a circle drawn twice the first keeps the arcs, and none does if only the circle is left.
     """
@@ -198,7 +187,7 @@ def quadratic_roots(c: Floats) -> tuple[Floats, Floats]:
 
 
 def _gaps(low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """(M, K, L + 1) what intervals (M, K, L) leave of the line: begins and ends of each gap."""
+    """(M, K, L + 1) starts and ends of the gaps that intervals (M, K, L) leave on the line."""
     order = np.argsort(low, axis=2, kind="stable")
     low = np.take_along_axis(low, order, axis=2)
     high = np.maximum.accumulate(

@@ -1,156 +1,164 @@
-"""A STEP file held against the mesh and its own claims, whatever the part is."""
+"""A STEP file compared with the mesh and with its own claims, whatever the part is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded, short_list
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded_each, short_list
 from tbcad_verify.step.step_file import StepFile
 
 GAP_MM = 1e-5  # a hundred times the kernel's own precision
 CLAIM_SHARE = 1e-6  # of what the file claims
-UNITS = {
-    "step solid": "faults",
-    "step valid": "complaints",
-    "step gaps": "mm",
-    "step volume": "mm^3",
-    "step area": "mm^2",
-    "step centroid": "mm",
-    "step box": "mm",
-    "step properties": "of the figure",
-}
+CLAIMS = {"volume", "area", "centroid"}
 
 
 @dataclass(frozen=True)
 class PartComparison:
-    """One part's STEP file and the mesh that it is held against.
+    """One part's STEP file and the mesh that it is compared with.
 
     Attributes:
         name: of the part.
         file: as read.
-        mass: the mesh's, in the same place; None where it could not be measured.
-        off: how far the mesh may be from the exact surface, mm.
-        claim: by what share the file's own claims may be off: faces between edges that have no
+        mesh_mass: of the mesh, in the same place; None where it could not be measured.
+        mesh_error: maximum distance of the mesh from the exact surface, mm.
+        claim: maximum error of the file's own claims, as a share: faces between edges that have no
             closed form are only integrated to about a millionth.
     """
 
     name: str
     file: StepFile
-    mass: MassProperties | None
-    off: float
+    mesh_mass: MassProperties | None
+    mesh_error: float
     claim: float = CLAIM_SHARE
 
+    @property
+    def masses(self) -> tuple[MassProperties, MassProperties]:
+        """Of mesh and file.
 
-Job = Callable[[CheckName, PartComparison], Check]
-
-
-def comparison_checks(file: str, lump: PartComparison) -> list[Check]:
-    """All checks of one file, each guarded; `file` is its name in the report."""
-    names = [(name, file, unit) for name, unit in UNITS.items()]
-    return [
-        check
-        for name, job in zip(names, JOBS, strict=True)
-        for check in guarded([name], partial(_one, job, name, lump))
-    ]
+        Raises:
+            Unknown: the mesh could not be measured.
+        """
+        if self.mesh_mass is None:
+            raise Unknown("the mesh could not be measured")
+        return self.mesh_mass, self.file.mass
 
 
-def _one(job: Job, name: CheckName, lump: PartComparison) -> list[Check]:
-    return [job(name, lump)]
+Checks = Mapping[str, tuple[str, Callable[..., Check]]]  # unit and function of each, by name
 
 
-def solid(name: CheckName, lump: PartComparison) -> Check:
+def names_of(checks: Checks, file: str) -> list[CheckName]:
+    """Name, file and unit of every check."""
+    return [(name, file, unit) for name, (unit, _) in checks.items()]
+
+
+def run_checks(checks: Checks, file: str, comparison: PartComparison) -> list[Check]:
+    """All checks of one file, each unknown by itself; `file` is its name in the report."""
+    return guarded_each(names_of(checks, file), [job for _, job in checks.values()], comparison)
+
+
+def solid(name: CheckName, part: PartComparison) -> Check:
     """One solid of one closed shell, with the part's name."""
-    counts, named = lump.file.counts, lump.file.solids
-    faults = abs(counts["solids"] - 1) + abs(counts["shells"] - 1) + counts["open_edges"]
-    said = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in counts.items())
-    odd = int(named != (lump.name,))
-    return at_most(name, faults + odd, 0, f"{said}; named {short_list(named)}, not {lump.name}")
+    counts, named = part.file.counts, part.file.solids
+    faults = (
+        int(named != (part.name,))
+        + abs(counts["solids"] - 1)
+        + abs(counts["shells"] - 1)
+        + counts["open_edges"]
+    )
+    counted = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in counts.items())
+    return at_most(name, faults, 0, f"{counted}; named {short_list(named)}, not {part.name}")
 
 
-def valid(name: CheckName, lump: PartComparison) -> Check:
+def valid(name: CheckName, part: PartComparison) -> Check:
     """The kernel's own check accepts the shape."""
-    return at_most(name, int(not lump.file.valid), 0, "the kernel's check refuses the shape")
+    return at_most(name, int(not part.file.valid), 0, "the kernel's check refuses the shape")
 
 
-def gaps(name: CheckName, lump: PartComparison) -> Check:
+def gaps(name: CheckName, part: PartComparison) -> Check:
     """Corners lie on their edges and edges on their faces, before a reader widens them."""
-    return at_most(name, lump.file.gap, GAP_MM, "corners, edges and faces do not meet")
+    return at_most(name, part.file.gap, GAP_MM, "corners, edges and faces do not meet")
 
 
-def volume(name: CheckName, lump: PartComparison) -> Check:
-    """The mesh's, as far as it may be off."""
-    mesh, solid = _bulks(lump)
+def volume(name: CheckName, part: PartComparison) -> Check:
+    """The same as the mesh's, within the mesh's error."""
+    mesh, solid = part.masses
     return at_most(
         name,
         abs(mesh.volume - solid.volume),
-        solid.area * lump.off,
+        solid.area * part.mesh_error,
         f"STEP {solid.volume:.3f}, mesh {mesh.volume:.3f}",
     )
 
 
-def area(name: CheckName, lump: PartComparison) -> Check:
-    """Facets off by h from a surface of radius r lose some 2 h / r of its area.
+def area(name: CheckName, part: PartComparison) -> Check:
+    """Facets at distance h from a surface of radius r lose some 2 h / r of its area.
 
-    Where the mesh's bend is known, that says more: no surface within h differs by more than it.
+    Where the mesh's bend is known, the limit is tighter: no surface within h differs by more.
     """
-    mesh, solid = _bulks(lump)
-    radius = lump.file.faces.radius
-    least = np.nanmin(radius, initial=np.ptp([solid.low, solid.high], axis=0).max() / 2)
-    limit = solid.area * 2 * lump.off / float(least)
-    limit = limit if mesh.bend is None else mesh.bend * lump.off
+    mesh, solid = part.masses
+    radius = part.file.faces.radius
+    smallest = np.nanmin(radius, initial=np.ptp([solid.low, solid.high], axis=0).max() / 2)
+    limit = solid.area * 2 * part.mesh_error / float(smallest)
+    limit = limit if mesh.bend is None else mesh.bend * part.mesh_error
     detail = f"STEP {solid.area:.3f}, mesh {mesh.area:.3f}"
     return at_most(name, abs(mesh.area - solid.area), limit, detail)
 
 
-def centroid(name: CheckName, lump: PartComparison) -> Check:
-    """A layer of the mesh's error all on one side moves the middle by its share of the volume."""
-    mesh, solid = _bulks(lump)
-    wide = float(np.linalg.norm(np.subtract(solid.high, solid.low))) / 2
-    away = float(np.linalg.norm(np.subtract(mesh.centroid, solid.centroid)))
+def centroid(name: CheckName, part: PartComparison) -> Check:
+    """The mesh's error all on one side moves the centroid by its share of the volume."""
+    mesh, solid = part.masses
+    size = float(np.linalg.norm(np.subtract(solid.high, solid.low))) / 2
+    distance = float(np.linalg.norm(np.subtract(mesh.centroid, solid.centroid)))
     detail = f"STEP {_three(solid.centroid)}, mesh {_three(mesh.centroid)}"
-    return at_most(name, away, wide * solid.area * lump.off / solid.volume, detail)
+    return at_most(name, distance, size * solid.area * part.mesh_error / solid.volume, detail)
 
 
-def box(name: CheckName, lump: PartComparison) -> Check:
-    """Reaches as far as the mesh, on all six sides."""
-    mesh, solid = _bulks(lump)
-    away = np.abs(np.subtract([mesh.low, mesh.high], [solid.low, solid.high])).max()
+def box(name: CheckName, part: PartComparison) -> Check:
+    """The same as the mesh's, on all six sides."""
+    mesh, solid = part.masses
+    error = np.abs(np.subtract([mesh.low, mesh.high], [solid.low, solid.high])).max()
     detail = (
         f"STEP {_three(solid.low)} to {_three(solid.high)}, "
         f"mesh {_three(mesh.low)} to {_three(mesh.high)}"
     )
-    return at_most(name, float(away), lump.off, detail)
+    return at_most(name, float(error), part.mesh_error, detail)
 
 
-def properties(name: CheckName, lump: PartComparison) -> Check:
-    """The file's own claims, so that any reader can tell whether it has read what was written."""
-    claims, solid = lump.file.properties, lump.file.mass
-    if set(claims) != {"volume", "area", "centroid"}:
-        detail = f"the file claims {short_list(sorted(claims)) or 'nothing'}; all three are wanted"
-        return at_most(name, np.inf, lump.claim, detail)
-    wide = float(np.linalg.norm(np.subtract(solid.high, solid.low)))
+def properties(name: CheckName, part: PartComparison) -> Check:
+    """The file's own claims, by which any reader can verify what it has read."""
+    claims, solid = part.file.properties, part.file.mass
+    if set(claims) != CLAIMS:
+        claimed = short_list(sorted(claims)) or "nothing"
+        detail = f"the file claims {claimed}; volume, area and centroid are required"
+        return at_most(name, np.inf, part.claim, detail)
+    size = float(np.linalg.norm(np.subtract(solid.high, solid.low)))
     shares = (
         abs(claims["volume"] / solid.volume - 1),
         abs(claims["area"] / solid.area - 1),
-        float(np.linalg.norm(np.subtract(claims["centroid"], solid.centroid))) / wide,
+        float(np.linalg.norm(np.subtract(claims["centroid"], solid.centroid))) / size,
     )
     detail = f"volume, area, centroid off by {', '.join(f'{share:.3g}' for share in shares)}"
-    return at_most(name, max(shares), lump.claim, detail)
-
-
-def _bulks(lump: PartComparison) -> tuple[MassProperties, MassProperties]:
-    if lump.mass is None:
-        raise Unknown("the mesh could not be measured")
-    return lump.mass, lump.file.mass
+    return at_most(name, max(shares), part.claim, detail)
 
 
 def _three(point: Sequence[float]) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in point) + ")"
 
 
-JOBS: tuple[Job, ...] = (solid, valid, gaps, volume, area, centroid, box, properties)
+SOLID_CHECKS: Checks = {
+    "step solid": ("faults", solid),
+    "step valid": ("complaints", valid),
+    "step gaps": ("mm", gaps),
+}
+MASS_CHECKS: Checks = {
+    "step volume": ("mm^3", volume),
+    "step area": ("mm^2", area),
+    "step centroid": ("mm", centroid),
+    "step box": ("mm", box),
+    "step properties": ("of the figure", properties),
+}
+CHECKS: Checks = {**SOLID_CHECKS, **MASS_CHECKS}

@@ -1,9 +1,9 @@
-"""The union of balls in closed form: what every mirror's cell must be, from the record alone.
+"""The union of balls in closed form: every mirror's cell, from the record alone.
 
 A cell is the part of a mirror's surface that no other ball, or half-space behind a planar mirror,
 of the same camera covers, on the side that faces the light, cut by the seam x = 0 and the foot
-plane. Nothing of a STEP file, a mesh or a CAD kernel is looked at, nor any neighbourhood that
-somebody else boundaries: the result is an oracle for them.
+plane. It does not depend on a STEP file, a mesh, a CAD kernel, or neighbours found elsewhere: it is
+an independent reference for them.
 
 By Gauss' theorem the columns `volume` and `moment`, summed over all faces of a closed solid, are
 its volume and its volume times its centroid; `vector_area` sums to zero.
@@ -26,7 +26,7 @@ from tbcad_verify.step.map_arcs import MapArcs
 from tbcad_verify.step.stereographic import to_surface
 from tbcad_verify.types import Bools, Floats, Ints
 
-TOUCHING = 1e-11  # of the spread: corners that are one corner
+SAME_CORNER = 1e-11  # of the spread
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class ClosedFormCells:
         first: (M, 3) mm^3, the integral of x.
         volume: (M,) mm^3, the integral of x.n / 3.
         moment: (M, 3) mm^4, the integral of x (x.n) / 4.
-        box: (M, 2, 3) mm, least and greatest x, y, z; NaN for empty cells.
-        corners: (M,) how many; where four cells meet within rounding, one corner.
-        edges: (M,) how many; a full circle is an edge without corners.
-        empty: (M,) nothing is left of the mirror.
-        closed: (M,) every arc goes on where another one ends, and the cell ends before the
-            horizon (for planes: before infinity). False where the figures mean nothing.
+        box: (M, 2, 3) mm, minimum and maximum x, y, z; NaN for empty cells.
+        corners: (M,) number; where four cells meet within rounding, one corner.
+        edges: (M,) number; a full circle is an edge without corners.
+        empty: (M,) the mirror is covered completely.
+        closed: (M,) every arc starts where another one ends, and the cell ends before the
+            horizon (for planes: before infinity). Where it is false, the figures are meaningless.
         rim: the edges.
     """
 
@@ -78,7 +78,7 @@ class ClosedFormCells:
     rim: CellEdges
 
     def __len__(self) -> int:
-        """How many mirrors."""
+        """Number of mirrors."""
         return len(self.area)
 
 
@@ -96,7 +96,7 @@ def closed_form_cells(
             from it; else all of it.
 
     Returns:
-        Their integrals, boxes and edges. Empty and open cells are marked, never refused.
+        Their integrals, boxes and edges. Empty and open cells are marked, not refused.
 
     Source: Archimedes' projection and Stokes' theorem, see `moments`.
     """
@@ -111,7 +111,7 @@ def closed_form_cells(
 
 
 def cells_of_balls(centre: Floats, radius: Floats, walls: Floats) -> ClosedFormCells:
-    """All that is free of balls (M, 3) mm, (M,) mm, front and back, on the right side of walls."""
+    """The uncovered parts of balls (M, 3) mm, (M,) mm, front and back, inside the walls."""
     up = np.zeros_like(centre) + np.array([0.0, 0.0, 1.0])
     return closed_form_cells(centre + radius[:, None] * up, up, 1 / radius, walls, front=False)
 
@@ -120,8 +120,8 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     """The cells of one camera's rows of mirrors.csv, in their order, as the solid has them.
 
     The recorded radius is that of the reflecting surface; the solid ends one coat below it, unless
-    `coated`. A row without a radius is a plane. The camera keeps the side of x = 0 that its
-    pinhole is on, and all above the foot plane. The recorded `cell_area_mm2` is the coated one.
+    `coated`. A row without a radius is a plane. The walls are the seam x = 0, of which the camera
+    has the side of its pinhole, and the foot plane. The recorded `cell_area_mm2` is the coated one.
     """
     rows = export.mirrors
     mine = np.flatnonzero(rows.camera == camera)
@@ -135,16 +135,16 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
 
 
 def _merged(boundaries: CellBoundaries) -> MapArcs:
-    """Without the arcs that are nothing but rounding at corners of four cells and more."""
-    return boundaries.arcs.take(boundaries.arcs.length > TOUCHING * boundaries.spread)
+    """Without the arcs that are only rounding at corners of four cells or more."""
+    return boundaries.arcs.take(boundaries.arcs.length > SAME_CORNER * boundaries.spread)
 
 
 def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
-    """All figures of the cells; `horizon` is the number that stands for it."""
+    """All figures of the cells; `horizon` is the number of the horizon."""
     count, arcs = len(boundaries.whole), boundaries.arcs
     empty = ~boundaries.whole & (_count(arcs.mirror, count) == 0)
     area, vector_area, first, volume, moment = _integrals(boundaries)
-    passed, circles = _passes(arcs)
+    passed, circles = _far_points(arcs)
     corners = _count(arcs.mirror, count) - _count(passed, count)
     wrong = arc_loops(arcs, boundaries.spread).loose | (arcs.circle == horizon)
     return ClosedFormCells(
@@ -205,10 +205,10 @@ def _box(boundaries: CellBoundaries) -> Floats:
     )
 
 
-def _passes(arcs: MapArcs) -> tuple[Ints, Ints]:
-    """Mirrors' numbers, one a circle of which both sides of the farthest point are arcs' ends.
+def _far_points(arcs: MapArcs) -> tuple[Ints, Ints]:
+    """Mirrors of circles whose farthest point lies inside an edge; and of full circles.
 
-    Such an end is no corner. And one a full circle.
+    A mirror is repeated for each such circle.
     """
     begin, end = arcs.t[0] == -np.inf, arcs.t[1] == np.inf
     circle = arcs.mirror * (arcs.circle.max(initial=0) + 1) + arcs.circle

@@ -1,4 +1,4 @@
-"""A STEP file of an export, read twice in a process of its own, and both readings joined."""
+"""A STEP file of an export: text and kernel read it in another process, and both are joined."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
-WAYS = ("sphere", "plane")
+EXACT_KINDS = ("sphere", "plane")
 FILES = (("part", "step"), ("answer", "json"))
 
 Row = dict[str, Any]
@@ -44,7 +44,8 @@ class StepFaces:
         area: (F,) mm^2.
         middle: (F, 3) of the area, mm.
 
-    What there is not is NaN: so are measures where the kernel has no face on the text's surface.
+    Figures that do not exist are NaN: so are measures where the kernel has no face on the text's
+    surface.
     """
 
     names: tuple[str, ...]
@@ -65,9 +66,9 @@ class StepFile:
         solids: names of the solids in the text.
         counts: the kernel's solids, shells and open edges.
         valid: the kernel's check of the shape.
-        gap: how far the kernel had to widen corners and edges until they met, mm.
+        gap: tolerance to which the kernel had to widen corners and edges until they met, mm.
         mass: of the whole, by the kernel.
-        properties: volume, area and centroid as the file claims them; what it does not is missing.
+        properties: volume, area and centroid, as far as the file claims them.
         faces: all of them.
     """
 
@@ -84,7 +85,7 @@ def load(folder: Path, name: str) -> FileBytes:
     """The bytes of a STEP file.
 
     Raises:
-        BadExport: as `files.read`; it does not begin or does not end as ISO 10303-21 demands.
+        BadExport: as `files.read`; it does not begin or end as ISO 10303-21 requires.
     """
     blob = read(folder, name, MAX_STEP_BYTES, _refuse_foreign)
     if not blob.data[-len(END) - 64 :].tobytes().rstrip().endswith(END):
@@ -98,32 +99,32 @@ def examine(blob: FileBytes, seconds: float) -> StepFile:
     Raises:
         Unknown: a reading failed, crashed or took too long.
     """
-    found = examine_all([blob], seconds)[0]
-    if isinstance(found, Unknown):
-        raise found
-    return found
+    file = examine_all([blob], seconds)[0]
+    if isinstance(file, Unknown):
+        raise file
+    return file
 
 
 def examine_all(blobs: Sequence[FileBytes], seconds: float) -> list[StepFile | Unknown]:
-    """Several files in one process, which takes long to start.
+    """Read several files in one process, which takes long to start.
 
-    Whatever that process did not come to is read once more, each file in a process of its own, so
-    that one file that crashes a reader or holds it up leaves the others known.
+    Files that it did not read are read again, each in a process of its own, so that a file that
+    crashes or stops the reader does not make the others unknown.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
         place = Path(name)
         for k, blob in enumerate(blobs):
             blob.data.tofile(place / f"part{k}.step")
         reason = _read(place, range(len(blobs)), seconds)
-        lost = [k for k in range(len(blobs)) if not (place / f"answer{k}.json").exists()]
-        reasons = dict.fromkeys(lost, reason)
+        unread = [k for k in range(len(blobs)) if not (place / f"answer{k}.json").exists()]
+        reasons = dict.fromkeys(unread, reason)
         if len(blobs) > 1:
-            reasons = {k: _read(place, [k], seconds) for k in lost}
+            reasons = {k: _read(place, [k], seconds) for k in unread}
         return [_answer(place / f"answer{k}.json", reasons.get(k, "")) for k in range(len(blobs))]
 
 
 def _read(place: Path, which: Iterable[int], seconds: float) -> str:
-    """Let a child read some files; why it did not come to its end, or nothing."""
+    """Read some files in a child process; why it failed, or empty."""
     pairs = [f"{place}/{word}{k}.{end}" for k in which for word, end in FILES]
     # -P: what lies in the current folder must not be imported.
     command = [sys.executable, "-P", "-m", "tbcad_verify.step", *pairs]
@@ -141,7 +142,7 @@ def _answer(path: Path, reason: str) -> StepFile | Unknown:
 
 
 def parse(text: Row, solid: Row) -> StepFile:
-    """Join what the text says with what the kernel measured."""
+    """Join the text's figures with the kernel's."""
     rows = solid["faces"]
     area = sum(row["area"] for row in rows)
     return StepFile(
@@ -156,13 +157,13 @@ def parse(text: Row, solid: Row) -> StepFile:
 
 
 def _key(row: Row) -> tuple[Any, ...]:
-    """A surface as both readers give it, to what the text's digits are worth."""
+    """A surface as both readers give it, to the precision of the text."""
     numbers = [*row.get("point", ()), *row.get("axis", ()), row.get("radius", 0.0)]
     return row["kind"], *(round(number, 9) + 0.0 for number in numbers)
 
 
 def _faces(rows: list[Row], measured: dict[tuple[Any, ...], Row]) -> StepFaces:
-    joined = [measured.get(_key(row), {}) if row["kind"] in WAYS else {} for row in rows]
+    joined = [measured.get(_key(row), {}) if row["kind"] in EXACT_KINDS else {} for row in rows]
     return StepFaces(
         tuple(row["name"] for row in rows),
         np.array([row["kind"] for row in rows], dtype=str),

@@ -1,16 +1,16 @@
-"""Every other mirror and wall, drawn on a flat map of each mirror.
+"""Every other mirror and wall as a circle on a flat map of each mirror.
 
 A mirror is a sphere or plane with apex p, unit normal N there and curvature k = 1 / r. Its map is
-the tangent plane at p; a point y of the map stands for x = p + d with
+the tangent plane at p; a point y of the map represents x = p + d with
 
     d = w (y - (k / 2) |y|^2 N),   w = 1 / (1 + k^2 |y|^2 / 4),
 
-the stereographic projection from the point opposite p, and nothing at all when k = 0. What another
-ball or half-space leaves free of the mirror is, on the map,
+the stereographic projection from the point opposite p, and the identity when k = 0. The part of the
+mirror that another ball or half-space does not cover is, on the map,
 
     alpha |y|^2 + beta . y + gamma >= 0:
 
-the in- or outside of a circle, or one side of a line. So spheres, planes and walls are one case.
+the inside or outside of a circle, or one side of a line. So spheres, planes and walls are one case.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class SurfaceMaps:
         surfaces: M of them; the apex is the map's origin.
         right: (3, M) unit, the map's first axis.
         up: (3, M) unit, its second; right, up and normal are right-handed.
-        reach: (M,) mm on the map, how far it is looked at: to the horizon of the front side.
+        reach: (M,) radius of the map, mm: to the horizon of the front side.
     """
 
     surfaces: Surfaces
@@ -59,8 +59,8 @@ class MapCircles:
         alpha: (M, K) 1/mm; twice this is the circle's curvature.
         beta: (2, M, K).
         gamma: (M, K) mm.
-        real: (M, K) false where the other one does not cut the mirror.
-        covers: (M, K) true where it covers all of the mirror.
+        real: (M, K) false where the other surface does not cut the mirror.
+        covers: (M, K) true where it covers the whole mirror.
     """
 
     alpha: Floats
@@ -71,21 +71,18 @@ class MapCircles:
 
     def take(self, column: Ints) -> MapCircles:
         """Some of each map's circles: (M, K') numbers of columns."""
-        pick = [
-            np.take_along_axis(a, column, axis=1)
-            for a in (self.alpha, *self.beta, self.gamma, self.real, self.covers)
-        ]
-        return MapCircles(pick[0], np.stack(pick[1:3]), pick[3], pick[4], pick[5])
+        return self.rows((np.arange(len(column))[:, None], column))
 
-    def rows(self, row: Ints) -> MapCircles:
-        """The circles of these maps."""
+    def rows(self, index: Ints | tuple[Ints, Ints]) -> MapCircles:
+        """The circles of these maps, or with these numbers of maps and columns."""
+        beta = self.beta[:, *index] if isinstance(index, tuple) else self.beta[:, index]
         return MapCircles(
-            self.alpha[row], self.beta[:, row], self.gamma[row], self.real[row], self.covers[row]
+            self.alpha[index], beta, self.gamma[index], self.real[index], self.covers[index]
         )
 
     @property
     def clearance(self) -> Floats:
-        """(M, K) mm, from the apex to what is covered; below zero inside it."""
+        """(M, K) mm, from the apex to the covered region; negative inside it."""
         distance = 2 * self.gamma / (np.hypot(*self.beta) + 1)
         return np.where(self.real, distance, np.where(self.covers, -np.inf, np.inf))
 
@@ -93,8 +90,8 @@ class MapCircles:
 def surface_maps(surfaces: Surfaces, front: bool, spread: float) -> SurfaceMaps:
     """Maps of surfaces that lie `spread` mm apart at most.
 
-    With `front`, a map ends at the horizon, 90 degrees from the apex; else it has no end. A plane
-    has no horizon: its map ends far outside of everything.
+    With `front`, a map ends at the horizon, 90 degrees from the apex; otherwise it is unbounded. A
+    plane has no horizon: its map ends far outside of everything.
     """
     right, up = tangent_basis(surfaces.normal)
     far = np.full(len(surfaces.curvature), FAR * spread)
@@ -164,9 +161,9 @@ def to_surface(maps: SurfaceMaps, y: Floats) -> Floats:
 
 
 def with_apex_uncovered(surfaces: Surfaces, others: Surfaces) -> Surfaces:
-    """Whole spheres with their apex moved to where the largest cap that others cover is opposite.
+    """Whole spheres with their apex moved opposite to the largest cap that others cover.
 
-    So the point that the map cannot show is never part of what is free, unless all is.
+    So the point that the map cannot show is covered, unless nothing is.
     """
     out = [_opposite(surfaces, others, part) for part in chunks(len(surfaces.curvature), 256)]
     normal = np.concatenate(out, axis=1)

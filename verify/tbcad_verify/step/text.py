@@ -1,7 +1,7 @@
-"""A STEP file as the text it is (ISO 10303-21), read without any CAD kernel.
+"""A STEP file as text (ISO 10303-21), read without any CAD kernel.
 
-What a kernel writes and the same kernel reads can be wrong both times; names, spheres, planes and
-validation properties are therefore taken from the text.
+What one kernel writes and reads can be wrong both times. Names, spheres, planes and validation
+properties are therefore taken from the text.
 """
 
 from __future__ import annotations
@@ -77,21 +77,21 @@ def _numbers(entity: Any) -> list[float]:
 
 def _properties(table: Entities) -> Row:
     """Values under every property definition called a geometric validation property."""
-    wanted = {
+    definitions = {
         reference
         for reference, item in table.items()
         if item.name == "PROPERTY_DEFINITION" and item.params[0] == "geometric validation property"
     }
-    found: Row = {}
+    properties: Row = {}
     for link in _of(table, "PROPERTY_DEFINITION_REPRESENTATION"):
-        if link.params[0] in wanted:
+        if link.params[0] in definitions:
             for item in (table[reference] for reference in table[link.params[1]].params[1]):
                 key = PROPERTIES.get(str(item.params[0]))
-                if key in found:
+                if key in properties:
                     raise ValueError(f"broken STEP text: {key} is claimed twice")
                 if key:
-                    found[key] = _value(item)
-    return found
+                    properties[key] = _value(item)
+    return properties
 
 
 def _value(item: Any) -> float | list[float]:
