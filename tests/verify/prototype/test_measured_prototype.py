@@ -11,6 +11,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+from tbcad_verify.mesh.lines import wrapped
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
@@ -136,7 +137,7 @@ def test_turns_about_the_axis(context: PrototypeContext) -> None:
         before, after = (axis.polar_and_azimuth(context.frame, d) for d in (x, found))
         np.testing.assert_allclose(before[0], after[0], atol=1e-12)
         np.testing.assert_allclose(
-            axis.wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
+            wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
         )
 
 

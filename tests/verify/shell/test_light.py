@@ -11,6 +11,7 @@ import pytest
 import trimesh
 from tbcad_verify import verify
 from tbcad_verify.mesh import rays
+from tbcad_verify.mesh.surfaces import distance_before_mirror
 from tbcad_verify.shell import coverage, image_rim, light, pixels
 from tbcad_verify.shell.optics import OpticalSetup
 
@@ -156,7 +157,7 @@ def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: OpticalSetup) ->
     start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
     seen = bench.seen(camera)
     small = image_rim.rim_rays(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
-    way = image_rim.nearest_on_the_way(seen, small.direction, small.lines)
+    way = distance_before_mirror(seen, small.direction, small.lines.reach)
     assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
 
 

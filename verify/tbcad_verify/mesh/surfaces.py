@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.lines import nearest_on_lines
 from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.types import Floats
 
@@ -124,10 +125,28 @@ def reflect_directions(d: Floats, normal: Floats) -> Floats:
     return d - 2 * dot(d, normal) * normal
 
 
-def nearest_to_origin(lines: ReflectedRays) -> Floats:
-    """(3, N) the point of each reflected line that is nearest to the origin."""
-    p, r = lines.point, lines.toward
-    return p - dot(p, r) / dot(r, r) * r
+def nearest_to_origin(rays: ReflectedRays) -> Floats:
+    """(3, N) the points nearest to the origin on the lines of reflected rays, mm."""
+    return nearest_on_lines(rays.point, rays.toward)
+
+
+def nearest_on_rays(rays: ReflectedRays) -> Floats:
+    """(3, N) the points nearest to the origin on reflected rays, not before their mirrors, mm.
+
+    A small ball deflects rays at its rim so far that they leave away from the object.
+    """
+    return nearest_on_lines(rays.point, rays.toward, first=0.0)
+
+
+def distance_before_mirror(surfaces: PreparedSurfaces, d: Floats, reach: Floats) -> Floats:
+    """(N,) minimum distances from the origin of rays d (3, N) up to where they meet the mirror.
+
+    Args:
+        surfaces: whose origin the rays start from.
+        d: directions.
+        reach: (N,) how many lengths of d lie before the mirror.
+    """
+    return norm(nearest_on_lines(surfaces.origin[:, None], d, last=reach))
 
 
 def miss_distances(lines: ReflectedRays) -> Floats:

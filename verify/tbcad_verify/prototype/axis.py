@@ -22,11 +22,6 @@ def polar_and_azimuth(frame: Floats, d: Floats) -> tuple[Floats, Floats]:
     return np.arctan2(np.hypot(zero, third), along), np.arctan2(third, zero)
 
 
-def wrapped(angle: Floats) -> Floats:
-    """Angles in -pi ... pi."""
-    return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))
-
-
 def angles_between(a: Floats, b: Floats) -> Floats:
     """(N,) angles between columns, radians; exact for small ones too.
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays, reflect
-from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
-from tbcad_verify.prototype import axis
+from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
+from tbcad_verify.mesh.surfaces import Surfaces, nearest_on_rays, prepare_for_rays, reflect
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.blocked_rays import blocked_rays
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.distances import distances_to_segments
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.prototype.pinhole_cells import (
     INSIDE,
@@ -25,7 +24,6 @@ from tbcad_verify.prototype.pinhole_cells import (
 )
 from tbcad_verify.prototype.ray_transfer import (
     RayTransfer,
-    nearest_on_rays,
     nearest_points,
     ray_transfer,
     rotated,
@@ -198,11 +196,11 @@ def _coverage(transfer: RayTransfer, outlines: CellOutlines, nearest: Floats) ->
     # A ray that misses the ball shows nothing, so it takes nothing away.
     diameter = 2 * np.where(both & np.isfinite(distance), distance, np.inf).min(axis=1)
     apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
-    first, second = tangent_basis(unit(apex - context.pinhole[:, None]))
+    middle = np.repeat(unit(apex - context.pinhole[:, None]), both.shape[1], axis=1)
     d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
-    angle = np.arctan2(*((side[:, :, None] * d).sum(axis=0) for side in (second, first)))
-    step = axis.wrapped(np.roll(angle, -1, axis=1) - angle)
-    turns = np.abs(np.where(both, step, 0).sum(axis=1)) / (2 * np.pi)
+    ends = [x.reshape(3, -1) for x in (d, np.roll(d, -1, axis=2))]
+    angle = np.where(both, rotation_angles(middle, *ends).reshape(both.shape), 0)
+    turns = np.abs(angle.sum(axis=1)) / (2 * np.pi)
     expected = np.where(context.halved, 0.5, 1.0)
     return np.where(np.abs(turns - expected) <= TURNS, diameter, 0.0)
 

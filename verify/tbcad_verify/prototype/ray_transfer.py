@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK
-from tbcad_verify.mesh.surfaces import ReflectedRays, reflect
-from tbcad_verify.mesh.vectors import chunks, dot
+from tbcad_verify.mesh.surfaces import ReflectedRays, nearest_on_rays, reflect
+from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
@@ -98,12 +98,3 @@ def nearest_points(transfer: RayTransfer, mirror: Ints, d: Floats) -> Floats:
         rays = transfer.reflected(repeated, d[:, part].reshape(3, -1))[1]
         nearest[:, part] = nearest_on_rays(rays).reshape(3, -1, d.shape[2])
     return nearest
-
-
-def nearest_on_rays(rays: ReflectedRays) -> Floats:
-    """(3, N) the point of each reflected ray that is nearest to the origin; not before it starts.
-
-    A small ball deflects rays at its rim so far that they leave away from the object.
-    """
-    p, r = rays.point, rays.toward
-    return np.asarray(p + np.maximum(-dot(p, r) / dot(r, r), 0) * r)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tbcad_verify.mesh.lines import wrapped
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.context import PrototypeContext
@@ -84,7 +85,7 @@ def position_errors(context: PrototypeContext) -> Floats:
         [
             np.abs(norm(p) + norm(pinhole - p) - double_a),
             np.abs(polar - np.radians(balls.polar_deg)),
-            np.abs(axis.wrapped(azimuth - np.radians(balls.azimuth_deg))),
+            np.abs(wrapped(azimuth - np.radians(balls.azimuth_deg))),
             norm(unit(unit(pinhole - p) - unit(p)) - n),
             norm(c - (p - balls.radius_mm * n)),
             norm(b - (p - depth * n)),

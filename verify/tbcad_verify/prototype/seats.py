@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import half_edge_vectors
-from tbcad_verify.mesh.vectors import cross, dot, norm, unit
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.distances import distance_to_facets, distances_to_segments
+from tbcad_verify.prototype.distances import distance_to_facets
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -202,9 +203,7 @@ def _margin(mesh: Mesh, pad: Pad, centre: Floats) -> float:
     half, other = _sides(mesh, pad.facets)
     start, edge = half_edge_vectors(mesh, half[~np.isin(other, pad.facets)])
     contact = centre + (start.T[0] - centre) @ pad.normal * pad.normal
-    x = np.broadcast_to(contact[:, None], start.shape)
+    x, normal = (np.broadcast_to(v[:, None], start.shape) for v in (contact, pad.normal))
     distance = float(distances_to_segments(x, start, start + edge).min())
-    a, b = start - x, start + edge - x
-    angle = np.arctan2(pad.normal @ cross(a, b), dot(a, b))
-    turns = angle.sum() / (2 * np.pi)
+    turns = rotation_angles(normal, start - x, start + edge - x).sum() / (2 * np.pi)
     return distance if abs(turns) > 0.5 else -distance

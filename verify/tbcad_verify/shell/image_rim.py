@@ -76,13 +76,6 @@ def margins(camera: Camera, d: Floats) -> Floats:
     return np.where(depth > 0, inside, -np.inf)
 
 
-def nearest_on_the_way(seen: PreparedSurfaces, d: Floats, lines: ReflectedRays) -> Floats:
-    """(N,) least distance from the origin of the rays between pinhole and mirror, mm."""
-    pinhole = seen.origin[:, None]
-    foot = np.minimum(-dot(pinhole, d) / dot(d, d), lines.reach)
-    return norm(pinhole + foot * d)
-
-
 def _miss(lines: ReflectedRays, u: Floats) -> Floats:
     """(2, N) how a line misses the origin, across u; as long as the distance in space."""
     miss = nearest_to_origin(lines)

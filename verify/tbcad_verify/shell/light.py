@@ -8,6 +8,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.lines import crossings
 from tbcad_verify.mesh.rays import (
     RayScene,
     distances_to_planes,
@@ -19,6 +20,7 @@ from tbcad_verify.mesh.rays import (
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
     ReflectedRays,
+    distance_before_mirror,
     nearest_to_origin,
     reflect,
     reflect_directions,
@@ -147,12 +149,10 @@ def _second(
 
 
 def _nearest_on_the_way(
-    stage: SensorScene, mirror: NDArray[np.int32], d: Floats, t: Floats
+    stage: SensorScene, mirror: NDArray[np.int32], d: Floats, reach: Floats
 ) -> Floats:
-    pinhole = stage.camera.pinhole[:, None]
-    foot = np.minimum(-dot(pinhole, d) / dot(d, d), t)
     least = np.full(stage.mirrors, np.inf)
-    np.minimum.at(least, mirror, norm(pinhole + foot * d))
+    np.minimum.at(least, mirror, distance_before_mirror(stage.seen, d, reach))
     return least
 
 
@@ -164,5 +164,4 @@ def _spread(
     pinhole = stage.camera.pinhole[:, None]
     t = (plane[3] + stage.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
     point, bounced = pinhole + t * d, reflect_directions(d, plane[:3])
-    at = point - dot(point, toward) / dot(bounced, toward) * bounced
-    return norm(at - miss).astype(np.float32)
+    return norm(crossings(point, bounced, toward) - miss).astype(np.float32)

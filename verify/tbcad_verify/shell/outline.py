@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
@@ -20,7 +21,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect,
     reflect_directions,
 )
-from tbcad_verify.mesh.vectors import dot, norm, tangent_basis
+from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.types import Floats, Ints
 
@@ -124,7 +125,8 @@ def minimum_miss_distance(outline: Outline, lines: ReflectedRays, virtual: Virtu
     """
     outer = np.flatnonzero(~outline.seam[:: SAMPLES.size])
     at = nearest_to_origin(lines).reshape(3, -1, SAMPLES.size)[:, outer]
-    miss = _from_segments(at[:, :, :-1].reshape(3, -1), at[:, :, 1:].reshape(3, -1))
+    start, end = at[:, :, :-1].reshape(3, -1), at[:, :, 1:].reshape(3, -1)
+    miss = distances_to_segments(np.zeros_like(start), start, end)
     camera = virtual.index[outline.mirror[:: SAMPLES.size][outer]]
     least = np.full(virtual.count, np.inf)
     # A ray that passes its mirror by sees nothing of the object.
@@ -144,14 +146,13 @@ def winding_numbers(outline: Outline, lines: ReflectedRays, virtual: Virtual, u:
         virtual: pairs halves.
         u: (3, M) directions of the virtual cameras.
     """
-    first, second = tangent_basis(u[:, outline.mirror])
-    miss = nearest_to_origin(lines)
-    angle = np.arctan2(dot(miss, second), dot(miss, first)).reshape(-1, SAMPLES.size)
-    step = np.diff(angle, axis=1)
-    step -= 2 * np.pi * np.round(step / (2 * np.pi))
-    edge = np.where(outline.seam[:: SAMPLES.size], 0.0, step.sum(axis=1))
-    camera = virtual.index[outline.mirror[:: SAMPLES.size]]
-    return np.bincount(camera, np.nan_to_num(edge), virtual.count) / (2 * np.pi)
+    miss = nearest_to_origin(lines).reshape(3, -1, SAMPLES.size)
+    start, end = miss[:, :, :-1].reshape(3, -1), miss[:, :, 1:].reshape(3, -1)
+    edge_mirror = outline.mirror[:: SAMPLES.size]
+    axis = np.repeat(u[:, edge_mirror], SAMPLES.size - 1, axis=1)
+    angle = rotation_angles(axis, start, end).reshape(-1, SAMPLES.size - 1).sum(axis=1)
+    angle = np.where(outline.seam[:: SAMPLES.size], 0.0, np.nan_to_num(angle))
+    return np.bincount(virtual.index[edge_mirror], angle, virtual.count) / (2 * np.pi)
 
 
 def _outline_edges(mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints]:
@@ -163,13 +164,6 @@ def _outline_edges(mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_]) -> t
     beyond = np.where(twin >= 0, patches.label[twin // 3], -1)
     edge = beyond != patches.label[half // 3]
     return half[edge], beyond[edge].astype(np.intp)
-
-
-def _from_segments(a: Floats, b: Floats) -> Floats:
-    """(N,) distances of the origin from segments a - b, (3, N) each."""
-    way = b - a
-    t = -dot(a, way) / np.maximum(dot(way, way), np.finfo(np.float64).tiny)
-    return norm(a + np.clip(t, 0, 1) * way)
 
 
 def _spread(values: Floats) -> Floats:

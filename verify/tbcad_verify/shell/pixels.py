@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tbcad_verify.mesh.surfaces import distance_before_mirror
 from tbcad_verify.record.export import Camera
 from tbcad_verify.report.checks import (
     Check,
@@ -98,7 +99,7 @@ def _clear(
     rings: list[tuple[Camera, image_rim.RimRays]],
 ) -> Check:
     ways = [
-        image_rim.nearest_on_the_way(bench.seen(camera), ring.direction, ring.lines)
+        distance_before_mirror(bench.seen(camera), ring.direction, ring.lines.reach)
         for camera, ring in rings
     ]
     least = np.nanmin(np.concatenate([tally.nearest, *ways]))

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.lines import crossings
 from tbcad_verify.mesh.surfaces import ReflectedRays
-from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.poses import Virtual
 from tbcad_verify.shell.outline import Outline
 from tbcad_verify.types import Floats
@@ -84,5 +84,5 @@ def _image(
     """Where lines pierce the plane through the origin across u: along x, and across it."""
     u = u[:, mirror[rows]]
     p, r = lines.point[:, rows], lines.toward[:, rows]
-    at = p - dot(p, u) / dot(r, u) * r
+    at = crossings(p, r, u)
     return at[0], u[1] * at[2] - u[2] * at[1]
