@@ -12,7 +12,8 @@ from tbcad.optics.power_diagram import Boundary, flip_until_regular, half_edges,
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# Corners nearer to each other than this are one: far below any maker's means, far above rounding.
+# Corners nearer to each other than this are one: far below any tolerance of manufacture, far above
+# rounding.
 MERGED_MM = 1e-4
 
 
@@ -20,8 +21,8 @@ MERGED_MM = 1e-4
 class Cells:
     """All cells of one camera's mirrors as one planar graph on shared corners (DESIGN.md 4).
 
-    Faces are the m mirrors, then the seam and the foot plane. Every corner is where three faces
-    meet; where four cells meet in one point two corners coincide.
+    Faces are the m mirrors, then the seam and the foot plane. Three faces meet at every corner;
+    where four cells meet in one point two corners coincide.
 
     Attributes:
         surfaces: the m mirrors and the two planes.
@@ -63,21 +64,19 @@ class Cells:
     @cached_property
     def arcs(self) -> "Arcs":
         """The arcs between cells, one for each pair of faces that touch."""
-        return arcs_of(self)
+        return _arcs(self)
 
     @cached_property
     def rings(self) -> tuple[Ints, Ints]:
-        """Arcs round each mirror, counter-clockwise from outside.
+        """Sides of each mirror's cell, counter-clockwise from outside.
 
         Returns:
             Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell
             follows it from start to end, 2 a + 1 where it goes back along it.
         """
         ends, twin = half_edges(self.triangles)
-        first = np.zeros(self.mirrors, dtype=np.int64)
-        first[ends[::-1, 0][ends[::-1, 0] < self.mirrors]] = (
-            len(ends) - 1 - np.flatnonzero(ends[::-1, 0] < self.mirrors)
-        )
+        _, first = np.unique(ends[:, 0], return_index=True)
+        first = first[: self.mirrors]
         degree = np.bincount(ends[:, 0], minlength=self.mirrors)[: self.mirrors]
         around = [first]
         for _ in range(int(degree.max()) - 1):
@@ -134,10 +133,10 @@ class Arcs:
         return result
 
 
-def arcs_of(cells: Cells) -> Arcs:
+def _arcs(cells: Cells) -> Arcs:
     """Arcs in closed form from the corners and the faces' gradients there.
 
-    Corners nearer to each other than MERGED_MM become one, which no maker could tell apart.
+    Corners nearer to each other than MERGED_MM become one.
     """
     ends, twin = half_edges(cells.triangles)
     edge = np.flatnonzero((np.arange(len(ends)) < twin) & (ends.min(axis=1) < cells.mirrors))
@@ -167,7 +166,7 @@ def _merged(between: Ints, short: Bools, corners: int) -> Ints:
 def _curves(
     surfaces: Surfaces, left: Ints, right: Ints, start: Floats, end: Floats
 ) -> tuple[Floats, Floats]:
-    """Control polygon (e, 3, 3) and weight (e,) of the arc the two faces have in common."""
+    """Control polygon (e, 3, 3) and weight (e,) of the arc that the two faces have in common."""
     swap = surfaces.curvature[right] > surfaces.curvature[left]
     p, q = np.where(swap, right, left), np.where(swap, left, right)
     plane, _ = radical_planes(surfaces, p, q)
@@ -178,7 +177,7 @@ def _curves(
     sine = half * surfaces.curvature[p] / np.sqrt(1 - tilt**2)
     cosine = np.sqrt(1 - sine**2)
     middle = (start + end) / 2
-    along = np.divide(chord, 2 * half[:, None], out=np.zeros_like(chord), where=half[:, None] > 0)
+    along = unit(chord)
     outward = np.cross(plane, along)
     outward *= np.sign(dot(outward, surfaces.gradient(p, middle)))[:, None]
     control = middle + (half * sine / cosine)[:, None] * outward
@@ -186,13 +185,18 @@ def _curves(
 
 
 def cells_of(surfaces: Surfaces, boundary: Boundary, triangles: Ints) -> Cells:
-    """Cells of mirrors, from a dual triangulation that is right or nearly so.
+    """Cells of m mirrors between the seam and the foot plane.
+
+    Args:
+        surfaces: the m mirrors, then the two planes.
+        boundary: indices of the planes.
+        triangles: a dual triangulation that is right or nearly so, (t, 3).
 
     Raises:
-        UnsettledError: when the mirrors bound no proper cells.
+        NotRegularError: when the mirrors bound no proper cells.
     """
-    settled, corners = flip_until_regular(surfaces, triangles, boundary.seam)
-    return Cells(surfaces, boundary, settled, corners)
+    regular, corners = flip_until_regular(surfaces, triangles, boundary.seam)
+    return Cells(surfaces, boundary, regular, corners)
 
 
 def cell_areas(cells: Cells) -> Floats:
@@ -207,41 +211,30 @@ def cell_areas(cells: Cells) -> Floats:
     points = cells.arcs.points[arc]
     points[back == 1] = points[back == 1][:, ::-1]
     mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
-    planar = np.all(cells.surfaces.curvature == 0)
-    part = _plane_part if planar else _sphere_part
-    total = np.add.reduceat(part(cells, mirror, arc, points, offsets), offsets[:-1])
-    if planar:
-        return total
-    return (2 * np.pi - total) / cells.surfaces.curvature[: cells.mirrors] ** 2
+    if np.all(cells.surfaces.curvature == 0):
+        return np.add.reduceat(_plane_areas(cells, mirror, points), offsets[:-1])
+    angles = np.add.reduceat(_turning_angles(cells, mirror, points, offsets), offsets[:-1])
+    return (2 * np.pi - angles) / cells.surfaces.curvature[: cells.mirrors] ** 2
 
 
-def _plane_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets: Ints) -> Floats:
-    del arc, offsets
+def _plane_areas(cells: Cells, mirror: Ints, points: Floats) -> Floats:
+    """Signed area of the triangle of each side and the mirror's apex, mm^2."""
     from_apex = points - cells.surfaces.apex[mirror][:, None]
-    normal = cells.surfaces.normal[mirror]
-    doubled = dot(np.cross(from_apex[:, 0], from_apex[:, 2]), normal)
-    result: Floats = -doubled / 2
-    return result
+    outside = -cells.surfaces.normal[mirror]
+    return dot(np.cross(from_apex[:, 0], from_apex[:, 2]), outside) / 2
 
 
-def _sphere_part(cells: Cells, mirror: Ints, arc: Ints, points: Floats, offsets: Ints) -> Floats:
+def _turning_angles(cells: Cells, mirror: Ints, points: Floats, offsets: Ints) -> Floats:
     """Exterior angle after each side and geodesic curvature along it, seen from outside."""
-    surfaces = cells.surfaces
-    outside = -surfaces.gradient(mirror, points[:, 2])
+    outside = -cells.surfaces.gradient(mirror, points[:, 2])
     tangents = unit(np.diff(points, axis=1))
-    following = np.arange(len(arc)) + 1
+    following = np.arange(len(points)) + 1
     following[offsets[1:] - 1] = offsets[:-1]
     before, after = tangents[:, 1], tangents[following, 0]
-    angle = np.arctan2(
-        dot(np.cross(before, after), outside),
-        dot(before, after),
-    )
-    # Geodesic curvature of a circle of angular radius b is cot b / r; with the turn of the
-    # tangent 2 asin(sin half angle) its integral is that turn times cos b.
+    exterior = np.arctan2(dot(np.cross(before, after), outside), dot(before, after))
+    # Geodesic curvature of a circle of angular radius b is cot b / r; its integral is the rotation
+    # of the tangent along the arc times cos b.
     start, control, end = points[:, 0], points[:, 1], points[:, 2]
-    bend = np.cross(control - start, end - control)
-    turn = 2 * np.arctan2(norm(control - (start + end) / 2), norm(end - start) / 2)
-    size = norm(bend)
-    axis = np.divide(bend, size[:, None], out=np.zeros_like(bend), where=size[:, None] > 0)
-    result: Floats = angle + turn * dot(axis, outside)
-    return result
+    rotation = 2 * np.arctan2(norm(control - (start + end) / 2), norm(end - start) / 2)
+    axis = unit(np.cross(control - start, end - control))
+    return exterior + rotation * dot(axis, outside)

@@ -1,8 +1,9 @@
-"""Which three mirrors meet at a corner: the dual triangulation of the cells, kept valid by flips.
+"""The power diagram of the mirrors' spheres, by edge flips on its dual triangulation.
 
-The dual triangulation starts as the geodesic polyhedron and is changed only by edge flips, so it
-is a proper triangulation at every step. Where four cells meet in one point either diagonal will
-do: the two corners then coincide. No tolerance decides the topology, only its stopping.
+A triangle of the dual triangulation is three mirrors whose cells meet at a corner. It starts as the
+geodesic polyhedron and is changed only by edge flips, so it is a proper triangulation at every
+step. Where four cells meet in one point either diagonal will do: the two corners then coincide. No
+tolerance decides the topology, only when the flips stop.
 """
 
 from dataclasses import dataclass
@@ -13,20 +14,20 @@ from tbcad.geometry.vectors import dot
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# A corner counts as covered when another sphere lies deeper than this over it, mm. It only keeps
+# An edge is flipped when a corner lies deeper than this inside the mirror across it. It only keeps
 # rounding from flipping an edge to and fro; arcs this short are merged later.
-COVERED = 1e-9
-# Flips settle within some ten rounds; a search that runs on is going in circles.
+FLIP_DEPTH_MM = 1e-9
+# Flips end within some ten rounds; a search that runs on is going in circles.
 MAX_ROUNDS = 200
 MAX_STEPS = 64
-# Rounding in the test against all mirrors, mm.
-TOUCHING = 1e-7
-# Pairs of point and surface looked at in one go: bounds the memory.
-CHUNK = 4_000_000
+# Rounding in the test of all corners against all mirrors.
+ROUNDING_MM = 1e-7
+# Pairs of point and surface that are tested at a time: bounds the memory.
+MAX_PAIRS = 4_000_000
 
 
 class NotRegularError(ArithmeticError):
-    """The cells' topology was not found."""
+    """No dual triangulation was found whose corners all lie outside the other mirrors."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,14 @@ def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints
     middle = u[kept][rim].sum(axis=1)
     plane = np.where(middle[:, 0] < middle[:, 2], boundary.seam, boundary.foot)
     closing = np.column_stack([rim[:, 1], rim[:, 0], plane])
-    return np.concatenate([inner, closing, _ends(rim, plane)]), boundary
+    return np.concatenate([inner, closing, _plane_ends(rim, plane)]), boundary
 
 
-def _ends(rim: Ints, plane: Ints) -> Ints:
+def _plane_ends(rim: Ints, plane: Ints) -> Ints:
     """Triangles (mirror, seam, foot) where the rim goes from one plane to the other."""
-    follows = np.empty(rim.max() + 1, dtype=np.int64)
-    follows[rim[:, 0]] = plane
-    after = follows[rim[:, 1]]
+    plane_after = np.empty(rim.max() + 1, dtype=np.int64)
+    plane_after[rim[:, 0]] = plane
+    after = plane_after[rim[:, 1]]
     change = after != plane
     return np.column_stack([rim[change, 1], plane[change], after[change]])
 
@@ -87,9 +88,16 @@ def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
 def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     """Points where three surfaces meet on the light's side, in closed form, mm, (t, 3).
 
-    Two planes of equal power (radical planes) give a line; it meets the sphere of the greatest
-    curvature there, at the point nearer to the mirrors' apices. NaN where there is no common
-    point. Indices from `mirrors` on are bounding planes.
+    Two planes of equal power (radical planes) meet in a line, and the line meets the sphere of the
+    largest curvature: the corner is the intersection nearer to the mirrors' apices.
+
+    Args:
+        surfaces: the mirrors, followed by the bounding planes.
+        triangles: indices of three surfaces each, (t, 3).
+        mirrors: number of mirrors.
+
+    Returns:
+        NaN where three surfaces have no point in common.
     """
     pivot = np.argmax(surfaces.curvature[triangles], axis=1)
     row = np.arange(len(triangles))
@@ -101,7 +109,7 @@ def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
         line = line / length
-        start = _between(surfaces, triangles, mirrors)
+        start = _mean_apices(surfaces, triangles, mirrors)
         point += dot(line, start)[:, None] * line
         gradient = surfaces.gradient(p, point)
         slope = dot(line, gradient)
@@ -111,7 +119,7 @@ def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     return result
 
 
-def _between(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+def _mean_apices(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     """Mean of the apices of those faces of each corner that are mirrors."""
     mirror = (triangles < mirrors)[:, :, None]
     mean: Floats = np.mean(surfaces.apex[triangles], axis=1, where=mirror)
@@ -119,7 +127,10 @@ def _between(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
-    """Planes g . x + h = 0 that hold what surfaces p and q have in common, curvature of p >= q."""
+    """Radical planes g . x + h = 0 of surfaces p and q (k,), curvature of p >= that of q.
+
+    They contain all points that the two surfaces have in common.
+    """
     kp, kq = surfaces.curvature[p], surfaces.curvature[q]
     ratio = np.divide(kq, kp, out=np.zeros_like(kp), where=kp > 0)
     g, h = surfaces.gradient_at_origin, surfaces.value_at_origin
@@ -132,38 +143,40 @@ def flip_until_regular(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tup
     Args:
         surfaces: the mirrors, followed by the bounding planes.
         triangles: a triangulation to start from, (t, 3).
-        mirrors: number of mirrors; higher indices are planes, which are never joined anew.
+        mirrors: number of mirrors; higher indices are planes, between which no edge is added.
 
     Returns:
         Triangles (t, 3) and their corners (t, 3).
 
     Raises:
-        UnsettledError: when no sequence of flips was found.
+        NotRegularError: when no sequence of flips was found.
     """
     steps = 1
     while steps <= MAX_STEPS:
         try:
-            return _follow(surfaces, triangles, mirrors, steps)
+            return _flip_in_steps(surfaces, triangles, mirrors, steps)
         except NotRegularError:
             steps *= 4
-    raise NotRegularError(f"the cells do not settle in {MAX_STEPS} steps from flat mirrors")
+    raise NotRegularError(f"no regular cells were found in {MAX_STEPS} steps from flat mirrors")
 
 
-def _follow(surfaces: Surfaces, start: Ints, mirrors: int, steps: int) -> tuple[Ints, Floats]:
-    """Settle directly, or along mirrors that grow from flat to their curvature in some steps.
+def _flip_in_steps(
+    surfaces: Surfaces, start: Ints, mirrors: int, steps: int
+) -> tuple[Ints, Floats]:
+    """Flip edges directly, or while the mirrors curve from flat to their radii in some steps.
 
     Tangent planes of an ellipsoid always bound proper cells; in small steps of curvature each
-    flip is then between corners that all but coincide, where it is sure to be right.
+    flip is then between corners that nearly coincide, where it is sure to be right.
     """
     triangles = start.copy()
     for share in np.linspace(0, 1, steps + 1) if steps > 1 else [1.0]:
         scaled = surfaces.with_curvature(share * surfaces.curvature)
-        points = _settle_once(scaled, triangles, mirrors)
+        points = _flip_in_rounds(scaled, triangles, mirrors)
     return triangles, points
 
 
-def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
-    """Flip the triangles in place until settled, and return their corners."""
+def _flip_in_rounds(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+    """Flip edges of the triangles in place until none is left to flip; return the corners."""
     points = corners(surfaces, triangles, mirrors)
     for _ in range(MAX_ROUNDS):
         edge, twin = _flips(surfaces, triangles, points, mirrors)
@@ -171,54 +184,58 @@ def _settle_once(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
             break
         changed = _flip(triangles, edge, twin)
         points[changed] = corners(surfaces, triangles[changed], mirrors)
-    deepest = lowest_value(surfaces, points)
-    if not deepest > -TOUCHING:
-        raise NotRegularError(f"a corner lies {-deepest:.3g} mm inside another mirror")
+    lowest = lowest_value(surfaces, points)
+    if not lowest > -ROUNDING_MM:
+        raise NotRegularError(f"a corner lies {-lowest:.3g} mm inside another mirror")
     return points
 
 
 def lowest_value(surfaces: Surfaces, points: Floats) -> float:
-    """Least value of any f_j at points (t, 3): below zero some surface covers a point, mm.
+    """Smallest value of any f_j at points (t, 3), mm: below zero a surface covers a point.
 
-    It looks at all pairs, so it is the proof of what the flips found by looking at neighbours.
+    All pairs are tested, so this verifies what the flips found by testing neighbours.
     """
     terms = np.column_stack(
         [surfaces.gradient_at_origin, surfaces.curvature / 2, surfaces.value_at_origin]
     )
     squared = dot(points, points)
     lifted = np.column_stack([points, squared, np.ones(len(points))])
-    rows = max(1, CHUNK // len(surfaces))
-    least = [np.min(lifted[k : k + rows] @ terms.T) for k in range(0, len(points), rows)]
-    return float(np.min(least))
+    rows = max(1, MAX_PAIRS // len(surfaces))
+    lowest = [np.min(lifted[k : k + rows] @ terms.T) for k in range(0, len(points), rows)]
+    return float(np.min(lowest))
 
 
 def _flips(surfaces: Surfaces, triangles: Ints, points: Floats, mirrors: int) -> tuple[Ints, Ints]:
-    """Directed edges to flip, at most one in any triangle, and their twins; worst first."""
+    """Directed edges to flip, at most one in any triangle, and their twins; deepest first."""
     ends, twin = half_edges(triangles)
     edge = np.flatnonzero(np.arange(len(ends)) < twin)
-    across = twin[edge]
-    here, there = _opposite(triangles, edge), _opposite(triangles, across)
-    depth = np.minimum(
-        surfaces.value(there, points[edge // 3]), surfaces.value(here, points[across // 3])
+    twin = twin[edge]
+    one, other = _opposite(triangles, edge), _opposite(triangles, twin)
+    value = np.minimum(
+        surfaces.value(other, points[edge // 3]), surfaces.value(one, points[twin // 3])
     )
-    low, high = np.minimum(here, there), np.maximum(here, there)
-    wanted = (np.nan_to_num(depth, nan=0.0) < -COVERED) & (low < mirrors) & (low != high)
-    size = len(surfaces)
-    wanted[wanted] = ~np.isin(
-        (low * size + high)[wanted], ends.min(axis=1) * size + ends.max(axis=1)
-    )
-    chosen = np.flatnonzero(wanted)
-    chosen = chosen[np.argsort(depth[chosen], kind="stable")]
-    rank = np.full(len(triangles), len(chosen))
-    order = np.arange(len(chosen))
-    np.minimum.at(rank, edge[chosen] // 3, order)
-    np.minimum.at(rank, across[chosen] // 3, order)
-    free = (rank[edge[chosen] // 3] == order) & (rank[across[chosen] // 3] == order)
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    new_edge = low * len(surfaces) + high
+    present = ends.min(axis=1) * len(surfaces) + ends.max(axis=1)
+    flippable = (np.nan_to_num(value, nan=0.0) < -FLIP_DEPTH_MM) & (low < mirrors) & (low != high)
+    flippable[flippable] = ~np.isin(new_edge[flippable], present)
+    candidates = np.flatnonzero(flippable)
+    candidates = candidates[np.argsort(value[candidates], kind="stable")]
+    candidates = candidates[_first_in_both(edge[candidates] // 3, twin[candidates] // 3)]
     # Flips of neighbouring triangles could make the same new edge twice.
-    new_edge = (low * size + high)[chosen[free]]
-    _, first = np.unique(new_edge, return_index=True)
-    picked = chosen[free][np.sort(first)]
-    return edge[picked], across[picked]
+    _, first = np.unique(new_edge[candidates], return_index=True)
+    candidates = candidates[np.sort(first)]
+    return edge[candidates], twin[candidates]
+
+
+def _first_in_both(one: Ints, other: Ints) -> Bools:
+    """Which pairs of triangles (k,) are the first in the list to name either of the two."""
+    order = np.arange(len(one))
+    rank = np.full(max(one.max(initial=0), other.max(initial=0)) + 1, len(one))
+    np.minimum.at(rank, one, order)
+    np.minimum.at(rank, other, order)
+    result: Bools = (rank[one] == order) & (rank[other] == order)
+    return result
 
 
 def _opposite(triangles: Ints, edge: Ints) -> Ints:
