@@ -1,1 +1,1 @@
-"""Vectors, ellipsoids, cones and simple bodies: numbers only (numpy, scipy)."""
+"""Vectors, rotations, ellipsoids, round cones and primitives, numbers only (numpy, scipy)."""

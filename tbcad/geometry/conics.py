@@ -47,7 +47,7 @@ class Ellipse:
         return Ellipse(self.centre + shift, self.major, self.minor)
 
     def arc(self, start: Floats, end: Floats, through: Floats) -> "EllipseArc":
-        """The arc from start to end on the side of the ellipse toward a third point."""
+        """The arc between two points (3,) on the side of the ellipse toward a third point."""
         first, last, middle = (self.parameter(point) for point in (start, end, through))
         forward = (last - first) % (2 * np.pi)
         if (middle - first) % (2 * np.pi) > forward:
@@ -64,16 +64,12 @@ class EllipseArc:
     last: float
 
     def at(self, share: ArrayLike) -> Floats:
-        """Points (..., 3) at shares (...) of the way in the parameter."""
+        """Points (..., 3) at shares (...) of the parameter's range."""
         return self.ellipse.at(self.first + np.asarray(share) * (self.last - self.first))
 
     def moved(self, shift: Floats) -> "EllipseArc":
         """The arc moved by a vector (3,), mm."""
         return EllipseArc(self.ellipse.moved(shift), self.first, self.last)
-
-    def reversed(self) -> "EllipseArc":
-        """The same arc from end to start."""
-        return EllipseArc(self.ellipse, self.last, self.first)
 
     def by_length(self, share: ArrayLike) -> Floats:
         """Points (..., 3) at shares (...) of the arc's length, to a part in 10^4."""

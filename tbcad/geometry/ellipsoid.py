@@ -22,7 +22,7 @@ class Ellipsoid:
 
     @property
     def linear_eccentricity(self) -> float:
-        """Half the distance of the foci, c, mm."""
+        """Linear eccentricity c, half the distance of the foci, mm."""
         return float(np.linalg.norm(self.pinhole)) / 2
 
     @property
@@ -51,12 +51,12 @@ class Ellipsoid:
         return self.radial_distance(u)[:, None] * u
 
     def normals(self, u: Floats) -> Floats:
-        """Unit normals (m, 3) at the apices, inward: they bisect -u and the way to the pinhole."""
+        """Unit normals (m, 3) at the apices, inward: they bisect -u and the ray to the pinhole."""
         to_pinhole = self.pinhole - self.apices(u)
         return unit(unit(to_pinhole) - u)
 
     def frame(self) -> Floats:
-        """Rows (3, 3): w, the direction of azimuth zero, and the third of a right-handed frame.
+        """Right-handed frame, rows (3, 3): axis w, direction of azimuth zero, azimuth 90 degrees.
 
         Azimuth is counted about w from the side of the mirrors (the zenith has azimuth zero).
         """

@@ -1,9 +1,9 @@
-"""What a ball meets as it swings about the axis: one angle for each thing in its way, closed form.
+"""Angles at which a ball that rotates about the axis meets an obstacle, in closed form.
 
-All that matters here is a hull of two spheres (a round cone) whose centres lie in a half-plane
-bounded by the axis: a ball (both spheres the same), the light that a ball reflects, a post, a
-camera. A ball whose centre goes round the axis meets such a hull within some angle to either side
-of that half-plane and nowhere else, so what is forbidden is always one symmetric interval.
+Every obstacle is a hull of two spheres (a round cone) whose centres lie in a half-plane bounded by
+the axis: a ball (both spheres the same), the light that a ball reflects, a post, a camera. A ball
+whose centre rotates about the axis meets such a hull within some angle to either side of that
+half-plane and nowhere else, so the forbidden angles are always one symmetric interval.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class RoundCones:
     """Hulls of two spheres each, centres in a half-plane at the axis, over m of them.
 
     Attributes:
-        start: centre of the one sphere, along the axis and out from it (>= 0), mm, (m, 2).
+        start: centre of one sphere, along the axis and out from it (>= 0), mm, (m, 2).
         end: centre of the other, mm, (m, 2).
         start_radius: mm, (m,).
         end_radius: mm, (m,).
@@ -34,7 +34,7 @@ class RoundCones:
         return len(self.start_radius)
 
     def grown(self, margin: float) -> "RoundCones":
-        """The same with a margin (mm) all round."""
+        """The hulls with a margin (mm) all round."""
         return RoundCones(
             self.start, self.end, self.start_radius + margin, self.end_radius + margin
         )
@@ -46,7 +46,7 @@ def spheres(centre: Floats, radius: Floats) -> RoundCones:
 
 
 def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
-    """Angles within which balls that go round the axis meet round cones, radians, (m, k).
+    """Angles within which balls that rotate about the axis meet round cones, radians, (m, k).
 
     Args:
         centre: of the balls, along the axis and out from it, mm, (k, 2).
@@ -58,12 +58,12 @@ def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
 
     At angle t the ball meets the sphere at share s of the hull when
     |C|^2 + |c|^2 - 2 C_along c_along - 2 C_out c_out cos t <= (r(s) + radius)^2, so when cos t is
-    at least a quadratic in s over a linear one, whose least value stands at an end or where its
+    at least a quadratic in s over a linear one, whose minimum is at an end or where its
     derivative is zero.
     """
     over, under = _quadratic(centre, radius, cones), _linear(centre, cones)
     with np.errstate(over="ignore"):  # next to the axis the ratio may be infinite
-        shares = [np.zeros_like(under[0]), np.ones_like(under[0]), *_level(over, under)]
+        shares = [np.zeros_like(under[0]), np.ones_like(under[0]), *_stationary(over, under)]
         cosine = np.min([_ratio(over, under, share) for share in shares], axis=0)
     angle: Floats = np.arccos(np.clip(cosine, -1, 1))
     return angle
@@ -71,14 +71,14 @@ def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
 
 def _quadratic(centre: Floats, radius: Floats, cones: RoundCones) -> tuple[Floats, Floats, Floats]:
     """Coefficients (m, k) of s^2, s and 1 of the squared distance in the plane less (r + R)^2."""
-    away = cones.start[:, None] - centre
+    offset = cones.start[:, None] - centre
     along = (cones.end - cones.start)[:, None]
     reach = cones.start_radius[:, None] + radius
     growth = (cones.end_radius - cones.start_radius)[:, None]
-    # Turned into the cones' half-plane the two are this far apart; the turn adds the rest.
+    # Distances with the ball in the cones' half-plane; the rotation out of it adds the rest.
     square = (along**2).sum(axis=-1) - growth**2
-    slope = 2 * ((along * away).sum(axis=-1) - growth * reach)
-    constant = (away**2).sum(axis=-1) - reach**2
+    slope = 2 * ((along * offset).sum(axis=-1) - growth * reach)
+    constant = (offset**2).sum(axis=-1) - reach**2
     return square + 0 * constant, slope, constant
 
 
@@ -96,13 +96,13 @@ def _ratio(over: tuple[Floats, ...], under: tuple[Floats, ...], share: Floats) -
     return 1 + np.divide(top, bottom, out=on_axis, where=bottom > 0)
 
 
-def _level(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> tuple[Floats, Floats]:
+def _stationary(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> tuple[Floats, Floats]:
     """Shares in [0, 1] where the ratio's derivative is zero, or an end."""
     (a, b, c), (m, n) = over, under
     square, half, constant = a * m, a * n, b * n - c * m
     root = np.sqrt(np.maximum(half**2 - square * constant, 0))
-    # The form that does not cancel; without a square term one of the two is the only root.
-    far = -(half + np.where(half >= 0, root, -root))
-    first = np.divide(far, square, out=np.zeros_like(far), where=square != 0)
-    second = np.divide(constant, far, out=np.zeros_like(far), where=far != 0)
+    # The form without cancellation; without a square term one of the two is the only root.
+    larger = -(half + np.where(half >= 0, root, -root))
+    first = np.divide(larger, square, out=np.zeros_like(larger), where=square != 0)
+    second = np.divide(constant, larger, out=np.zeros_like(larger), where=larger != 0)
     return np.clip(first, 0, 1), np.clip(second, 0, 1)

@@ -1,1 +1,1 @@
-"""Numbers only: the geometry and optics of the turtleback reflector (numpy, scipy)."""
+"""The optics of the turtleback reflector, numbers only (numpy, scipy)."""

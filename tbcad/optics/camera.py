@@ -1,4 +1,4 @@
-"""A pinhole camera turned so that all its mirrors are in the frame."""
+"""A pinhole camera whose orientation brings all its mirrors into the frame."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,11 @@ from scipy.optimize import minimize
 
 from tbcad.geometry.vectors import FLIP_X, unit
 from tbcad.types import Floats
+
+# A tilt with points behind the camera has an infinite fill, which the search cannot use.
+MAX_FILL = 1e3
+# Digits beyond are noise of the search: a symmetric array gets a symmetric camera.
+TILT_DIGITS = 8
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Camera:
         return _fill(self.forward, self.right, self.half_sizes, points - self.pinhole)
 
     def mirrored(self) -> "Camera":
-        """The other camera: mirror image in the plane x = 0, its rows running the other way."""
+        """Camera b for camera a: the mirror image in the plane x = 0, with its rows reversed."""
         return Camera(
             self.pinhole * FLIP_X,
             self.forward * FLIP_X,
@@ -65,9 +70,16 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
 def fitted_camera(
     pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
 ) -> Camera:
-    """The camera turned so that points (k, 3) fill the least share of its frame.
+    """The camera whose orientation leaves the widest margin round points (k, 3) in its frame.
 
     The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
+
+    Args:
+        pinhole: mm, (3,).
+        points: that must be in the frame, mm, (k, 3).
+        width_px: columns.
+        height_px: rows.
+        hfov: angle of view across the columns, radians.
     """
     rays = unit(points - pinhole)
     middle = unit(rays.mean(axis=0))
@@ -76,19 +88,18 @@ def fitted_camera(
     half = np.tan(hfov / 2)
     half_sizes = np.array([half, half * height_px / width_px])
 
-    def axes(turn: Floats) -> tuple[Floats, Floats]:
-        forward = unit(middle + turn[0] * across + turn[1] * along)
+    def axes(tilt: Floats) -> tuple[Floats, Floats]:
+        forward = unit(middle + tilt[0] * across + tilt[1] * along)
         return forward, unit(across - (across @ forward) * forward)
 
-    def fill(turn: Floats) -> float:
-        return min(_fill(*axes(turn), half_sizes, rays), 1e3)
+    def fill(tilt: Floats) -> float:
+        return min(_fill(*axes(tilt), half_sizes, rays), MAX_FILL)
 
-    found = minimize(
+    optimum = minimize(
         fill,
         np.zeros(2),
         method="Nelder-Mead",
         options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},
     )
-    # What is left of the search beyond this is noise: a symmetric array gets a symmetric camera.
-    forward, right = axes(np.round(found.x, 8) + 0.0)
+    forward, right = axes(np.round(optimum.x, TILT_DIGITS) + 0.0)
     return Camera(pinhole, forward, right, width_px, height_px, hfov)

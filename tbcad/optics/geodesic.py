@@ -1,11 +1,14 @@
-"""The geodesic polyhedron whose vertices are the directions of the virtual cameras."""
+"""The geodesic polyhedron whose vertices are the directions of the virtual cameras.
+
+Section 3.1 and figure 2(b) of the paper: the icosahedron is split by the prime factors of n.
+"""
 
 import numpy as np
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.types import Floats, Ints
 
-# Directions closer than this to a symmetry plane lie on it; the splitting leaves errors of 1e-16.
+# Directions closer than this to a symmetry plane lie on it; splitting leaves errors of 1e-16.
 ON_PLANE = 1e-12
 
 
@@ -14,8 +17,8 @@ def icosahedron() -> tuple[Floats, Ints]:
     phi = (1 + 5**0.5) / 2
     rectangle = np.array([(0.0, s, t * phi) for s in (-1, 1) for t in (-1, 1)])
     vertices = np.concatenate([np.roll(rectangle, shift, axis=1) for shift in range(3)])
-    near = np.isclose(norm(vertices[:, None] - vertices[None]), 2.0)
-    a, b, c = np.nonzero(near[:, :, None] & near[:, None, :] & near[None, :, :])
+    adjacent = np.isclose(norm(vertices[:, None] - vertices[None]), 2.0)
+    a, b, c = np.nonzero(adjacent[:, :, None] & adjacent[:, None, :] & adjacent[None, :, :])
     faces = np.stack([a, b, c], axis=1)[(a < b) & (b < c)]
     inward = np.linalg.det(vertices[faces]) < 0
     faces[inward] = faces[inward][:, [0, 2, 1]]
@@ -34,7 +37,7 @@ def prime_factors(n: int) -> list[int]:
 
 
 def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
-    """Split each face into m x m and push the new vertices onto the unit sphere.
+    """Split each face (f, 3) into m x m faces and move the new vertices onto the unit sphere.
 
     Points on shared edges are made once, so that no tolerance decides which vertices are equal.
     """
@@ -70,7 +73,11 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
 
 
 def geodesic(n: int) -> tuple[Floats, Ints]:
-    """Geodesic polyhedron of frequency n: directions (10 n^2 + 2, 3), outward faces (20 n^2, 3)."""
+    """Geodesic polyhedron of frequency n, the paper's edge separation frequency.
+
+    Returns:
+        Unit vectors to the vertices (10 n^2 + 2, 3), and outward triangles over them (20 n^2, 3).
+    """
     vertices, faces = icosahedron()
     for factor in prime_factors(n):
         vertices, faces = split(vertices, faces, factor)

@@ -1,4 +1,4 @@
-"""Mirror surfaces as one implicit form that covers spheres and planes alike.
+"""Mirror surfaces in one implicit form for spheres and planes.
 
 A point x is on the light's side of mirror i where f_i(x) > 0 with
 
@@ -81,7 +81,7 @@ class Surfaces:
         return Surfaces(*(array[which] for array in self._arrays()))
 
     def with_curvature(self, curvature: Floats) -> "Surfaces":
-        """The same poses with other curvatures (m,)."""
+        """The same apices and normals with other curvatures (m,), 1/mm."""
         return Surfaces(self.apex, self.normal, curvature)
 
     def offset(self, distance: float) -> "Surfaces":
@@ -91,7 +91,7 @@ class Surfaces:
         return Surfaces(apex, self.normal, curvature)
 
     def mirrored(self) -> "Surfaces":
-        """The surfaces of the other camera: mirror image in the plane x = 0."""
+        """Camera b's surfaces for camera a's: the mirror image in the plane x = 0."""
         return Surfaces(self.apex * FLIP_X, self.normal * FLIP_X, self.curvature)
 
     def joined(self, other: "Surfaces") -> "Surfaces":
