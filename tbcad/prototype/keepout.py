@@ -182,7 +182,7 @@ def _boss(base: BaseLayout, k: int) -> Floats:
     seat, turn = base.seats, 2 * np.pi * np.arange(CIRCLE) / CIRCLE
     wide = float(seat.boss[k]) / np.cos(np.pi / CIRCLE)
     circle = wide * np.stack([np.cos(turn), np.sin(turn)], axis=1) @ seat.axes[k, :2]
-    lengths = (seat.front[k], seat.back[k] + base.keys.relief_mm)
+    lengths = (seat.front[k], seat.back[k] + base.spec.relief_mm)
     ends = [seat.centre[k] + length * seat.axes[k, 2] + circle for length in lengths]
     local = np.vstack(ends) @ base.frame.T
     plane = np.column_stack([local[:, 0], norm(local[:, 1:])])

@@ -1,7 +1,7 @@
-"""The coupon: one seat for each size of body at several places of the pads, to try the fit.
+"""The coupon: one seat for each size of body at several offsets of the pads, to try the fit.
 
-A seat stands on a bar that only joins it to the others, and is no thicker than on the carrier: a
-wall round cup and pocket, with a cone of 45 degrees between them that prints without support.
+A seat is on a bar that only joins it to the others, and is no thicker than on the carrier: a wall
+round cup and pocket, with a cone of 45 degrees between them that prints without support.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,8 +13,8 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.checks import check_mesh, check_pads
 from tbcad.cad.glyphs import ROWS, relief, width
 from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, ring
-from tbcad.prototype.base import seat_solids as seat
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.seat_solids import seat_hollow
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import room
 from tbcad.prototype.printing.placing import PlacedSolid
@@ -23,15 +23,15 @@ from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
-# Bars are thinner than a pocket's floor, so that they reach into no pocket.
-OF_FLOOR = 0.8
-BESIDE_MM = 1.5  # of a bar beside its text
-GAP_MM = 3.0
-SUNK_MM = 0.4
-# Tolerance (mm) and angle (radians) of a mesh that is only looked at for gaps.
-CLOSED = (0.2, 0.4)
-# The seat's axis points down.
-DOWN = np.diag([1.0, -1.0, -1.0])
+BAR_HEIGHT = 0.8  # of a pocket's floor: bars are lower, so that they reach into no pocket
+BESIDE_TEXT_MM = 1.5  # of a bar
+GAP_MM = 3.0  # round texts and between seats
+SUNK_MM = 0.4  # of texts into their face
+# Tolerance (mm) and angle (radians) of a mesh that is only checked for gaps.
+COARSE_MESH = (0.2, 0.4)
+DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a seat whose axis points down
+DECIMALS = 6  # to which sizes are the same, mm
+ROUNDING_MM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class CouponRow:
 
 
 Place = tuple[CouponRow, Floats]
+"""A row, and its left end on its shelf's middle line, mm, (2,)."""
 
 
 def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
@@ -63,139 +64,154 @@ def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
         SpecError: when a row of seats is larger than the bed.
         InvalidSolidError: when the kernel fails.
     """
-    seats = replace(base.seats, back=base.seats.bottom + base.keys.floor_mm)
-    plates = _plates(coupon_rows(seats, base.keys), printer)
+    seats = replace(base.seats, back=base.seats.bottom + base.spec.floor_mm)
+    plates = _plates(coupon_rows(seats, base.spec), printer)
     return [
-        PlacedSolid(name, _plate(name, seats, base.keys, rows), np.eye(3), np.zeros(3))
+        PlacedSolid(name, _plate(name, seats, base.spec, rows), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
     ]
 
 
-def coupon_rows(seats: Seats, keys: BaseSpec) -> list[CouponRow]:
+def coupon_rows(seats: Seats, spec: BaseSpec) -> list[CouponRow]:
     """A row for each size, the largest first."""
-    sizes, first = np.unique(np.round(seats.radius, 6), return_index=True)
-    return [_row(seats, keys, int(k)) for k in first[np.argsort(-sizes)]]
+    sizes, first = np.unique(np.round(seats.radius, DECIMALS), return_index=True)
+    return [_row(seats, spec, int(k)) for k in first[np.argsort(-sizes)]]
 
 
-def _row(seats: Seats, keys: BaseSpec, k: int) -> CouponRow:
-    name = f"{2 * seats.radius[k]:.2f}".rstrip("0").rstrip(".")
-    wide = 2 * float(seats.boss[k])
-    signs = max(width(_sign(offset)) for offset in keys.coupon_offsets_mm)
-    cell = signs * keys.digit_mm / ROWS + 2 * GAP_MM + wide
-    first = width(name) * keys.digit_mm / ROWS + 2 * GAP_MM
-    across = first + cell * len(keys.coupon_offsets_mm)
-    return CouponRow(k, name, first, cell, (across, max(wide, _bar(keys)) + GAP_MM))
+def _row(seats: Seats, spec: BaseSpec, k: int) -> CouponRow:
+    name = _short(f"{2 * seats.radius[k]:.2f}")
+    boss = 2 * float(seats.boss[k])
+    cell = _offsets_width(spec) + 2 * GAP_MM + boss
+    first = _text_width(name, spec) + 2 * GAP_MM
+    size = (first + cell * len(spec.coupon_offsets_mm), max(boss, _bar_width(spec)) + GAP_MM)
+    return CouponRow(k, name, first, cell, size)
 
 
-def _bar(keys: BaseSpec) -> float:
-    """Width of the bars, mm."""
-    return keys.digit_mm + 2 * BESIDE_MM
+def _bar_width(spec: BaseSpec) -> float:
+    return spec.digit_mm + 2 * BESIDE_TEXT_MM
 
 
-def _sign(offset: float) -> str:
-    text = f"{offset:+.3f}".rstrip("0").rstrip(".")
+def _text_width(text: str, spec: BaseSpec) -> float:
+    return width(text) * spec.digit_mm / ROWS
+
+
+def _offsets_width(spec: BaseSpec) -> float:
+    """Width of the widest offset, mm."""
+    return max(_text_width(_offset_text(offset), spec) for offset in spec.coupon_offsets_mm)
+
+
+def _offset_text(offset: float) -> str:
+    text = _short(f"{offset:+.3f}")
     return "0" if text in ("+0", "-0") else text
+
+
+def _short(number: str) -> str:
+    """A number without zeros at its end."""
+    return number.rstrip("0").rstrip(".")
 
 
 def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[list[Place]]]:
     """Rows on shelves, shelves on plates, each with its left end on the shelf's middle line."""
-    wide, deep = room(printer)[:2]
+    bed_width, bed_depth = room(printer)[:2]
     shelves: list[list[Place]] = []
     y = x = depth = 0.0
     for row in rows:
-        across, needed = row.size
-        _check(row, printer)
+        row_width, row_depth = row.size
+        _check_fits(row, printer)
         # Rows come with falling depth, so the first of a shelf decides.
-        if not shelves or x + across > wide:
-            y, x, depth = (y + depth if shelves else 0.0), 0.0, needed
-            if y + depth > deep:
+        if not shelves or x + row_width > bed_width:
+            y, x, depth = (y + depth if shelves else 0.0), 0.0, row_depth
+            if y + depth > bed_depth:
                 yield shelves
                 shelves, y = [], 0.0
             shelves.append([])
         shelves[-1].append((row, np.array([x, y + depth / 2])))
-        x += across
+        x += row_width
     yield shelves
 
 
-def _check(row: CouponRow, printer: PrinterSpec) -> None:
-    across, depth = row.size
+def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
+    row_width, depth = row.size
     if (np.array(row.size) > room(printer)[:2]).any():
         raise SpecError(
-            f"the coupon's seats for {row.name} mm take {across:.0f} x {depth:.0f} mm: make "
+            f"the coupon's seats for {row.name} mm take {row_width:.0f} x {depth:.0f} mm: make "
             "printer.bed_mm larger or prototype.base.coupon_offsets_mm shorter"
         )
 
 
-def _plate(name: str, seats: Seats, keys: BaseSpec, shelves: list[list[Place]]) -> TopoDS_Solid:
-    bodies = _bars(keys, shelves)
-    contacts, pads = [], []
+def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) -> TopoDS_Solid:
+    bodies, contacts, pads = _bars(spec, shelves), [], []
     for row, left in (place for shelf in shelves for place in shelf):
-        bodies += _texts(row, keys, left)
-        for n, offset in enumerate(keys.coupon_offsets_mm):
-            at = np.array([*_middle(row, left, n, seats), float(seats.back[row.seat])])
-            bodies.append(moved(_seat(seats, keys, row.seat, offset), DOWN, at))
-            away = seats.radius[row.seat] + offset
-            contacts.append(at - away * seats.local_normals[row.seat] @ DOWN)
-            pads.append(seats.pad[row.seat])
+        k = row.seat
+        bodies += _texts(row, spec, left)
+        for n, offset in enumerate(spec.coupon_offsets_mm):
+            at = np.array([*_seat_middle(row, left, n, seats), float(seats.back[k])])
+            bodies.append(moved(_seat(seats, spec, k, offset), DOWN, at))
+            contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ DOWN)
+            pads.append(seats.pad[k])
     solid = one_solid(name, fused(bodies))
-    check_mesh(name, meshed(solid, *CLOSED))
+    check_mesh(name, meshed(solid, *COARSE_MESH))
     check_pads(name, solid, np.concatenate(contacts), np.repeat(pads, 3))
     return solid
 
 
-def _bars(keys: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
+def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
     """A bar under each shelf, and one at the left that joins them."""
-    half, ends = _bar(keys) / 2, [shelf[-1][1][0] + shelf[-1][0].size[0] for shelf in shelves]
-    middles = [float(shelf[0][1][1]) for shelf in shelves]
+    half = _bar_width(spec) / 2
+    middles = [float(left[1]) for ((_, left), *_) in shelves]
+    ends = [float(left[0] + row.size[0]) - GAP_MM for (*_, (row, left)) in shelves]
     low, high = middles[0] - half, middles[-1] + half
     bars = [
-        _slab((0.0, y - half), (float(end) - GAP_MM, y + half), keys)
-        for y, end in zip(middles, ends, strict=True)
+        _bar((0.0, y - half), (end, y + half), spec) for y, end in zip(middles, ends, strict=True)
     ]
-    return [*bars, _slab((0.0, low), (_bar(keys), high), keys)]
+    return [*bars, _bar((0.0, low), (_bar_width(spec), high), spec)]
 
 
-def _slab(low: tuple[float, float], high: tuple[float, float], keys: BaseSpec) -> TopoDS_Shape:
+def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) -> TopoDS_Shape:
+    """A bar on the bed between two corners (x, y)."""
     (a, b), (c, d) = low, high
     corners = np.array([[a, b, 0], [c, b, 0], [c, d, 0], [a, d, 0]], dtype=float)
-    return prism(polygon(corners), np.array([0, 0, OF_FLOOR * keys.floor_mm]))
+    return prism(polygon(corners), np.array([0, 0, BAR_HEIGHT * spec.floor_mm]))
 
 
-def _middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
-    """Where the axis of a row's n-th seat stands, (2,)."""
+def _seat_middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
+    """Where the axis of a row's n-th seat meets the bed, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
     middle: Floats = left + np.array([right - float(seats.boss[row.seat]), 0.0])
     return middle
 
 
-def _seat(seats: Seats, keys: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
+def _seat(seats: Seats, spec: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
     """A seat in its own frame."""
-    return cut(ring(_wall(seats, keys, k), 0.0, 2 * np.pi), [seat.seat_hollow(seats, k, offset)])
+    wall = ring(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
+    return cut(wall, [seat_hollow(seats, k, offset)])
 
 
-def _wall(seats: Seats, keys: BaseSpec, k: int) -> Floats:
+def _wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
     """Half section (z, r) of what a hollow is cut out of, (n, 2)."""
     front, back, boss = float(seats.front[k]), float(seats.back[k]), float(seats.boss[k])
-    # On the cone, tangent to the sphere round the cup, z + r is this.
-    cone = np.sqrt(2) * float(seats.cup[k] + keys.cup_wall_mm)
-    foot = max(cone - back, float(seats.pocket[k]) + keys.cup_wall_mm)
-    slope = [[cone - boss, boss], [cone - foot, foot]] if foot < boss else [[back, boss]]
-    end = [[back, foot]] if cone - foot < back - 1e-6 and foot < boss else []
-    return np.array([[front, 0.0], [front, boss], *slope, *end, [back, 0.0]])
+    # On the cone of 45 degrees, tangent to the sphere round the cup, z + r is this.
+    cone = np.sqrt(2) * float(seats.cup[k] + spec.cup_wall_mm)
+    foot = max(cone - back, float(seats.pocket[k]) + spec.cup_wall_mm)
+    if foot >= boss:
+        slope = [[back, boss]]
+    else:
+        slope = [[cone - boss, boss], [cone - foot, foot]]
+        if cone - foot < back - ROUNDING_MM:
+            slope.append([back, foot])
+    return np.array([[front, 0.0], [front, boss], *slope, [back, 0.0]])
 
 
-def _texts(row: CouponRow, keys: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
+def _texts(row: CouponRow, spec: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
-    at = left + np.array([row.first / 2, 0.0])
-    found = _text(row.name, keys, at)
-    wide = max(width(_sign(offset)) for offset in keys.coupon_offsets_mm) * keys.digit_mm / ROWS
-    for n, offset in enumerate(keys.coupon_offsets_mm):
-        found += _text(
-            _sign(offset), keys, left + np.array([row.first + n * row.cell + wide / 2, 0.0])
-        )
-    return found
+    solids = _text(row.name, spec, left, row.first / 2)
+    half = _offsets_width(spec) / 2
+    for n, offset in enumerate(spec.coupon_offsets_mm):
+        solids += _text(_offset_text(offset), spec, left, row.first + n * row.cell + half)
+    return solids
 
 
-def _text(text: str, keys: BaseSpec, at: Floats) -> list[TopoDS_Shape]:
-    place = np.array([*at, OF_FLOOR * keys.floor_mm])
-    return relief(text, keys.digit_mm, keys.relief_mm, SUNK_MM, np.eye(3), place)
+def _text(text: str, spec: BaseSpec, left: Floats, x: float) -> list[TopoDS_Shape]:
+    """A text about a point at a distance x from a row's left end."""
+    place = np.array([*(left + np.array([x, 0.0])), BAR_HEIGHT * spec.floor_mm])
+    return relief(text, spec.digit_mm, spec.relief_mm, SUNK_MM, np.eye(3), place)

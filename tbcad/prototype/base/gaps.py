@@ -1,37 +1,32 @@
 """Where ribs and rings are left out, so that the numbers on the bosses' ends can be read.
 
-Each is left out in its whole width, between plane ends: what a round window would leave of it could
-be as thin as a knife. What is left between two gaps is left out too when it is short.
+Each is left out in its whole width, between plane ends: a round window could leave remains as thin
+as a knife. What remains between two gaps is left out too when it is short.
 """
 
 import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.profile import outward
+from tbcad.prototype.base.profile import at_azimuths, meridian, outward
 from tbcad.prototype.base.seats import Seats
 from tbcad.types import Bools, Floats
 
 STEP_MM = 0.25
 ROOM_MM = 1.0  # round the end of a boss
-SHORTEST_MM = 8.0  # of what is left between gaps
-BEYOND_MM = 5.0  # by which a gap's section stands out of the rib
+MIN_PART_MM = 8.0  # of a rib or ring between gaps
+BEYOND_MM = 5.0  # by which a gap's section extends beyond the rib
+DEPTHS = (0.0, 0.25, 0.5)  # of a rib, as shares of it, where gaps are looked for
+WIDTH_POINTS = 5  # across a rib's or ring's section, where gaps are looked for
+GAP_POINTS = 8  # of a gap's section along the rib
 
 
 def ring_arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[tuple[float, float]]:
-    """Azimuths between which a ring (4, 2) of (z, r) is there, within two azimuths, radians."""
-    reach = float(ring[:, 1].max())
-    azimuth = np.linspace(low, high, int(np.ceil((high - low) * reach / STEP_MM)) + 1)
-    z, r = _filled(ring).T
-    points = np.stack(
-        [
-            np.outer(np.cos(azimuth), r),
-            np.outer(np.sin(azimuth), r),
-            np.ones_like(azimuth)[:, None] * z,
-        ],
-        axis=-1,
-    )
-    return _runs(azimuth, _free(base.own_seats, points), SHORTEST_MM / reach)
+    """Azimuths between which a ring (4, 2) of (z, r) is present, within two azimuths, radians."""
+    radius = float(ring[:, 1].max())
+    azimuth = np.linspace(low, high, int(np.ceil((high - low) * radius / STEP_MM)) + 1)
+    points = at_azimuths(_points_of_section(ring), azimuth)
+    return _runs(azimuth, _free(base.local_seats, points), MIN_PART_MM / radius)
 
 
 def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
@@ -40,54 +35,57 @@ def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
     Args:
         base: with its seats about z.
         azimuth: of the rib, radians.
-        side: of its width, which lies to this side and beyond, of its thickness.
+        side: where the rib begins beside the azimuth, in its thicknesses.
     """
-    keys, line = base.keys, base.outline
-    place, normal = _along(line)
-    deep = keys.rib_height_mm + keys.thickness_mm
-    section = np.stack([place - share * deep * normal for share in (0.0, 0.25, 0.5)], axis=1)
-    out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    across = np.array([-out[1], out[0], 0.0])
-    widths = (side + np.linspace(0, 1, 5)) * keys.rib_mm
+    spec = base.spec
+    place, normal = _points_along(base.outline)
+    height = spec.rib_height_mm + spec.thickness_mm
+    section = np.stack([place - share * height * normal for share in DEPTHS], axis=1)
+    out, across = meridian(azimuth)
+    widths = (side + np.linspace(0, 1, WIDTH_POINTS)) * spec.rib_mm
     points = section[..., 1, None] * out + section[..., 0, None] * np.array([0.0, 0.0, 1.0])
     points = (points[:, :, None] + widths[:, None] * across).reshape(len(place), -1, 3)
     length = np.arange(len(place), dtype=np.float64) * STEP_MM
-    kept = _runs(length, _free(base.own_seats, points), SHORTEST_MM)
-    return [_section(place, normal, deep, first, last) for first, last in _between(length, kept)]
+    kept = _runs(length, _free(base.local_seats, points), MIN_PART_MM)
+    return [
+        _gap_section(place, normal, height, first, last) for first, last in _between(length, kept)
+    ]
 
 
-def _filled(ring: Floats) -> Floats:
-    """Points all over a quadrilateral (4, 2), (25, 2)."""
-    s, t = (grid.ravel()[:, None] for grid in np.meshgrid(*[np.linspace(0, 1, 5)] * 2))
+def _points_of_section(ring: Floats) -> Floats:
+    """Points all over a quadrilateral (4, 2), (WIDTH_POINTS**2, 2)."""
+    shares = np.linspace(0, 1, WIDTH_POINTS)
+    s, t = (grid.ravel()[:, None] for grid in np.meshgrid(shares, shares))
     a, b, c, d = ring
     result: Floats = (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * d + t * c)
     return result
 
 
 def _free(seats: Seats, points: Floats) -> Bools:
-    """Whether none of points (n, s, 3) lies behind the end of a boss, (n,)."""
-    away = points[..., None, :] - (seats.centre + seats.back[:, None] * seats.axis)
-    along = dot(away, seats.axis)
-    beside = norm(away - along[..., None] * seats.axis)
-    over = (along > -ROOM_MM) & (beside < seats.boss + ROOM_MM)
-    return np.asarray(~over.any(axis=(1, 2)))
+    """Whether none of points (n, s, 3) is behind the end of a boss, (n,)."""
+    from_end = points[..., None, :] - seats.at_depth(seats.back)
+    along = dot(from_end, seats.axis)
+    beside = norm(from_end - along[..., None] * seats.axis)
+    behind = (along > -ROOM_MM) & (beside < seats.boss + ROOM_MM)
+    return np.asarray(~behind.any(axis=(1, 2)))
 
 
-def _along(line: Floats) -> tuple[Floats, Floats]:
+def _points_along(line: Floats) -> tuple[Floats, Floats]:
     """Points of a line (n, 2) at even steps, and unit normals that turn evenly at its corners."""
-    part = norm(np.diff(line, axis=0))
-    length = np.concatenate([[0.0], np.cumsum(part)])
+    length = np.concatenate([[0.0], np.cumsum(norm(np.diff(line, axis=0)))])
     at = np.arange(0.0, length[-1], STEP_MM)
     faces = outward(line)
     corner = unit(np.vstack([faces[:1], faces[:-1] + faces[1:], faces[-1:]]))
-    place = np.stack([np.interp(at, length, line[:, k]) for k in (0, 1)], axis=1)
-    normal = unit(np.stack([np.interp(at, length, corner[:, k]) for k in (0, 1)], axis=1))
-    return place, normal
+    place, normal = (
+        np.stack([np.interp(at, length, values[:, k]) for k in (0, 1)], axis=1)
+        for values in (line, corner)
+    )
+    return place, unit(normal)
 
 
-def _spans(mask: Bools) -> list[tuple[int, int]]:
-    """First and last of each run of places (n,) where it is so."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+def _spans(flags: Bools) -> list[tuple[int, int]]:
+    """First and last place of each run of set flags (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
 
 
@@ -98,16 +96,16 @@ def _runs(at: Floats, free: Bools, shortest: float) -> list[tuple[float, float]]
 
 
 def _between(length: Floats, kept: list[tuple[float, float]]) -> list[tuple[int, int]]:
-    """First and last step of what is not kept."""
+    """First and last step of each interval that is not kept."""
     keep = np.zeros(len(length), dtype=np.bool_)
     for low, high in kept:
         keep |= (length >= low) & (length <= high)
     return _spans(~keep)
 
 
-def _section(place: Floats, normal: Floats, deep: float, first: int, last: int) -> Floats:
-    """Polygon over some steps of a rib's outline, from the wall's middle to beyond the rib."""
-    some = np.unique(np.linspace(first, last, 8).round().astype(int))
-    outer = place[some] + BEYOND_MM * normal[some]
-    inner = place[some] - (deep + BEYOND_MM) * normal[some]
+def _gap_section(place: Floats, normal: Floats, height: float, first: int, last: int) -> Floats:
+    """Polygon over some steps of a rib's outline, from within the wall to beyond the rib."""
+    steps = np.unique(np.linspace(first, last, GAP_POINTS).round().astype(int))
+    outer = place[steps] + BEYOND_MM * normal[steps]
+    inner = place[steps] - (height + BEYOND_MM) * normal[steps]
     return np.vstack([outer, inner[::-1]])

@@ -4,15 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.geometry.rotations import unit_circle
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec, Drive
 from tbcad.types import Floats
 
 WALL_MM = 3.0  # round holes that take a load
+MIN_WALL_MM = 1.5  # between the shaft's bore and the holes
 SCREW_MM = 3.4  # clearance hole of an M3 screw (ISO 273, medium)
-SLIT_MM = 2.0
-DISC_MM = 10.0
-BOSS_MM = 20.0
+SLIT_MM = 2.0  # width of the clamp's slit
+DISC_MM = 10.0  # thickness of the disc
+BOSS_MM = 20.0  # length of the boss
+DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
+MIN_DISC_RADIUS_MM = 30.0  # with a boss
+BELOW_HEAD_MM = 6.0  # material below a counterbore
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class HolePattern:
         hole: diameter of the holes; zero: inserts of the spec.
         head: diameter and depth of the counterbore on the side of the object, mm; zero: none.
         boss: whether the hub has a boss with a shaft bore that is locked.
-        source: where the pattern is from.
+        source: where the pattern comes from.
     """
 
     circle: float
@@ -58,14 +63,14 @@ class Hub:
         face: z of the outer face, where the drive is bolted on.
         disc: radius of the disc.
         boss: radius of the boss between back and face; zero: none.
-        bore: radius of the shaft's bore, through.
-        holes: places (h, 2) of the drive's holes across the axis, first toward azimuth zero.
-        hole: their diameter.
-        depth: their depth from the outer face.
+        bore: radius of the shaft's through bore.
+        holes: places (h, 2) of the drive's holes across the axis, x toward azimuth zero.
+        hole: diameter of the holes.
+        depth: depth of the holes from the outer face.
         head: diameter and depth of their counterbores from the front; zero: none.
         lock: how the shaft is held; None without a boss.
-        cross: z of the lock's screws.
-        source: where the pattern of holes is from.
+        lock_z: z of the lock's screws.
+        source: where the pattern of holes comes from.
     """
 
     front: float
@@ -79,24 +84,26 @@ class Hub:
     depth: float
     head: tuple[float, float]
     lock: str | None
-    cross: float
+    lock_z: float
     source: str
 
 
-def hub_layout(keys: BaseSpec, front: float) -> Hub:
+def hub_layout(spec: BaseSpec, front: float) -> Hub:
     """The hub whose disc begins at z = front.
 
     Raises:
         SpecError: when the shaft's bore meets the holes of the drive.
     """
-    pattern, bore = PATTERNS[keys.drive], keys.shaft_mm / 2
-    hole = pattern.hole or keys.insert_hole_mm
-    _check(keys, pattern, hole)
-    reach = pattern.circle / 2 + max(hole, pattern.head[0]) / 2 + WALL_MM
-    boss = max(reach, bore + WALL_MM + keys.insert_depth_mm) if pattern.boss else 0.0
-    disc = max(boss + 8.0, 30.0) if pattern.boss else reach
-    thick = DISC_MM if pattern.boss else max(DISC_MM, pattern.head[1] + 6.0)
-    back = front - thick
+    pattern, bore = PATTERNS[spec.drive], spec.shaft_mm / 2
+    hole = pattern.hole or spec.insert_hole_mm
+    _check_shaft(spec, pattern, hole)
+    outer = pattern.circle / 2 + max(hole, pattern.head[0]) / 2 + WALL_MM
+    if pattern.boss:
+        boss = max(outer, bore + WALL_MM + spec.insert_depth_mm)
+        disc, thickness = max(boss + DISC_BEYOND_BOSS_MM, MIN_DISC_RADIUS_MM), DISC_MM
+    else:
+        boss, disc, thickness = 0.0, outer, max(DISC_MM, pattern.head[1] + BELOW_HEAD_MM)
+    back = front - thickness
     face = back - BOSS_MM if pattern.boss else back
     return Hub(
         front=front,
@@ -105,26 +112,25 @@ def hub_layout(keys: BaseSpec, front: float) -> Hub:
         disc=disc,
         boss=boss,
         bore=bore,
-        holes=_circle(pattern.circle / 2),
+        holes=_corners_of_square(pattern.circle / 2),
         hole=hole,
-        depth=keys.insert_depth_mm if pattern.boss else thick,
+        depth=spec.insert_depth_mm if pattern.boss else thickness,
         head=pattern.head,
-        lock=keys.lock if pattern.boss else None,
-        cross=(back + face + keys.insert_depth_mm) / 2 if pattern.boss else face,
+        lock=spec.lock if pattern.boss else None,
+        lock_z=(back + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
         source=pattern.source,
     )
 
 
-def _check(keys: BaseSpec, pattern: HolePattern, hole: float) -> None:
-    least = 1.5
-    most = pattern.circle - max(hole, pattern.head[0]) - 2 * least
-    if keys.shaft_mm > most:
+def _check_shaft(spec: BaseSpec, pattern: HolePattern, hole: float) -> None:
+    largest = pattern.circle - max(hole, pattern.head[0]) - 2 * MIN_WALL_MM
+    if spec.shaft_mm > largest:
         raise SpecError(
-            f"a shaft of {keys.shaft_mm:g} mm leaves no wall to the holes of drive {keys.drive}: "
-            f"make prototype.base.shaft_mm {most:g} or less"
+            f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
+            f"make prototype.base.shaft_mm {largest:g} or less"
         )
 
 
-def _circle(radius: float) -> Floats:
-    turn = np.pi / 4 + np.arange(4) * np.pi / 2
-    return radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+def _corners_of_square(radius: float) -> Floats:
+    """Corners (4, 2) of a square in a circle, none on the axes."""
+    return radius * unit_circle(np.pi / 4 + np.arange(4) * np.pi / 2)

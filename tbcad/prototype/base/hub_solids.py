@@ -1,17 +1,18 @@
-"""The hub's solids and what is drilled out of them, about z."""
+"""The hub's solids and the holes in it, about z."""
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
 from tbcad.prototype.base.hub import SCREW_MM, SLIT_MM, Hub
+from tbcad.prototype.base.profile import meridian
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
-THROUGH = 1.0  # tools stick out this far, so that no faces coincide
-# Azimuths of the set screws: on the side without ribs, at a right angle to each other.
-SCREWS = np.radians([135.0, 225.0])
+THROUGH_MM = 1.0  # tools stick out this far, so that no faces coincide
+# On the side without ribs, at a right angle to each other.
+SET_SCREW_AZIMUTHS = np.radians([135.0, 225.0])
 
 
 def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:
@@ -19,55 +20,57 @@ def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:
     disc = cylinder(hub.back * UP, UP, hub.disc, hub.front - hub.back)
     if not hub.boss:
         return [disc]
-    return [disc, cylinder(hub.face * UP, UP, hub.boss, hub.back - hub.face + THROUGH)]
+    return [disc, cylinder(hub.face * UP, UP, hub.boss, hub.back - hub.face + THROUGH_MM)]
 
 
-def hub_holes(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
+def hub_holes(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
     """Bore, the drive's holes, and those of the lock."""
-    start, length = hub.face - THROUGH, hub.front - hub.face + 2 * THROUGH
-    found = [cylinder(start * UP, UP, hub.bore, length)]
+    start, through = hub.face - THROUGH_MM, hub.front - hub.face + 2 * THROUGH_MM
+    blind = hub.depth < hub.front - hub.face
+    holes = [cylinder(start * UP, UP, hub.bore, through)]
     for place in hub.holes:
-        at = np.array([*place, start])
-        through = hub.depth >= hub.front - hub.face
-        found.append(cylinder(at, UP, hub.hole / 2, length if through else hub.depth + THROUGH))
+        length = hub.depth + THROUGH_MM if blind else through
+        holes.append(cylinder(np.array([*place, start]), UP, hub.hole / 2, length))
         if hub.head[0]:
-            top = np.array([*place, hub.front + THROUGH])
-            found.append(cylinder(top, -UP, hub.head[0] / 2, hub.head[1] + THROUGH))
-    locks = {"set-screws": _set_screws, "clamp": _clamp}
-    return found + (locks[hub.lock](hub, keys) if hub.lock else [])
+            top = np.array([*place, hub.front + THROUGH_MM])
+            holes.append(cylinder(top, -UP, hub.head[0] / 2, hub.head[1] + THROUGH_MM))
+    locks = {"set-screws": _set_screw_holes, "clamp": _clamp_cuts}
+    return holes + (locks[hub.lock](hub, spec) if hub.lock else [])
 
 
-def _set_screws(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
-    found = []
-    for turn in SCREWS.tolist():
-        out = np.array([np.cos(turn), np.sin(turn), 0.0])
-        found += _insert(hub.cross * UP, out, hub.boss, keys)
-    return found
-
-
-def _insert(at: Floats, out: Floats, end: float, keys: BaseSpec) -> list[TopoDS_Shape]:
-    """A screw's hole from a point outward, and the insert's hole at its end."""
-    insert = at + (end + THROUGH) * out
+def _set_screw_holes(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
     return [
-        cylinder(at, out, SCREW_MM / 2, end + THROUGH),
-        cylinder(insert, -out, keys.insert_hole_mm / 2, keys.insert_depth_mm + THROUGH),
+        hole
+        for azimuth in SET_SCREW_AZIMUTHS.tolist()
+        for hole in _screw_with_insert(hub.lock_z * UP, meridian(azimuth)[0], hub.boss, spec)
     ]
 
 
-def _clamp(hub: Hub, keys: BaseSpec) -> list[TopoDS_Shape]:
+def _screw_with_insert(
+    start: Floats, out: Floats, length: float, spec: BaseSpec
+) -> list[TopoDS_Shape]:
+    """A screw's hole from a point outward, and the insert's hole at its end."""
+    end = start + (length + THROUGH_MM) * out
+    return [
+        cylinder(start, out, SCREW_MM / 2, length + THROUGH_MM),
+        cylinder(end, -out, spec.insert_hole_mm / 2, spec.insert_depth_mm + THROUGH_MM),
+    ]
+
+
+def _clamp_cuts(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
     """A slit away from the ribs, and a screw across it."""
-    half, far, top = SLIT_MM / 2, -hub.boss - THROUGH, hub.back - SLIT_MM
-    corners = [[0, half], [far, half], [far, -half], [0, -half]]
-    base = np.array([[x, y, hub.face - THROUGH] for x, y in corners])
-    slit = prism(polygon(base), (top - hub.face + THROUGH) * UP)
+    far, bottom, top = -hub.boss - THROUGH_MM, hub.face - THROUGH_MM, hub.back - SLIT_MM
+    slit = _block(far, SLIT_MM / 2, bottom, top)
     # Above the slit a cut half round the bore, or the disc would hold the jaws apart.
-    low, high = np.array([0, 0, top - SLIT_MM]), np.array([0, 0, top])
-    ring = np.array(
-        [[0, -hub.boss - 1], [0, hub.boss + 1], [far, hub.boss + 1], [far, -hub.boss - 1]]
-    )
-    free = prism(polygon(np.column_stack([ring, np.full(4, low[2])])), high - low)
+    relief = _block(far, hub.boss + THROUGH_MM, top - SLIT_MM, top)
     across = np.array([0.0, 1.0, 0.0])
-    at = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.cross])
-    end = float(np.sqrt(hub.boss**2 - at[0] ** 2))
-    back = cylinder(at, -across, SCREW_MM / 2, end + THROUGH)
-    return [slit, free, back, *_insert(at, across, end, keys)]
+    middle = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.lock_z])
+    half = float(np.sqrt(hub.boss**2 - middle[0] ** 2))
+    head_side = cylinder(middle, -across, SCREW_MM / 2, half + THROUGH_MM)
+    return [slit, relief, head_side, *_screw_with_insert(middle, across, half, spec)]
+
+
+def _block(far: float, half: float, low: float, high: float) -> TopoDS_Shape:
+    """A block from the axis to x = far, to half a width on both sides, between two z."""
+    corners = [[0, half, low], [far, half, low], [far, -half, low], [0, -half, low]]
+    return prism(polygon(np.array(corners)), (high - low) * UP)

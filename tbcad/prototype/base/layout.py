@@ -1,14 +1,15 @@
 """The base in numbers: a ribbed carrier about the axis with a seat for each ball, and its hub.
 
-Its cross-section is a convex line behind all light and behind what each seat needs, so small balls
-and caps do not hang in a wall that large ones push far out; the wall is that line turned about the
-axis over the sector of the balls. Ribs stand outside, highest at the hub where the load is.
+Its cross-section is a convex line behind all light and as deep as each seat needs, so small balls
+and caps are not in a wall that large ones push far out; the wall is that line turned about the
+axis over the sector of the balls. Ribs are outside, highest at the hub where the load is.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -29,38 +30,44 @@ from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 EDGE_MM = 2.0  # wall beyond the outermost bosses
-SHORTEST_MM = 8.0  # parts of the cross-section
-ROOTED_MM = 6.0  # how far the wall goes into the hub's disc
-OUT_MM = 0.8  # least that a boss stands out of the wall, for its number
-WIDEST = np.radians(330)
+MIN_PART_MM = 8.0  # length of the parts of the cross-section
+ROOTED_MM = 6.0  # how far the wall reaches into the hub's disc
+MIN_PROTRUSION_MM = 0.8  # of a boss beyond the wall, for its number
+MAX_SECTOR = np.radians(330)
 # Ribs between the edges may be moved by this share of their distance to miss the bosses.
-FREE = 0.35
-CORNER_MM = 3.0  # by which ribs stay back from the hub's outer edge
-CORNERS = 24
-APART_MM = 0.4  # of the wall from a boss's front edge, which must not just touch it
+MAX_RIB_SHIFT = 0.35
+RIB_SHIFTS = 29  # tried
+HUB_CORNER_MM = 3.0  # by which ribs stay back from the hub's outer edge
+FRONT_CORNERS = 24  # of a polygon round the front of a boss
+OFF_FRONT_MM = 0.4  # of the wall from a boss's front edge, which must not just touch it
 # Ribs end this far before the wall, rings half as far: faces that nearly coincide do not join well.
-BACK_MM = 1.0
-LOWER_MM = 0.6  # rings than ribs, whose tops would touch their cones along a line
+RIB_END_MM = 1.0
+# Rings are lower than ribs by this, whose tops would touch their cones along a line.
+RING_LOWER_MM = 0.6
+RING_FOOT = 0.3  # of the wall's thickness, where a ring's section begins
+END_POINTS = 9  # across the end of a boss, where its height over the wall is measured
+MAX_ROUNDS = 60  # of lengthening bosses
+ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True)
 class BaseLayout:
-    """What the carrier is made of, in the ellipsoid's frame unless said otherwise.
+    """Dimensions of the carrier, in the ellipsoid's frame unless said otherwise.
 
     Attributes:
-        keys: of the spec.
+        spec: of the base.
         frame: rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3).
         light: what the carrier stays out of.
         inner: the wall's inner line from the hub toward the camera, (z, r) in mm, (p, 2).
-        sector: least and largest azimuth of the wall, radians.
-        ribs: azimuth of the meridian ribs, the first and the last at the edges, radians.
+        sector: minimum and maximum azimuth of the wall, radians.
+        ribs: azimuths of the meridian ribs, the first and the last at the edges, radians.
         outline: outer line of the ribs, (z, r), mm, (q, 2).
         rings: cross-sections of the ring ribs, (z, r), mm, each (4, 2).
         hub: disc, boss and holes.
         seats: one for each ball, in the frame of the shell.
     """
 
-    keys: BaseSpec
+    spec: BaseSpec
     frame: Floats
     light: LightSpheroid
     inner: Floats
@@ -72,19 +79,14 @@ class BaseLayout:
     seats: Seats
 
     @property
-    def hub_face(self) -> float:
-        """Z of the hub's outer face along the axis, mm."""
-        return self.hub.face
-
-    @property
     def outer(self) -> Floats:
         """The wall's outer line, (z, r), mm, (p, 2)."""
-        return offset(self.inner, self.keys.thickness_mm)
+        return offset(self.inner, self.spec.thickness_mm)
 
     @property
     def middle(self) -> Floats:
         """The line half way through the wall as far as the ribs go, (z, r), mm, (p, 2)."""
-        return shortened(offset(self.inner, self.keys.thickness_mm / 2), BACK_MM)
+        return shortened(offset(self.inner, self.spec.thickness_mm / 2), RIB_END_MM)
 
     @property
     def axes(self) -> Floats:
@@ -95,125 +97,130 @@ class BaseLayout:
         return self.frame[[1, 2, 0]]
 
     @property
-    def own_seats(self) -> Seats:
+    def local_seats(self) -> Seats:
         """The seats in the carrier's own frame."""
-        turn, found = self.axes.T, self.seats
-        centre, way = found.centre @ turn, found.way @ turn
-        return replace(found, centre=centre, axes=found.axes @ turn, way=way)
+        rotation, seats = self.axes.T, self.seats
+        return replace(
+            seats,
+            centre=seats.centre @ rotation,
+            axes=seats.axes @ rotation,
+            insertion=seats.insertion @ rotation,
+        )
 
     def outermost(self, swing: float) -> float:
         """Largest azimuth, to either side, that the wall reaches over a swing, radians."""
         return float(np.abs(self.sector).max() + swing / 2)
 
 
-def base_layout(keys: BaseSpec, made: PrototypeLayout) -> BaseLayout:
+def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
     """The base for a prototype's balls.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
     """
-    frame, seat = made.half.ellipsoid.frame(), seat_layout(keys, made)
-    behind = _light(keys, made)
-    _check_front(seat, behind, frame)
-    nose = float(behind.pinhole / 2 - behind.level / 2)
-    held = hub_layout(keys, nose - keys.light_clearance_mm)
-    inner, sector = _inner(keys, seat, frame, behind, held), _sector(keys, seat, made)
+    frame, seats = prototype.half.ellipsoid.frame(), seat_layout(spec, prototype)
+    light = _light(spec, prototype)
+    _check_fronts(seats, light, frame)
+    behind_light = float(light.pinhole / 2 - light.level / 2)
+    hub = hub_layout(spec, behind_light - spec.light_clearance_mm)
+    inner = _inner(spec, seats, frame, light, hub)
+    sector = _sector(spec, seats, prototype)
     return BaseLayout(
-        keys=keys,
+        spec=spec,
         frame=frame,
-        light=behind,
+        light=light,
         inner=inner,
         sector=sector,
-        ribs=_ribs(keys, seat, made, sector),
-        outline=_outline(keys, inner, held),
-        rings=_rings(keys, inner),
-        hub=held,
-        seats=_standing_out(keys, seat, frame, offset(inner, keys.thickness_mm)),
+        ribs=_ribs(spec, seats, prototype, sector),
+        outline=_outline(spec, inner, hub),
+        rings=_rings(spec, inner),
+        hub=hub,
+        seats=_protruding(spec, seats, frame, offset(inner, spec.thickness_mm)),
     )
 
 
-def _light(keys: BaseSpec, made: PrototypeLayout) -> LightSpheroid:
-    """The level of all light with its margins.
+def _light(spec: BaseSpec, prototype: PrototypeLayout) -> LightSpheroid:
+    """The spheroid of all light with its margins.
 
     On a sphere about a point the sum of distances is at most that at the point plus the diameter.
-    The capture sphere lies inside the mirrors' ellipsoid and so far below the level of any ball.
+    The capture sphere is inside the mirrors' ellipsoid and so far below the level of any ball.
     """
-    pinhole = 2 * made.half.ellipsoid.linear_eccentricity
-    free, cones = LightSpheroid(pinhole, 0.0), light_hulls(made.balls.outline, pinhole, 0.0)[0]
-    level = (free.beyond(cones.end) + 2 * cones.end_radius).max()
-    return LightSpheroid(pinhole, float(level) + 2 * keys.light_clearance_mm)
+    pinhole = 2 * prototype.half.ellipsoid.linear_eccentricity
+    foci = LightSpheroid(pinhole, 0.0)
+    cones = light_hulls(prototype.balls.outline, pinhole, 0.0)[0]
+    level = (foci.excess(cones.end) + 2 * cones.end_radius).max()
+    return LightSpheroid(pinhole, float(level) + 2 * spec.light_clearance_mm)
 
 
-def _check_front(seat: Seats, behind: LightSpheroid, frame: Floats) -> None:
+def _check_fronts(seats: Seats, light: LightSpheroid, frame: Floats) -> None:
     """Refuse seats that reach into the light.
 
     Raises:
-        SpecError: as said.
+        SpecError: it names the ball.
     """
-    beyond = behind.least_beyond(_front_corners(seat) @ frame.T)
-    worst = int(beyond.argmin())
-    if beyond[worst] < 0:
+    excess = light.min_excess(_front_corners(seats) @ frame.T)
+    worst = int(excess.argmin())
+    if excess[worst] < 0:
         raise SpecError(
-            f"the seat of ball {worst + 1} reaches {-beyond[worst] / 2:.1f} mm into the light: "
+            f"the seat of ball {worst + 1} reaches {-excess[worst] / 2:.1f} mm into the light: "
             "make prototype.base.pad_angle_deg, pad_mm, cup_wall_mm or light_clearance_mm smaller"
         )
 
 
-def _front_corners(seat: Seats) -> Floats:
-    """Corners of a polygon round the front of each boss, mm, (k, CORNERS, 3)."""
-    turn = 2 * np.pi * np.arange(CORNERS) / CORNERS
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1) / np.cos(np.pi / CORNERS)
-    middle = seat.centre + seat.front[:, None] * seat.axis
-    corners: Floats = middle[:, None] + seat.boss[:, None, None] * (circle @ seat.axes[:, :2])
+def _front_corners(seats: Seats) -> Floats:
+    """Corners of a polygon round the front of each boss, mm, (k, FRONT_CORNERS, 3)."""
+    circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
+    middle = seats.at_depth(seats.front)[:, None]
+    corners: Floats = middle + seats.boss[:, None, None] * (circle @ seats.axes[:, :2])
     return corners
 
 
-def _plane(points: Floats) -> Floats:
+def _half_plane(points: Floats) -> Floats:
     """Points of the ellipsoid's frame (..., 3) as (z, r), (..., 2)."""
     return np.stack([points[..., 0], norm(points[..., 1:])], axis=-1)
 
 
-def _inner(keys: BaseSpec, seat: Seats, frame: Floats, behind: LightSpheroid, held: Hub) -> Floats:
+def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hub: Hub) -> Floats:
     """The wall's inner line: round the light, from the hub's rim to beyond the last boss.
 
-    It lies behind the fronts of all bosses, and so deep at each that the ribs end where it does.
+    It is behind the fronts of all bosses, and so deep at each that the ribs end where the boss
+    does.
     """
-    depth = np.maximum(seat.back - keys.rib_height_mm - keys.thickness_mm, seat.front)
-    axis, side = seat.axis @ frame.T, seat.boss[:, None] * (seat.axes[:, 0] @ frame.T)
-    lengths = (depth, seat.front + APART_MM)
-    deep, front = (seat.centre @ frame.T + at[:, None] * axis for at in lengths)
-    points = np.vstack([_plane(deep), _plane(front - side), _plane(front + side)])
-    points = np.vstack([points, behind.outline()])
-    rim = np.array([[held.front, held.disc]])
-    end = _end(seat, frame)
-    line = trimmed(hull(np.vstack([rim, points[points[:, 0] > held.front]])), end)
-    if norm(line[-1] - line[-2]) < SHORTEST_MM and len(line) > 2:
+    depth = np.maximum(seats.back - spec.rib_height_mm - spec.thickness_mm, seats.front)
+    axis, side = seats.axis @ frame.T, seats.boss[:, None] * (seats.axes[:, 0] @ frame.T)
+    lengths = (depth, seats.front + OFF_FRONT_MM)
+    deep, front = (seats.centre @ frame.T + length[:, None] * axis for length in lengths)
+    points = [_half_plane(one) for one in (deep, front - side, front + side)]
+    behind = np.vstack([*points, light.outline()])
+    rim = np.array([[hub.front, hub.disc]])
+    end = _end(seats, frame)
+    line = trimmed(hull(np.vstack([rim, behind[behind[:, 0] > hub.front]])), end)
+    if norm(line[-1] - line[-2]) < MIN_PART_MM and len(line) > 2:
         line = trimmed(line[:-1], end)
     root = line[0] - ROOTED_MM * unit(line[1] - line[0])
-    return thinned(np.vstack([root, line[1:]]), SHORTEST_MM)
+    return thinned(np.vstack([root, line[1:]]), MIN_PART_MM)
 
 
-def _end(seat: Seats, frame: Floats) -> float:
+def _end(seats: Seats, frame: Floats) -> float:
     """Z beyond all bosses, toward the camera."""
-    tops = (seat.centre + seat.back[:, None] * seat.axis) @ frame[0]
-    fronts = (seat.centre + seat.front[:, None] * seat.axis) @ frame[0]
-    wide = seat.boss * (seat.axes[:, 0] @ frame[0])
-    return float((np.maximum(tops, fronts) + wide).max() + EDGE_MM)
+    ends, fronts = (seats.at_depth(depth) @ frame[0] for depth in (seats.back, seats.front))
+    side = seats.boss * (seats.axes[:, 0] @ frame[0])
+    return float((np.maximum(ends, fronts) + side).max() + EDGE_MM)
 
 
-def _sector(keys: BaseSpec, seat: Seats, made: PrototypeLayout) -> tuple[float, float]:
+def _sector(spec: BaseSpec, seats: Seats, prototype: PrototypeLayout) -> tuple[float, float]:
     """Azimuths between which the wall carries all bosses and has room for the edges' ribs."""
-    azimuth = made.placement.azimuth
-    out = _plane((seat.centre + seat.front[:, None] * seat.axis) @ made.half.ellipsoid.frame().T)
-    room = seat.boss + keys.rib_mm + EDGE_MM
-    if (near := out[:, 1] <= room).any():
+    azimuth, frame = prototype.placement.azimuth, prototype.half.ellipsoid.frame()
+    radius = _half_plane(seats.at_depth(seats.front) @ frame.T)[:, 1]
+    room = seats.boss + spec.rib_mm + EDGE_MM
+    if (near := radius <= room).any():
         raise SpecError(
-            f"ball {int(near.argmax()) + 1} stands too near to the axis for its seat: make "
+            f"ball {int(near.argmax()) + 1} is too near to the axis for its seat: make "
             "prototype.base.rib_mm or prototype.base.cup_wall_mm smaller"
         )
-    half = np.arcsin(room / out[:, 1])
+    half = np.arcsin(room / radius)
     low, high = float((azimuth - half).min()), float((azimuth + half).max())
-    if high - low > WIDEST:
+    if high - low > MAX_SECTOR:
         raise SpecError(
             f"the base would go {np.degrees(high - low):.0f} degrees round its axis: make "
             "prototype.k or prototype.ball_wall_mm smaller"
@@ -222,67 +229,65 @@ def _sector(keys: BaseSpec, seat: Seats, made: PrototypeLayout) -> tuple[float, 
 
 
 def _ribs(
-    keys: BaseSpec, seat: Seats, made: PrototypeLayout, sector: tuple[float, float]
+    spec: BaseSpec, seats: Seats, prototype: PrototypeLayout, sector: tuple[float, float]
 ) -> Floats:
-    """Azimuths of the ribs: both edges, and between them where they meet bosses least."""
-    even = np.linspace(*sector, keys.ribs)
-    step = even[1] - even[0]
-    tried = np.linspace(-FREE, FREE, 29) * step
-    out = made.balls.body_centre[:, 1]
-    inner = []
+    """Azimuths of the ribs: both edges, and between them where they overlap bosses least."""
+    even = np.linspace(*sector, spec.ribs)
+    shifts = np.linspace(-MAX_RIB_SHIFT, MAX_RIB_SHIFT, RIB_SHIFTS) * (even[1] - even[0])
+    radius, azimuth = prototype.balls.body_centre[:, 1], prototype.placement.azimuth
+    between = []
     for middle in even[1:-1].tolist():
-        away = out * np.abs(np.sin(made.placement.azimuth - (middle + tried)[:, None]))
-        cost = np.maximum(seat.boss + keys.rib_mm / 2 - away, 0).sum(axis=1)
-        inner.append(middle + tried[np.lexsort((np.abs(tried), np.round(cost, 6)))[0]])
-    return np.array([sector[0], *inner, sector[1]])
+        distance = radius * np.abs(np.sin(azimuth - (middle + shifts)[:, None]))
+        overlap = np.maximum(seats.boss + spec.rib_mm / 2 - distance, 0).sum(axis=1)
+        best = np.lexsort((np.abs(shifts), np.round(overlap, 6)))[0]
+        between.append(middle + shifts[best])
+    return np.array([sector[0], *between, sector[1]])
 
 
-def _outline(keys: BaseSpec, inner: Floats, held: Hub) -> Floats:
+def _outline(spec: BaseSpec, inner: Floats, hub: Hub) -> Floats:
     """Outer line of the ribs, from the hub's outer end, so that they are its gussets."""
-    line = offset(inner, keys.thickness_mm + keys.rib_height_mm)
-    radius = held.boss or held.disc
-    corner = [held.face + CORNER_MM, radius - CORNER_MM]
-    return shortened(hull(np.vstack([[corner], line[line[:, 0] > corner[0]]])), BACK_MM)
+    line = offset(inner, spec.thickness_mm + spec.rib_height_mm)
+    corner = [hub.face + HUB_CORNER_MM, (hub.boss or hub.disc) - HUB_CORNER_MM]
+    return shortened(hull(np.vstack([[corner], line[line[:, 0] > corner[0]]])), RIB_END_MM)
 
 
-def _rings(keys: BaseSpec, inner: Floats) -> tuple[Floats, ...]:
+def _rings(spec: BaseSpec, inner: Floats) -> tuple[Floats, ...]:
     """Cross-sections of the ring ribs at even distances along the wall, the last at its end."""
     length = np.concatenate([[0.0], np.cumsum(norm(np.diff(inner, axis=0)))])
-    at = (length[-1] - BACK_MM / 2) * np.arange(1, keys.rings + 1) / keys.rings
+    at = (length[-1] - RIB_END_MM / 2) * np.arange(1, spec.rings + 1) / spec.rings
     part = np.clip(np.searchsorted(length, at) - 1, 0, len(inner) - 2)
     along = unit(np.diff(inner, axis=0))[part]
     place = inner[part] + (at - length[part])[:, None] * along
-    place[:-1] += along[:-1] * keys.rib_mm / 2
-    low, high = 0.3 * keys.thickness_mm, keys.thickness_mm + keys.rib_height_mm - LOWER_MM
+    place[:-1] += along[:-1] * spec.rib_mm / 2
+    foot = RING_FOOT * spec.thickness_mm
+    top = spec.thickness_mm + spec.rib_height_mm - RING_LOWER_MM
     return tuple(
         np.array(
             [
-                p + low * n,
-                p - keys.rib_mm * a + low * n,
-                p - keys.rib_mm * a + high * n,
-                p + high * n,
+                end + foot * out,
+                end - spec.rib_mm * forward + foot * out,
+                end - spec.rib_mm * forward + top * out,
+                end + top * out,
             ]
         )
-        for p, a, n in zip(place, along, outward(inner)[part], strict=True)
+        for end, forward, out in zip(place, along, outward(inner)[part], strict=True)
     )
 
 
-def _standing_out(keys: BaseSpec, seat: Seats, frame: Floats, outer: Floats) -> Seats:
-    """The seats with bosses so long that their ends stand out of the wall.
+def _protruding(spec: BaseSpec, seats: Seats, frame: Floats, outer: Floats) -> Seats:
+    """The seats with bosses so long that their ends protrude from the wall.
 
-    Beside its meridian a boss is only farther from the axis, so the ends' points on it decide.
+    Beside its meridian a boss is only farther from the axis, so the points of its end on the
+    meridian decide.
     """
-    share = np.linspace(-1, 1, 9)[:, None]
-    side = share[None] * (seat.boss[:, None] * (seat.axes[:, 0] @ frame.T))[:, None]
-    back = seat.back.copy()
-    for _ in range(60):
-        end = seat.centre @ frame.T + back[:, None] * (seat.axis @ frame.T)
-        lack = (
-            OUT_MM
-            + keys.relief_mm
-            - distance_outside(outer, _plane(end[:, None] + side)).min(axis=1)
-        )
-        if lack.max() <= 1e-9:
+    share = np.linspace(-1, 1, END_POINTS)[:, None]
+    side = share[None] * (seats.boss[:, None] * (seats.axes[:, 0] @ frame.T))[:, None]
+    back = seats.back.copy()
+    for _ in range(MAX_ROUNDS):
+        end = seats.centre @ frame.T + back[:, None] * (seats.axis @ frame.T)
+        height = distance_outside(outer, _half_plane(end[:, None] + side)).min(axis=1)
+        missing = MIN_PROTRUSION_MM + spec.relief_mm - height
+        if missing.max() <= ROUNDING_MM:
             break
-        back += np.maximum(lack, 0)
-    return replace(seat, back=back)
+        back += np.maximum(missing, 0)
+    return replace(seats, back=back)

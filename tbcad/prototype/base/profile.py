@@ -1,70 +1,91 @@
 """The carrier's cross-section in the half-plane of the axis: convex lines (z along the axis, r).
 
-Points (n, 2) run from the hub toward the camera, z rising. A convex outline has no dents, and
-what lies inside of it is proved to be clear of the wall by its corners alone.
+Points (n, 2) run from the hub toward the camera, z rising. A convex outline has no dents, so a
+wall outside of its corners is outside of all that the outline encloses.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats
 
 # Corners of the polygon round the ellipse of light: few, so that the wall has few cones.
-CORNERS = 24
+OUTLINE_PARTS = 24
+ROUNDING_MM = 1e-9
+MIN_CORNERS = 4  # of a line that is thinned
 
 
 @dataclass(frozen=True)
 class LightSpheroid:
-    """All light of all balls: |X| + |X - pinhole| is at most a level.
+    """A spheroid that contains all light of all balls: |X| + |X - pinhole| is at most a level.
 
-    The sum of distances to two points is convex. So if it is at most the level on the spheres that
-    a round cone is the hull of, it is so in the whole cone: a spheroid with the same foci as the
-    mirrors' ellipsoid holds all light.
+    The sum of distances to two points is convex. So if it is at most the level on the two spheres
+    of a round cone, it is so in the whole cone: a spheroid with the same foci as the mirrors'
+    ellipsoid contains all light.
 
     Attributes:
         pinhole: distance along the axis, mm.
-        level: the sum that no light goes beyond, mm.
+        level: maximum of the sum, mm.
     """
 
     pinhole: float
     level: float
 
-    def beyond(self, points: Floats) -> Floats:
-        """How far the sum of distances of points (..., 2 or 3) is beyond the level, mm, (...).
+    def excess(self, points: Floats) -> Floats:
+        """By how much the sum of distances of points (..., 2 or 3) exceeds the level, mm, (...).
 
         Axis first. A point is at least half as far from all light.
         """
-        away = points - np.eye(points.shape[-1])[0] * self.pinhole
-        result: Floats = norm(points) + norm(away) - self.level
-        return result
+        return norm(points) + norm(self._from_pinhole(points)) - self.level
 
     def slope(self, points: Floats) -> Floats:
         """Gradient of the sum of distances at points (..., 2 or 3), (..., 2 or 3)."""
-        away = points - np.eye(points.shape[-1])[0] * self.pinhole
-        result: Floats = unit(points) + unit(away)
+        return unit(points) + unit(self._from_pinhole(points))
+
+    def _from_pinhole(self, points: Floats) -> Floats:
+        result: Floats = points - np.eye(points.shape[-1])[0] * self.pinhole
         return result
 
-    def least_beyond(self, corners: Floats) -> Floats:
-        """Lower bound of `beyond` on all of a line or facet with these corners (m, c, 2 or 3).
+    def min_excess(self, corners: Floats) -> Floats:
+        """Lower bound (m,) of the excess on each line or facet with corners (m, c, 2 or 3), mm.
 
-        A convex function lies above its tangent plane, here the one at the middle.
+        A convex function is above its tangent plane, here the one at the middle.
         """
         middle = corners.mean(axis=1)
         rise = dot(self.slope(middle)[:, None], corners - middle[:, None])
-        result: Floats = self.beyond(middle) + rise.min(axis=1)
+        result: Floats = self.excess(middle) + rise.min(axis=1)
         return result
 
     def outline(self) -> Floats:
-        """Corners of a polygon round the spheroid's half, (CORNERS + 1, 2)."""
+        """Corners of a polygon round the spheroid's half, (OUTLINE_PARTS + 1, 2)."""
         focal, major = self.pinhole / 2, self.level / 2
         minor = np.sqrt(major**2 - focal**2)
-        turn = np.pi * (1 - np.arange(CORNERS + 1) / CORNERS)
-        wide = 1 / np.cos(np.pi / (2 * CORNERS))
-        points = np.stack([major * np.cos(turn), minor * np.sin(turn)], axis=1) * wide
+        angle = np.pi * (1 - np.arange(OUTLINE_PARTS + 1) / OUTLINE_PARTS)
+        circumscribed = 1 / np.cos(np.pi / (2 * OUTLINE_PARTS))
+        points = [major, minor] * unit_circle(angle) * circumscribed
         result: Floats = points + np.array([focal, 0.0])
         return result
+
+
+def half_plane(points: Floats) -> Floats:
+    """Points (..., 3) about z as (z, r), (..., 2)."""
+    return np.stack([points[..., 2], norm(points[..., :2])], axis=-1)
+
+
+def at_azimuths(line: Floats, azimuth: Floats) -> Floats:
+    """Points (a, n, 3) about z of a line (n, 2) of (z, r) at azimuths (a,)."""
+    z, r = line.T
+    x, y = (np.outer(one, r) for one in unit_circle(azimuth).T)
+    return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=-1)
+
+
+def meridian(azimuth: float) -> tuple[Floats, Floats]:
+    """Unit vectors (3,) away from the z axis at an azimuth, and toward rising azimuth."""
+    cosine, sine = np.cos(azimuth), np.sin(azimuth)
+    return np.array([cosine, sine, 0.0]), np.array([-sine, cosine, 0.0])
 
 
 def hull(points: Floats) -> Floats:
@@ -79,14 +100,14 @@ def hull(points: Floats) -> Floats:
 
 def _turns_down(kept: list[Floats], point: Floats) -> bool:
     if len(kept) == 1:
-        return bool(point[0] > kept[0][0] + 1e-9)
+        return bool(point[0] > kept[0][0] + ROUNDING_MM)
     a, b = kept[-1] - kept[-2], point - kept[-1]
-    return bool(a[0] * b[1] - a[1] * b[0] < -1e-9)
+    return bool(a[0] * b[1] - a[1] * b[0] < -ROUNDING_MM)
 
 
 def trimmed(line: Floats, end: float) -> Floats:
-    """A line (n, 2) with rising z up to z = end, its last part prolonged where it is short."""
-    last = max(int((line[:, 0] < end - 1e-9).sum()), 2)
+    """A line (n, 2) with rising z up to z = end, its last part extended where it is short."""
+    last = max(int((line[:, 0] < end - ROUNDING_MM).sum()), 2)
     line = line[: last + 1] if last < len(line) else line
     a, b = line[-2], line[-1]
     return np.vstack([line[:-1], a + (b - a) * (end - a[0]) / (b[0] - a[0])])
@@ -112,23 +133,22 @@ def offset(line: Floats, by: float) -> Floats:
 
 
 def thinned(line: Floats, shortest: float) -> Floats:
-    """A convex line without parts shorter than this, as a line that goes round it.
+    """A line round a convex one that has no inner parts shorter than this (mm).
 
-    A short part goes by prolonging its neighbours until they meet.
+    A short part is removed by extending its neighbours until they meet.
     """
-    while len(line) > 4:
-        length = norm(np.diff(line, axis=0))
-        inner = length[1:-1]
+    while len(line) > MIN_CORNERS:
+        inner = norm(np.diff(line, axis=0))[1:-1]
         part = int(inner.argmin()) + 1
         if inner.min() >= shortest:
             break
-        meet = _meeting(line[part - 1 : part + 3])
-        line = np.vstack([line[:part], meet, line[part + 2 :]])
+        corner = _intersection(line[part - 1 : part + 3])
+        line = np.vstack([line[:part], corner, line[part + 2 :]])
     return line
 
 
-def _meeting(four: Floats) -> Floats:
-    """Where the lines through the first two and the last two of four points meet, (2,)."""
+def _intersection(four: Floats) -> Floats:
+    """Intersection of the lines through the first two and the last two of four points, (2,)."""
     a, b = four[1] - four[0], four[3] - four[2]
     share = np.linalg.solve(np.stack([a, -b], axis=1), four[2] - four[0])
     result: Floats = four[0] + share[0] * a
@@ -136,8 +156,6 @@ def _meeting(four: Floats) -> Floats:
 
 
 def distance_outside(line: Floats, points: Floats) -> Floats:
-    """Least distance, never too large, of points (..., 2) beyond a convex line; < 0 inside."""
-    normal = outward(line)
-    away = points[..., None, :] - line[:-1]
-    result: Floats = dot(away, normal).max(axis=-1)
+    """Lower bound (...) of the distance of points (..., 2) from a convex line; < 0 inside."""
+    result: Floats = dot(points[..., None, :] - line[:-1], outward(line)).max(axis=-1)
     return result

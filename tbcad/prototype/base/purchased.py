@@ -1,24 +1,25 @@
-"""What is bought for the base: magnets, what the hub and the joints need, by names of the lists."""
+"""Purchased parts of the base: magnets, and what the hub and the joints need."""
 
 from collections import Counter
 
+from tbcad.prototype.base.hub import Hub
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import joint_hardware
+from tbcad.prototype.base.screws import M3_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
-from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
+from tbcad.prototype.purchased.parts import SAME_SIZE_MM, Parts, load_parts, of_kind
 from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import BaseSpec
 
-# In the hub: set screws, or the one screw of the clamp.
-LOCKS = {"set-screws": 2, "clamp": 1}
-PLAY_MM = 1e-6
+# Screws that lock the shaft in the hub: set screws, or the one of the clamp.
+LOCK_SCREWS = {"set-screws": 2, "clamp": 1}
 
 
-def base_purchased_parts(base: BaseLayout, plan: BaseSplit) -> dict[str, int]:
+def base_purchased_parts(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
     """Purchased parts of the base, without balls and without what bolts the drive to it.
 
     Args:
         base: in numbers.
-        plan: its pieces and joints.
+        split: its pieces and joints.
 
     Returns:
         Names as in the parts lists, and how many of each.
@@ -26,8 +27,8 @@ def base_purchased_parts(base: BaseLayout, plan: BaseSplit) -> dict[str, int]:
     Raises:
         SpecError: when a part is in no list.
     """
-    found = Counter(magnets(base)) + Counter(fasteners(base, plan))
-    return dict(sorted(found.items()))
+    counts = Counter(magnets(base)) + Counter(fasteners(base, split))
+    return dict(sorted(counts.items()))
 
 
 def magnets(base: BaseLayout) -> dict[str, int]:
@@ -36,94 +37,79 @@ def magnets(base: BaseLayout) -> dict[str, int]:
     Raises:
         SpecError: when one is in no list.
     """
-    parts, sizes_mm = load_parts(), base.seats.magnet.tolist()
-    return dict(Counter(magnet_name(base, size, parts) for size in sizes_mm if size > 0))
+    parts, diameters = load_parts(), base.seats.magnet.tolist()
+    return dict(Counter(magnet_name(base, one, parts) for one in diameters if one > 0))
 
 
-def fasteners(base: BaseLayout, plan: BaseSplit) -> dict[str, int]:
+def fasteners(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
     """Screws, inserts and dowels of hub and joints, by name.
 
     Raises:
         SpecError: when one is in no list.
     """
     parts = load_parts()
-    found, insert = Counter(_hub(base, parts)), _insert(base, parts)
-    for joint in plan.joints:
-        size = joint_hardware(base.keys)
-        found.update({size.dowel: len(joint.dowels), size.screw: len(joint.screws)})
-        found[insert] += len(joint.screws)
-    return {name: count for name, count in found.items() if count}
+    counts, insert = _hub_fasteners(base, parts), _insert(base.spec, parts)
+    for joint in split.joints:
+        hardware = joint_hardware(base.spec)
+        counts.update({hardware.dowel: len(joint.dowels), hardware.screw: len(joint.screws)})
+        counts[insert] += len(joint.screws)
+    return dict(+counts)
 
 
-def magnet_name(base: BaseLayout, size: float, parts: dict[str, PurchasedPart]) -> str:
+def magnet_name(base: BaseLayout, diameter: float, parts: Parts) -> str:
     """Name of the disc magnet of a diameter (mm) and of the spec's height.
 
     Raises:
         SpecError: when it is in no list.
     """
-    wanted = (size, base.keys.magnet_height_mm)
-    for part in parts.values():
-        if part.kind == "magnets" and _same(part.sizes, wanted):
-            return part.name
+    height = base.spec.magnet_height_mm
+    for part in of_kind(parts, "magnets", diameter_mm=diameter, height_mm=height):
+        return part.name
     raise SpecError(
-        f"no magnet of {wanted[0]:g} x {wanted[1]:g} mm is in magnets.csv: change "
+        f"no magnet of {diameter:g} x {height:g} mm is in magnets.csv: change "
         "prototype.base.magnets_mm or prototype.base.magnet_height_mm"
     )
 
 
-def _same(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    return all(abs(a - b) < PLAY_MM for a, b in zip(one, other, strict=True))
-
-
-def _hub(base: BaseLayout, parts: dict[str, PurchasedPart]) -> dict[str, int]:
+def _hub_fasteners(base: BaseLayout, parts: Parts) -> Counter[str]:
     """Inserts of the drive's holes and of the lock, and the lock's screws."""
-    held, keys = base.hub, base.keys
-    found: Counter[str] = Counter()
-    if abs(held.hole - keys.insert_hole_mm) < PLAY_MM:
-        found[_insert(base, parts)] += len(held.holes)
-    if held.lock:
-        count = LOCKS[held.lock]
-        found[_insert(base, parts)] += count
+    hub, spec = base.hub, base.spec
+    counts: Counter[str] = Counter()
+    if abs(hub.hole - spec.insert_hole_mm) < SAME_SIZE_MM:
+        counts[_insert(spec, parts)] += len(hub.holes)
+    if hub.lock:
+        count = LOCK_SCREWS[hub.lock]
+        counts[_insert(spec, parts)] += count
         # A set screw reaches from the shaft to the boss's face at most; the clamp's screw from
         # face to face.
-        room = held.boss - held.bore if held.lock == "set-screws" else _across(base)
-        kind = "setscrews" if held.lock == "set-screws" else "screws"
-        found[_screw(kind, room, parts)] += count
-    return dict(found)
+        if hub.lock == "set-screws":
+            counts[_longest_screw("setscrews", hub.boss - hub.bore, parts)] += count
+        else:
+            counts[_longest_screw("screws", _clamp_screw_length(hub), parts)] += count
+    return counts
 
 
-def _across(base: BaseLayout) -> float:
+def _clamp_screw_length(hub: Hub) -> float:
     """Length of the clamp's screw hole, mm."""
-    held = base.hub
-    return float(2 * (held.boss**2 - ((held.bore + held.boss) / 2) ** 2) ** 0.5)
+    return float(2 * (hub.boss**2 - ((hub.bore + hub.boss) / 2) ** 2) ** 0.5)
 
 
-def _screw(kind: str, room: float, parts: dict[str, PurchasedPart]) -> str:
+def _longest_screw(kind: str, room: float, parts: Parts) -> str:
     """The longest M3 screw no longer than a length (mm)."""
-    fit = [
-        part
-        for part in parts.values()
-        if part.kind == kind and abs(part.sizes[0] - 3) < PLAY_MM and part.sizes[1] <= room
-    ]
-    if not fit:
+    screws = of_kind(parts, kind, thread_mm=M3_MM)
+    screws = [screw for screw in screws if screw["length_mm"] <= room]
+    if not screws:
         raise SpecError(f"no M3 screw of at most {room:.1f} mm is in {kind}.csv: add one")
-    return max(fit, key=lambda part: part.sizes[1]).name
+    return max(screws, key=lambda part: part["length_mm"]).name
 
 
-def _insert(base: BaseLayout, parts: dict[str, PurchasedPart]) -> str:
+def _insert(spec: BaseSpec, parts: Parts) -> str:
     """The longest M3 insert that the holes of the spec take."""
-    keys = base.keys
-    fit = [
-        part
-        for part in parts.values()
-        if part.kind == "inserts"
-        and abs(part.sizes[0] - 3) < PLAY_MM
-        and part.sizes[1] <= keys.insert_depth_mm
-        and abs(part.sizes[3] - keys.insert_hole_mm) < PLAY_MM
-    ]
-    if not fit:
+    inserts = of_kind(parts, "inserts", thread_mm=M3_MM, hole_mm=spec.insert_hole_mm)
+    inserts = [insert for insert in inserts if insert["length_mm"] <= spec.insert_depth_mm]
+    if not inserts:
         raise SpecError(
-            f"no M3 insert for holes of {keys.insert_hole_mm:g} mm, {keys.insert_depth_mm:g} mm "
+            f"no M3 insert for holes of {spec.insert_hole_mm:g} mm, {spec.insert_depth_mm:g} mm "
             "deep, is in inserts.csv: change prototype.base.insert_hole_mm or insert_depth_mm"
         )
-    return max(fit, key=lambda part: part.sizes[1]).name
+    return max(inserts, key=lambda part: part["length_mm"]).name

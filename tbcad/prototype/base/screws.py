@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 
-from tbcad.prototype.purchased.parts import PurchasedPart, load_parts
+from tbcad.prototype.purchased.parts import load_parts, of_kind
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec
 
+M3_MM = 3.0
 FLOOR_MM = 1.0  # below holes
-BITE_MM = 4.0  # of a screw in its insert: 1.3 diameters
-BEYOND_MM = 0.5  # of a hole beyond its dowel
-KEY_MM = 0.55  # round a screw's head
+MIN_ENGAGEMENT_MM = 4.0  # of a screw in its insert: 1.3 diameters
+BEYOND_DOWEL_MM = 0.5  # depth of a hole beyond its dowel
+KEY_PLAY_MM = 0.55  # round a screw's head
 
 
 @dataclass(frozen=True)
@@ -22,46 +23,45 @@ class JointHardware:
     head: float
 
 
-def joint_hardware(keys: BaseSpec) -> JointHardware:
+def joint_hardware(spec: BaseSpec) -> JointHardware:
     """The longest dowel and the shortest M3 screw for the flanges' thickness.
 
     Raises:
         SpecError: when none is in the lists.
     """
-    parts = load_parts().values()
-    _check_insert(keys)
-    most = 2 * (keys.joint_mm - FLOOR_MM - BEYOND_MM)
-    pins = [p for p in parts if p.kind == "dowels" and _is(p, keys.dowel_mm) and p.sizes[1] <= most]
-    if not pins:
+    parts = load_parts()
+    _check_insert(spec)
+    longest_dowel = 2 * (spec.joint_mm - FLOOR_MM - BEYOND_DOWEL_MM)
+    dowels = of_kind(parts, "dowels", diameter_mm=spec.dowel_mm)
+    dowels = [dowel for dowel in dowels if dowel["length_mm"] <= longest_dowel]
+    if not dowels:
         raise SpecError(
-            f"no dowel of {keys.dowel_mm:g} mm is at most {most:g} mm long: make "
+            f"no dowel of {spec.dowel_mm:g} mm is at most {longest_dowel:g} mm long: make "
             "prototype.base.joint_mm larger or prototype.base.dowel_mm smaller"
         )
-    least, longest = keys.joint_mm + BITE_MM, keys.joint_mm + keys.insert_depth_mm
-    screws = [
-        p for p in parts if p.kind == "screws" and _is(p, 3) and least <= p.sizes[1] <= longest
-    ]
+    shortest, longest = spec.joint_mm + MIN_ENGAGEMENT_MM, spec.joint_mm + spec.insert_depth_mm
+    screws = of_kind(parts, "screws", thread_mm=M3_MM)
+    screws = [screw for screw in screws if shortest <= screw["length_mm"] <= longest]
     if not screws:
         raise SpecError(
-            f"no M3 screw is {least:g} to {longest:g} mm long: make prototype.base.joint_mm one "
+            f"no M3 screw is {shortest:g} to {longest:g} mm long: make prototype.base.joint_mm one "
             "of the lengths on sale less 4"
         )
-    pin, screw = max(pins, key=lambda p: p.sizes[1]), min(screws, key=lambda p: p.sizes[1])
-    return JointHardware(pin.name, pin.sizes[1] / 2 + BEYOND_MM, screw.name, screw.sizes[2])
+    dowel = max(dowels, key=lambda part: part["length_mm"])
+    screw = min(screws, key=lambda part: part["length_mm"])
+    depth = dowel["length_mm"] / 2 + BEYOND_DOWEL_MM
+    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"])
 
 
-def _is(part: PurchasedPart, size: float) -> bool:
-    return abs(part.sizes[0] - size) < 1e-9
-
-
-def _check_insert(keys: BaseSpec) -> None:
-    if keys.joint_mm < keys.insert_depth_mm + FLOOR_MM:
+def _check_insert(spec: BaseSpec) -> None:
+    minimum = spec.insert_depth_mm + FLOOR_MM
+    if spec.joint_mm < minimum:
         raise SpecError(
-            f"flanges of {keys.joint_mm:g} mm are too thin for inserts: make "
-            f"prototype.base.joint_mm at least {keys.insert_depth_mm + FLOOR_MM:g}"
+            f"flanges of {spec.joint_mm:g} mm are too thin for inserts: make "
+            f"prototype.base.joint_mm at least {minimum:g}"
         )
 
 
-def access_radius(size: JointHardware) -> float:
+def access_radius(hardware: JointHardware) -> float:
     """Radius of what is kept clear over a screw's head, mm."""
-    return size.head / 2 + KEY_MM
+    return hardware.head / 2 + KEY_PLAY_MM

@@ -1,9 +1,12 @@
-"""Bosses of the seats, and what is cut out of them: cup, pocket and way, but not the pads.
+"""Bosses of the seats, and what is cut out of them: cup, pocket and path, but not the pads.
 
-Both are built in the seat's own frame with the ball's centre at the origin and the seat's axis
+Each is built in the seat's own frame with the ball's centre at the origin and the seat's axis
 along z, and then moved: a sphere whose axis is not the axis of the cut comes out invalid now and
 then.
 """
+
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from OCP.BRepBuilderAPI import (
@@ -12,18 +15,22 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeWire,
 )
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.solids import cut, cylinder, moved, revolved
+from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
 
-# Of the cup's radius: the way is a little narrower, so that the two meet at an angle.
+# The path is narrower than the cup by this share of the cup's clearance, so that the two meet at
+# an angle.
 NARROWER = 0.4
-# A post of each pad goes this far into the boss.
-POST_MM = 1.5
-# What frees a boss's end begins this far inside of the boss.
-INTO_MM = 0.3
+POST_MM = 1.5  # of each pad into the boss
+INTO_BOSS_MM = 0.3  # by which the space behind a boss begins inside of it, and is narrower
+POLE_ANGLE = 0.3  # about the axis, radians: the cup's hemisphere ends here, short of its pole
 ALONG = np.array([0.0, 0.0, 1.0])
+
+Point = tuple[float, float]
+"""A point (x out, z along) of the half-plane y = 0."""
 
 
 def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
@@ -37,14 +44,14 @@ def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
 
     Args:
         seats: of all balls.
-        k: which.
+        k: number of the seat.
         offset: how far the pads are moved off the ball, mm.
     """
     radius, cup, pocket = float(seats.radius[k]), float(seats.cup[k]), float(seats.pocket[k])
     # Seams where no pad is: half way between two of them.
-    turn = float(seats.turn[k]) + np.pi / 3
-    seam = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], ALONG])
-    room = moved(revolved(_half(cup, pocket, float(seats.bottom[k]))), seam, np.zeros(3))
+    seam = np.array([*meridian(float(seats.pad_azimuth[k]) + np.pi / 3), ALONG])
+    section = _hollow_section(cup, pocket, float(seats.bottom[k]))
+    room = moved(revolved(section), seam, np.zeros(3))
     posts = [
         cylinder(-(radius + offset) * n, -n, float(seats.pad[k]), cup - radius + POST_MM)
         for n in seats.local_normals[k]
@@ -53,8 +60,8 @@ def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
 
 
 def insertion_path(seats: Seats, k: int) -> TopoDS_Shape:
-    """What a ball needs to be put in, in its own frame."""
-    out = seats.way[k] @ seats.axes[k].T
+    """What a ball needs to be inserted, in its own frame."""
+    out = seats.insertion[k] @ seats.axes[k].T
     length = float(np.linalg.norm(out))
     radius = seats.radius[k] + (1 - NARROWER) * (seats.cup[k] - seats.radius[k])
     return cylinder(np.zeros(3), out / length, float(radius), length)
@@ -62,8 +69,8 @@ def insertion_path(seats: Seats, k: int) -> TopoDS_Shape:
 
 def column_behind_boss(seats: Seats, k: int, length: float) -> TopoDS_Shape:
     """Cylinder behind a boss, in its own frame; no face of it lies on one of the boss."""
-    start = (seats.back[k] - INTO_MM) * ALONG
-    return cylinder(start, ALONG, float(seats.boss[k]) - INTO_MM, length)
+    start = (seats.back[k] - INTO_BOSS_MM) * ALONG
+    return cylinder(start, ALONG, float(seats.boss[k]) - INTO_BOSS_MM, length)
 
 
 def moved_to_seat(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
@@ -71,24 +78,37 @@ def moved_to_seat(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
     return moved(shape, seats.axes[k], seats.centre[k])
 
 
-def _half(cup: float, pocket: float, bottom: float) -> TopoDS_Face:
-    """Half section (x out, z along): cup and pocket below it, in y = 0.
+def _hollow_section(cup: float, pocket: float, bottom: float) -> TopoDS_Face:
+    """Half section in y = 0: cup and pocket below it.
 
     The cup's front half is a hemisphere short of its pole, since a pole makes bad facets.
     """
-    low = float(np.sqrt(cup**2 - pocket**2))
-    high = -cup * float(np.cos(0.3))
-    points = [
-        gp_Pnt(0, 0, high),
-        gp_Pnt(cup * float(np.sin(0.3)), 0, high),
-        gp_Pnt(pocket, 0, low),
-        gp_Pnt(pocket, 0, bottom),
-        gp_Pnt(0, 0, bottom),
-    ]
-    circle = gp_Circ(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, -1, 0), gp_Dir(1, 0, 0)), cup)
+    front = -cup * float(np.cos(POLE_ANGLE))
+    rim = (cup * float(np.sin(POLE_ANGLE)), front)
+    edge = (pocket, float(np.sqrt(cup**2 - pocket**2)))
+    axis: list[Point] = [(0.0, bottom), (0.0, front)]
+    arc = arc_about_axis(0.0, cup, rim, edge)
+    return section_face([*lines([axis[1], rim]), arc, *lines([edge, (pocket, bottom), *axis])])
+
+
+def section_face(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
+    """Face in y = 0 inside edges that follow each other and close."""
     wire = BRepBuilderAPI_MakeWire()
-    wire.Add(BRepBuilderAPI_MakeEdge(points[0], points[1]).Edge())
-    wire.Add(BRepBuilderAPI_MakeEdge(circle, points[1], points[2]).Edge())
-    for a, b in zip(points[2:], [*points[3:], points[0]], strict=True):
-        wire.Add(BRepBuilderAPI_MakeEdge(a, b).Edge())
+    for edge in edges:
+        wire.Add(edge)
     return BRepBuilderAPI_MakeFace(wire.Wire(), True).Face()
+
+
+def lines(points: Sequence[Point]) -> list[TopoDS_Edge]:
+    """Straight edges between points that follow each other."""
+    return [
+        BRepBuilderAPI_MakeEdge(gp_Pnt(a[0], 0, a[1]), gp_Pnt(b[0], 0, b[1])).Edge()
+        for a, b in pairwise(points)
+    ]
+
+
+def arc_about_axis(middle: float, radius: float, start: Point, end: Point) -> TopoDS_Edge:
+    """Arc about a point (0, middle) of the axis between two points, z rising."""
+    circle = gp_Circ(gp_Ax2(gp_Pnt(0, 0, middle), gp_Dir(0, -1, 0), gp_Dir(1, 0, 0)), radius)
+    ends = (gp_Pnt(start[0], 0, start[1]), gp_Pnt(end[0], 0, end[1]))
+    return BRepBuilderAPI_MakeEdge(circle, *ends).Edge()

@@ -126,7 +126,7 @@ def _plan(keys: FrameSpec, base: BaseLayout, drive: Drive) -> Plan:
     reach, face = drive.centre_mm, base.hub.face
     if drive.wheel and drive.belt:
         travel = keys.belt_travel_mm / 2
-        least = drive.motor["frame_mm"] / 2 + travel + 2 * WALL_MM + base.keys.shaft_mm
+        least = drive.motor["frame_mm"] / 2 + travel + 2 * WALL_MM + base.spec.shaft_mm
         if reach < least:
             raise SpecError(
                 f"the motor of drive {drive.name} would meet the bearings at {reach:.1f} mm: use a "
@@ -146,7 +146,7 @@ def _plan(keys: FrameSpec, base: BaseLayout, drive: Drive) -> Plan:
 
 
 def _bearings(base: BaseLayout, plan: Plan, parts: Parts) -> Bearings:
-    bore, key = base.keys.shaft_mm, "prototype.base.shaft_mm"
+    bore, key = base.spec.shaft_mm, "prototype.base.shaft_mm"
     hint = "set it to 8, 10 or 12, or add one to the list"
     bearing = fitting(parts, "bearings", key, hint, "width_mm", bore_mm=bore)
     collar = fitting(parts, "collars", key, hint, "width_mm", bore_mm=bore)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.gaps import SHORTEST_MM, STEP_MM, _runs, rib_gaps, ring_arcs
+from tbcad.prototype.base.gaps import MIN_PART_MM, STEP_MM, _runs, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.spec.prototype import BaseSpec
 
@@ -17,11 +17,11 @@ def base(paper_prototype: PrototypeLayout) -> BaseLayout:
 
 
 def test_arcs_miss_every_number(base: BaseLayout) -> None:
-    seats = base.own_seats
+    seats = base.local_seats
     for ring in base.rings:
         z, r = ring.mean(axis=0)
         for low, high in ring_arcs(base, ring, *base.sector):
-            assert (high - low) * ring[:, 1].max() >= SHORTEST_MM - STEP_MM
+            assert (high - low) * ring[:, 1].max() >= MIN_PART_MM - STEP_MM
             azimuth = np.linspace(low, high, 500)
             points = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), 0 * azimuth + z], axis=1)
             for k in range(len(seats)):

@@ -20,7 +20,12 @@ from tbcad.prototype.base.profile import (
     thinned,
     trimmed,
 )
-from tbcad.prototype.base.seats import APART_MM, insertion_clearance, seat_layout, shifted_contacts
+from tbcad.prototype.base.seats import (
+    OFF_PATH_MM,
+    insertion_clearance,
+    seat_layout,
+    shifted_contacts,
+)
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import BaseSpec
@@ -76,18 +81,20 @@ class TestSeats:
         assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
 
     def test_balls_go_in_past_the_pads_of_others(self, whole: BaseLayout) -> None:
-        assert insertion_clearance(whole.seats).min() > APART_MM
+        assert insertion_clearance(whole.seats).min() > OFF_PATH_MM
 
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
         self, paper_design: MirrorDesign
     ) -> None:
         small_prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
         seat = seat_layout(KEYS, small_prototype)
-        slant = np.degrees(np.arccos(np.clip(-dot(seat.way, seat.axis) / norm(seat.way), -1, 1)))
+        slant = np.degrees(
+            np.arccos(np.clip(-dot(seat.insertion, seat.axis) / norm(seat.insertion), -1, 1))
+        )
         assert 5 < slant.max() < 21
         # On its way out it leaves its own pads.
-        assert dot(seat.way[:, None], seat.pad_normals).min() > 0
-        assert insertion_clearance(seat).min() > APART_MM
+        assert dot(seat.insertion[:, None], seat.pad_normals).min() > 0
+        assert insertion_clearance(seat).min() > OFF_PATH_MM
 
     def test_moved_pads(self, whole: BaseLayout) -> None:
         moved = shifted_contacts(whole.seats, np.array([0.0, 0.2]))
@@ -106,18 +113,18 @@ class TestLight:
             reach = reach + cone.end_radius[:, None] * share[..., 0]
             turn = 2 * np.pi * random.random(reach.shape)
             rim = reach[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-            assert whole.light.beyond(middle + rim).max() <= -2 * KEYS.light_clearance_mm + 1e-9
+            assert whole.light.excess(middle + rim).max() <= -2 * KEYS.light_clearance_mm + 1e-9
 
     def test_the_wall_is_beyond_it(self, whole: BaseLayout) -> None:
         parts = np.stack([whole.inner[:-1], whole.inner[1:]], axis=1)
-        assert whole.light.least_beyond(parts).min() >= 0
+        assert whole.light.min_excess(parts).min() >= 0
 
     def test_the_bound_of_a_facet_is_below_all_of_it(self) -> None:
         random, region = np.random.default_rng(2), LightSpheroid(140.0, 250.0)
         facets = random.normal(size=(200, 3, 3)) * 100
         weights = random.dirichlet([1, 1, 1], size=(200, 40))
-        inside = region.beyond(weights @ facets).min(axis=1)
-        assert (region.least_beyond(facets) <= inside + 1e-9).all()
+        inside = region.excess(weights @ facets).min(axis=1)
+        assert (region.min_excess(facets) <= inside + 1e-9).all()
 
     def test_a_boss_in_the_light_is_refused(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
@@ -172,8 +179,8 @@ class TestProfile:
 class TestHub:
     def test_it_stands_beyond_the_light(self, whole: BaseLayout) -> None:
         held = whole.hub
-        assert whole.light.beyond(np.array([held.front, 0.0])) >= 0
-        assert held.front > held.back > held.face == whole.hub_face
+        assert whole.light.excess(np.array([held.front, 0.0])) >= 0
+        assert held.front > held.back > held.face == whole.hub.face
 
     @pytest.mark.parametrize(
         ("drive", "circle", "hole"),
@@ -215,14 +222,14 @@ class TestRefused:
         crowded = replace(
             small_prototype, placement=close, balls=replace(small_prototype.balls, poses=small)
         )
-        with pytest.raises(SpecError, match="stands where another ball is put in"):
+        with pytest.raises(SpecError, match="is where another ball is inserted"):
             seat_layout(KEYS, crowded)
 
     def test_a_ball_next_to_the_axis(self, small_prototype: PrototypeLayout) -> None:
         seat = seat_layout(KEYS, small_prototype)
         frame = small_prototype.half.ellipsoid.frame()
         near = replace(seat, centre=seat.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
-        with pytest.raises(SpecError, match="stands too near to the axis for its seat"):
+        with pytest.raises(SpecError, match="is too near to the axis for its seat"):
             sector(KEYS, near, small_prototype)
 
     def test_balls_all_round_the_axis(self, small_prototype: PrototypeLayout) -> None:

@@ -33,7 +33,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import hub_solids as hubs
 from tbcad.prototype.base import seat_solids as seat
 from tbcad.prototype.base.cap_solids import cap_parts, cap_pocket, flat_depth
-from tbcad.prototype.base.coupon import _wall as seat_section
+from tbcad.prototype.base.coupon import _wall_section as seat_section
 from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
 from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -146,15 +146,15 @@ class TestCarrier:
         corners = mesh.triangles @ numbers.frame.T
         for _ in range(4):
             # The bound is below all of a facet; where it is too low, of its quarters.
-            corners = quartered(corners[numbers.light.least_beyond(corners) < 0])
+            corners = quartered(corners[numbers.light.min_excess(corners) < 0])
         assert not len(corners)
-        assert numbers.light.beyond(mesh.vertices @ numbers.frame.T).min() > 0
+        assert numbers.light.excess(mesh.vertices @ numbers.frame.T).min() > 0
 
     def test_volume_against_booleans_of_meshes(
         self, numbers: BaseLayout, part: PlacedSolid
     ) -> None:
         """The kernel's booleans can lose a piece and pass for valid; other booleans tell."""
-        seats = numbers.own_seats
+        seats = numbers.local_seats
         added, removed = added_solids(numbers, seats), removed_solids(numbers, seats)
         assert part.volume == pytest.approx(volume_by_meshes(added, removed, 0.01), rel=2e-4)
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
@@ -163,7 +163,7 @@ class TestCarrier:
     def test_balls_can_be_put_in(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         points = np.vstack([mesh.vertices, mesh.triangles_center])
         found = numbers.seats
-        for centre, way, radius in zip(found.centre, found.way, found.radius, strict=True):
+        for centre, way, radius in zip(found.centre, found.insertion, found.radius, strict=True):
             length = norm(way)
             away = points - centre
             along = away @ way / length
@@ -198,7 +198,7 @@ class TestCarrier:
 
     def test_the_hub_is_about_the_axis(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
         local = mesh.vertices @ numbers.frame.T
-        assert local[:, 0].min() == pytest.approx(numbers.hub_face)
+        assert local[:, 0].min() == pytest.approx(numbers.hub.face)
         bore = np.isclose(norm(local[:, 1:]), KEYS.shaft_mm / 2)
         assert bore.sum() > 40
 
@@ -240,7 +240,7 @@ def test_booleans_in_parallel_give_the_same_bytes(
     numbers: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Faces come in the same order, in two threads or one, by oriented boxes or plain ones."""
-    found = numbers.own_seats
+    found = numbers.local_seats
 
     def step(name: str) -> bytes:
         bosses = [

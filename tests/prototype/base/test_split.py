@@ -52,7 +52,7 @@ def cut(
 
 def rims(numbers: BaseLayout) -> np.ndarray:
     """Points round both ends of all bosses, (k, 2, n, 3)."""
-    found, turn = numbers.own_seats, np.linspace(0, 2 * np.pi, 90)
+    found, turn = numbers.local_seats, np.linspace(0, 2 * np.pi, 90)
     circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     around = found.boss[:, None, None] * (circle @ found.axes)
     ends = np.stack([found.front, found.back], axis=1)[..., None] * found.axis[:, None]
@@ -72,8 +72,8 @@ class TestPlanes:
         numbers, plan = cut
         corners = rims(numbers).reshape(len(numbers.seats), -1, 3)
         for joint in plan.joints:
-            inside = (corners @ joint.within[:, :3].T <= joint.within[:, 3]).all(axis=(1, 2))
-            away = joint.plane.above(corners[inside])
+            inside = (corners @ joint.region[:, :3].T <= joint.region[:, 3]).all(axis=(1, 2))
+            away = joint.plane.height(corners[inside])
             assert ((away.min(axis=1) > 0.99) | (away.max(axis=1) < -0.99)).all()
             assert (away.min(axis=1) > 0).any()
             assert (away.max(axis=1) < 0).any()
@@ -112,7 +112,7 @@ class TestJoints:
             assert len(joint.dowels) == 2
             assert len(joint.screws) >= 2
             places = np.vstack([joint.dowels, joint.screws])
-            assert np.abs(joint.plane.above(places)).max() < 1e-9
+            assert np.abs(joint.plane.height(places)).max() < 1e-9
             apart = norm(places[:, None] - places) + 99 * np.eye(len(places))
             assert apart.min() >= 8.0
             assert norm(joint.dowels[1] - joint.dowels[0]) > 40
@@ -121,7 +121,7 @@ class TestJoints:
         self, cut: tuple[BaseLayout, BaseSplit]
     ) -> None:
         numbers, plan = cut
-        seat, used = numbers.own_seats, numbers.keys
+        seat, used = numbers.local_seats, numbers.spec
         for joint in plan.joints:
             along = np.linspace(-used.joint_mm, used.joint_mm, 40)[:, None, None]
             axes = np.vstack([joint.dowels, joint.screws]) + along * joint.plane.normal
@@ -137,15 +137,15 @@ class TestJoints:
 
     def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         numbers, plan = cut
-        free = access_radius(joint_hardware(numbers.keys))
+        free = access_radius(joint_hardware(numbers.spec))
         assert free > 5.5 / 2
         for joint in plan.joints:
             for place, side in zip(joint.screws, joint.heads, strict=True):
-                steps = numbers.keys.joint_mm + np.linspace(0, 25, 60)
+                steps = numbers.spec.joint_mm + np.linspace(0, 25, 60)
                 axis = place + side * steps[:, None] * joint.plane.normal
                 at = np.stack([axis[:, 2], norm(axis[:, :2])], axis=-1)
                 assert distance_outside(numbers.outer, at).min() > 5.5 / 2
-                for rim, up in zip(rims(numbers), numbers.own_seats.axis, strict=True):
+                for rim, up in zip(rims(numbers), numbers.local_seats.axis, strict=True):
                     ends = rim.mean(axis=1)
                     deep = np.clip((axis - ends[0]) @ up, 0, (ends[1] - ends[0]) @ up)
                     away = norm(axis - ends[0] - deep[:, None] * up)
@@ -155,7 +155,7 @@ class TestJoints:
         numbers, _ = cut
         line = flange_profile(numbers)
         parts = np.stack([line, np.roll(line, -1, axis=0)], axis=1)
-        assert numbers.light.least_beyond(parts).min() > 0
+        assert numbers.light.min_excess(parts).min() > 0
         assert line[:, 1].min() > numbers.hub.disc
 
     def test_sizes_are_in_the_lists(self) -> None:
@@ -234,6 +234,6 @@ class TestBought:
         whole = split_base(numbers, PrinterSpec())
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
             fasteners(numbers, whole)
-        short = replace(numbers, hub=replace(numbers.hub, boss=6.0), keys=KEYS)
+        short = replace(numbers, hub=replace(numbers.hub, boss=6.0), spec=KEYS)
         with pytest.raises(SpecError, match=r"no M3 screw of at most 2\.0 mm is in setscrews\.csv"):
             fasteners(short, whole)

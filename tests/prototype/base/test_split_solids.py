@@ -93,7 +93,7 @@ class TestSmall:
 
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
         numbers, _, plan, parts, _ = small
-        seats = numbers.own_seats
+        seats = numbers.local_seats
         added, removed = added_solids(numbers, seats, plan), removed_solids(numbers, seats)
         with_flanges = volume_by_meshes(added, removed, 0.01)
         assert with_flanges > volume_by_meshes(added_solids(numbers, seats), removed, 0.01) + 10_000
@@ -108,7 +108,7 @@ class TestSmall:
     def test_holes_of_both_sides_are_coaxial(self, small: Cut) -> None:
         numbers, _, plan, parts, _ = small
         (joint,) = plan.joints
-        used, size = numbers.keys, joint_hardware(numbers.keys)
+        used, size = numbers.spec, joint_hardware(numbers.spec)
         turn = numbers.axes
         press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
         sides = {
@@ -129,7 +129,7 @@ class TestSmall:
         """Straight from the plane into the material, until the mesh is met."""
         numbers, _, plan, _, meshes = small
         (joint,) = plan.joints
-        used, depth = numbers.keys, joint_hardware(numbers.keys).dowel_depth
+        used, depth = numbers.spec, joint_hardware(numbers.spec).dowel_depth
         for side in (-1, 1):
             mesh = meshes[piece_at(plan, joint, side)]
             out = side * joint.plane.normal @ numbers.axes
@@ -146,12 +146,12 @@ class TestSmall:
         for side, place in zip((-1, 1), joint.labels, strict=True):
             n = piece_at(plan, joint, side)
             out = side * joint.plane.normal @ numbers.axes
-            far = numbers.keys.joint_mm + numbers.keys.relief_mm
+            far = numbers.spec.joint_mm + numbers.spec.relief_mm
             top = place @ numbers.axes + far * out
             mesh = meshes[n]
             flat = np.abs((mesh.triangles - top) @ out).max(axis=1) < 1e-6
             flat &= (mesh.face_normals @ out > 1 - 1e-9) & (norm(mesh.triangles_center - top) < 6)
-            square = fitting(str(n + 1), numbers.keys.digit_mm, 0.95 * LABEL_MM) / ROWS
+            square = fitting(str(n + 1), numbers.spec.digit_mm, 0.95 * LABEL_MM) / ROWS
             squares = "".join(SIGNS[str(n + 1)]).count("#")
             assert mesh.area_faces[flat].sum() == pytest.approx(squares * square**2, rel=1e-6)
 
@@ -159,13 +159,13 @@ class TestSmall:
         numbers, _, _, _, meshes = small
         for mesh in meshes:
             points = np.vstack([mesh.vertices, mesh.triangles_center])
-            assert numbers.light.beyond(points @ numbers.frame.T).min() > 0
+            assert numbers.light.excess(points @ numbers.frame.T).min() > 0
 
     def test_balls_can_be_put_in(self, small: Cut) -> None:
         numbers, _, _, _, meshes = small
         points = np.vstack([np.vstack([m.vertices, m.triangles_center]) for m in meshes])
         found = numbers.seats
-        for centre, way, radius in zip(found.centre, found.way, found.radius, strict=True):
+        for centre, way, radius in zip(found.centre, found.insertion, found.radius, strict=True):
             away, length = points - centre, norm(way)
             along = away @ way / length
             beside = norm(away - along[:, None] * way / length)
@@ -195,7 +195,7 @@ def piece_at(plan: BaseSplit, joint: Joint, side: int) -> int:
 
 def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
     """Of dowels' and screws' holes and of inserts, without what is taken off for the heads."""
-    used, depth = numbers.keys, joint_hardware(numbers.keys).dowel_depth
+    used, depth = numbers.spec, joint_hardware(numbers.spec).dowel_depth
     pins = [used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm]
     dowels = len(joint.dowels) * sum(np.pi / 4 * pin**2 * depth for pin in pins)
     insert = np.pi / 4 * used.insert_hole_mm**2 * used.insert_depth_mm
@@ -206,7 +206,7 @@ def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
 def heads_volume(numbers: BaseLayout, joint: Joint) -> float:
     """At most all of what is kept clear for the heads."""
     return float(
-        len(joint.screws) * np.pi * access_radius(joint_hardware(numbers.keys)) ** 2 * 25.2
+        len(joint.screws) * np.pi * access_radius(joint_hardware(numbers.spec)) ** 2 * 25.2
     )
 
 
