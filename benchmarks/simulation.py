@@ -122,13 +122,13 @@ class Every:
     """All captured rays and the wanted ones of a view.
 
     Attributes:
-        slab: along the view.
+        two_plane: parametrisation along the view.
         origin: of captured rays, (n, 3).
         direction: of captured rays, (n, 3).
-        wanted: points of the slab, (k, 4).
+        wanted: two-plane coordinates, (k, 4).
     """
 
-    slab: TwoPlane
+    two_plane: TwoPlane
     origin: NDArray[np.float32]
     direction: NDArray[np.float32]
     wanted: Floats
@@ -138,8 +138,8 @@ class Every:
         return len(self.origin)
 
     def points(self) -> Floats:
-        """Captured rays in the slab, without those that are too oblique."""
-        found = self.slab.points(self.origin, self.direction)
+        """Coordinates of the captured rays, without those that are too oblique."""
+        found = self.two_plane.coordinates(self.origin, self.direction)
         return found[~np.isnan(found[:, 0])]
 
 
@@ -149,12 +149,12 @@ def all_rays(source: LightField, at: Camera) -> Every:
     for frame in source.frames.values():
         on = frame.planes["mirror"][:] > 0
         parts.append([frame.planes[name][:][on] for name in ("origin", "direction")])
-    slab = two_plane_along(at.forward, at.right, source.capture_mm)
+    two_plane = two_plane_along(at.forward, at.right, source.capture_mm)
     way = view_directions(at).reshape(-1, 3)
     way = way[np.linalg.norm(np.cross(at.pinhole, way), axis=1) <= source.capture_mm / 2]
-    wanted = slab.points(np.broadcast_to(at.pinhole, way.shape), way)
+    wanted = two_plane.coordinates(np.broadcast_to(at.pinhole, way.shape), way)
     origin, direction = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Every(slab, origin, direction, wanted)
+    return Every(two_plane, origin, direction, wanted)
 
 
 def plain(subject: SceneObject) -> SceneObject:

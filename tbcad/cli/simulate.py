@@ -120,8 +120,9 @@ def view(
     PSNR and SSIM.
     """
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.image_files import check_image_path
-    from tbcad.simulate.scene.ground_truth import pinhole_picture, to_bytes
+    from tbcad.simulate.scene.ground_truth import pinhole_picture
     from tbcad.simulate.scene.ray_casting import depth_along_rays
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import synthesise
@@ -179,8 +180,9 @@ def refocus(
     For a simulated capture also writes the ray-traced picture of a real lens and a comparison.
     """
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
-    from tbcad.simulate.scene.ground_truth import lens_picture, to_bytes
+    from tbcad.simulate.scene.ground_truth import lens_picture
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.refocus import Focus, refocus_sweep
     from tbcad.simulate.views.refocus import refocus as refocused

@@ -40,6 +40,23 @@ class Camera:
         half = np.tan(self.hfov / 2)
         return np.array([half, half * self.height_px / self.width_px])
 
+    @property
+    def axes(self) -> Floats:
+        """Rows: unit vectors along the rows, down the columns, and forward, (3, 3)."""
+        return np.stack([self.right, np.cross(self.forward, self.right), self.forward])
+
+    @property
+    def pixel_pitch(self) -> float:
+        """Width of a pixel at unit distance."""
+        return float(2 * self.half_sizes[0] / self.width_px)
+
+    def project(self, points: Floats) -> Floats:
+        """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
+        image = (points - self.pinhole) @ self.axes.T
+        size = np.array([self.width_px, self.height_px])
+        result: Floats = image[..., :2] / image[..., 2:] / self.pixel_pitch + (size - 1) / 2
+        return result
+
     def fill(self, points: Floats) -> float:
         """How far points (k, 3) fill the frame: 1 when the outermost is on its edge.
 

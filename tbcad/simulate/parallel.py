@@ -1,6 +1,6 @@
-"""Compiled loops: numba, without the interpreter's lock, so that threads share the work."""
+"""Work in threads, and loops compiled by numba, which release the interpreter's lock."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from os import cpu_count
 from typing import TypeVar
@@ -17,13 +17,35 @@ THREADS = min(cpu_count() or 1, 8)
 def compiled(function: Function) -> Function:
     """The function, compiled when first called and kept for the next process."""
     try:
-        made: Function = njit(nogil=True, cache=True)(function)
+        result: Function = njit(nogil=True, cache=True)(function)
     except RuntimeError:  # no folder that may be written: compile in every process
-        made = njit(nogil=True)(function)
-    return made
+        result = njit(nogil=True)(function)
+    return result
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """Results in the items' order, whatever the threads do."""
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(work, items))
+
+
+def in_batches(
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    begin: Callable[[Item], object] = lambda _: None,
+) -> Iterator[Result]:
+    """Results in the items' order, of which few are in memory at a time.
+
+    Args:
+        work: run in threads.
+        items: what to work on.
+        begin: called with the first item of each batch before the batch.
+    """
+    for batch in chunks(len(items), 2 * THREADS):
+        begin(items[batch.start])
+        yield from in_threads(work, items[batch])
+
+
+def chunks(count: int, size: int) -> list[slice]:
+    """Slices of at most `size` that cover `count` items."""
+    return [slice(first, min(first + size, count)) for first in range(0, count, size)]

@@ -18,7 +18,7 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, camera_axes, edge_models
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.pointing import pointing
 from tests.tolerance.exact_builds import brutally, meshed, proved, slowly
 
@@ -170,7 +170,7 @@ def longer(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.nda
     """A pixel then stands for an angle of lesser tangent from the optical axis."""
     way = half.table[:-2, :3] - half.view.pinhole
     way /= np.linalg.norm(way, axis=1)[:, None]
-    forward = camera_axes(half.view)[2]
+    forward = half.view.forward
     radial = way - (way @ forward)[:, None] * forward
     turn = -size / 100 * (radial - np.sum(radial * way, axis=1)[:, None] * way)
     return replace(perfect(half), focal=np.array([1 + size / 100])), np.zeros((1, 3)), turn

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import THREADS, in_threads
+from tbcad.simulate.parallel import chunks, in_batches
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
-from tbcad.simulate.scene.rays import ReflectedRays, unit_directions
+from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
 from tbcad.types import Bytes, Progress
 
 Colours = NDArray[np.float32]
-Shift = tuple[float, float]
+
 Tracer = Callable[[range, Shift], ReflectedRays]
 
 BAND_ROWS = 64  # also the height of a chunk of the light field's file
@@ -49,25 +49,29 @@ def photograph(
         progress: told how far it has come.
     """
     height = view.height_px
-    rows = row_bands(height)
-    for first in range(0, len(rows), 2 * THREADS):
-        progress(f"row {rows[first].start} of {height}")
-        yield from in_threads(
-            partial(_band, view, trace, scene, samples), rows[first : first + 2 * THREADS]
-        )
+    work = partial(_band, view, trace, scene, samples)
+    return in_batches(
+        work, row_bands(height), lambda rows: progress(f"row {rows.start} of {height}")
+    )
 
 
 def row_bands(height: int) -> list[range]:
     """Rows of a picture in bands, which are worked on one by one."""
-    return [range(k, min(k + BAND_ROWS, height)) for k in range(0, height, BAND_ROWS)]
+    return [range(part.start, part.stop) for part in chunks(height, BAND_ROWS)]
+
+
+def to_bytes(colours: NDArray[np.floating]) -> Bytes:
+    """Colours 0 to 255 as whole numbers."""
+    return np.asarray(np.rint(colours), dtype=np.uint8)
 
 
 def _band(view: Camera, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
     rays, colour = _through(view, trace, scene, rows, CENTRE)
     if samples > 1:
-        taken = (_through(view, trace, scene, rows, shift)[1] for shift in subpixel_shifts(samples))
-        colour = sum(taken, np.zeros_like(colour)) / np.float32(samples**2)
-    return Band(rows, rays, np.rint(colour).astype(np.uint8))
+        shifts = subpixel_shifts(samples)
+        colours = (_through(view, trace, scene, rows, shift)[1] for shift in shifts)
+        colour = sum(colours, np.zeros_like(colour)) / np.float32(samples**2)
+    return Band(rows, rays, to_bytes(colour))
 
 
 def subpixel_shifts(samples: int) -> list[Shift]:

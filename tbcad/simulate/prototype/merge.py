@@ -1,8 +1,8 @@
 """The photographs of all stops, merged into the pictures that the shell would have given.
 
-A pixel of the shell's picture belongs to a mirror. Its direction is turned as the mirror's window
-goes along with its ball (tbcad.design.balls); what the photograph of the mirror's stop shows there
-is its colour. Its ray comes from the record: ball and base stand where the plan has them.
+A pixel of the shell's picture belongs to a mirror. Its direction is rotated as the mirror's window
+is rotated along with its ball (tbcad.optics.windows); what the photograph of the mirror's stop
+shows there is its colour. Its ray comes from the record: ball and base are where the plan has them.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import (
     CENTRE,
     Band,
-    Shift,
     Tracer,
     row_bands,
     subpixel_shifts,
+    to_bytes,
 )
-from tbcad.simulate.parallel import THREADS, in_threads
+from tbcad.simulate.parallel import in_batches, in_threads
 from tbcad.simulate.prototype.ball_rays import (
     BallHits,
     image_points,
@@ -38,37 +38,41 @@ from tbcad.simulate.prototype.ball_rays import (
 from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector
 from tbcad.simulate.prototype.stop_photograph import resampled_photograph
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
-from tbcad.simulate.scene.reflector import MARGIN_PX, project_points
+from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
+from tbcad.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
 Colours = NDArray[np.float32]
-Numbers = NDArray[np.uint16]
 Resample = Literal["photograph", "exact"]
 
-NOWHERE = -1
+NO_BALL = -1
+"""In place of a ball's number: what is on no mirror is shown by no ball."""
 
 
 @dataclass(frozen=True)
 class MergePlan:
     """A run ready to be merged; each array has what is on no mirror first, then the mirrors.
 
-    What is on no mirror is taken from the first photograph as it is, and shows no ball.
+    What is on no mirror is taken from the first photograph as it is.
 
     Attributes:
         run: the run.
-        shell: gives the rays of rows of the shell's picture.
+        scene: the object.
+        samples: a pixel is the mean of samples x samples rays.
+        trace_shell: traces rows of the shell's picture.
         boxes: columns x0, x1 and rows y0, y1, ends excluded, of the shell's picture that hold the
             object seen directly, or a mirror's cell, (1 + m, 4).
-        turn: of directions, (1 + m, 3, 3).
+        rotation: of directions, (1 + m, 3, 3).
         stop: whose photograph is used, (1 + m,).
-        ball: that stands in, from 1, (1 + m,).
+        ball: in place of the mirror, from 1, (1 + m,).
     """
 
     run: PrototypeRun
-    shell: Tracer
+    scene: Scene
+    samples: int
+    trace_shell: Tracer
     boxes: Ints
-    turn: Floats
+    rotation: Floats
     stop: Ints
     ball: Ints
 
@@ -79,19 +83,19 @@ class MergedPixels:
 
     Attributes:
         mirror: that each belongs to, from 1; 0 for none, (n,).
-        seen: what it meets; only the ball that stands in for its mirror is a ball here.
-        front: whether the object itself stands before that, (n,).
+        hits: what it meets; only the ball in place of its mirror is a ball here.
+        front: whether the object itself is in front of that, (n,).
         direct: its colours there, (n, 3).
     """
 
     mirror: Ints
-    seen: BallHits
+    hits: BallHits
     front: Bools
     direct: Colours
 
 
 def merged_light_field(
-    both: tuple[PrototypeRun, PrototypeRun],
+    runs: tuple[PrototypeRun, PrototypeRun],
     scene: Scene,
     capture_mm: float,
     resample: Resample = "photograph",
@@ -100,11 +104,14 @@ def merged_light_field(
 ) -> LightField:
     """Both runs merged, in memory; capture_mm is the diameter of the capture sphere.
 
-    The other arguments are those of `merge`.
+    The other arguments are those of `merge_run`.
     """
     captured = {
-        run.at.camera_id: (ball_reflector(run), merge_run(run, scene, resample, samples, progress))
-        for run in both
+        run.reflector.camera_id: (
+            ball_reflector(run),
+            merge_run(run, scene, resample, samples, progress),
+        )
+        for run in runs
     }
     return light_field_in_memory(captured, capture_mm)
 
@@ -121,123 +128,121 @@ def merge_run(
     Args:
         run: for camera a's mirrors or camera b's.
         scene: the object.
-        resample: "photograph": between the four nearest pixels of the stop's photograph, as a
-            machine must; "exact": traced along the turned direction itself.
+        resample: "photograph": between the four nearest pixels of the stop's photograph, as with
+            a real prototype; "exact": traced along the rotated direction itself.
         samples: a pixel, of the photograph or of the picture, is the mean of samples x samples.
-        progress: told how far it has come.
+        progress: called with each step.
 
-    Where a turned direction leaves the photograph, or meets something else than its ball, there
+    Where a rotated direction leaves the photograph, or meets something else than its ball, there
     is no ray and no colour. What is on no mirror shows the object itself, or nothing.
     """
-    ready = _ready(run, scene)
-    photographs = resample == "photograph"
-    picture = _resampled(ready, scene, samples, progress) if photographs else None
-    work = partial(_band, ready, scene, samples, picture)
-    every = row_bands(run.at.camera.height_px)
-    for first in range(0, len(every), 2 * THREADS):
-        progress(f"row {every[first].start} of {run.at.camera.height_px}")
-        yield from in_threads(work, every[first : first + 2 * THREADS])
+    plan, height = _merge_plan(run, scene, samples), run.reflector.camera.height_px
+    picture = _resampled(plan, progress) if resample == "photograph" else None
+    yield from in_batches(
+        partial(_band, plan, picture),
+        row_bands(height),
+        lambda rows: progress(f"row {rows.start} of {height}"),
+    )
 
 
-def _ready(run: PrototypeRun, scene: Scene) -> MergePlan:
+def _merge_plan(run: PrototypeRun, scene: Scene, samples: int) -> MergePlan:
     return MergePlan(
         run,
-        exact_tracer(run.at),
-        np.vstack([_object_box(run, scene), run.at.boxes()]),
-        np.concatenate([np.eye(3)[None], run.turn]),
+        scene,
+        samples,
+        exact_tracer(run.reflector),
+        np.vstack([_object_box(run, scene), run.reflector.boxes()]),
+        np.concatenate([np.eye(3)[None], run.window_rotation]),
         np.append(0, run.stop),
-        np.append(NOWHERE, run.ball + 1),
+        np.append(NO_BALL, run.ball + 1),
     )
 
 
 def _object_box(run: PrototypeRun, scene: Scene) -> Ints:
     """Columns and rows that hold the object as the camera sees it directly, (4,)."""
-    view = run.at.camera
+    camera = run.reflector.camera
     corners = scene.radius * np.array(list(product((-1.0, 1.0), repeat=3)))
-    size = np.array([view.width_px, view.height_px])
-    if ((corners - view.pinhole) @ view.forward <= 0).any():
+    size = np.array([camera.width_px, camera.height_px])
+    if ((corners - camera.pinhole) @ camera.forward <= 0).any():
         return np.array([0, size[0], 0, size[1]])
-    place = project_points(view, corners)
-    low, high = np.floor(place.min(axis=0)), np.ceil(place.max(axis=0)) + 1
+    pixels = camera.project(corners)
+    low, high = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0)) + 1
     ends = np.clip([low - MARGIN_PX, high + MARGIN_PX], 0, size)
     return np.asarray(ends.T.ravel(), dtype=np.int64)
 
 
-def _resampled(ready: MergePlan, scene: Scene, samples: int, progress: Progress) -> Bytes:
+def _resampled(plan: MergePlan, progress: Progress) -> Bytes:
     """The merged picture (h, w, 3), stop after stop."""
+    bands = row_bands(plan.run.reflector.camera.height_px)
     mirror = np.concatenate(
-        in_threads(partial(_mirrors, ready), row_bands(ready.run.at.camera.height_px))
+        in_threads(lambda rows: plan.trace_shell(rows, CENTRE).mirror.astype(np.uint16), bands)
     )
     picture = np.zeros((*mirror.shape, 3), dtype=np.uint8)
-    work = partial(_fill, ready, scene, samples, mirror, picture)
-    for first in range(0, len(ready.run), 4 * THREADS):
-        progress(f"stop {first + 1} of {len(ready.run)}")
-        in_threads(work, range(first, min(first + 4 * THREADS, len(ready.run))))
+    stops = range(len(plan.run))
+    for _ in in_batches(
+        partial(_fill, plan, mirror, picture),
+        stops,
+        lambda stop: progress(f"stop {stop + 1} of {len(stops)}"),
+    ):
+        pass
     return picture
 
 
-def _mirrors(ready: MergePlan, rows: range) -> Numbers:
-    return ready.shell(rows, CENTRE).mirror.astype(np.uint16)
+def _fill(plan: MergePlan, mirror: NDArray[np.uint16], picture: Bytes, stop: int) -> None:
+    """Paint the pixels of a stop's mirrors; other stops paint other pixels."""
+    run, mirrors = plan.run, np.flatnonzero(plan.stop == stop)
+    parts = [_pixels_of(mirror, plan.boxes[number], number) for number in mirrors.tolist()]
+    pixels = np.concatenate(parts)
+    rotation = plan.rotation[np.repeat(mirrors, [len(part) for part in parts])]
+    straight = pixel_rays(run.reflector.camera, pixels.astype(np.float64))
+    places = image_points(run.camera, np.einsum("nx,nxy->ny", straight, rotation))
+    inside = np.isfinite(places[:, 0])
+    column, row = pixels[inside].T
+    picture[row, column] = resampled_photograph(run, plan.scene, stop, plan.samples, places[inside])
 
 
-def _fill(
-    ready: MergePlan, scene: Scene, samples: int, mirror: Numbers, picture: Bytes, stop: int
-) -> None:
-    """Paint the pixels of a stop's mirrors; those of other stops are others."""
-    at, view = ready.run.at.camera, ready.run.view
-    served = np.flatnonzero(ready.stop == stop)
-    parts = [_inside(mirror, ready.boxes[number], number) for number in served.tolist()]
-    pixel = np.concatenate(parts)
-    turn = ready.turn[np.repeat(served, [len(part) for part in parts])]
-    way = np.einsum("nx,nxy->ny", pixel_rays(at, pixel.astype(np.float64)), turn)
-    place = image_points(view, way)
-    good = np.isfinite(place[:, 0])
-    column, row = pixel[good].T
-    picture[row, column] = resampled_photograph(ready.run, scene, stop, samples, place[good])
-
-
-def _inside(mirror: Numbers, box: Ints, number: int) -> Ints:
+def _pixels_of(mirror: NDArray[np.uint16], box: Ints, number: int) -> Ints:
     """Columns and rows (n, 2) in a box that belong to a mirror."""
     x0, x1, y0, y1 = box.tolist()
     row, column = np.nonzero(mirror[y0:y1, x0:x1] == number)
     return np.column_stack([column + x0, row + y0])
 
 
-def _band(ready: MergePlan, scene: Scene, samples: int, picture: Bytes | None, rows: range) -> Band:
-    part = _part(ready, scene, rows, CENTRE)
-    shape = (len(rows), ready.run.at.camera.width_px)
+def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> Band:
+    pixels = _merged_pixels(plan, rows, CENTRE)
+    hits, shape = pixels.hits, (len(rows), plan.run.reflector.camera.width_px)
     if picture is None:
-        colour = _traced(ready, scene, samples, rows)
+        colour = _traced(plan, rows)
     else:
-        shown = (part.seen.ball > 0) | part.front
+        shown = (hits.ball > 0) | pixels.front
         colour = picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None]
     rays = ReflectedRays(
-        part.mirror.astype(np.int32).reshape(shape),
-        part.seen.origin.reshape(*shape, 3),
-        part.seen.direction.reshape(*shape, 3),
+        pixels.mirror.astype(np.int32).reshape(shape),
+        hits.origin.reshape(*shape, 3),
+        hits.direction.reshape(*shape, 3),
     )
-    gone = (part.seen.ball == 0) | part.front
-    return Band(rows, rays.without(gone.reshape(shape)), colour.reshape(*shape, 3))
+    removed = (hits.ball == 0) | pixels.front
+    return Band(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
 
 
-def _traced(ready: MergePlan, scene: Scene, samples: int, rows: range) -> Bytes:
-    """Colours (n, 3) along the turned directions themselves."""
-    total = np.zeros((len(rows) * ready.run.at.camera.width_px, 3), dtype=np.float32)
-    for shift in subpixel_shifts(samples):
-        part = _part(ready, scene, rows, shift)
-        total += np.where(part.front[:, None], part.direct, reflected_colours(scene, part.seen))
-    return np.asarray(np.rint(total / np.float32(samples**2)), dtype=np.uint8)
+def _traced(plan: MergePlan, rows: range) -> Bytes:
+    """Colours (n, 3) along the rotated directions themselves."""
+    total = np.zeros((len(rows) * plan.run.reflector.camera.width_px, 3), dtype=np.float32)
+    for shift in subpixel_shifts(plan.samples):
+        pixels = _merged_pixels(plan, rows, shift)
+        reflected = reflected_colours(plan.scene, pixels.hits)
+        total += np.where(pixels.front[:, None], pixels.direct, reflected)
+    return to_bytes(total / np.float32(plan.samples**2))
 
 
-def _part(ready: MergePlan, scene: Scene, rows: range, shift: Shift) -> MergedPixels:
-    """The pixels of a band, each turned with its mirror's window."""
-    run = ready.run
-    mirror = ready.shell(rows, shift).mirror.ravel().astype(np.int64)
-    straight = unit(pixel_directions(run.at.camera, rows, shift).reshape(-1, 3))
-    way = np.einsum("nx,nxy->ny", straight, ready.turn[mirror])
-    seen = trace_balls(run, way, ready.stop[mirror])
-    taken = np.isfinite(image_points(run.view, way)[:, 0])
-    own = taken & (seen.ball == ready.ball[mirror])
-    front, direct = object_in_front(scene, run.view, way, seen.reach)
-    seen = replace(seen, ball=np.where(own, seen.ball, 0))
-    return MergedPixels(mirror, seen, front & taken, direct)
+def _merged_pixels(plan: MergePlan, rows: range, shift: Shift) -> MergedPixels:
+    """The pixels of a band, each rotated with its mirror's window."""
+    run, camera = plan.run, plan.run.camera
+    mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)
+    straight = unit(pixel_directions(run.reflector.camera, rows, shift).reshape(-1, 3))
+    direction = np.einsum("nx,nxy->ny", straight, plan.rotation[mirror])
+    hits = trace_balls(run, direction, plan.stop[mirror])
+    inside = np.isfinite(image_points(camera, direction)[:, 0])
+    ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
+    front, direct = object_in_front(plan.scene, camera, direction, hits.distance)
+    return MergedPixels(mirror, replace(hits, ball=ball), front & inside, direct)

@@ -8,7 +8,7 @@ machine stands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,24 +28,24 @@ class PrototypeRun:
     All in the frame of the object.
 
     Attributes:
-        at: the shell's camera and mirrors, whose picture is wanted.
-        view: the camera that takes the photographs.
+        reflector: the shell's camera and mirrors, whose picture is composed.
+        camera: that takes the photographs.
         balls: at each stop: centre and radius of the reflecting sphere, centre and radius of the
             sphere in the seat, mm, (s, k, 8).
-        stop: at which each mirror is served, (m,).
-        ball: that stands in for it, (m,).
-        stands: the balls' surfaces where they stand in, (m,).
-        turn: matrices that turn directions (3,) @ turn of the shell's picture into the
-            photograph's, (m, 3, 3).
+        stop: whose photograph shows the ball in place of each mirror, (m,).
+        ball: in place of each mirror, (m,).
+        ball_surfaces: the reflecting surface of that ball at that stop, (m,).
+        window_rotation: matrices that rotate directions (3,) @ matrix of the shell's picture into
+            the photograph's, (m, 3, 3).
     """
 
-    at: Reflector
-    view: Camera
+    reflector: Reflector
+    camera: Camera
     balls: Floats
     stop: Ints
     ball: Ints
-    stands: Surfaces
-    turn: Floats
+    ball_surfaces: Surfaces
+    window_rotation: Floats
 
     def __len__(self) -> int:
         """Number of stops."""
@@ -65,65 +65,54 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
 
     `u` are the directions of the balls: where the virtual cameras really were.
     """
-    at = run.at
-    return SubstitutedReflector(
-        at.camera_id, at.camera, unit(run.stands.apex), at.cells, run.stands
-    )
+    shell, balls = run.reflector, run.ball_surfaces
+    return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _run(at: Reflector, view: Camera, plan: Plan, half: int, turn: Floats) -> PrototypeRun:
+def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, turn: Floats) -> PrototypeRun:
     ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * turn
-    place = (ball, plan.angle[stop])
-    apex, normal = (_at(points * turn, frame, *place) for points in (plan.apex, plan.normal))
-    seen_from = _carried(view, turn)
-    windows = _turns(at.mirrors.apex, apex, frame, seen_from.pinhole)
-    still = np.broadcast_to(np.eye(3), windows.shape)
+    angle = plan.angle[stop]
+    apex, normal = (
+        rotated(vectors[ball] * turn, frame[0], angle) for vectors in (plan.apex, plan.normal)
+    )
+    turned = replace(
+        camera,
+        pinhole=camera.pinhole * turn,
+        forward=camera.forward * turn,
+        right=camera.right * turn,
+    )
+    rotations = _window_rotations(reflector.mirrors.apex, apex, frame, turned.pinhole)
+    if not plan.moved:
+        rotations = np.broadcast_to(np.eye(3), rotations.shape)
     return PrototypeRun(
-        at=at,
-        view=seen_from,
-        balls=_everywhere(plan, frame, turn),
+        reflector=reflector,
+        camera=turned,
+        balls=_balls_at_stops(plan, frame[0], turn),
         stop=stop,
         ball=ball,
-        stands=Surfaces(apex, normal, 1 / plan.radius[ball]),
-        turn=windows if plan.moved else still,
+        ball_surfaces=Surfaces(apex, normal, 1 / plan.radius[ball]),
+        window_rotation=rotations,
     )
 
 
-def _carried(view: Camera, turn: Floats) -> Camera:
-    return Camera(
-        view.pinhole * turn,
-        view.forward * turn,
-        view.right * turn,
-        view.width_px,
-        view.height_px,
-        view.hfov,
-    )
-
-
-def _at(points: Floats, frame: Floats, ball: Ints, angle: Floats) -> Floats:
-    """Points (k, 3) of balls (...) with the base at angles (...), (..., 3)."""
-    return rotated(points[ball], frame[0], angle)
-
-
-def _everywhere(plan: Plan, frame: Floats, turn: Floats) -> Floats:
+def _balls_at_stops(plan: Plan, axis: Floats, turn: Floats) -> Floats:
     """All balls at all stops, (s, k, 8)."""
-    ball, angle = np.arange(len(plan))[None, :], plan.angle[:, None]
-    shape = (len(plan.angle), len(plan), 1)
-    centre, body = (
-        _at(points * turn, frame, np.broadcast_to(ball, shape[:2]), angle)
+    shape = (len(plan.angle), len(plan))
+    centre, body_centre = (
+        rotated(np.broadcast_to(points * turn, (*shape, 3)), axis, plan.angle[:, None])
         for points in (plan.centre, plan.body_centre)
     )
     radius, body_radius = (
-        np.broadcast_to(values[:, None], shape) for values in (plan.radius, plan.body_radius)
+        np.broadcast_to(values, shape)[..., None] for values in (plan.radius, plan.body_radius)
     )
-    return np.concatenate([centre, radius, body, body_radius], axis=2)
+    return np.concatenate([centre, radius, body_centre, body_radius], axis=2)
 
 
-def _turns(mirror: Floats, ball: Floats, frame: Floats, pinhole: Floats) -> Floats:
-    """How each mirror's window goes along with its ball, (m, 3, 3).
+def _window_rotations(mirror: Floats, ball: Floats, frame: Floats, pinhole: Floats) -> Floats:
+    """Rotation of each mirror's window along with its ball, (m, 3, 3).
 
     About the axis by the known difference of both azimuths, then in the plane of the axis by the
-    known angle between both apices as the pinhole sees them (tbcad.design.balls).
+    known angle between both apices as the pinhole sees them (tbcad.optics.windows).
 
     Args:
         mirror: apices of the mirrors, mm, (m, 3).
@@ -132,14 +121,15 @@ def _turns(mirror: Floats, ball: Floats, frame: Floats, pinhole: Floats) -> Floa
         pinhole: mm, (3,).
     """
     (phi, low), (psi, high) = (_angles(apex, frame, pinhole) for apex in (mirror, ball))
-    side = np.cos(psi)[:, None] * frame[2] - np.sin(psi)[:, None] * frame[1]
-    about = rotated(np.broadcast_to(np.eye(3), (len(mirror), 3, 3)), frame[0], (psi - phi)[:, None])
-    return rotated(about, side[:, None], (low - high)[:, None])
+    normal = np.cos(psi)[:, None] * frame[2] - np.sin(psi)[:, None] * frame[1]
+    still = np.broadcast_to(np.eye(3), (len(mirror), 3, 3))
+    about_axis = rotated(still, frame[0], (psi - phi)[:, None])
+    return rotated(about_axis, normal[:, None], (low - high)[:, None])
 
 
 def _angles(apex: Floats, frame: Floats, pinhole: Floats) -> tuple[Floats, Floats]:
     """Azimuth of apices (m, 3), and the angle at the pinhole between them and the origin."""
-    way = apex - pinhole
-    along = way @ frame[0]
-    out = norm(way - along[:, None] * frame[0])
-    return np.arctan2(apex @ frame[2], apex @ frame[1]), np.arctan2(out, -along)
+    ray = apex - pinhole
+    along = ray @ frame[0]
+    across = norm(ray - along[:, None] * frame[0])
+    return np.arctan2(apex @ frame[2], apex @ frame[1]), np.arctan2(across, -along)

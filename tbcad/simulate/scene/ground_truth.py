@@ -49,11 +49,6 @@ def lens_picture(
     return total / np.float32(samples)
 
 
-def to_bytes(picture: Colours) -> NDArray[np.uint8]:
-    """A picture in whole numbers."""
-    return np.rint(picture).astype(np.uint8)
-
-
 def _disc(count: int) -> Floats:
     """Points (n, 2) spread evenly over the unit disc, on Vogel's spiral."""
     k = np.arange(count)

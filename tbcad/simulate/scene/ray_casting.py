@@ -1,4 +1,4 @@
-"""What a ray sees of the object: Embree finds the facet, colour and light are ours."""
+"""Ray casting: Embree finds the facet that a ray meets first; colour and light are ours."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.embree import embree_scene
 from tbcad.simulate.scene.object import SceneObject, pattern
+from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bytes, Floats, Ints
 
 # Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
@@ -22,7 +22,7 @@ BACKGROUND = 0
 
 @dataclass(frozen=True)
 class Scene:
-    """An object ready to be looked at from several threads.
+    """An object ready for ray casting from several threads.
 
     Attributes:
         subject: the object.
@@ -62,22 +62,23 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     """What rays from origins (n, 3) along unit directions (n, 3) see."""
     colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
     depth = np.full(len(origin), np.inf)
-    near = _near(origin, direction, scene.radius)
+    near = np.flatnonzero(meets_sphere(origin, direction, scene.radius))
     if len(near) == 0:
         return RayHits(colour, depth)
-    found = scene.embree.run(
+    hits = scene.embree.run(
         origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
     )
-    hit = found["primID"] >= 0
-    rows, facet = near[hit], found["primID"][hit].astype(np.int64)
-    weight = _weights(found["u"][hit], found["v"][hit])
-    depth[rows] = found["tfar"][hit]
+    hit = hits["primID"] >= 0
+    rows, facet = near[hit], hits["primID"][hit].astype(np.int64)
+    u, v = hits["u"][hit], hits["v"][hit]
+    weight = np.column_stack([1 - u - v, u, v]).astype(np.float64)
+    depth[rows] = hits["tfar"][hit]
     colour[rows] = 255 * shaded_colours(scene, facet, weight)
     return RayHits(colour, depth)
 
 
 def depth_along_rays(scene: Scene) -> Callable[[Floats, Floats], Floats]:
-    """What gives the distance along rays to the object, mm, infinite where there is none."""
+    """A function that gives the distance (n,) along rays to the object, mm; infinite beside it."""
 
     def depth(origin: Floats, direction: Floats) -> Floats:
         return cast_rays(scene, origin, direction).depth
@@ -112,26 +113,3 @@ def _texels(picture: Bytes, uv: Floats) -> Floats:
     lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
     result: Floats = (upper * (1 - down) + lower * down) / 255
     return result
-
-
-def _weights(u: NDArray[np.float32], v: NDArray[np.float32]) -> Floats:
-    return np.column_stack([1 - u - v, u, v]).astype(np.float64)
-
-
-@compiled
-def _near(origin: Floats, direction: Floats, radius: float) -> Ints:
-    """Indices of the rays whose line meets the sphere about the origin and goes toward it."""
-    kept = np.empty(len(origin), dtype=np.int64)
-    count = 0
-    for i in range(len(origin)):
-        ox, oy, oz = origin[i, 0], origin[i, 1], origin[i, 2]
-        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
-        along = ox * dx + oy * dy + oz * dz
-        away = ox * ox + oy * oy + oz * oz
-        outside = away > radius * radius
-        if dx * dx + dy * dy + dz * dz == 0 or (along >= 0 and outside):
-            continue
-        if away - along * along <= radius * radius:
-            kept[count] = i
-            count += 1
-    return kept[:count]

@@ -1,4 +1,4 @@
-"""Where each pixel's ray meets its mirror, and where it goes from there: exact spheres."""
+"""Rays of pixels off the exact mirrors: where each meets its mirror, and its direction after."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.parallel import compiled
-from tbcad.simulate.scene.reflector import Reflector, pixel_pitch
-from tbcad.types import Floats, Ints
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.types import Bools, Floats, Ints
 
 MirrorNumbers = NDArray[np.int32]
 Shift = tuple[float, float]
@@ -36,20 +36,18 @@ class ReflectedRays:
     origin: Floats
     direction: Floats
 
-    def meeting(self, radius: float) -> NDArray[np.bool_]:
+    def meeting(self, radius: float) -> Bools:
         """Which rays meet the sphere of a radius (mm) about the origin, (h, w)."""
-        along = np.einsum("hwx,hwx->hw", self.origin, self.direction)
-        away = np.einsum("hwx,hwx->hw", self.origin, self.origin) - along**2
-        meets: NDArray[np.bool_] = (self.mirror > 0) & (along < 0) & (away <= radius**2)
-        return meets
+        meets = meets_sphere(self.origin.reshape(-1, 3), self.direction.reshape(-1, 3), radius)
+        return (self.mirror > 0) & meets.reshape(self.mirror.shape)
 
-    def without(self, gone: NDArray[np.bool_]) -> "ReflectedRays":
-        """These rays but for some pixels (h, w)."""
-        if not gone.any():
+    def without(self, removed: Bools) -> "ReflectedRays":
+        """These rays without those of some pixels (h, w)."""
+        if not removed.any():
             return self
-        none = gone[..., None]
+        none = removed[..., None]
         return ReflectedRays(
-            np.where(gone, np.int32(0), self.mirror),
+            np.where(removed, np.int32(0), self.mirror),
             np.where(none, 0.0, self.origin),
             np.where(none, 0.0, self.direction),
         )
@@ -89,11 +87,11 @@ def unit_directions(
 
 def _lattice(view: Camera, rows: range, shift: Shift) -> tuple[Floats, Floats]:
     """Directions to columns (w, 3), and what rows add to them (h, 3)."""
-    width = pixel_pitch(view)
-    across = (np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]) * width
-    downward = (np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]) * width
-    down = np.cross(view.forward, view.right)
-    return view.forward + across[:, None] * view.right, downward[:, None] * down
+    right, down, forward = view.axes
+    x = np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]
+    y = np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]
+    pitch = view.pixel_pitch
+    return forward + (x * pitch)[:, None] * right, (y * pitch)[:, None] * down
 
 
 @compiled
@@ -109,69 +107,95 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
     return result
 
 
-def exact_tracer(at: Reflector) -> Callable[[range, Shift], ReflectedRays]:
-    """What gives the rays of rows of a camera's picture off its exact mirrors.
+def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays]:
+    """A function that traces rows of a camera's pixels off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
     """
-    boxes, beside, table = at.boxes(), at.beside_edge(), _table(at.mirrors)
+    boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
+    camera, edges = reflector.camera, (reflector.side, reflector.foot)
+    table = _table(reflector.mirrors, camera.pinhole)
 
     def trace(rows: range, shift: Shift) -> ReflectedRays:
-        way = pixel_directions(at.camera, rows, shift)
+        direction = pixel_directions(camera, rows, shift)
         near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
         in_band = boxes - np.array([0, 0, rows.start, rows.start])
-        mirror = _first(at.camera.pinhole, way, table, near, in_band, at.side, at.foot)
-        rays = reflect_pixels(at.camera.pinhole, way, at.mirrors, mirror)
-        return rays.without(_covered(table, beside, mirror, rays.origin))
+        mirror = _first_mirror(camera.pinhole, direction, table, near, in_band, *edges)
+        rays = reflect_pixels(camera.pinhole, direction, reflector.mirrors, mirror)
+        return rays.without(_inside_neighbours(table, neighbours, mirror, rays.origin))
 
     return trace
 
 
 def reflect_pixels(
-    pinhole: Floats, way: Floats, mirrors: Surfaces, mirror: MirrorNumbers
+    pinhole: Floats, direction: Floats, mirrors: Surfaces, mirror: MirrorNumbers
 ) -> ReflectedRays:
     """Rays along (h, w, 3) from the pinhole after mirrors of given numbers (h, w)."""
-    origin, direction = np.zeros_like(way), np.zeros_like(way)
-    _reflect(pinhole, way, _table(mirrors), mirror, origin, direction)
-    return ReflectedRays(mirror, origin, direction)
+    origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
+    _reflect(pinhole, direction, _table(mirrors, pinhole), mirror, origin, reflected)
+    return ReflectedRays(mirror, origin, reflected)
 
 
-def _table(mirrors: Surfaces) -> Floats:
-    return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature])
+def _table(mirrors: Surfaces, pinhole: Floats) -> Floats:
+    """For each mirror apex, normal, curvature, and value and gradient at the pinhole, (m, 11)."""
+    every = np.arange(len(mirrors))
+    at_pinhole = np.broadcast_to(pinhole, mirrors.apex.shape)
+    value, gradient = mirrors.value(every, at_pinhole), mirrors.gradient(every, at_pinhole)
+    return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature, value, gradient])
 
 
 @compiled
-def _first(
+def meets_sphere(origin: Floats, direction: Floats, radius: float) -> Bools:
+    """Which rays (n, 3) along unit directions meet the sphere of a radius about (0, 0, 0), (n,)."""
+    meets = np.zeros(len(origin), dtype=np.bool_)
+    for i in range(len(origin)):
+        along = squared = length = 0.0
+        for j in range(3):
+            along += origin[i, j] * direction[i, j]
+            squared += origin[i, j] * origin[i, j]
+            length += direction[i, j] * direction[i, j]
+        inside = squared <= radius * radius
+        ahead = along < 0 or inside
+        meets[i] = length > 0 and ahead and squared - along * along <= radius * radius
+    return meets
+
+
+@compiled
+def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
+    """Where a ray from the pinhole enters a mirror (11,), in lengths of its direction.
+
+    On the ray x = pinhole + t d the surface's f (tbcad.optics.surfaces) is k/2 d.d t^2 + g.d t + h;
+    the ray enters at the smaller root, in the form that loses no digits and holds for planes.
+    Infinite where it does not enter.
+    """
+    slope = mirror[8] * dx + mirror[9] * dy + mirror[10] * dz
+    root = slope * slope - 2 * mirror[6] * mirror[7] * (dx * dx + dy * dy + dz * dz)
+    if slope >= 0 or root < 0:
+        return np.inf
+    t: float = 2 * mirror[7] / (np.sqrt(root) - slope)
+    return t
+
+
+@compiled
+def _first_mirror(
     pinhole: Floats,
-    way: Floats,
+    direction: Floats,
     table: Floats,
     near: Ints,
     boxes: Ints,
     side: float,
     foot: float,
 ) -> MirrorNumbers:
-    """The surface that each ray of the band enters first, from 1, out of those near it.
-
-    On the ray x = pinhole + t d the surface's f (tbcad.optics.surfaces) is A t^2 + B t + C; the
-    ray enters at the lesser root, in the form that loses no digits and holds for planes.
-    """
-    height, width = way.shape[0], way.shape[1]
+    """The mirror that each ray of the band enters first, from 1, out of those near it."""
+    height, width = direction.shape[0], direction.shape[1]
     mirror = np.zeros((height, width), dtype=np.int32)
     reach = np.full((height, width), np.inf)
     for i in near:
-        px, py, pz = pinhole[0] - table[i, 0], pinhole[1] - table[i, 1], pinhole[2] - table[i, 2]
-        nx, ny, nz, k = table[i, 3], table[i, 4], table[i, 5], table[i, 6]
-        c = nx * px + ny * py + nz * pz + k / 2 * (px * px + py * py + pz * pz)
-        gx, gy, gz = nx + k * px, ny + k * py, nz + k * pz
         for y in range(max(boxes[i, 2], 0), min(boxes[i, 3], height)):
             for x in range(boxes[i, 0], boxes[i, 1]):
-                dx, dy, dz = way[y, x, 0], way[y, x, 1], way[y, x, 2]
-                b = gx * dx + gy * dy + gz * dz
-                root = b * b - 2 * k * c * (dx * dx + dy * dy + dz * dz)
-                if b >= 0 or root < 0:
-                    continue
-                t = 2 * c / (np.sqrt(root) - b)
+                dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
+                t = _entry(table[i], dx, dy, dz)
                 if (
                     0 < t < reach[y, x]
                     and side * (pinhole[0] + t * dx) >= 0
@@ -182,22 +206,22 @@ def _first(
 
 
 @compiled
-def _covered(
-    table: Floats, beside: Ints, mirror: MirrorNumbers, point: Floats
-) -> NDArray[np.bool_]:
-    """Which points (h, w, 3) on numbered mirrors lie inside the sphere of one beside the edge."""
+def _inside_neighbours(
+    table: Floats, neighbours: Ints, mirror: MirrorNumbers, point: Floats
+) -> Bools:
+    """Which points (h, w, 3) on mirrors lie inside the sphere of a neighbour cut by the edge."""
     inside = np.zeros(mirror.shape, dtype=np.bool_)
     for y in range(mirror.shape[0]):
         for x in range(mirror.shape[1]):
             if mirror[y, x] == 0:
                 continue
-            for j in beside[mirror[y, x] - 1]:
+            for j in neighbours[mirror[y, x] - 1]:
                 if j < 0:
                     break
                 value = 0.0
                 for axis in range(3):
-                    away = point[y, x, axis] - table[j, axis]
-                    value += (table[j, 3 + axis] + table[j, 6] / 2 * away) * away
+                    offset = point[y, x, axis] - table[j, axis]
+                    value += (table[j, 3 + axis] + table[j, 6] / 2 * offset) * offset
                 if value < -ROUNDING_MM:
                     inside[y, x] = True
     return inside
@@ -206,31 +230,29 @@ def _covered(
 @compiled
 def _reflect(
     pinhole: Floats,
-    way: Floats,
+    direction: Floats,
     table: Floats,
     mirror: MirrorNumbers,
     origin: Floats,
-    direction: Floats,
+    reflected: Floats,
 ) -> None:
-    """Fill in points on the numbered mirrors and unit directions after them."""
-    for y in range(way.shape[0]):
-        for x in range(way.shape[1]):
-            i = mirror[y, x] - 1
-            if i < 0:
+    """Fill in points on the numbered mirrors and unit directions after them.
+
+    The law of tbcad.optics.reflection, compiled: it is the inner loop of every photograph.
+    """
+    normal = np.empty(3)
+    for y in range(direction.shape[0]):
+        for x in range(direction.shape[1]):
+            if mirror[y, x] == 0:
                 continue
-            k, length = table[i, 6], 0.0
+            row = table[mirror[y, x] - 1]
+            dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            t, slope = _entry(row, dx / length, dy / length, dz / length), 0.0
             for j in range(3):
-                length += way[y, x, j] ** 2
-            length, b, c = np.sqrt(length), 0.0, 0.0
-            for j in range(3):
-                away, n = pinhole[j] - table[i, j], table[i, 3 + j]
-                c += (n + k / 2 * away) * away
-                b += (n + k * away) * way[y, x, j] / length
-            t, slope = 2 * c / (np.sqrt(b * b - 2 * k * c) - b), 0.0
-            for j in range(3):
-                d = way[y, x, j] / length
+                d = direction[y, x, j] / length
                 origin[y, x, j] = pinhole[j] + t * d
-                slope += d * (table[i, 3 + j] + k * (origin[y, x, j] - table[i, j]))
+                normal[j] = row[3 + j] + row[6] * (origin[y, x, j] - row[j])
+                slope += d * normal[j]
             for j in range(3):
-                n = table[i, 3 + j] + k * (origin[y, x, j] - table[i, j])
-                direction[y, x, j] = way[y, x, j] / length - 2 * slope * n
+                reflected[y, x, j] = direction[y, x, j] / length - 2 * slope * normal[j]

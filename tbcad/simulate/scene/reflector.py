@@ -54,20 +54,19 @@ class Reflector:
         """Columns and rows that hold each cell's picture: x0, x1, y0, y1, ends excluded, (m, 4)."""
         arcs, m = self.cells.arcs, len(self)
         which = np.broadcast_to(np.arange(len(arcs))[:, None], (len(arcs), len(ARC_SAMPLES)))
-        places = project_points(
-            self.camera, arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape))
-        )
+        samples = arcs.at(which, np.broadcast_to(ARC_SAMPLES, which.shape))
+        pixels = self.camera.project(samples)
         low, high = np.full((m, 2), np.inf), np.full((m, 2), -np.inf)
         for faces in (arcs.left, arcs.right):
             mine = faces < m
-            np.minimum.at(low, faces[mine], places[mine].min(axis=1))
-            np.maximum.at(high, faces[mine], places[mine].max(axis=1))
+            np.minimum.at(low, faces[mine], pixels[mine].min(axis=1))
+            np.maximum.at(high, faces[mine], pixels[mine].max(axis=1))
         size = np.array([self.camera.width_px, self.camera.height_px])
         first = np.clip(np.floor(low) - MARGIN_PX, 0, size)
         last = np.clip(np.ceil(high) + 1 + MARGIN_PX, 0, size)
         return np.stack([first, last], axis=2).reshape(m, 4).astype(np.int64)
 
-    def beside_edge(self) -> Ints:
+    def neighbours_at_edge(self) -> Ints:
         """For each mirror the neighbours that the seam or the foot cuts, -1 where no more, (m, k).
 
         A ray may enter the sphere of such a neighbour beyond the edge, where there is no mirror;
@@ -88,10 +87,10 @@ class Reflector:
 
 @dataclass(frozen=True)
 class SubstitutedReflector(Reflector):
-    """A camera with other surfaces in the place of its mirrors.
+    """A camera with other surfaces in place of its mirrors.
 
     Attributes:
-        surfaces: of what stands there, (m,).
+        surfaces: in place of the mirrors, (m,).
     """
 
     surfaces: Surfaces
@@ -106,18 +105,3 @@ def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
     """Both cameras of a design with their mirrors."""
     a, b = (Reflector(half.camera_id, half.camera, half.u, half.cells) for half in design.halves)
     return a, b
-
-
-def project_points(view: Camera, points: Floats) -> Floats:
-    """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
-    ray = points - view.pinhole
-    across = np.stack([view.right, np.cross(view.forward, view.right)])
-    plane = (ray @ across.T) / (ray @ view.forward)[..., None]
-    size = np.array([view.width_px, view.height_px])
-    result: Floats = plane / pixel_pitch(view) + (size - 1) / 2
-    return result
-
-
-def pixel_pitch(view: Camera) -> float:
-    """Width of a pixel at unit distance."""
-    return float(2 * view.half_sizes[0] / view.width_px)

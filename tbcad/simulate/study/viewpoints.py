@@ -6,8 +6,9 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
+from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture, to_bytes
+from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles

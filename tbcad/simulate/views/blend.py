@@ -1,25 +1,24 @@
-"""A wanted ray from several virtual cameras: each shows the point where the ray meets a surface.
+"""A target ray from several virtual cameras: each shows the point where the ray meets a surface.
 
-Of the virtual cameras those are taken that look at the point most nearly along the wanted ray;
+Of the virtual cameras those are taken that look at the point most nearly along the target ray;
 their weights fall to nothing at the first that is left out, so that pictures are continuous (C.
-Buehler and others, Unstructured Lumigraph Rendering, 2001, section 3). Each lends the pixels
-about the point, by a bell curve much narrower than its pixels: the pixels of several cameras lie
-between each other, and together they are finer than one of them.
+Buehler and others, Unstructured Lumigraph Rendering, 2001, section 3). Each adds the pixels
+about the point, weighted by a bell curve much narrower than they are: the pixels of several
+cameras lie between each other, and together they are finer than one of them.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tbcad.simulate.parallel import compiled, in_threads
+from tbcad.simulate.parallel import chunks, compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
+    RAYS_PER_CHUNK,
     SAMPLED_RAY_STEP,
     RayBundle,
     candidate_mirrors,
     greedy_descent,
-    ray_chunks,
     squared_distance,
 )
-from tbcad.types import Bytes, Floats, Ints
+from tbcad.types import Bools, Bytes, Floats, Ints
 
 # docs/decisions/0006: of 3 to 10 cameras and 0.2 to 0.4 pixels the best in PSNR and SSIM for the
 # time they take.
@@ -27,26 +26,24 @@ CAMERAS = 6
 SIGMA_PX = 0.2
 
 
-def blend_cameras(
-    sheaf: RayBundle, wanted: Floats, depth: Floats, limit: float
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Colours of wanted rays, and which were seen.
+def blend_cameras(bundle: RayBundle, targets: Floats, depth: Floats) -> tuple[Floats, Bools]:
+    """Colours of target rays, and which were seen.
 
     Args:
-        sheaf: captured rays.
-        wanted: points of the slab, (n, 4).
-        depth: where each wanted ray meets the surface, along the slab's direction, over s, (n,).
-        limit: farthest that a captured ray may pass that point, mm.
+        bundle: captured rays; none is used that passes the point by more than the limit.
+        targets: two-plane coordinates, (n, 4).
+        depth: where each target meets the surface, along the direction of the view, over s, (n,).
 
     Returns:
         Colours (n, 3), 0 to 255, and whether any virtual camera showed the point, (n,).
     """
 
-    def mixed(part: slice) -> Floats:
-        arrays = sheaf.points, sheaf.tiles, sheaf.meeting, sheaf.colour
-        return _blend(*arrays, wanted[part], depth[part], limit)
+    def blended(part: slice) -> Floats:
+        arrays = bundle.points, bundle.tiles, bundle.pinholes, bundle.colour
+        return _blend(*arrays, targets[part], depth[part], bundle.limit)
 
-    result = np.concatenate([np.zeros((0, 4)), *in_threads(mixed, ray_chunks(len(wanted)))])
+    parts = in_threads(blended, chunks(len(targets), RAYS_PER_CHUNK))
+    result = np.concatenate([np.zeros((0, 4)), *parts])
     return result[:, :3], result[:, 3] > 0
 
 
@@ -54,19 +51,19 @@ def blend_cameras(
 def _blend(
     points: Floats,
     tiles: Ints,
-    meeting: Floats,
+    pinholes: Floats,
     colour: Bytes,
-    wanted: Floats,
+    targets: Floats,
     depth: Floats,
     limit: float,
 ) -> Floats:
-    near = candidate_mirrors(meeting, wanted, limit, SAMPLED_RAY_STEP)
+    near = candidate_mirrors(pinholes, targets, limit, SAMPLED_RAY_STEP)
     last = tiles[:, 3].copy()
-    result = np.zeros((len(wanted), 4))
+    result = np.zeros((len(targets), 4))
     chosen, angle = np.empty(CAMERAS + 1, dtype=np.int64), np.empty(CAMERAS + 1)
-    for i in range(len(wanted)):
-        ray, z = wanted[i], depth[i]
-        _choose(meeting, near, last, ray, z, chosen, angle)
+    for i in range(len(targets)):
+        ray, z = targets[i], depth[i]
+        _choose(pinholes, near, last, ray, z, chosen, angle)
         for j in range(CAMERAS):
             k = chosen[j]
             weight = 1 - angle[j] / angle[CAMERAS]
@@ -74,7 +71,7 @@ def _blend(
                 continue
             last[k] = greedy_descent(points, tiles[k], last[k], ray, z, 0.0)
             if squared_distance(points, last[k], ray, z, 0.0) <= limit**2:
-                _lend(points, tiles[k], colour, last[k], ray, z, weight, result[i])
+                _add_pixels(points, tiles[k], colour, last[k], ray, z, weight, result[i])
         if result[i, 3] > 0:
             for c in range(3):
                 result[i, c] /= result[i, 3]
@@ -83,7 +80,7 @@ def _blend(
 
 @compiled
 def _choose(
-    meeting: Floats,
+    pinholes: Floats,
     near: Ints,
     last: Ints,
     ray: Floats,
@@ -95,23 +92,23 @@ def _choose(
     chosen[:], angle[:] = -1, np.inf
     x, y = ray[0] + depth * ray[2], ray[1] + depth * ray[3]
     for k in near:
-        far = depth - meeting[k, 2]
-        if last[k] < 0 or far <= 0:
+        ahead = depth - pinholes[k, 2]
+        if last[k] < 0 or ahead <= 0:
             continue
-        across = (x - meeting[k, 0]) / far - ray[2]
-        down = (y - meeting[k, 1]) / far - ray[3]
-        away = np.sqrt(across * across + down * down)
-        if away >= angle[-1]:
+        across = (x - pinholes[k, 0]) / ahead - ray[2]
+        down = (y - pinholes[k, 1]) / ahead - ray[3]
+        deviation = np.sqrt(across * across + down * down)
+        if deviation >= angle[-1]:
             continue
         j = len(angle) - 1
-        while j > 0 and angle[j - 1] > away:
+        while j > 0 and angle[j - 1] > deviation:
             angle[j], chosen[j] = angle[j - 1], chosen[j - 1]
             j -= 1
-        angle[j], chosen[j] = away, k
+        angle[j], chosen[j] = deviation, k
 
 
 @compiled
-def _lend(
+def _add_pixels(
     points: Floats,
     tile: Ints,
     colour: Bytes,
@@ -124,21 +121,21 @@ def _lend(
     """Add a pixel and its neighbours of one mirror to a total of colours and weights."""
     first, height, width = tile[0], tile[1], tile[2]
     row, column = divmod(pixel - first, width)
-    width_of_bell = 2 * SIGMA_PX**2 * _pitch(points, tile, pixel, depth)
+    bell_width2 = 2 * SIGMA_PX**2 * _squared_pitch(points, tile, pixel, depth)
     for y in range(max(row - 1, 0), min(row + 2, height)):
         for x in range(max(column - 1, 0), min(column + 2, width)):
             other = first + y * width + x
-            away = squared_distance(points, other, ray, depth, 0.0)
-            if np.isnan(away):
+            distance2 = squared_distance(points, other, ray, depth, 0.0)
+            if np.isnan(distance2):
                 continue
-            share = weight * np.exp(-away / width_of_bell)
+            share = weight * np.exp(-distance2 / bell_width2)
             for c in range(3):
                 total[c] += share * colour[other, c]
             total[3] += share
 
 
 @compiled
-def _pitch(points: Floats, tile: Ints, pixel: int, depth: float) -> float:
+def _squared_pitch(points: Floats, tile: Ints, pixel: int, depth: float) -> float:
     """Mean squared distance of the rays of a pixel's four neighbours from its own, at a depth."""
     first, height, width = tile[0], tile[1], tile[2]
     row, column = divmod(pixel - first, width)

@@ -1,34 +1,36 @@
-"""The captured rays of some mirrors, each mirror a tile of pixels, packed one after another."""
+"""The captured rays of each mirror: a rectangle of pixels, read when first needed."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tbcad.geometry.vectors import dot, norm
 from tbcad.simulate.capture.light_field import Frame, LightField
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Bytes, Floats, Ints
 
 NEIGHBOURS = 6
 
 
 @dataclass(frozen=True)
 class MirrorTile:
-    """What one mirror shows.
+    """The rectangle of h x w pixels that holds a mirror's, row by row; n = h w.
 
     Attributes:
-        valid: whether a pixel is of this mirror, (h, w).
-        colour: (h, w, 3), uint8.
-        origin: mm, (h, w, 3), float32.
-        direction: (h, w, 3), float32.
-        pinhole: point that its rays come nearest to, mm, (3,).
-        spread: farthest that one of its rays passes by it, mm.
-        middle: number of its pixel that is nearest to the middle, row by row.
+        shape: h and w.
+        valid: whether a pixel is of this mirror, (n,).
+        colour: (n, 3).
+        origin: of the rays, mm, (n, 3).
+        direction: of the rays, (n, 3).
+        pinhole: point that the rays come nearest to, the virtual camera's, mm, (3,).
+        spread: largest distance of a ray from that point, mm.
+        middle: number of the mirror's pixel nearest to the middle of the rectangle.
     """
 
-    valid: NDArray[np.bool_]
-    colour: NDArray[np.uint8]
+    shape: tuple[int, int]
+    valid: Bools
+    colour: Bytes
     origin: NDArray[np.float32]
     direction: NDArray[np.float32]
     pinhole: Floats
@@ -36,36 +38,9 @@ class MirrorTile:
     middle: int
 
 
-@dataclass(frozen=True)
-class PackedTiles:
-    """Tiles of k mirrors in one list of n pixels, row by row.
-
-    Attributes:
-        first: pixel that each tile begins with, (k,).
-        shape: height and width of each, (k, 2).
-        valid: (n,).
-        colour: (n, 3), uint8.
-        origin: mm, (n, 3).
-        direction: (n, 3).
-        pinhole: (k, 3), mm.
-        spread: (k,), mm.
-        middle: pixel in the middle of each, (k,).
-    """
-
-    first: Ints
-    shape: Ints
-    valid: NDArray[np.bool_]
-    colour: NDArray[np.uint8]
-    origin: NDArray[np.float32]
-    direction: NDArray[np.float32]
-    pinhole: Floats
-    spread: Floats
-    middle: Ints
-
-
 @dataclass
 class MirrorTiles:
-    """Tiles of a light field, each read once.
+    """The tiles of all mirrors of a light field, each read once.
 
     Attributes:
         source: the light field; its file must stay open.
@@ -79,7 +54,7 @@ class MirrorTiles:
     apex: Floats = field(init=False)
     width: Floats = field(init=False)
     _read: dict[int, MirrorTile | None] = field(init=False, default_factory=dict)
-    _places: list[tuple[Frame, int]] = field(init=False)
+    _mirrors: list[tuple[Frame, int]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Number the mirrors of all frames."""
@@ -87,30 +62,16 @@ class MirrorTiles:
         self.u = np.concatenate([frame.u for frame in frames])
         self.apex = np.concatenate([frame.mirrors.apex for frame in frames])
         self.width = np.concatenate([_widths(frame.mirrors.apex) for frame in frames])
-        self._places = [(frame, i) for frame in frames for i in range(len(frame.u))]
+        self._mirrors = [(frame, i) for frame in frames for i in range(len(frame.u))]
 
-    def packed(self, mirrors: Ints) -> PackedTiles | None:
-        """Tiles of some mirrors, without those that show nothing; None if none shows anything."""
-        tiles = [tile for tile in map(self._tile, mirrors.tolist()) if tile is not None]
-        if not tiles:
-            return None
-        shape = np.array([tile.valid.shape for tile in tiles])
-        first = np.concatenate([[0], np.cumsum(shape.prod(axis=1))[:-1]])
-        return PackedTiles(
-            first,
-            shape,
-            np.concatenate([tile.valid.ravel() for tile in tiles]),
-            np.concatenate([tile.colour.reshape(-1, 3) for tile in tiles]),
-            np.concatenate([tile.origin.reshape(-1, 3) for tile in tiles]),
-            np.concatenate([tile.direction.reshape(-1, 3) for tile in tiles]),
-            np.stack([tile.pinhole for tile in tiles]),
-            np.array([tile.spread for tile in tiles]),
-            first + np.array([tile.middle for tile in tiles]),
-        )
+    def of(self, mirrors: Ints) -> list[MirrorTile]:
+        """Tiles of some mirrors, without those that have no pixels."""
+        tiles = map(self._tile, mirrors.tolist())
+        return [tile for tile in tiles if tile is not None]
 
     def _tile(self, mirror: int) -> MirrorTile | None:
         if mirror not in self._read:
-            self._read[mirror] = _tile(*self._places[mirror])
+            self._read[mirror] = _tile(*self._mirrors[mirror])
         return self._read[mirror]
 
 
@@ -120,43 +81,44 @@ def _widths(apex: Floats) -> Floats:
     Cells of six neighbours have corners at 0.58 of the neighbours' distance; those at the edges
     have fewer, and farther neighbours count for them.
     """
-    away, _ = cKDTree(apex).query(apex, k=min(NEIGHBOURS + 1, len(apex)))
-    result: Floats = np.asarray(away).reshape(len(apex), -1)[:, -1]
+    distance, _ = cKDTree(apex).query(apex, k=min(NEIGHBOURS + 1, len(apex)))
+    result: Floats = np.asarray(distance).reshape(len(apex), -1)[:, -1]
     return result
 
 
 def _tile(frame: Frame, index: int) -> MirrorTile | None:
     x0, x1, y0, y1 = frame.boxes[index].tolist()
-    part = frame.read(slice(y0, y1), slice(x0, x1))
-    valid = part["mirror"] == index + 1
+    pixels = frame.read(slice(y0, y1), slice(x0, x1))
+    valid = pixels["mirror"] == index + 1
     if not valid.any():
         return None
     rows, columns = (np.flatnonzero(valid.any(axis=axis)) for axis in (1, 0))
     cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    valid = valid[cut]
-    origin, direction = part["origin"][cut], part["direction"][cut]
+    height, width = valid[cut].shape
+    valid = valid[cut].ravel()
+    colour, origin, direction = (
+        pixels[name][cut].reshape(-1, 3) for name in ("colour", "origin", "direction")
+    )
     pinhole, spread = convergence_point(origin[valid], direction[valid])
-    middle = _middle(valid)
-    return MirrorTile(valid, part["colour"][cut], origin, direction, pinhole, spread, middle)
+    middle = _middle(valid, height, width)
+    return MirrorTile((height, width), valid, colour, origin, direction, pinhole, spread, middle)
 
 
-def _middle(valid: NDArray[np.bool_]) -> int:
-    height, width = valid.shape
-    rows, columns = np.nonzero(valid)
-    away = (2 * rows - height) ** 2 + (2 * columns - width) ** 2
-    return int((rows * width + columns)[away.argmin()])
+def _middle(valid: Bools, height: int, width: int) -> int:
+    pixel = np.flatnonzero(valid)
+    row, column = np.divmod(pixel, width)
+    return int(pixel[((2 * row - height) ** 2 + (2 * column - width) ** 2).argmin()])
 
 
-def convergence_point(origin: NDArray[Any], direction: NDArray[Any]) -> tuple[Floats, float]:
-    """Point (3,) with the least squared distance to rays (n, 3), and the largest distance, mm."""
-    d = direction.astype(np.float64)
-    o = origin.astype(np.float64)
-    along = np.einsum("nx,nx->n", o, d)
+def convergence_point(
+    origin: NDArray[np.floating], direction: NDArray[np.floating]
+) -> tuple[Floats, float]:
+    """Point (3,) with the minimum squared distance to rays (n, 3), and the largest distance, mm."""
+    d, o = direction.astype(np.float64), origin.astype(np.float64)
     matrix = len(d) * np.eye(3) - np.einsum("nx,ny->xy", d, d)
-    foot = o - along[:, None] * d
+    foot = o - dot(o, d)[:, None] * d
     # One ray, or parallel ones, leave the place along them open: nearest the mirror then.
     point = o.mean(axis=0)
     point = point + np.linalg.lstsq(matrix, foot.sum(axis=0) - matrix @ point, rcond=1e-9)[0]
-    away = point - o
-    across = away - np.einsum("nx,nx->n", away, d)[:, None] * d
-    return point, float(np.sqrt((across**2).sum(axis=1)).max())
+    offset = point - o
+    return point, float(norm(offset - dot(offset, d)[:, None] * d).max())

@@ -1,78 +1,80 @@
-"""The nearest captured ray to each wanted one (section 4.2 of the paper).
+"""The nearest captured ray to each target ray (section 4.2 of the paper).
 
-tests/simulate/test_nearest.py compares with a four-dimensional k-d tree over all rays.
+tests/simulate/views/test_nearest.py compares with a four-dimensional k-d tree over all rays.
 """
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled, in_threads
+from tbcad.simulate.parallel import chunks, compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
+    RAYS_PER_CHUNK,
     SAMPLED_RAY_STEP,
     RayBundle,
     candidate_mirrors,
     greedy_descent,
-    ray_chunks,
     squared_distance,
 )
 from tbcad.types import Floats, Ints
 
-# Wanted rays in a row that are so near to each other that a few mirrors do for all of them.
+# Target rays in a row that are so near to each other that a few mirrors do for all of them.
 RAYS_PER_RUN = 64
+SAMPLED_IN_RUN = 4
 
 
-def nearest_rays(sheaf: RayBundle, wanted: Floats, limit: float) -> Ints:
-    """Packed pixel (n,) nearest to each wanted point (n, 4) of the slab; -1 beyond a limit, mm."""
+def nearest_rays(bundle: RayBundle, targets: Floats) -> Ints:
+    """Pixel (n,) of the bundle nearest to each target (n, 4); -1 beyond the bundle's limit."""
 
-    def found(part: slice) -> Ints:
-        return _nearest(sheaf.points, sheaf.tiles, sheaf.meeting, wanted[part], limit)
+    def pixels(part: slice) -> Ints:
+        arrays = bundle.points, bundle.tiles, bundle.pinholes
+        return _nearest(*arrays, targets[part], bundle.limit)
 
-    return np.concatenate(
-        [np.zeros(0, dtype=np.int64), *in_threads(found, ray_chunks(len(wanted)))]
-    )
+    parts = in_threads(pixels, chunks(len(targets), RAYS_PER_CHUNK))
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
 
 
 @compiled
-def _nearest(points: Floats, tiles: Ints, meeting: Floats, wanted: Floats, limit: float) -> Ints:
-    about = candidate_mirrors(meeting, wanted, limit, SAMPLED_RAY_STEP)
-    near, likely = about, -1
+def _nearest(points: Floats, tiles: Ints, pinholes: Floats, targets: Floats, limit: float) -> Ints:
+    near_chunk = candidate_mirrors(pinholes, targets, limit, SAMPLED_RAY_STEP)
+    near, previous = near_chunk, -1
     last = tiles[:, 3].copy()
-    # How near each mirror came, or may have come, when last asked, and how far the wanted rays have
-    # gone since: they cannot have come nearer by more than that.
-    came, way = np.full(len(tiles), -np.inf), 0.0
-    found = np.full(len(wanted), -1, dtype=np.int64)
-    for i in range(len(wanted)):
-        ray = wanted[i]
+    # How near each mirror came, or may have come, when last asked, and how far the targets have
+    # moved since: they cannot have come nearer by more than that.
+    came, moved = np.full(len(tiles), -np.inf), 0.0
+    result = np.full(len(targets), -1, dtype=np.int64)
+    for i in range(len(targets)):
+        ray = targets[i]
         if i % RAYS_PER_RUN == 0:
-            near = about[candidate_mirrors(meeting[about], wanted[i : i + RAYS_PER_RUN], limit, 4)]
+            run = targets[i : i + RAYS_PER_RUN]
+            near = near_chunk[candidate_mirrors(pinholes[near_chunk], run, limit, SAMPLED_IN_RUN)]
         if i > 0:
             step = 0.0
             for j in range(4):
-                step += (ray[j] - wanted[i - 1, j]) ** 2
-            way += np.sqrt(step)
+                step += (ray[j] - targets[i - 1, j]) ** 2
+            moved += np.sqrt(step)
         best, owner = limit, -1
-        for turn in range(-1, len(near)):
-            k = likely if turn < 0 else near[turn]
-            if k < 0 or last[k] < 0 or came[k] - way >= best or (turn >= 0 and k == likely):
+        for turn in range(-1, len(near)):  # first the mirror of the previous target
+            k = previous if turn < 0 else near[turn]
+            if k < 0 or last[k] < 0 or came[k] - moved >= best or (turn >= 0 and k == previous):
                 continue
-            least = _bound(meeting[k], ray) if turn >= 0 else 0.0
-            if least >= best:
-                came[k] = least + way
+            bound = _lower_bound(pinholes[k], ray) if turn >= 0 else 0.0
+            if bound >= best:
+                came[k] = bound + moved
                 continue
             last[k] = greedy_descent(points, tiles[k], last[k], ray, 0.0, 1.0)
-            away = np.sqrt(squared_distance(points, last[k], ray, 0.0, 1.0))
-            came[k] = away + way
-            if away < best:
-                best, found[i] = away, last[k]
+            distance = np.sqrt(squared_distance(points, last[k], ray, 0.0, 1.0))
+            came[k] = distance + moved
+            if distance < best:
+                best, result[i] = distance, last[k]
                 owner = k
-        likely = owner
-    return found
+        previous = owner
+    return result
 
 
 @compiled
-def _bound(meeting: Floats, ray: Floats) -> float:
-    """Least distance that a mirror's rays can have from a wanted one, mm."""
-    x = ray[0] + meeting[2] * ray[2] - meeting[0]
-    y = ray[1] + meeting[2] * ray[3] - meeting[1]
-    past = max(np.sqrt(x * x + y * y) - meeting[3], 0.0)
-    result: float = past / np.sqrt(1 + meeting[2] ** 2)
+def _lower_bound(pinhole: Floats, ray: Floats) -> float:
+    """Minimum distance that a mirror's rays can have from a target ray, mm."""
+    x = ray[0] + pinhole[2] * ray[2] - pinhole[0]
+    y = ray[1] + pinhole[2] * ray[3] - pinhole[1]
+    past = max(np.sqrt(x * x + y * y) - pinhole[3], 0.0)
+    result: float = past / np.sqrt(1 + pinhole[2] ** 2)
     return result

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import THREADS, in_threads
+from tbcad.simulate.parallel import in_batches
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import (
@@ -16,6 +16,7 @@ from tbcad.simulate.views.synthesis import (
     SynthesisedView,
     nearby_rays,
     ray_colours,
+    rays_to_capture_sphere,
     search_radius,
 )
 from tbcad.simulate.views.two_plane import two_plane_along
@@ -76,11 +77,10 @@ def lens_rays(
     Returns:
         Origins and unit directions, (h, w, 3) each.
     """
-    down = np.cross(view.forward, view.right)
-    start = view.pinhole + place[0] * view.right + place[1] * down
+    offset = place @ view.axes[:2]
     depth = -float(view.pinhole @ view.forward) - focus.plane_mm
-    way = unit_directions(view, range(view.height_px), shift, depth, start - view.pinhole)
-    return np.broadcast_to(start, way.shape), way
+    direction = unit_directions(view, range(view.height_px), shift, depth, offset)
+    return np.broadcast_to(view.pinhole + offset, direction.shape), direction
 
 
 def refocus(tiles: MirrorTiles, view: Camera, focus: Focus) -> SynthesisedView:
@@ -94,23 +94,22 @@ def refocus(tiles: MirrorTiles, view: Camera, focus: Focus) -> SynthesisedView:
     Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
     the mean is of the others.
     """
-    points = lens_pinholes() * focus.aperture_mm / 2
-    slab = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
-    edge = [_meeting(tiles, view, focus, place) for place in _outermost(points)]
-    corners = [np.concatenate(part) for part in zip(*(rays for rays, _ in edge), strict=True)]
-    near = nearby_rays(tiles, slab, (corners[0], corners[1]), search_radius(tiles))
+    places = lens_pinholes() * focus.aperture_mm / 2
+    two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
+    corners = [_target_rays(tiles, view, focus, place)[1] for place in _square_around(places)]
+    origin, direction = (np.concatenate(part) for part in zip(*corners, strict=True))
+    bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
 
     def one(place: Floats) -> tuple[Bools, Colours, Bools]:
-        rays, meets = _meeting(tiles, view, focus, place)
-        return meets, *ray_colours(near, rays)
+        meets, rays = _target_rays(tiles, view, focus, place)
+        return meets, *ray_colours(bundle, rays)
 
-    for first in range(0, len(points), 2 * THREADS):
-        for meets, found, seen in in_threads(one, points[first : first + 2 * THREADS]):
-            total[meets] += found
-            count += ~meets
-            count[meets] += seen
+    for meets, colours, seen in in_batches(one, list(places)):
+        total[meets] += colours
+        count += ~meets
+        count[meets] += seen
     mean = total / np.maximum(count, 1)[..., None]
     return SynthesisedView(mean.astype(np.float32), count > 0)
 
@@ -131,17 +130,14 @@ def refocus_sweep(
     return pictures
 
 
-def _meeting(tiles: MirrorTiles, view: Camera, focus: Focus, place: Floats) -> tuple[Rays, Bools]:
-    """Rays from a place on the lens that meet the capture sphere (n, 3), and which, (h, w)."""
-    origin, way = lens_rays(view, focus, place)
-    start = origin[0, 0]
-    along = np.einsum("hwx,x->hw", way, start)  # BLAS rounds by its own number of threads
-    meets: Bools = start @ start - along**2 <= (tiles.source.capture_mm / 2) ** 2
-    inside = way[meets]
-    return (np.broadcast_to(start, inside.shape), inside), meets
+def _target_rays(
+    tiles: MirrorTiles, view: Camera, focus: Focus, place: Floats
+) -> tuple[Bools, Rays]:
+    """Which rays from a place on the lens meet the capture sphere, (h, w), and those, (n, 3)."""
+    return rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
 
 
-def _outermost(points: Floats) -> Floats:
+def _square_around(places: Floats) -> Floats:
     """The four corners of the square about places (n, 2)."""
-    reach = float(np.abs(points).max(initial=0.0))
-    return np.array([[-reach, -reach], [reach, -reach], [-reach, reach], [reach, reach]])
+    half = float(np.abs(places).max(initial=0.0))
+    return half * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])

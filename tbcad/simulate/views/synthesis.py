@@ -1,4 +1,4 @@
-"""Pictures from anywhere out of a light field: wanted rays, the mirrors near them, colours."""
+"""Views from anywhere out of a light field: target rays, the mirrors near them, colours."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import compiled
+from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.blend import blend_cameras
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
 from tbcad.simulate.views.ray_bundle import RayBundle, candidate_mirrors, ray_bundle
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
-from tbcad.types import Bools, Floats
+from tbcad.types import Bools, Floats, Ints
 
 Colours = NDArray[np.float32]
 Method = Literal["nearest", "blend"]
@@ -24,7 +24,7 @@ Rays = tuple[Floats, Floats]
 DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
 
-# One wanted ray of so many tells which mirrors are near.
+# One target ray of so many tells which mirrors are near.
 VIEW_RAY_STEP = 601
 
 
@@ -34,7 +34,7 @@ class SynthesisedView:
 
     Attributes:
         colour: (h, w, 3), 0 to 255, float32; zero where nothing was captured.
-        seen: whether a captured ray stands in, or the ray passes the capture sphere by, (h, w).
+        seen: whether a captured ray was near, or the ray misses the capture sphere, (h, w).
     """
 
     colour: Colours
@@ -47,7 +47,10 @@ class SynthesisedView:
 
 
 def synthesise(
-    tiles: MirrorTiles, view: Camera, method: Method = "nearest", depth: DepthFunction | None = None
+    tiles: MirrorTiles,
+    view: Camera,
+    method: Method = "nearest",
+    depth: DepthFunction | None = None,
 ) -> SynthesisedView:
     """The picture that a pinhole camera would see.
 
@@ -58,77 +61,60 @@ def synthesise(
         depth: the surface that a blend takes the object for; without, the plane through the
             origin that faces the camera.
     """
-    way = view_directions(view)
-    meets = _meets(view.pinhole, way, tiles.source.capture_mm / 2)
-    origin = np.broadcast_to(view.pinhole, (int(meets.sum()), 3))
-    slab = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
-    rays = (origin, way[meets])
-    found, seen = ray_colours(
-        nearby_rays(tiles, slab, rays, search_radius(tiles)), rays, method, depth
-    )
+    direction = view_directions(view)
+    origin = np.broadcast_to(view.pinhole, direction.shape)
+    meets, rays = rays_to_capture_sphere(tiles, (origin, direction))
+    two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
+    bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
+    found, seen = ray_colours(bundle, rays, method, depth)
     if not seen.all():
-        rest = (origin[~seen], rays[1][~seen])
-        wide = nearby_rays(tiles, slab, rest, horizon_search_radius(tiles))
-        found[~seen], seen[~seen] = ray_colours(wide, rest, method, depth)
-    colour = np.zeros(way.shape, dtype=np.float32)
+        rest = (rays[0][~seen], rays[1][~seen])
+        bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
+        found[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
+    colour = np.zeros(direction.shape, dtype=np.float32)
     colour[meets] = found
-    every = ~meets
-    every[meets] = seen
-    return SynthesisedView(colour, every)
+    complete = ~meets
+    complete[meets] = seen
+    return SynthesisedView(colour, complete)
 
 
-@compiled
-def _meets(pinhole: Floats, way: Floats, radius: float) -> Bools:
-    """Which unit directions (h, w, 3) from a pinhole meet the sphere about the origin, (h, w)."""
-    meets = np.empty(way.shape[:2], dtype=np.bool_)
-    a, b, c = pinhole
-    for y in range(way.shape[0]):
-        for x in range(way.shape[1]):
-            p, q, r = way[y, x]
-            i, j, k = b * r - c * q, c * p - a * r, a * q - b * p
-            meets[y, x] = np.sqrt(i * i + j * j + k * k) <= radius
-    return meets
+def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Bools, Rays]:
+    """Which rays (h, w, 3) meet the capture sphere, (h, w), and those rays, (n, 3)."""
+    flat = [part.reshape(-1, 3) for part in rays]
+    meets = meets_sphere(flat[0], flat[1], tiles.source.capture_mm / 2)
+    return meets.reshape(rays[0].shape[:2]), (flat[0][meets], flat[1][meets])
 
 
-@dataclass(frozen=True)
-class NearbyRays:
-    """The captured rays that may be near some wanted ones.
-
-    Attributes:
-        slab: what the views look along.
-        sheaf: captured rays; None where there are none.
-        limit: how far from a wanted ray a captured one may be, mm.
-    """
-
-    slab: TwoPlane
-    sheaf: RayBundle | None
-    limit: float
-
-
-def nearby_rays(tiles: MirrorTiles, slab: TwoPlane, rays: Rays, limit: float) -> NearbyRays:
-    """The captured rays that may be within a limit (mm) of wanted ones."""
-    packed = tiles.packed(_near(tiles, slab, slab.points(*rays), limit))
-    return NearbyRays(slab, None if packed is None else ray_bundle(slab, packed), limit)
+def nearby_rays(
+    tiles: MirrorTiles, two_plane: TwoPlane, rays: Rays, limit: float
+) -> RayBundle | None:
+    """The captured rays that may be within a limit (mm) of target rays; None if none is."""
+    targets = two_plane.coordinates(*rays)
+    near = tiles.of(_near_mirrors(tiles, two_plane, targets, limit))
+    return ray_bundle(two_plane, near, limit) if near else None
 
 
 def ray_colours(
-    near: NearbyRays, rays: Rays, method: Method = "nearest", depth: DepthFunction | None = None
+    bundle: RayBundle | None,
+    rays: Rays,
+    method: Method = "nearest",
+    depth: DepthFunction | None = None,
 ) -> tuple[Colours, Bools]:
-    """Colours (n, 3) of wanted rays, and which of them were seen, (n,)."""
-    wanted = near.slab.points(*rays)
-    if near.sheaf is None:
-        return np.zeros((len(wanted), 3), dtype=np.float32), np.zeros(len(wanted), dtype=bool)
+    """Colours (n, 3) of target rays, and which of them were seen, (n,)."""
+    count = len(rays[0])
+    if bundle is None:
+        return np.zeros((count, 3), dtype=np.float32), np.zeros(count, dtype=bool)
+    targets = bundle.two_plane.coordinates(*rays)
     if method == "nearest":
-        found = nearest_rays(near.sheaf, wanted, near.limit)
-        seen = found >= 0
-        return np.where(seen[:, None], near.sheaf.colour[found], np.float32(0)), seen
-    at = _depths(near.slab, rays, depth) / near.slab.scale
-    mixed, seen = blend_cameras(near.sheaf, wanted, at, near.limit)
-    return mixed.astype(np.float32), seen
+        pixels = nearest_rays(bundle, targets)
+        seen = pixels >= 0
+        return np.where(seen[:, None], bundle.colour[pixels], np.float32(0)), seen
+    colour, seen = blend_cameras(bundle, targets, _depths(bundle.two_plane, rays, depth))
+    return colour.astype(np.float32), seen
 
 
 def search_radius(tiles: MirrorTiles) -> float:
-    """How far from a wanted ray a captured one is at most, in the slab, mm.
+    """Largest distance of a captured ray from a target ray, in two-plane coordinates, mm.
 
     As far as neighbouring virtual cameras are apart, evenly spread over the hemisphere, and
     neighbouring pixels, their mirror's share of the sensor evenly spread over the capture sphere.
@@ -151,23 +137,23 @@ def horizon_search_radius(tiles: MirrorTiles) -> float:
     return radius / float(np.sqrt(1 + 3 * (depth / radius) ** 2))
 
 
-def _near(tiles: MirrorTiles, slab: TwoPlane, wanted: Floats, limit: float) -> NDArray[np.int64]:
-    """Mirrors (k,) whose rays may be within the limit of wanted ones (n, 4), by their apices."""
-    place = slab.place(tiles.apex) / [1, 1, slab.scale]
+def _near_mirrors(tiles: MirrorTiles, two_plane: TwoPlane, targets: Floats, limit: float) -> Ints:
+    """Mirrors (k,) whose rays may be within the limit of targets (n, 4), by their apices."""
+    place = two_plane.place(tiles.apex)
     behind = np.flatnonzero(place[:, 2] < 0)
-    kept = wanted[~np.isnan(wanted[:, 0])]
-    if len(kept) == 0:
+    targets = targets[~np.isnan(targets[:, 0])]
+    if len(targets) == 0:
         return behind[:0]
-    meeting = np.column_stack([place[behind], tiles.width[behind]])
-    return behind[candidate_mirrors(meeting, kept, limit, VIEW_RAY_STEP)]
+    pinholes = np.column_stack([place[behind], tiles.width[behind]])
+    return behind[candidate_mirrors(pinholes, targets, limit, VIEW_RAY_STEP)]
 
 
-def _depths(slab: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:
-    """Where rays meet the surface, along the slab's direction, mm; on the plane where they miss."""
+def _depths(two_plane: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:
+    """Where rays meet the surface, along the view over s, (n,); 0 where they do not."""
     origin, direction = rays
     if depth is None:
         return np.zeros(len(direction))
-    reached = depth(origin, direction)
-    along = np.where(np.isfinite(reached), reached, 0)
-    place = (origin + along[:, None] * direction) @ slab.axes[2]
-    return np.where(np.isfinite(reached), place, 0.0)
+    distance = depth(origin, direction)
+    hit = np.isfinite(distance)
+    points = origin + np.where(hit, distance, 0)[:, None] * direction
+    return np.where(hit, two_plane.place(points)[:, 2], 0.0)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.simulate.scene.reflector import pixel_pitch
 from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, surface_tables, view_tables
@@ -37,7 +36,7 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws) -> MirrorCoverage:
             *(surfaces, pairs.pair, pairs.offset, pairs.face, pairs.reach),
             *(half.halved, view, half.screen),
         )
-    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / pixel_pitch(half.view)) ** 2
+    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
     crossings = outlines[..., CROSSINGS].astype(np.int64)
     return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
 

@@ -96,11 +96,6 @@ def surface_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
     return table
 
 
-def camera_axes(view: Camera) -> Floats:
-    """Right, down and forward of a camera, (3, 3)."""
-    return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
-
-
 def view_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
     """Camera and object of s builds, in the frame of the shell, (s, 6, 3).
 
@@ -109,7 +104,7 @@ def view_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
     """
     shell = Rotation.from_rotvec(draws.shell_tilt)
     camera = Rotation.from_rotvec(draws.camera_tilt)
-    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in camera_axes(half.view)]
+    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in half.view.axes]
     pinhole = half.view.pinhole + draws.camera_shift
     points = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
     return np.stack([*points, draws.scale, *axes], axis=1)

@@ -13,7 +13,6 @@ from tbcad.tolerance.montecarlo.edge_model import (
     CURVATURE,
     NORMAL,
     EdgeModel,
-    camera_axes,
     surface_tables,
     view_tables,
 )
@@ -55,7 +54,7 @@ def pointing(half: EdgeModel, draws: ShellDraws) -> Pointing:
 
 def _pixel_rays(half: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
     """Rays (s, m, 3) of the same pixels in built cameras, whose axes are three of (s, 1, 3)."""
-    designed = (half.apex - half.view.pinhole) @ camera_axes(half.view).T
+    designed = (half.apex - half.view.pinhole) @ half.view.axes.T
     right, down, forward = designed[..., None].swapaxes(0, 1)
     focal = draws.focal[:, None, None] * forward
     result: Floats = axes[2] + axes[0] * right / focal + axes[1] * down / focal

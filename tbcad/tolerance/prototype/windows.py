@@ -82,22 +82,22 @@ def prototype_model(reflectors: tuple[Reflector, Reflector], plan: Plan) -> Prot
     """The fast model of both cameras and the plan."""
     a, b = prototype_runs(reflectors, plan)
     view = reflectors[0].camera
-    axes = camera_axes(view)
+    axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
     return PrototypeModel(view.pinhole, axes, plan, both, _virtual_cameras(*both))
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
-    sides, m = cell_windows(run.at.cells, run.view.pinhole), len(run.at)
+    sides, m = cell_windows(run.reflector.cells, run.camera.pinhole), len(run.reflector)
     order = np.argsort(sides.mirror, kind="stable")
     mirror = sides.mirror[order]
     t = np.broadcast_to(np.linspace(0, 1, SIDE_SAMPLES), (len(mirror), SIDE_SAMPLES))
-    still = np.broadcast_to(run.at.u, (m, 3)), np.zeros(m)
-    side = sides.rays(t, *still)[order] @ run.turn[mirror] @ axes.T
-    apex = unit(run.at.mirrors.apex - run.view.pinhole)
-    middle = np.einsum("mx,mxy->my", apex, run.turn) @ axes.T
+    still = np.broadcast_to(run.reflector.u, (m, 3)), np.zeros(m)
+    side = sides.rays(t, *still)[order] @ run.window_rotation[mirror] @ axes.T
+    apex = unit(run.reflector.mirrors.apex - run.camera.pinhole)
+    middle = np.einsum("mx,mxy->my", apex, run.window_rotation) @ axes.T
     first = np.searchsorted(mirror, np.arange(m + 1))
-    halved = run.at.mirrors.apex[:, 0] == 0
+    halved = run.reflector.mirrors.apex[:, 0] == 0
     outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
     outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
     return RunWindows(run.ball, run.stop, side, first, middle, outward, halved)

@@ -10,7 +10,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tbcad.simulate.parallel
-import tbcad.simulate.prototype.merge
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -26,7 +25,7 @@ from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import Reflector, project_points
+from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.load import load_spec
 from tests.csv_files import edit_csv
 from tests.prototype_exports import plan_of
@@ -70,7 +69,7 @@ def misses(run: PrototypeRun, mirror: np.ndarray, way: np.ndarray) -> np.ndarray
     Infinite where a ray meets something else.
     """
     whole = np.concatenate([run.balls[..., :4], run.balls[..., :4]], axis=2)
-    turned = np.einsum("nx,nxy->ny", way, run.turn[mirror])
+    turned = np.einsum("nx,nxy->ny", way, run.window_rotation[mirror])
     seen = trace_balls(replace(run, balls=whole), turned, run.stop[mirror])
     away = norm(np.cross(seen.origin, seen.direction))
     return np.where(seen.ball == run.ball[mirror] + 1, away, np.inf)
@@ -82,45 +81,47 @@ class TestGeometry:
     ) -> None:
         """Origin and pinhole are foci of the ellipsoid that both apices lie on."""
         for run in both:
-            way = unit(run.at.mirrors.apex - run.view.pinhole)
-            turned = np.einsum("nx,nxy->ny", way, run.turn)
+            way = unit(run.reflector.mirrors.apex - run.camera.pinhole)
+            turned = np.einsum("nx,nxy->ny", way, run.window_rotation)
             seen = trace_balls(run, turned, run.stop)
             assert (seen.ball == run.ball + 1).all()
-            assert np.abs(seen.origin - run.stands.apex).max() < 1e-9
-            assert np.abs(seen.direction + unit(run.stands.apex)).max() < 1e-9
+            assert np.abs(seen.origin - run.ball_surfaces.apex).max() < 1e-9
+            assert np.abs(seen.direction + unit(run.ball_surfaces.apex)).max() < 1e-9
 
     def test_balls_stand_as_far_off_as_the_plan_says(
         self, both: Both, made: PrototypeLayout
     ) -> None:
-        a, b = (2 * np.arcsin(norm(unit(run.stands.apex) - run.at.u) / 2) for run in both)
+        a, b = (
+            2 * np.arcsin(norm(unit(run.ball_surfaces.apex) - run.reflector.u) / 2) for run in both
+        )
         assert a == pytest.approx(made.stops.error, abs=1e-9)
         assert b[made.twin] == pytest.approx(made.stops.error, abs=1e-9)
         assert a.max() > np.radians(1)
 
     def test_windows_are_turned_not_tilted(self, both: Both) -> None:
         for run in both:
-            eye = np.einsum("mxy,mzy->mxz", run.turn, run.turn)
+            eye = np.einsum("mxy,mzy->mxz", run.window_rotation, run.window_rotation)
             assert np.abs(eye - np.eye(3)).max() < 1e-12
-            assert np.linalg.det(run.turn) == pytest.approx(1)
+            assert np.linalg.det(run.window_rotation) == pytest.approx(1)
 
     def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
         self, both: Both, made: PrototypeLayout
     ) -> None:
         """The record is computed at the mirror's own azimuth, these rays at the stop."""
         for run, order in zip(both, (np.arange(len(made.half)), made.twin), strict=True):
-            arcs, m = run.at.cells.arcs, len(run.at)
-            wall, t = run.at.cells.boundary.seam, np.linspace(0, 1, 201)
+            arcs, m = run.reflector.cells.arcs, len(run.reflector)
+            wall, t = run.reflector.cells.boundary.seam, np.linspace(0, 1, 201)
             least = np.full(m, np.inf)
             for mine, other in (arcs.faces.T, arcs.faces.T[::-1]):
                 # A cell halved by the seam goes on in the other camera's picture.
                 counted = np.flatnonzero(
-                    (mine < m) & ~((other == wall) & (run.at.u[mine % m, 0] == 0))
+                    (mine < m) & ~((other == wall) & (run.reflector.u[mine % m, 0] == 0))
                 )
                 point = arcs.at(
                     np.repeat(counted[:, None], len(t), 1),
                     np.broadcast_to(t, (len(counted), len(t))),
                 )
-                way = unit(point - run.view.pinhole).reshape(-1, 3)
+                way = unit(point - run.camera.pinhole).reshape(-1, 3)
                 mirror = np.repeat(mine[counted], len(t))
                 np.minimum.at(least, mirror, misses(run, mirror, way))
             assert 2 * least[order] == pytest.approx(made.fit.coverage, abs=2e-3)
@@ -129,13 +130,13 @@ class TestGeometry:
         self, made: PrototypeLayout, cameras: tuple[Reflector, ...]
     ) -> None:
         still = prototype_runs(cameras, replace(plan_of(made), moved=False))
-        assert (still[0].turn == np.eye(3)).all()
+        assert (still[0].window_rotation == np.eye(3)).all()
 
     def test_a_caps_body_hides_and_shows_nothing(self, both: Both) -> None:
         """Body about (0, 0, 10) of radius 3, its front cut off by a ball of 10 whose apex is 8."""
         cap = np.array([[[0.0, 0.0, 18.0, 10.0, 0.0, 0.0, 10.0, 3.0]]])
-        view = replace(both[0].view, pinhole=np.zeros(3))
-        run = replace(both[0], view=view, balls=cap)
+        view = replace(both[0].camera, pinhole=np.zeros(3))
+        run = replace(both[0], camera=view, balls=cap)
         # Both spheres meet at z = 8.6875, 2.697 from the axis.
         edge, rim = np.arctan2(2.697, 8.6875), np.arcsin(3 / 10)
         angle = np.array([0, 0.9 * edge, 0.99 * rim, 1.01 * rim])
@@ -143,13 +144,13 @@ class TestGeometry:
         seen = trace_balls(run, way, np.zeros(4, dtype=np.int64))
         assert edge < 0.99 * rim
         assert seen.ball.tolist() == [1, 1, 0, 0]
-        assert np.isfinite(seen.reach).tolist() == [True, True, True, False]
-        assert seen.reach[0] == pytest.approx(8)
+        assert np.isfinite(seen.distance).tolist() == [True, True, True, False]
+        assert seen.distance[0] == pytest.approx(8)
         assert norm(seen.origin[1] - [0, 0, 18]) == pytest.approx(10)
         assert seen.direction[0] == pytest.approx([0, 0, -1])
 
     def test_places(self, both: Both) -> None:
-        view = both[1].view
+        view = both[1].camera
         places = np.array([[0.0, 0.0], [415.0, 309.0], [12.25, 200.5]])
         assert image_points(view, pixel_rays(view, places)) == pytest.approx(places, abs=1e-9)
         outside = pixel_rays(view, np.array([[-0.1, 5.0], [5.0, 309.1]]))
@@ -218,7 +219,7 @@ class TestMerged:
 
     def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, both: Both) -> None:
         for run in both:
-            frame = merged.frames[run.at.camera_id]
+            frame = merged.frames[run.reflector.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
             row = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
@@ -230,12 +231,12 @@ class TestMerged:
     def test_light_obeys_the_law_of_reflection(self, merged: LightField, both: Both) -> None:
         """Way in and way out have the ball's normal for their bisector."""
         for run in both:
-            frame = merged.frames[run.at.camera_id]
+            frame = merged.frames[run.reflector.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
             centre = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1], :3]
             origin = frame.planes["origin"][on].astype(float)
-            both_ways = unit(run.view.pinhole - origin) + frame.planes["direction"][on]
+            both_ways = unit(run.camera.pinhole - origin) + frame.planes["direction"][on]
             assert np.abs(unit(both_ways) - unit(origin - centre)).max() < 1e-4
 
     def test_pixels_kept(
@@ -265,15 +266,15 @@ class TestMerged:
 
     def test_windows_that_leave_the_photograph(self, both: Both, scene: Scene) -> None:
         """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
-        wide = both[0].view
-        narrow = replace(both[0], view=replace(wide, hfov=0.8 * wide.hfov))
+        wide = both[0].camera
+        narrow = replace(both[0], camera=replace(wide, hfov=0.8 * wide.hfov))
         for resample in ("exact", "photograph"):
             bands = list(merge_run(narrow, scene, resample))  # type: ignore[arg-type]
             mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
-            place = project_points(narrow.view, origin[mirror > 0])
+            place = narrow.camera.project(origin[mirror > 0])
             assert (place >= -1e-6).all()
             assert (place <= np.array([415, 309]) + 1e-6).all()
-            free = exact_tracer(both[0].at)(range(310), CENTRE).mirror
+            free = exact_tracer(both[0].reflector)(range(310), CENTRE).mirror
             lost = (mirror == 0) & (free > 0)
             assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
             assert not np.concatenate([band.colour for band in bands])[lost].any()
@@ -291,7 +292,6 @@ class TestMerged:
         self, merged: LightField, both: Both, scene: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(tbcad.simulate.parallel, "THREADS", 1)
-        monkeypatch.setattr(tbcad.simulate.prototype.merge, "THREADS", 1)
         again = merged_light_field(both, scene, CAPTURE_MM)
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
@@ -305,11 +305,14 @@ class TestMerged:
                 write_camera(store, ball_reflector(run), merge_run(run, scene))
         with LightField.open(tmp_path / "field.h5") as found:
             for run in both:
-                frame, other = found.frames[run.at.camera_id], merged.frames[run.at.camera_id]
+                frame, other = (
+                    found.frames[run.reflector.camera_id],
+                    merged.frames[run.reflector.camera_id],
+                )
                 assert (frame.image() == other.image()).all()
-                assert (frame.mirrors.apex == run.stands.apex).all()
+                assert (frame.mirrors.apex == run.ball_surfaces.apex).all()
                 assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
-                assert frame.u == pytest.approx(unit(run.stands.apex))
+                assert frame.u == pytest.approx(unit(run.ball_surfaces.apex))
 
     def test_progress(self, both: Both, scene: Scene) -> None:
         told: list[str] = []

@@ -7,7 +7,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import design
 from tbcad.optics.reflection import miss_distances
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
-from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
+from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.spec.load import load_spec
 
 Cameras = tuple[Reflector, Reflector]
@@ -141,6 +141,6 @@ def test_planar_mirrors() -> None:
 def test_pixels_of_points_undo_directions(cameras: Cameras) -> None:
     view = cameras[0].camera
     way = pixel_directions(view, range(5, 9))
-    place = project_points(view, view.pinhole + 7 * way)
+    place = view.project(view.pinhole + 7 * way)
     assert place[..., 0] == pytest.approx(np.broadcast_to(np.arange(view.width_px), (4, 416)))
     assert place[:, 0, 1] == pytest.approx([5, 6, 7, 8])

@@ -7,7 +7,7 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.simulate.scene.reflector import Reflector, project_points, reflectors
+from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.study.pixels import Sensor, _traced, count_pixels, parse_sensor, virtual_cameras
 from tbcad.simulate.study.resolution import Ratio, balance, parse_ratio
 from tbcad.spec.load import load_spec
@@ -27,7 +27,7 @@ def window(at: Reflector, mirror: int) -> float:
     steps, total = np.linspace(0, 1, 200), 0.0
     for side in sides[offsets[mirror] : offsets[mirror + 1]]:
         t = steps if side % 2 == 0 else steps[::-1]
-        point = project_points(at.camera, at.cells.arcs.at(np.full(len(t), side // 2), t))
+        point = at.camera.project(at.cells.arcs.at(np.full(len(t), side // 2), t))
         for (x0, y0), (x1, y1) in pairwise(point):
             total += (x0 * y1 - x1 * y0) / 2
     return abs(total)

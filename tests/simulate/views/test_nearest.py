@@ -33,11 +33,11 @@ def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def wanted_by(view: Camera) -> tuple[TwoPlane, Rays]:
-    slab = two_plane_along(view.forward, view.right, CAPTURE_MM)
+    two_plane = two_plane_along(view.forward, view.right, CAPTURE_MM)
     way = view_directions(view).reshape(-1, 3)
     meets = np.linalg.norm(np.cross(view.pinhole, way), axis=1) < CAPTURE_MM / 2
     way = way[meets]
-    return slab, (np.broadcast_to(view.pinhole, way.shape), way)
+    return two_plane, (np.broadcast_to(view.pinhole, way.shape), way)
 
 
 @given(
@@ -52,30 +52,30 @@ def test_equals_the_tree(
     view = camera_around_object(
         np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120)
     )
-    slab, rays = wanted_by(view)
-    wanted = slab.points(*rays)
+    two_plane, rays = wanted_by(view)
+    wanted = two_plane.coordinates(*rays)
     origin, direction, _ = every_ray(light_field)
-    points = slab.points(origin, direction)
+    points = two_plane.coordinates(origin, direction)
     away, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(wanted)
-    near = nearby_rays(tiles, slab, rays, search_radius(tiles))
-    assert near.sheaf is not None
-    found = nearest_rays(near.sheaf, wanted, near.limit)
+    near = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
+    assert near is not None
+    found = nearest_rays(near, wanted)
     # At the limit itself a mirror may be left out: one wanted ray in a few says which are near.
     within = found >= 0
     assert (away[within] <= near.limit).all()
     assert within[away < 0.9 * near.limit].all()
-    mine = np.linalg.norm(near.sheaf.points[found[within]] - wanted[within], axis=1)
+    mine = np.linalg.norm(near.points[found[within]] - wanted[within], axis=1)
     # Walking may end beside the nearest where a mirror's pixels have a notch; it is rare.
     assert (mine <= away[within] * (1 + 1e-9)).mean() > 0.9995
 
 
-def test_distance_in_the_slab_is_that_of_the_rays_in_the_capture_sphere() -> None:
+def test_distance_in_two_plane_coordinates_is_that_of_the_rays_in_the_capture_sphere() -> None:
     """Root mean square over the depth -R ... R, by quadrature."""
     rng = np.random.default_rng(4)
-    slab = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
+    two_plane = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
     origin = rng.normal(size=(2, 3)) * [20, 20, 5] + [0, 0, 100]
     way = rng.normal(size=(2, 3)) * [0.2, 0.2, 0] + [0, 0, -1]
-    a, b = slab.points(origin, way / np.linalg.norm(way, axis=1)[:, None])
+    a, b = two_plane.coordinates(origin, way / np.linalg.norm(way, axis=1)[:, None])
     z = np.linspace(-30, 30, 20001)
     at = [o[:2] + ((o[2] - z) / -w[2])[:, None] * w[:2] for o, w in zip(origin, way, strict=True)]
     apart = ((at[0] - at[1]) ** 2).sum(axis=1)
@@ -83,8 +83,8 @@ def test_distance_in_the_slab_is_that_of_the_rays_in_the_capture_sphere() -> Non
 
 
 def test_rays_that_are_too_oblique_have_no_place() -> None:
-    slab = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
-    points = slab.points(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
+    two_plane = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
+    points = two_plane.coordinates(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     assert np.isnan(points).all()
 
 
@@ -110,9 +110,11 @@ def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: Mirro
     origin, direction, colour = (
         frame.planes[name][:][on] for name in ("origin", "direction", "colour")
     )
-    slab = two_plane_along(-frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM)
-    wanted = slab.points(origin, direction)
-    near = nearby_rays(tiles, slab, (origin, direction), search_radius(tiles))
-    assert near.sheaf is not None
-    found = nearest_rays(near.sheaf, wanted, near.limit)
-    assert np.array_equal(near.sheaf.colour[found], colour)
+    two_plane = two_plane_along(
+        -frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM
+    )
+    wanted = two_plane.coordinates(origin, direction)
+    near = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
+    assert near is not None
+    found = nearest_rays(near, wanted)
+    assert np.array_equal(near.colour[found], colour)

@@ -6,8 +6,9 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture, to_bytes
+from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
@@ -48,7 +49,6 @@ def test_the_same_whatever_the_workers(tiles: MirrorTiles, monkeypatch: pytest.M
     focus = Focus(200, 0)
     mean = refocus(tiles, view, focus).colour
     monkeypatch.setattr("tbcad.simulate.parallel.THREADS", 1)
-    monkeypatch.setattr("tbcad.simulate.views.refocus.THREADS", 1)
     assert np.array_equal(synthesise(tiles, view, "blend").colour, before)
     assert np.array_equal(refocus(tiles, view, focus).colour, mean)
 

@@ -9,7 +9,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import project_points, reflectors
+from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
 from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
@@ -52,8 +52,7 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
         half, (offsets, sides) = edge_model(at), at.cells.rings
         t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
         t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
-        edge = project_points(
-            at.camera, at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
+        edge = at.camera.project(at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
         )
         area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
         for k, (first, last) in enumerate(pairwise(offsets)):

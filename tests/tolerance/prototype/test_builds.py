@@ -76,9 +76,13 @@ def pictures(both: tuple[PrototypeRun, PrototypeRun]) -> list[Picture]:
     """Mirror of each side of both runs' windows, and where the sides are in the picture."""
     result = []
     for run, turn in zip(both, (np.ones(3), HALF_TURN), strict=True):
-        sides, view = cell_windows(run.at.cells, run.view.pinhole), both[0].view
+        sides, view = cell_windows(run.reflector.cells, run.camera.pinhole), both[0].camera
         t = np.broadcast_to(np.linspace(0, 1, SAMPLES), (len(sides.arc), SAMPLES))
-        way = sides.rays(t, run.at.u, np.zeros(len(run.at))) @ run.turn[sides.mirror] * turn
+        way = (
+            sides.rays(t, run.reflector.u, np.zeros(len(run.reflector)))
+            @ run.window_rotation[sides.mirror]
+            * turn
+        )
         axes = np.column_stack([view.right, np.cross(view.forward, view.right)])
         result.append((sides.mirror, way @ axes / (way @ view.forward)[..., None]))
     return result
@@ -92,7 +96,7 @@ def slow(
     machine: int = 0,
 ) -> np.ndarray:
     """Coverage of all virtual cameras by many samples, every error put in by other means."""
-    view, turn = both[0].view, Rotation.from_rotvec(draws.camera_tilt[machine])
+    view, turn = both[0].camera, Rotation.from_rotvec(draws.camera_tilt[machine])
     axes = turn.apply([view.right, np.cross(view.forward, view.right)])
     pinhole = view.pinhole + draws.camera_shift[machine]
     least = np.full(int(at.virtual.max()) + 1, np.inf)
@@ -100,7 +104,7 @@ def slow(
         way = unit(turn.apply(view.forward) + place / draws.focal[machine] @ axes)
         centre, radius = balls(at, run, draws, machine, half)
         miss = sphere_miss_distances(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
-        which = at.virtual[half * len(run.at) :][mirror]
+        which = at.virtual[half * len(run.reflector) :][mirror]
         np.minimum.at(least, which, 2 * miss.min(axis=1))
     return least
 
@@ -109,7 +113,7 @@ def balls(
     at: PrototypeModel, run: PrototypeRun, draws: PrototypeDraws, machine: int, half: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centre and radius of the ball in each window."""
-    frame, centre = at.plan.frame, np.empty((len(run.at), 3))
+    frame, centre = at.plan.frame, np.empty((len(run.reflector), 3))
     tilt = Rotation.from_rotvec(
         draws.tilt[machine, 0] * frame[1] + draws.tilt[machine, 1] * frame[2]
     )
