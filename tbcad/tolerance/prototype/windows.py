@@ -21,7 +21,7 @@ from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import Errors
-from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC, camera_axes
+from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.rays import SIDE_SAMPLES, highlights, minimum_miss_distances
 from tbcad.types import Bools, Floats, Ints

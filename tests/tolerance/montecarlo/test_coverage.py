@@ -52,8 +52,7 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
         half, (offsets, sides) = edge_model(at), at.cells.rings
         t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
         t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
-        edge = at.camera.project(at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t)
-        )
+        edge = at.camera.project(at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t))
         area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
         for k, (first, last) in enumerate(pairwise(offsets)):
             x, y = edge[first:last].reshape(-1, 2).T
