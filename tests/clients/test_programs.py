@@ -143,10 +143,10 @@ def test_freecad_sees_bolt_and_dowel_holes(export: Path, camera: str) -> None:
     if not command:
         pytest.skip("freecadcmd is not installed")
     with sandbox(command, export, f"shell_{camera}.step", "step", Limits()) as given:
-        (given.place / "look.py").write_text(KINDS)
-        done = given.run(given.place / "look.py")
+        (given.folder / "look.py").write_text(KINDS)
+        done = given.run(given.folder / "look.py")
         assert done.code == 0, done
-        kinds = json.loads((given.place / "kinds.json").read_text())
+        kinds = json.loads((given.folder / "kinds.json").read_text())
     assert kinds["Sphere"] == 847
     assert kinds["Cylinder"] == 15
 
@@ -198,7 +198,7 @@ def sample(tmp_path: Path) -> Path:
 def asked(sample: Path, kind: str, program: str, **others: float) -> dict[str, bool | None]:
     """Verdicts on shell_a's one file of a kind."""
     part = replace(wanted(SAMPLE, 0.02)[0], **others)
-    said = of(program, check_with_programs(sample, [part], errands=[READERS[program, kind]]))
+    said = of(program, check_with_programs(sample, [part], queries=[READERS[program, kind]]))
     return {check.name.split()[1]: check.passed for check in said}
 
 

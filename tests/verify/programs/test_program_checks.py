@@ -194,7 +194,7 @@ def test_gmsh_as_a_package(export: Path, package: Path, solids: int, wrong: list
     [
         ("raise OSError('libGLU.so.1: no such file')", "OSError: libGLU.so.1: no such file"),
         ("import os; os.abort()", "crashed (SIGABRT)"),
-        ("import os; os._exit(0)", "ended well, but left no readable answer"),
+        ("import os; os._exit(0)", "ended without error, but left no readable answer"),
     ],
 )
 def test_a_package_that_breaks(export: Path, package: Path, body: str, detail: str) -> None:
@@ -344,7 +344,7 @@ def test_no_folder_is_a_bad_export(tmp_path: Path) -> None:
 
 
 def test_order_and_number_at_a_time(export: Path, programs: Path, tmp_path: Path) -> None:
-    """Answers come in the order of parts and errands; never do three programs run at once."""
+    """Answers come in the order of parts and queries; never do three programs run at once."""
     log = tmp_path / "log"
     noted = f"""
 import time

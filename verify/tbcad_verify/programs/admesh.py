@@ -1,4 +1,4 @@
-"""admesh: would it repair anything? It repairs before it reports, so the counts of what it did."""
+"""admesh: the repairs that a mesh needs. It repairs before it reports, and counts what it did."""
 
 from __future__ import annotations
 
@@ -19,38 +19,40 @@ FLAWS = (
     "Backwards edges",
     "Normals fixed",
 )
-LEAST_FACETS = 4
+MIN_FACETS = 4
 
 
-def ask(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
+def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
     """Nothing to repair, one part, the mesh's volume.
 
     Raises:
-        Unknown: there is no answer.
+        Unknown: the program gives no answer.
     """
-    said = _figures(text_of(room.run(room.given)))
-    flaws = {key: said[key] for key in FLAWS}
-    found = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)
+    report = _figures(text_of(sandbox.run(sandbox.copy)))
+    flaws = {key: report[key] for key in FLAWS}
+    repairs = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)
     return [
-        at_most(("admesh repairs", room.file, "flaws"), sum(flaws.values()), 0, found),
-        count_check(("admesh parts", room.file, PARTS), said["Number of parts"], 1, "must be one"),
+        at_most(("admesh repairs", sandbox.file, "flaws"), sum(flaws.values()), 0, repairs),
+        count_check(
+            ("admesh parts", sandbox.file, PARTS), report["Number of parts"], 1, "must be one"
+        ),
         volume_check(
-            ("admesh volume", room.file, VOLUME),
-            said["Volume"],
-            wanted.volume,
-            wanted.volume_error,
+            ("admesh volume", sandbox.file, VOLUME),
+            report["Volume"],
+            expected.volume,
+            expected.volume_error,
         ),
     ]
 
 
 def _figures(text: str) -> dict[str, float]:
-    """Every figure by its label; of two columns the first, "Original"."""
+    """Every figure by its label; the first of two columns, "Original"."""
     rows = re.findall(r"(\w[\w ]{0,40}?) +: +(-?\d{1,20}(?:\.\d{1,9})?)\b", text)
-    said = {label: float(figure) for label, figure in rows}
-    wanted = {*FLAWS, "Number of facets", "Number of parts", "Volume"}
-    if not wanted <= {*said} or said["Number of facets"] < LEAST_FACETS:
-        raise Unknown("ended well, but without its report")
-    return said
+    report = {label: float(figure) for label, figure in rows}
+    labels = {*FLAWS, "Number of facets", "Number of parts", "Volume"}
+    if not labels <= {*report} or report["Number of facets"] < MIN_FACETS:
+        raise Unknown("ended without error, but without its report")
+    return report
 
 
 STL = ProgramQuery(

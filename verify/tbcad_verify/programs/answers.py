@@ -1,14 +1,15 @@
-"""From what a program said to checks. What it did not say clearly is unknown."""
+"""Checks from the answers of programs. What a program does not answer clearly is unknown."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tbcad_verify.programs.program_query import ExpectedPart
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,29 +22,41 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.run.child import Outcome
 
 SKIPPED = "skipped: "
+NO_ANSWER = "ended without error, but left no readable answer"
+SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
+# The end of our scripts inside programs. They define `look`, which returns figures, and `message`.
+SCRIPT_END = """
+try:
+    answer = look()
+except BaseException as error:
+    answer = {"error": type(error).__name__ + ": " + message(error)}
+with open("answer.json", "w") as stream:
+    json.dump(answer, stream)
+sys.exit(3 if "error" in answer else 0)
+"""
 MAX_ANSWER = 100_000  # bytes
-SHOWN = 160  # characters of a program's own words
+SHOWN = 160  # characters of a program's own message
 
 
 def skipped(check: CheckName, reason: str) -> Check:
-    """Nobody looked, and nobody was asked to: no failure, and no figure either."""
+    """A check that was not made because nobody could: no failure, and no figure either."""
     return informative(check, math.nan, SKIPPED + reason)
 
 
 def is_skipped(check: Check) -> bool:
-    """True for what `skipped` made; it should not be shown like a pass."""
+    """Whether `skipped` made it: it should not be shown like a pass."""
     return check.measured is None and check.detail.startswith(SKIPPED)
 
 
 def count_check(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
-    """A check that a count is as it should be."""
+    """A check that a count has its only allowed value."""
     name, file, unit = check
     good = measured == limit
     return Check(name, file, good, finite(measured), limit, unit, "" if good else detail)
 
 
 def volume_check(check: CheckName, measured: float, mesh: float, error: float) -> Check:
-    """A check that a volume is the mesh's.
+    """A check that a volume is the same as the mesh's.
 
     Args:
         check: name, file, unit.
@@ -58,8 +71,33 @@ def volume_check(check: CheckName, measured: float, mesh: float, error: float) -
     )
 
 
+def solid_checks(
+    program: str, file: str, figures: Mapping[str, float], part: ExpectedPart
+) -> tuple[Check, Check, Check]:
+    """One solid; every mirror a face on an exact sphere, and nothing else; the mesh's volume.
+
+    Args:
+        program: that read the file.
+        file: STEP.
+        figures: of solids, spheres and volume.
+        part: what is expected.
+    """
+    solids, spheres, volume = (
+        (f"{program} {key}", file, unit)
+        for key, unit in (("solids", SOLID), ("spheres", SPHERES), ("volume", VOLUME))
+    )
+    count = figures["spheres"]
+    return (
+        count_check(solids, figures["solids"], 1, "must be one"),
+        informative(spheres, count, "no mirrors: any number is allowed")
+        if part.spheres is None
+        else count_check(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
+        volume_check(volume, figures["volume"], part.volume, part.volume_error),
+    )
+
+
 def text_of(outcome: Outcome) -> str:
-    """What a program printed that ended well.
+    """The output of a program that ended without error.
 
     Raises:
         Unknown: it did not.
@@ -71,24 +109,24 @@ def text_of(outcome: Outcome) -> str:
     return outcome.text
 
 
-def figures(outcome: Outcome, answer: Path, keys: Sequence[str]) -> dict[str, float]:
-    """The numbers a script of ours wrote inside a program, as a JSON object.
+def script_figures(outcome: Outcome, folder: Path, keys: Sequence[str]) -> dict[str, float]:
+    """The numbers that a script of ours wrote inside a program, as a JSON object.
 
     Args:
         outcome: of the program.
-        answer: the script's file; with "error" in it when the script broke.
+        folder: that it ran in.
         keys: all of which must be there, as finite numbers.
 
     Raises:
         Unknown: it crashed, broke or left no such answer.
     """
-    said = _object(answer) if outcome.code is not None else {}
-    if outcome.code and isinstance(said.get("error"), str):
-        raise Unknown(_gave_up(outcome, _last_line(said["error"])))
+    answer = _object(folder / "answer.json") if outcome.code is not None else {}
+    if outcome.code and isinstance(answer.get("error"), str):
+        raise Unknown(_gave_up(outcome, _last_line(answer["error"])))
     text_of(outcome)
-    if not all(_is_number(said.get(key)) for key in keys):
-        raise Unknown("ended well, but left no readable answer")
-    return {key: float(said[key]) for key in keys}
+    if not all(_is_number(answer.get(key)) for key in keys):
+        raise Unknown(NO_ANSWER)
+    return {key: float(answer[key]) for key in keys}
 
 
 def _object(path: Path) -> dict[str, Any]:

@@ -9,34 +9,34 @@ from pathlib import Path
 
 from tbcad_verify.programs import admesh, freecad, gmsh, prusa
 from tbcad_verify.programs.answers import skipped
-from tbcad_verify.programs.program_query import Command, ExpectedPart, ProgramQuery, sandbox
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
-AT_ONCE = 2
+PROCESSES = 2
 QUERIES = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
 
 
 def check_with_programs(
     folder: Path,
-    wanted: Sequence[ExpectedPart],
+    parts: Sequence[ExpectedPart],
     seconds: float = 300.0,
     progress: Progress = lambda _: None,
-    errands: Sequence[ProgramQuery] = QUERIES,
+    queries: Sequence[ProgramQuery] = QUERIES,
 ) -> list[Check]:
     """Ask the programs about every file that they open.
 
-    A program that is not installed is skipped: see `is_skipped`. One that crashes, runs out of
-    time or gives no clear answer leaves its checks unknown. An interrupt kills those that run.
+    The checks of a program that is not installed are skipped: see `is_skipped`. Those of one that
+    crashes, runs out of time or gives no clear answer are unknown. An interrupt kills all of them.
 
     Args:
-        folder: the export; its files should have been held against the manifest before.
-        wanted: its parts.
+        folder: the export; its files should have been compared with the manifest before.
+        parts: of the export.
         seconds: time limit of one run of one program.
         progress: called with program and file before each run, from several threads.
-        errands: what is asked.
+        queries: what is asked.
 
     Raises:
         BadExport: the folder is missing or is no folder.
@@ -44,15 +44,15 @@ def check_with_programs(
     limits = Limits(seconds)
     root = open_folder(folder)
     jobs = [
-        partial(_settle, root, part, errand, limits, progress)
-        for part in wanted
-        for errand in errands
+        partial(_answers, root, part, query, limits, progress)
+        for part in parts
+        for query in queries
     ]
     return [check for checks in _two_at_a_time(jobs, limits) for check in checks]
 
 
 def _two_at_a_time(jobs: Sequence[Callable[[], list[Check]]], limits: Limits) -> list[list[Check]]:
-    with ThreadPoolExecutor(AT_ONCE) as pool:
+    with ThreadPoolExecutor(PROCESSES) as pool:
         try:
             running = [pool.submit(job) for job in jobs]
             done, _ = wait(running, return_when=FIRST_EXCEPTION)
@@ -65,23 +65,19 @@ def _two_at_a_time(jobs: Sequence[Callable[[], list[Check]]], limits: Limits) ->
             raise
 
 
-def _settle(
-    folder: Path, part: ExpectedPart, errand: ProgramQuery, limits: Limits, progress: Progress
+def _answers(
+    folder: Path, part: ExpectedPart, query: ProgramQuery, limits: Limits, progress: Progress
 ) -> list[Check]:
-    file = part.files.get(errand.kind, "")
-    if not file:
-        reason = f"the record names no {errand.kind} file"
-        return [skipped(name, reason) for name in errand.names(part)]
-    command = errand.find()
-    if not command:
-        reason = f"not installed: {errand.install}"
-        return [skipped(name, reason) for name in errand.names(part)]
-    progress(f"{errand.program}: {file}")
-    return guarded(errand.names(part), lambda: _ask(folder, part, errand, command, limits))
+    """The checks that one program answers about one file, or why they are skipped."""
+    file, command = part.files.get(query.kind, ""), query.find()
+    if not file or not command:
+        missing = f"not installed: {query.install}"
+        reason = missing if file else f"the record names no {query.kind} file"
+        return [skipped(name, reason) for name in query.names(part)]
+    progress(f"{query.program}: {file}")
 
+    def ask() -> Sequence[Check]:
+        with sandbox(command, folder, file, query.kind, limits) as private:
+            return query.ask(private, part)
 
-def _ask(
-    folder: Path, part: ExpectedPart, errand: ProgramQuery, command: Command, limits: Limits
-) -> Sequence[Check]:
-    with sandbox(command, folder, part.files[errand.kind], errand.kind, limits) as given:
-        return errand.ask(given, part)
+    return guarded(query.names(part), ask)

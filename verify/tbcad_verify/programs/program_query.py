@@ -1,4 +1,4 @@
-"""What one program is asked about one kind of file, and what it is given to answer."""
+"""What one program is asked about one kind of file, and the sandbox that it runs in."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad_verify.record.files import locate
-from tbcad_verify.report.checks import Check, CheckName
+from tbcad_verify.report.checks import Check, CheckName, check_names
 from tbcad_verify.run.child import Limits, Outcome, run
 
 Command = tuple[str, ...]  # a program's absolute path and first arguments; empty: it is absent
@@ -22,10 +22,10 @@ class ExpectedPart:
 
     Attributes:
         name: of the part.
-        files: "step", "stl", "3mf" -> file name inside the export; what is missing is skipped.
+        files: "step", "stl", "3mf" -> file name inside the export; missing ones are skipped.
         spheres: number of spherical faces of the solid; None: any number.
         volume: of the mesh, mm^3; NaN when it is unknown.
-        volume_error: how far another file's volume may be from it, mm^3.
+        volume_error: maximum difference of another file's volume from it, mm^3.
     """
 
     name: str
@@ -41,21 +41,21 @@ class Sandbox:
 
     Attributes:
         command: how the program's command line starts.
-        place: the folder, absolute.
-        given: the copy in it. Its name is ours, so that no name is ever taken for an option.
+        folder: absolute.
+        copy: in the folder. Its name is ours, so that it is never taken for an option.
         file: name of the original inside the export.
         limits: of the run.
     """
 
     command: Command
-    place: Path
-    given: Path
+    folder: Path
+    copy: Path
     file: str
     limits: Limits
 
     def run(self, *arguments: str | Path) -> Outcome:
         """Run the program with these further arguments."""
-        return run([*self.command, *map(str, arguments)], self.place, self.limits)
+        return run([*self.command, *map(str, arguments)], self.folder, self.limits)
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class ProgramQuery:
         kind: which of a part's files it is given.
         install: the command that installs it.
         questions: name -> unit of the checks it answers, in order.
-        find: how to start it.
+        find: returns how to start it.
         ask: runs it; raises Unknown when there is no answer.
     """
 
@@ -78,23 +78,23 @@ class ProgramQuery:
     find: Callable[[], Command]
     ask: Callable[[Sandbox, ExpectedPart], Sequence[Check]]
 
-    def names(self, wanted: ExpectedPart) -> list[CheckName]:
-        """Name, file and unit of every check; a part without such a file goes by its own name."""
-        file = wanted.files.get(self.kind) or wanted.name
-        return [(name, file, unit) for name, unit in self.questions.items()]
+    def names(self, part: ExpectedPart) -> list[CheckName]:
+        """Name, file and unit of every check; a part without such a file by its own name."""
+        file = part.files.get(self.kind) or part.name
+        return check_names(self.questions, file)
 
 
 def on_path(*names: str) -> Command:
     """The first of these programs that is installed, by its absolute path."""
-    found = next(filter(None, map(shutil.which, names)), None)
-    return () if found is None else (str(Path(found).absolute()),)
+    path = next(filter(None, map(shutil.which, names)), None)
+    return () if path is None else (str(Path(path).absolute()),)
 
 
 @contextmanager
 def sandbox(
     command: Command, folder: Path, file: str, kind: str, limits: Limits
 ) -> Iterator[Sandbox]:
-    """A room that is gone afterwards.
+    """A sandbox that is deleted afterwards.
 
     Args:
         command: how the program's command line starts.
@@ -108,7 +108,7 @@ def sandbox(
     """
     original = locate(folder, file)
     with tempfile.TemporaryDirectory(prefix="tbcad-", ignore_cleanup_errors=True) as name:
-        place = Path(name).resolve()
-        given = place / f"given.{kind}"
-        shutil.copyfile(original, given)
-        yield Sandbox(command, place, given, file, limits)
+        private = Path(name).resolve()
+        copy = private / f"given.{kind}"
+        shutil.copyfile(original, copy)
+        yield Sandbox(command, private, copy, file, limits)

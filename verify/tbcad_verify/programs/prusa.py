@@ -1,4 +1,4 @@
-"""PrusaSlicer: is a mesh manifold as it is, and does it become a print of the right volume?"""
+"""PrusaSlicer: whether a mesh is manifold without repair, and the volume of its print."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REPAIRS = (
     "backwards_edges",
 )
 FILAMENT_MM = 1.75
-SOLID_PERCENT = 5.0  # a print's volume is that of its lines; measured: 1.0 to 1.8 too much
+SOLID_PERCENT = 5.0  # a print's volume is that of its lines; 1.0 to 1.8 too much were measured
 TAIL = 1_000_000  # bytes of G-code that hold the figures at its end
 HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
 
@@ -34,73 +34,78 @@ PROFILE = (
 )
 
 
-def ask_info(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
+def ask_info(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
     Raises:
-        Unknown: there is no answer.
+        Unknown: the program gives no answer.
     """
-    said = _lines(text_of(room.run("--datadir", room.place / "home", "--info", room.given)))
+    lines = _lines(
+        text_of(sandbox.run("--datadir", sandbox.folder / "home", "--info", sandbox.copy))
+    )
     return [
-        _manifold(room.file, said),
+        _manifold(sandbox.file, lines),
         count_check(
-            ("prusa parts", room.file, PARTS), _needed(said, "number_of_parts"), 1, "must be one"
+            ("prusa parts", sandbox.file, PARTS),
+            _required(lines, "number_of_parts"),
+            1,
+            "must be one",
         ),
         volume_check(
-            ("prusa volume", room.file, VOLUME),
-            _needed(said, "volume"),
-            wanted.volume,
-            wanted.volume_error,
+            ("prusa volume", sandbox.file, VOLUME),
+            _required(lines, "volume"),
+            expected.volume,
+            expected.volume_error,
         ),
     ]
 
 
-def ask_slices(room: Sandbox, wanted: ExpectedPart) -> list[Check]:
-    """The print's volume is the mesh's; how much filament and time it takes is told.
+def ask_slices(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+    """The print's volume is the mesh's; filament and time inform.
 
     Raises:
-        Unknown: there is no answer.
+        Unknown: the program gives no answer.
     """
-    code = room.place / "sliced.gcode"
-    data = ("--datadir", room.place / "home")
-    text_of(room.run(*data, "--export-gcode", *PROFILE, "--output", code, room.given))
+    code = sandbox.folder / "sliced.gcode"
+    data = ("--datadir", sandbox.folder / "home")
+    text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
     length, hours = _print(_tail(code))
     return [
-        _slices(("prusa slices", room.file, "%"), length, wanted.volume),
-        informative(("prusa filament", room.file, "m"), length / 1e3),
+        _slices(("prusa slices", sandbox.file, "%"), length, expected.volume),
+        informative(("prusa filament", sandbox.file, "m"), length / 1e3),
         informative(
-            ("prusa time", room.file, "h"), round(hours, 1)
+            ("prusa time", sandbox.file, "h"), round(hours, 1)
         ),  # seconds differ from run to run
     ]
 
 
 def _lines(text: str) -> list[tuple[str, str]]:
-    """Key and value of every line; an object of the file begins anew."""
+    """Key and value of every line; keys repeat for each object of the file."""
     return re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE)
 
 
-def _manifold(file: str, said: list[tuple[str, str]]) -> Check:
-    verdicts = [value for key, value in said if key == "manifold"]
+def _manifold(file: str, lines: list[tuple[str, str]]) -> Check:
+    verdicts = [value for key, value in lines if key == "manifold"]
     if not verdicts or {*verdicts} - {"yes", "no"}:
-        raise Unknown("ended well, but did not say whether the mesh is manifold")
-    repairs = {key: _sum(said, key) for key in REPAIRS if any(name == key for name, _ in said)}
+        raise Unknown("ended without error, but did not say whether the mesh is manifold")
+    repairs = {key: _sum(lines, key) for key in REPAIRS if any(name == key for name, _ in lines)}
     flaws = verdicts.count("no") + sum(map(abs, repairs.values()))
     named = ", ".join(f"{key} {count:.0f}" for key, count in repairs.items())
     detail = f"manifold: {', '.join(verdicts)}; {named or 'no repairs'}"
     return at_most(("prusa manifold", file, "flaws"), flaws, 0, detail)
 
 
-def _needed(said: list[tuple[str, str]], key: str) -> float:
-    if not any(name == key for name, _ in said):
-        raise Unknown(f"ended well, but did not say its {key}")
-    return _sum(said, key)
+def _required(lines: list[tuple[str, str]], key: str) -> float:
+    if not any(name == key for name, _ in lines):
+        raise Unknown(f"ended without error, but did not say its {key}")
+    return _sum(lines, key)
 
 
-def _sum(said: list[tuple[str, str]], key: str) -> float:
+def _sum(lines: list[tuple[str, str]], key: str) -> float:
     try:
-        return sum([float(value) for name, value in said if name == key]) + 0.0
+        return sum([float(value) for name, value in lines if name == key]) + 0.0
     except ValueError as error:
-        raise Unknown(f"ended well, but its {key} is no number") from error
+        raise Unknown(f"ended without error, but its {key} is no number") from error
 
 
 def _slices(name: tuple[str, str, str], length: float, mesh: float) -> Check:
@@ -117,7 +122,7 @@ def _tail(code: Path) -> str:
             stream.seek(max(0, code.stat().st_size - TAIL))
             return stream.read(TAIL).decode("utf-8", "replace")
     except OSError as error:
-        raise Unknown("ended well, but wrote no G-code") from error
+        raise Unknown("ended without error, but wrote no G-code") from error
 
 
 def _print(code: str) -> tuple[float, float]:
@@ -126,7 +131,7 @@ def _print(code: str) -> tuple[float, float]:
     time = re.search(r"^; estimated printing time \(normal mode\) = (.{2,40})$", code, re.MULTILINE)
     spans = re.findall(r"(\d{1,9})([dhms])", time[1]) if time else []
     if length is None or not spans:
-        raise Unknown("ended well, but its G-code tells neither filament nor time")
+        raise Unknown("ended without error, but its G-code tells neither filament nor time")
     return float(length[1]), sum(int(count) * HOURS[unit] for count, unit in spans)
 
 
