@@ -107,8 +107,8 @@ class TestVersions:
     def test_a_worker_that_came_late_is_asked_too(self) -> None:
         other = {**versions(), "numpy": "0.1"}
         with pytest.raises(InputError, match=r"numpy .* allowed is 0\.1 as here: install the same"):
-            schedule._on_worker(drawn, 1, other)
-        assert schedule._on_worker(drawn, 1, versions()) == drawn(1)
+            schedule._on_worker(drawn, 1, other, "here")
+        assert schedule._on_worker(drawn, 1, versions(), "here") == drawn(1)
 
 
 def copied(folder: Path) -> Path:
@@ -207,6 +207,12 @@ class Marks:
 
         return marked
 
+    def are_quiet(self) -> bool:
+        """Whether no unit begins for some time."""
+        begun = self.of("begun")
+        time.sleep(0.5)
+        return begun == self.of("begun") == self.of("ended")
+
     def of(self, what: str, process: int | str = "*") -> list[int]:
         found = self.folder.glob(f"{what}-{process}-*")
         return sorted(int(path.name.rpartition("-")[2]) for path in found)
@@ -249,10 +255,8 @@ class TestCluster:
 
         with pytest.raises(KeyboardInterrupt):
             run_units(marks.work(0.1), range(1000), standing.address, interrupted)
-        until(lambda: marks.of("begun") == marks.of("ended"))
-        begun = len(marks.of("begun"))
-        time.sleep(0.5)
-        assert len(marks.of("begun")) == begun < 50
+        until(marks.are_quiet)
+        assert len(marks.of("begun")) < 50
 
     def test_what_work_raises_is_raised_here(self, standing: Cluster) -> None:
         def work(unit: int) -> None:
@@ -324,7 +328,7 @@ class TestRefused:
     ) -> None:
         """dask's own client would wait for a silent one without end."""
         pytest.importorskip("distributed")
-        monkeypatch.setattr(schedule, "_CONNECT", 0.5)
+        monkeypatch.setattr(schedule, "_CONNECT_TIMEOUT", 0.5)
 
         def greet(server: socket.socket) -> None:
             line, _ = server.accept()
@@ -341,7 +345,7 @@ class TestRefused:
         said = refusal(drawn_there(), [1], cluster.address, patience=0.3)
         assert f"no worker for 0.3 s: start `dask worker {cluster.address}`" in said
 
-        module = copied(tmp_path / "other") / "__init__.py"
+        module = copied(tmp_path / "other") / "version.py"
         module.write_text(module.read_text().replace(tbcad.__version__, "0.0.1"))
         cluster.start(1, {"PYTHONPATH": str(tmp_path / "other")})
         said = refusal(drawn_there(), [1], cluster.address)
@@ -372,7 +376,7 @@ class TestRefused:
     def test_when_all_workers_die_and_when_the_scheduler_does(
         self, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(schedule, "_LOOK", 0.3)
+        monkeypatch.setattr(schedule, "_CHECK_INTERVAL", 0.3)
         cluster.start(1)
         work = Marks(tmp_path / "marks").work(0.1)
 
