@@ -1,4 +1,4 @@
-"""One good synthetic export, made once; every test takes a copy and breaks it."""
+"""One good synthetic export, made once; every test that breaks it takes a copy."""
 
 from __future__ import annotations
 
@@ -8,20 +8,27 @@ from pathlib import Path
 import pytest
 from tbcad_verify.shell.optics import OpticalSetup
 
-from tests.verify.benches import bench_of
+from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells, Design, export
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Cells]:
+def synthetic_shells(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Cells]:
     return export(tmp_path_factory.mktemp("good") / "export", Design())
 
 
 @pytest.fixture
-def good(made: tuple[Path, Cells], tmp_path: Path) -> Path:
-    return Path(shutil.copytree(made[0], tmp_path / "export"))
+def export_folder(synthetic_shells: tuple[Path, Cells], tmp_path: Path) -> Path:
+    """A copy, to be broken."""
+    return Path(shutil.copytree(synthetic_shells[0], tmp_path / "export"))
 
 
 @pytest.fixture(scope="session")
-def bench(made: tuple[Path, Cells]) -> OpticalSetup:
-    return bench_of(made[0])
+def exact_cells(synthetic_shells: tuple[Path, Cells]) -> Cells:
+    """The cells that the export's shells were made from."""
+    return synthetic_shells[1]
+
+
+@pytest.fixture(scope="session")
+def optical_setup(synthetic_shells: tuple[Path, Cells]) -> OpticalSetup:
+    return optical_setup_of(synthetic_shells[0])

@@ -14,7 +14,7 @@ from tbcad_verify import main, verify
 from tbcad_verify.report.checks import Check
 
 from tests.csv_files import Rows, edit_csv
-from tests.verify.benches import HERE
+from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.prototype.synthetic_prototype import Machine, balls, export
 from tests.verify.synthetic_export import sign
 
@@ -24,7 +24,7 @@ Row = dict[str, Any]
 ON_STOPS = (
     "cells",
     "coverage, balls",
-    "coverage, balls, off the record",
+    "coverage, balls, deviation from record",
     "light of the balls",
     "rays of the balls",
     "pixels kept by the balls",
@@ -45,7 +45,7 @@ def signed(folder: Path) -> Path:
 
 def found(folder: Path) -> dict[str, Check]:
     """Failed and unknown checks by name."""
-    report = verify(folder, options=replace(HERE, write=False))
+    report = verify(folder, options=replace(IN_PROCESS, write=False))
     return {check.name: check for check in report.checks if check.passed is not True}
 
 
@@ -67,7 +67,7 @@ def moved(row: dict[str, str], name: str, by: float) -> None:
 
 
 def test_a_good_prototype_passes(made: Path) -> None:
-    report = verify(made, options=HERE)
+    report = verify(made, options=IN_PROCESS)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert report.verdict.startswith("PASS: no shell in this export; prototype: 4 balls at 48")
     section = json.loads((made / "verify.json").read_text())["prototype"]
@@ -79,22 +79,22 @@ def test_a_good_prototype_passes(made: Path) -> None:
 
 
 def test_the_proof_in_another_process_is_the_same(made: Path) -> None:
-    here = verify(made, options=replace(HERE, write=False))
-    apart = verify(made, options=replace(HERE, write=False, apart=True))
+    here = verify(made, options=replace(IN_PROCESS, write=False))
+    apart = verify(made, options=replace(IN_PROCESS, write=False, apart=True))
     assert apart.to_json() == here.to_json()
 
 
 def test_a_prototype_beside_a_shell(tmp_path: Path) -> None:
-    report = verify(export(tmp_path / "x", Machine(shell=True)), options=HERE)
+    report = verify(export(tmp_path / "x", Machine(shell=True)), options=IN_PROCESS)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert "virtual cameras see" in report.verdict
     assert "prototype: 4 balls" in report.verdict
 
 
 def test_the_shell_is_not_asked_for_when_there_is_none(made: Path) -> None:
-    names = {check.name for check in verify(made, options=HERE).checks}
+    names = {check.name for check in verify(made, options=IN_PROCESS).checks}
     assert "poses" in names
-    assert not names & {"coverage, spheres", "light path", "mirrors found"}
+    assert not names & {"coverage, spheres", "light paths", "mirrors found"}
 
 
 def row_of(name: str) -> Callable[[list[Row]], None]:
@@ -385,7 +385,7 @@ def test_a_mesh_with_a_hole_fails(made: Path) -> None:
 
 
 def test_a_machine_that_cannot_make_the_parts_fails(made: Path) -> None:
-    report = verify(made, options=replace(HERE, write=False, printers=("sla",)))
+    report = verify(made, options=replace(IN_PROCESS, write=False, printers=("sla",)))
     assert {c.file for c in report.checks if c.name == "print sla" and not c.passed} >= {"foot.stl"}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tbcad_verify import BadExport, main, verify
 
-from tests.verify.benches import HERE
+from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.synthetic_export import sign
 
 NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
@@ -188,34 +188,36 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("how", BROKEN)
-def test_broken_export_is_refused(good: Path, how: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_broken_export_is_refused(
+    export_folder: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     change, words = BROKEN[how]
-    change(good)
-    before = {path: path.stat().st_mtime_ns for path in good.parent.rglob("*")}
-    assert main([str(good)]) == 2
+    change(export_folder)
+    before = {path: path.stat().st_mtime_ns for path in export_folder.parent.rglob("*")}
+    assert main([str(export_folder)]) == 2
     out = capsys.readouterr()
     last = [line for line in out.err.splitlines() if not line.startswith("verify: ")]
     assert len(last) == 1
     assert words in last[0]
     assert out.out == ""
-    assert {path: path.stat().st_mtime_ns for path in good.parent.rglob("*")} == before
+    assert {path: path.stat().st_mtime_ns for path in export_folder.parent.rglob("*")} == before
 
 
 def test_missing_folder_and_file_for_folder(tmp_path: Path) -> None:
     with pytest.raises(BadExport, match="no such folder"):
-        verify(tmp_path / "nowhere", options=HERE)
+        verify(tmp_path / "nowhere", options=IN_PROCESS)
     (tmp_path / "file").write_text("x")
     with pytest.raises(BadExport, match="not a folder"):
-        verify(tmp_path / "file", options=HERE)
+        verify(tmp_path / "file", options=IN_PROCESS)
     (tmp_path / "empty").mkdir()
     with pytest.raises(BadExport, match=r"design\.json: missing"):
-        verify(tmp_path / "empty", options=HERE)
+        verify(tmp_path / "empty", options=IN_PROCESS)
 
 
-def test_link_inside_is_followed(good: Path) -> None:
-    (good / "shell_a.stl").rename(good / "real.stl")
-    (good / "shell_a.stl").symlink_to("real.stl")
-    assert verify(sign(good, NAMES), options=HERE).passed
+def test_link_inside_is_followed(export_folder: Path) -> None:
+    (export_folder / "shell_a.stl").rename(export_folder / "real.stl")
+    (export_folder / "shell_a.stl").symlink_to("real.stl")
+    assert verify(sign(export_folder, NAMES), options=IN_PROCESS).passed
 
 
 def test_bad_arguments_are_bad_input() -> None:
@@ -224,7 +226,7 @@ def test_bad_arguments_are_bad_input() -> None:
     assert stop.value.code == 2
 
 
-def test_a_file_cut_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_cut_while_it_is_read(export_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tbcad_verify.record import files
 
     whole = np.fromfile
@@ -234,10 +236,12 @@ def test_a_file_cut_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(files.np, "fromfile", cut)
     with pytest.raises(BadExport, match="changed while it was read"):
-        verify(good, options=HERE)
+        verify(export_folder, options=IN_PROCESS)
 
 
-def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_grows_while_it_is_read(
+    export_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from tbcad_verify.record import files
 
     def smaller(handle: int) -> os.stat_result:
@@ -246,11 +250,13 @@ def test_a_file_that_grows_while_it_is_read(good: Path, monkeypatch: pytest.Monk
     real = os.fstat
     monkeypatch.setattr(files.os, "fstat", smaller)
     with pytest.raises(BadExport, match="changed while it was read"):
-        verify(good, options=HERE)
+        verify(export_folder, options=IN_PROCESS)
 
 
-def test_a_folder_that_takes_no_verdict(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (good / "verify.json").mkdir()
-    assert main([str(good), "-q"]) == 2
+def test_a_folder_that_takes_no_verdict(
+    export_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (export_folder / "verify.json").mkdir()
+    assert main([str(export_folder), "-q"]) == 2
     assert "verify.json cannot be written" in capsys.readouterr().err
-    assert [p.name for p in good.iterdir() if p.name.startswith(".")] == []
+    assert [p.name for p in export_folder.iterdir() if p.name.startswith(".")] == []

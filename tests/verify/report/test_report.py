@@ -21,7 +21,7 @@ from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
 
 from tests.csv_files import Rows, edit_csv
-from tests.verify.benches import HERE
+from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.synthetic_export import (
     Cells,
     Design,
@@ -45,11 +45,11 @@ def detail(report: Report, name: str) -> str:
     return "; ".join(check.detail for check in report.checks if check.name == name)
 
 
-def test_a_good_export_passes(good: Path) -> None:
-    report = verify(good, options=HERE)
+def test_a_good_export_passes(export_folder: Path) -> None:
+    report = verify(export_folder, options=IN_PROCESS)
     assert failed(report) == set()
     assert report.passed
-    written = json.loads((good / "verify.json").read_text())
+    written = json.loads((export_folder / "verify.json").read_text())
     assert list(written) == ["pass", "target_mm", "checks", "printing", "mirrors"]
     assert written["pass"] is True
     assert written["target_mm"] == 40.0
@@ -73,31 +73,33 @@ def test_a_good_export_passes(good: Path) -> None:
         assert mirror["pixels"] > 0
 
 
-def test_same_export_same_bytes(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    verify(good, options=HERE)
-    before = (good / "verify.json").read_bytes()
+def test_same_export_same_bytes(export_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    verify(export_folder, options=IN_PROCESS)
+    before = (export_folder / "verify.json").read_bytes()
     for threads in (1, 3):
         monkeypatch.setattr(rays, "THREADS", threads)
-        verify(good, options=HERE)
-        assert (good / "verify.json").read_bytes() == before
-    assert [path.name for path in good.iterdir() if "verify" in path.name] == ["verify.json"]
+        verify(export_folder, options=IN_PROCESS)
+        assert (export_folder / "verify.json").read_bytes() == before
+    assert [path.name for path in export_folder.iterdir() if "verify" in path.name] == [
+        "verify.json"
+    ]
 
 
-def test_nothing_is_written_when_asked(good: Path) -> None:
-    assert verify(good, options=VerifyOptions(write=False, apart=False)).passed
-    assert not (good / "verify.json").exists()
+def test_nothing_is_written_when_asked(export_folder: Path) -> None:
+    assert verify(export_folder, options=VerifyOptions(write=False, apart=False)).passed
+    assert not (export_folder / "verify.json").exists()
 
 
-def test_stages_are_told(good: Path) -> None:
+def test_stages_are_told(export_folder: Path) -> None:
     said: list[str] = []
-    verify(good, said.append, HERE)
+    verify(export_folder, said.append, IN_PROCESS)
     assert said[0] == "reading"
     assert said[-1] == "every pixel"
 
 
-def test_command_line(good: Path) -> None:
+def test_command_line(export_folder: Path) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "tbcad_verify", str(good)],
+        [sys.executable, "-m", "tbcad_verify", str(export_folder)],
         capture_output=True,
         text=True,
         check=False,
@@ -108,8 +110,8 @@ def test_command_line(good: Path) -> None:
     assert "\x1b" not in run.stdout
 
 
-def test_quiet_is_one_line(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(good), "--quiet"]) == 0
+def test_quiet_is_one_line(export_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(export_folder), "--quiet"]) == 0
     out = capsys.readouterr()
     assert out.err == ""
     assert len(out.out.splitlines()) == 1
@@ -196,7 +198,7 @@ def dent(facets: np.ndarray) -> np.ndarray:
 
 
 BROKEN: dict[str, tuple[Callable[[Path], None], str, str]] = {
-    "flipped": (both(lambda f: f[:, ::-1]), "outward", "inside out"),
+    "flipped": (both(lambda f: f[:, ::-1]), "signed volume", "inside out"),
     "one facet flipped": (rewrite("shell_a.stl", flip_one), "watertight", "turned against"),
     "a hole": (rewrite("shell_a.stl", lambda f: f[1:]), "watertight", "3 open"),
     "inches": (both(lambda f: f / np.float32(25.4)), "mirrors found", "x the record's size"),
@@ -231,14 +233,14 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str, str]] = {
 
 
 @pytest.mark.parametrize("how", BROKEN)
-def test_broken_export_fails_for_its_reason(good: Path, how: str) -> None:
+def test_broken_export_fails_for_its_reason(export_folder: Path, how: str) -> None:
     change, name, words = BROKEN[how]
-    change(good)
-    report = verify(sign(good, NAMES), options=HERE)
+    change(export_folder)
+    report = verify(sign(export_folder, NAMES), options=IN_PROCESS)
     assert not report.passed
     assert name in failed(report)
     assert words in detail(report, name)
-    assert json.loads((good / "verify.json").read_text())["pass"] is False
+    assert json.loads((export_folder / "verify.json").read_text())["pass"] is False
     assert report.verdict.startswith("FAIL: ")
 
 
@@ -258,53 +260,53 @@ def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
             "shell_b.stl": stl(mirrored(facets)),
         },
     )
-    assert failed(verify(folder, options=HERE)) == {"directions"}
+    assert failed(verify(folder, options=IN_PROCESS)) == {"directions"}
 
 
-def test_changed_files_are_noticed(good: Path) -> None:
-    data = bytearray((good / "shell_a.stl").read_bytes())
+def test_changed_files_are_noticed(export_folder: Path) -> None:
+    data = bytearray((export_folder / "shell_a.stl").read_bytes())
     data[0] ^= 1
-    (good / "shell_a.stl").write_bytes(data)
-    report = verify(good, options=HERE)
+    (export_folder / "shell_a.stl").write_bytes(data)
+    report = verify(export_folder, options=IN_PROCESS)
     assert failed(report) == {"manifest"}
     assert "shell_a.stl" in detail(report, "manifest")
 
 
-def test_listed_but_missing_and_unlisted_files(good: Path) -> None:
-    (good / "notes.csv").write_text("x")
-    sign(good, [*NAMES, "notes.csv"])
-    assert verify(good, options=HERE).passed
-    (good / "notes.csv").unlink()
-    assert failed(verify(good, options=HERE)) == {"manifest"}
-    sign(good, NAMES[:3])
-    assert "shell_b.stl" in detail(verify(good, options=HERE), "manifest")
-    sign(good, NAMES)
-    (good / "notes.txt").write_text("mine")
-    report = verify(good, options=HERE)
+def test_listed_but_missing_and_unlisted_files(export_folder: Path) -> None:
+    (export_folder / "notes.csv").write_text("x")
+    sign(export_folder, [*NAMES, "notes.csv"])
+    assert verify(export_folder, options=IN_PROCESS).passed
+    (export_folder / "notes.csv").unlink()
+    assert failed(verify(export_folder, options=IN_PROCESS)) == {"manifest"}
+    sign(export_folder, NAMES[:3])
+    assert "shell_b.stl" in detail(verify(export_folder, options=IN_PROCESS), "manifest")
+    sign(export_folder, NAMES)
+    (export_folder / "notes.txt").write_text("mine")
+    report = verify(export_folder, options=IN_PROCESS)
     assert report.passed
     assert next(c.measured for c in report.checks if c.name == "other files") == 1
 
 
 def test_a_check_that_breaks_is_unknown_and_no_pass(
-    good: Path, monkeypatch: pytest.MonkeyPatch
+    export_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError("on purpose")
 
     monkeypatch.setattr(pixels.light, "full_sensor", broken)
-    report = verify(good, options=HERE)
+    report = verify(export_folder, options=IN_PROCESS)
     assert not report.passed
     unknown = {check.name for check in report.checks if check.passed is None}
     assert unknown == set(pixels.CHECKS)
-    written = json.loads((good / "verify.json").read_text())
+    written = json.loads((export_folder / "verify.json").read_text())
     lost = [check for check in written["checks"] if check["pass"] is None]
     assert all(check["detail"] == "ZeroDivisionError: on purpose" for check in lost)
     assert all(mirror["pixels"] is None for mirror in written["mirrors"])
-    assert "unknown: light path" in report.verdict
+    assert "unknown: light paths" in report.verdict
 
 
 def test_everything_optical_is_unknown_without_a_bench(
-    good: Path, monkeypatch: pytest.MonkeyPatch
+    export_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tbcad_verify.run import stages
 
@@ -312,17 +314,17 @@ def test_everything_optical_is_unknown_without_a_bench(
         raise MemoryError
 
     monkeypatch.setattr(stages, "recover", broken)
-    report = verify(good, options=HERE)
+    report = verify(export_folder, options=IN_PROCESS)
     names = {check.name for check in report.checks if check.passed is None}
-    assert {"mirrors found", "coverage, facets", "light path"} <= names
+    assert {"mirrors found", "coverage, facets", "light paths"} <= names
     assert "watertight" not in names
 
 
-def test_a_spec_without_its_keys_is_unknown(good: Path) -> None:
-    design = json.loads((good / "design.json").read_text())
+def test_a_spec_without_its_keys_is_unknown(export_folder: Path) -> None:
+    design = json.loads((export_folder / "design.json").read_text())
     del design["spec"]["optics"]
-    (good / "design.json").write_text(json.dumps(design))
-    report = verify(sign(good, NAMES), options=HERE)
+    (export_folder / "design.json").write_text(json.dumps(design))
+    report = verify(sign(export_folder, NAMES), options=IN_PROCESS)
     unknown = {check.name for check in report.checks if check.passed is None}
     assert unknown == {"requirements", "poses", "directions"}
     assert not report.passed

@@ -102,41 +102,41 @@ def test_results_add_up() -> None:
     np.testing.assert_array_equal(results.mirrors["pixels"], column)
 
 
-def test_the_result_is_the_same_in_a_process_of_its_own(good: Path) -> None:
+def test_the_result_is_the_same_in_a_process_of_its_own(export_folder: Path) -> None:
     said: list[str] = []
-    assert verify(good, said.append).passed
-    apart = (good / NAME).read_bytes()
+    assert verify(export_folder, said.append).passed
+    apart = (export_folder / NAME).read_bytes()
     here: list[str] = []
-    assert verify(good, here.append, VerifyOptions(apart=False)).passed
-    assert (good / NAME).read_bytes() == apart
+    assert verify(export_folder, here.append, VerifyOptions(apart=False)).passed
+    assert (export_folder / NAME).read_bytes() == apart
     assert said == here
 
 
-def test_too_little_time_is_no_pass(good: Path) -> None:
-    report = verify(good, options=VerifyOptions(seconds=0.01))
+def test_too_little_time_is_no_pass(export_folder: Path) -> None:
+    report = verify(export_folder, options=VerifyOptions(seconds=0.01))
     assert not report.passed
     assert {check.passed for check in report.checks} == {None}
     assert "unknown: reading" in report.verdict
 
 
-def test_a_file_replaced_while_it_is_read(good: Path) -> None:
+def test_a_file_replaced_while_it_is_read(export_folder: Path) -> None:
     """With the very same bytes, in another file: who did that may have done more."""
 
     def replace(stage: str) -> None:
         if stage == "coverage":
-            copy = good / "copy"
-            copy.write_bytes((good / "shell_a.stl").read_bytes())
-            copy.replace(good / "shell_a.stl")
+            copy = export_folder / "copy"
+            copy.write_bytes((export_folder / "shell_a.stl").read_bytes())
+            copy.replace(export_folder / "shell_a.stl")
 
     with pytest.raises(BadExport, match=r"shell_a\.stl: changed while it was read"):
-        verify(good, replace, VerifyOptions(apart=False))
-    assert not (good / NAME).exists()
+        verify(export_folder, replace, VerifyOptions(apart=False))
+    assert not (export_folder / NAME).exists()
 
 
-def test_a_file_removed_while_it_is_read(good: Path) -> None:
+def test_a_file_removed_while_it_is_read(export_folder: Path) -> None:
     def remove(stage: str) -> None:
         if stage == "coverage":
-            (good / "mirrors.csv").unlink()
+            (export_folder / "mirrors.csv").unlink()
 
     with pytest.raises(BadExport, match=r"mirrors\.csv: changed"):
-        verify(good, remove, VerifyOptions(apart=False))
+        verify(export_folder, remove, VerifyOptions(apart=False))

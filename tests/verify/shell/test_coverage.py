@@ -24,7 +24,7 @@ from tbcad_verify.shell.outline import (
 )
 from tbcad_verify.shell.recover import follows_fit, recover
 
-from tests.verify.benches import bench_of
+from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import PIN, Cells, Design, export, poses, unit
 
 ONE = Virtual(np.array([0]), 1, np.array([False]))
@@ -160,10 +160,10 @@ def oracle(cells: Cells) -> dict[int, float]:
 FINE = Cells(Design(arc=80), poses(Design()))
 
 
-def test_every_mirror_against_brute_force(bench: OpticalSetup) -> None:
-    found = coverage.measure(bench)
+def test_every_mirror_against_brute_force(optical_setup: OpticalSetup) -> None:
+    found = coverage.measure(optical_setup)
     expected = oracle(FINE)
-    for v, name in enumerate(bench.virtual_ids):
+    for v, name in enumerate(optical_setup.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(expected[int(name[1:])], abs=0.08), name
             assert found.facet[v] == pytest.approx(expected[int(name[1:])], abs=3.0), name
@@ -172,15 +172,15 @@ def test_every_mirror_against_brute_force(bench: OpticalSetup) -> None:
 
 def test_flat_mirrors_are_recovered_and_covered(tmp_path: Path) -> None:
     folder, _ = export(tmp_path / "x", Design(flat=True, target=15.0))
-    bench = bench_of(folder)
-    assert (bench.match.segment >= 0).all()
-    assert bench.match.centre_error.max() < 1e-4
-    assert (bench.match.radius_error == 0).all()
+    optical_setup = optical_setup_of(folder)
+    assert (optical_setup.match.segment >= 0).all()
+    assert optical_setup.match.centre_error.max() < 1e-4
+    assert (optical_setup.match.radius_error == 0).all()
     found, expected = (
-        coverage.measure(bench),
+        coverage.measure(optical_setup),
         oracle(Cells(Design(flat=True, arc=80), poses(Design()))),
     )
-    for v, name in enumerate(bench.virtual_ids):
+    for v, name in enumerate(optical_setup.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(expected[int(name[1:])], abs=0.05), name
     # DESIGN.md section 3 has 21.0 mm at n = 4, there as 2 d sin theta_0, on the whole sphere.
@@ -189,14 +189,14 @@ def test_flat_mirrors_are_recovered_and_covered(tmp_path: Path) -> None:
 
 def test_a_flat_mirror_tilted_by_a_micrometre_is_seen(tmp_path: Path) -> None:
     folder, _ = export(tmp_path / "x", Design(flat=True, target=15.0, moved={10: [0, 0, 0.01]}))
-    assert bench_of(folder).match.centre_error.max() == pytest.approx(0.01, rel=0.3)
+    assert optical_setup_of(folder).match.centre_error.max() == pytest.approx(0.01, rel=0.3)
 
 
-def test_halves_share_their_coverage(bench: OpticalSetup) -> None:
-    found = coverage.measure(bench)
-    index = bench.virtual.index
-    ids = bench.export.mirrors.ids
-    halves = [k for k in range(len(ids)) if bench.virtual.halved[k]]
+def test_halves_share_their_coverage(optical_setup: OpticalSetup) -> None:
+    found = coverage.measure(optical_setup)
+    index = optical_setup.virtual.index
+    ids = optical_setup.export.mirrors.ids
+    halves = [k for k in range(len(ids)) if optical_setup.virtual.halved[k]]
     assert len(halves) == 18
     for k in halves:
         other = ids.index(("b" if ids[k][0] == "a" else "a") + ids[k][1:])
@@ -205,47 +205,49 @@ def test_halves_share_their_coverage(bench: OpticalSetup) -> None:
         assert found.fitted[index[k]] > 40
 
 
-def test_a_lost_half_is_no_coverage(bench: OpticalSetup) -> None:
-    half = int(np.flatnonzero(bench.virtual.halved)[0])
-    segment = bench.match.segment.copy()
+def test_a_lost_half_is_no_coverage(optical_setup: OpticalSetup) -> None:
+    half = int(np.flatnonzero(optical_setup.virtual.halved)[0])
+    segment = optical_setup.match.segment.copy()
     segment[half] = -1
-    found = coverage.measure(replace(bench, match=replace(bench.match, segment=segment)))
-    assert np.isnan(found.fitted[bench.virtual.index[half]])
-    lines = {c.name: c for c in coverage.checks(bench, found, "x")}
+    found = coverage.measure(
+        replace(optical_setup, match=replace(optical_setup.match, segment=segment))
+    )
+    assert np.isnan(found.fitted[optical_setup.virtual.index[half]])
+    lines = {c.name: c for c in coverage.checks(optical_setup, found, "x")}
     assert lines["coverage, spheres"].passed is False
-    assert bench.export.mirrors.ids[half] in lines["coverage, spheres"].detail
+    assert optical_setup.export.mirrors.ids[half] in lines["coverage, spheres"].detail
 
 
 @pytest.mark.parametrize("coating", [0.0, 0.05])
 def test_a_coated_export_is_proved_like_a_bare_one(tmp_path: Path, coating: float) -> None:
     """The record speaks of the coated spheres: with the coat on, the same mirrors see the same."""
     folder, _ = export(tmp_path / "x", Design(coating=coating))
-    bench = bench_of(folder)
-    assert bench.match.radius_error.max() < 1e-3
-    found = coverage.measure(bench)
+    optical_setup = optical_setup_of(folder)
+    assert optical_setup.match.radius_error.max() < 1e-3
+    found = coverage.measure(optical_setup)
     bare = oracle(FINE)
-    for v, name in enumerate(bench.virtual_ids):
+    for v, name in enumerate(optical_setup.virtual_ids):
         if name.startswith("a"):
             assert found.fitted[v] == pytest.approx(bare[int(name[1:])], abs=0.1), name
 
 
 def test_the_coat_matters(tmp_path: Path) -> None:
     folder, _ = export(tmp_path / "x", Design(coating=0.05))
-    bench = bench_of(folder)
-    forgotten = replace(bench, export=replace(bench.export, coating_mm=0.0))
+    optical_setup = optical_setup_of(folder)
+    forgotten = replace(optical_setup, export=replace(optical_setup.export, coating_mm=0.0))
     from tbcad_verify.shell.match import centre_and_radius_errors
 
-    mirrors, fits = bench.export.mirrors, bench.recovery.fits
+    mirrors, fits = optical_setup.export.mirrors, optical_setup.recovery.fits
     radius = centre_and_radius_errors(
-        mirrors, fits, bench.match.segment, forgotten.export.coating_mm
+        mirrors, fits, optical_setup.match.segment, forgotten.export.coating_mm
     )[1]
     assert radius.max() == pytest.approx(0.05, abs=1e-3)
 
 
-def test_seam_gap_against_brute_force(bench: OpticalSetup) -> None:
+def test_seam_gap_against_brute_force(optical_setup: OpticalSetup) -> None:
     """Where each half's cut is imaged, from exact circles, and the room between the two."""
-    gaps, cells = coverage.measure(bench).gap, FINE
-    radius = bench.radius
+    gaps, cells = coverage.measure(optical_setup).gap, FINE
+    radius = optical_setup.radius
     for k, m in enumerate(cells.mirrors):
         if m["u"][0] > 1e-9:
             continue
@@ -261,8 +263,12 @@ def test_seam_gap_against_brute_force(bench: OpticalSetup) -> None:
         # Camera a looks at x > curve, camera b, its mirror image, at x < -curve.
         chord = np.sqrt(radius**2 - height**2)
         expected = np.clip(2 * np.minimum(np.abs(curve), chord) * np.sign(curve), 0, None).max()
-        v = bench.virtual_ids.index(f"a{m['number']:04d}")
+        v = optical_setup.virtual_ids.index(f"a{m['number']:04d}")
         assert gaps[v] == pytest.approx(expected, abs=0.04)  # chords for arcs
     assert gaps.max() > 1
-    whole = [v for v in range(bench.virtual.count) if (bench.virtual.index == v).sum() == 1]
+    whole = [
+        v
+        for v in range(optical_setup.virtual.count)
+        if (optical_setup.virtual.index == v).sum() == 1
+    ]
     assert (gaps[whole] == 0).all()

@@ -15,15 +15,15 @@ from tbcad_verify.mesh.surfaces import distance_before_mirror
 from tbcad_verify.shell import coverage, image_rim, light, pixels
 from tbcad_verify.shell.optics import OpticalSetup
 
-from tests.verify.benches import HERE, bench_of
+from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 from tests.verify.synthetic_export import PIN, Cells, sign, stl
 
 NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
 
 
-def pixel_directions(bench: OpticalSetup) -> np.ndarray:
+def pixel_directions(optical_setup: OpticalSetup) -> np.ndarray:
     """(N, 3) directions of camera a's pixels, row by row, from the definition."""
-    c = bench.cameras[0]
+    c = optical_setup.cameras[0]
     focal = c.width / 2 / np.tan(c.hfov / 2)
     down = np.cross(c.forward, c.right)
     j, i = np.meshgrid(np.arange(c.width), np.arange(c.height))
@@ -31,10 +31,10 @@ def pixel_directions(bench: OpticalSetup) -> np.ndarray:
     return c.forward + (x[:, None] * c.right + y[:, None] * down) / focal
 
 
-def test_pixel_rays_are_the_definitions(bench: OpticalSetup) -> None:
-    camera = bench.cameras[0]
+def test_pixel_rays_are_the_definitions(optical_setup: OpticalSetup) -> None:
+    camera = optical_setup.cameras[0]
     found = np.hstack([rays.pixel_rows(camera, *rows) for rows in rays.row_chunks(camera)])
-    np.testing.assert_allclose(found.T, pixel_directions(bench), atol=1e-13)
+    np.testing.assert_allclose(found.T, pixel_directions(optical_setup), atol=1e-13)
 
 
 def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -62,13 +62,12 @@ def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.nd
     return mirror, (miss <= radius) & ~outside
 
 
-def test_pixel_counts_against_brute_force(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
-    cells = made[1]
-    tally = light.full_sensor(bench.stage(bench.cameras[0]))
-    mirror, useful = exact(cells, pixel_directions(bench), bench.radius)
-    expected = np.bincount(mirror[useful], minlength=len(cells.mirrors))
-    found = tally.pixels[: len(cells.mirrors)]
-    assert tally.pixels[len(cells.mirrors) :].sum() == 0
+def test_pixel_counts_against_brute_force(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
+    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
+    mirror, useful = exact(exact_cells, pixel_directions(optical_setup), optical_setup.radius)
+    expected = np.bincount(mirror[useful], minlength=len(exact_cells.mirrors))
+    found = tally.pixels[: len(exact_cells.mirrors)]
+    assert tally.pixels[len(exact_cells.mirrors) :].sum() == 0
     # Only pixels on the very edge of a cell may differ: the mesh has chords for arcs.
     assert np.abs(found - expected).max() <= 2
     assert found.sum() > 4000
@@ -76,20 +75,20 @@ def test_pixel_counts_against_brute_force(bench: OpticalSetup, made: tuple[Path,
     assert tally.blocked.sum() == 0
 
 
-def test_nearest_way_against_brute_force(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
-    d = pixel_directions(bench)
-    useful = exact(made[1], d, bench.radius)[1]
+def test_nearest_way_against_brute_force(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
+    d = pixel_directions(optical_setup)
+    useful = exact(exact_cells, d, optical_setup.radius)[1]
     d = d[useful]
     foot = -(d @ PIN) / (d * d).sum(axis=1)
     expected = np.linalg.norm(PIN + foot[:, None] * d, axis=1).min()
-    tally = light.full_sensor(bench.stage(bench.cameras[0]))
+    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
     assert tally.nearest.min() == pytest.approx(expected, rel=0.02)
 
 
 def test_chunks_and_threads_do_not_matter(
-    bench: OpticalSetup, monkeypatch: pytest.MonkeyPatch
+    optical_setup: OpticalSetup, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stage = bench.stage(bench.cameras[1])
+    stage = optical_setup.stage(optical_setup.cameras[1])
     one = light.full_sensor(stage)
     monkeypatch.setattr(rays, "RAYS_A_CHUNK", 999)
     monkeypatch.setattr(rays, "THREADS", 3)
@@ -98,24 +97,24 @@ def test_chunks_and_threads_do_not_matter(
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
-def test_hits_in_float64(bench: OpticalSetup) -> None:
-    d = rays.pixel_rows(bench.cameras[0], 90, 100)
-    origin = bench.cameras[0].pinhole[:, None]
-    facet = rays.first_hits(bench.scene, origin, d)
+def test_hits_in_float64(optical_setup: OpticalSetup) -> None:
+    d = rays.pixel_rows(optical_setup.cameras[0], 90, 100)
+    origin = optical_setup.cameras[0].pinhole[:, None]
+    facet = rays.first_hits(optical_setup.scene, origin, d)
     hit = np.flatnonzero(facet >= 0)
-    t = rays.distances_to_planes(bench.scene, facet[hit], origin, d[:, hit])
+    t = rays.distances_to_planes(optical_setup.scene, facet[hit], origin, d[:, hit])
     x = origin + t * d[:, hit]
-    corners = bench.mesh.points[bench.mesh.faces[facet[hit]]]
+    corners = optical_setup.mesh.points[optical_setup.mesh.faces[facet[hit]]]
     inside = trimesh.triangles.points_to_barycentric(corners, x.T)
     assert inside.min() > -1e-4
     back = np.einsum("nij,ni->nj", corners, inside)
     np.testing.assert_allclose(back, x.T, atol=1e-9)
 
 
-def test_facet_error_is_the_facets_size(bench: OpticalSetup) -> None:
+def test_facet_error_is_the_facets_size(optical_setup: OpticalSetup) -> None:
     """Off a facet of size s on a sphere of radius r the normal is wrong by up to s / 2 r, and the
     ray at the object by twice that times the distance: millimetres, here."""
-    tally = light.full_sensor(bench.stage(bench.cameras[0]))
+    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
     assert 0.3 < np.median(tally.spread) < 5
 
 
@@ -129,79 +128,81 @@ def with_post(folder: Path, low: list[float], high: list[float]) -> Path:
     return sign(folder, [*NAMES, "post.stl"])
 
 
-def test_a_post_between_camera_and_mirrors_is_named(good: Path) -> None:
-    bench = bench_of(with_post(good, [66, 9, -23], [68, 11, -21]))
-    lines = {c.name: c for c in coverage.checks(bench, coverage.measure(bench), "x")}
-    assert lines["mirrors seen"].passed is False
-    assert "behind post (no mirror)" in lines["mirrors seen"].detail
+def test_a_post_between_camera_and_mirrors_is_named(export_folder: Path) -> None:
+    optical_setup = optical_setup_of(with_post(export_folder, [66, 9, -23], [68, 11, -21]))
+    lines = {
+        c.name: c for c in coverage.checks(optical_setup, coverage.measure(optical_setup), "x")
+    }
+    assert lines["mirrors visible"].passed is False
+    assert "behind post (no mirror)" in lines["mirrors visible"].detail
 
 
-def test_a_post_between_mirror_and_object_is_named(good: Path) -> None:
-    bench = bench_of(with_post(good, [-6, -6, 30], [6, 6, 32]))
-    lines = {c.name: c for c in pixels.checks(bench, None, "x")[1]}
-    assert lines["light path"].passed is False
-    assert "blocked by post (no mirror)" in lines["light path"].detail
-    assert lines["light path"].measured > 10
+def test_a_post_between_mirror_and_object_is_named(export_folder: Path) -> None:
+    optical_setup = optical_setup_of(with_post(export_folder, [-6, -6, 30], [6, 6, 32]))
+    lines = {c.name: c for c in pixels.checks(optical_setup, None, "x")[1]}
+    assert lines["light paths"].passed is False
+    assert "blocked by post (no mirror)" in lines["light paths"].detail
+    assert lines["light paths"].measured > 10
 
 
-def test_a_post_inside_the_capture_sphere_is_the_object(good: Path) -> None:
-    bench = bench_of(with_post(good, [-5, -5, -5], [5, 5, 5]))
-    lines = {c.name: c for c in pixels.checks(bench, None, "x")[1]}
-    assert lines["light path"].passed is True
+def test_a_post_inside_the_capture_sphere_is_the_object(export_folder: Path) -> None:
+    optical_setup = optical_setup_of(with_post(export_folder, [-5, -5, -5], [5, 5, 5]))
+    lines = {c.name: c for c in pixels.checks(optical_setup, None, "x")[1]}
+    assert lines["light paths"].passed is True
 
 
-def test_the_paths_to_the_zenith_mirror_limit_the_object(bench: OpticalSetup) -> None:
+def test_the_paths_to_the_zenith_mirror_limit_the_object(optical_setup: OpticalSetup) -> None:
     """DESIGN.md section 3: 62.0 mm, at the zenith mirror."""
-    camera = bench.cameras[0]
-    zenith = np.flatnonzero(bench.u[2] > 1 - 1e-12)[:1]
-    start = bench.export.mirrors.columns("px", 3)[:, zenith] + 0.3
-    seen = bench.seen(camera)
-    small = image_rim.rim_rays(seen, zenith, start, bench.u[:, zenith], np.array([1e-3]))
+    camera = optical_setup.cameras[0]
+    zenith = np.flatnonzero(optical_setup.u[2] > 1 - 1e-12)[:1]
+    start = optical_setup.export.mirrors.columns("px", 3)[:, zenith] + 0.3
+    seen = optical_setup.seen(camera)
+    small = image_rim.rim_rays(seen, zenith, start, optical_setup.u[:, zenith], np.array([1e-3]))
     way = distance_before_mirror(seen, small.direction, small.lines.reach)
     assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
 
 
-def test_an_object_too_large_stands_in_the_light(bench: OpticalSetup) -> None:
+def test_an_object_too_large_stands_in_the_light(optical_setup: OpticalSetup) -> None:
     lines = {}
     for diameter in (40.0, 75.0):
-        big = replace(bench, export=replace(bench.export, target_mm=diameter))
-        lines[diameter] = {c.name: c for c in pixels.checks(big, None, "x")[1]}["object clear"]
+        big = replace(optical_setup, export=replace(optical_setup.export, target_mm=diameter))
+        lines[diameter] = {c.name: c for c in pixels.checks(big, None, "x")[1]}["object clearance"]
     assert lines[40.0].passed is True
     assert lines[75.0].passed is False
 
 
-def test_ring_grazes_the_capture_sphere(bench: OpticalSetup) -> None:
-    camera = bench.cameras[0]
-    ring = pixels._ring(bench, camera, None)
+def test_ring_grazes_the_capture_sphere(optical_setup: OpticalSetup) -> None:
+    camera = optical_setup.cameras[0]
+    ring = pixels._ring(optical_setup, camera, None)
     assert ring.error.max() < 1e-6
     from tbcad_verify.mesh.surfaces import miss_distances
 
-    np.testing.assert_allclose(miss_distances(ring.lines), bench.radius, atol=1e-6)
+    np.testing.assert_allclose(miss_distances(ring.lines), optical_setup.radius, atol=1e-6)
     assert np.bincount(ring.mirror).max() == image_rim.AZIMUTHS
 
 
-def test_a_narrow_camera_cuts_mirrors_off(good: Path) -> None:
-    design = json.loads((good / "design.json").read_text())
+def test_a_narrow_camera_cuts_mirrors_off(export_folder: Path) -> None:
+    design = json.loads((export_folder / "design.json").read_text())
     for camera in design["cameras"]:
         camera["hfov_deg"] = 70.0
-    (good / "design.json").write_text(json.dumps(design))
-    lines = {c.name: c for c in pixels.checks(bench_of(good), None, "x")[1]}
-    assert lines["in frame"].passed is False
-    assert "partly out of the frame: a0" in lines["in frame"].detail
+    (export_folder / "design.json").write_text(json.dumps(design))
+    lines = {c.name: c for c in pixels.checks(optical_setup_of(export_folder), None, "x")[1]}
+    assert lines["frame margin"].passed is False
+    assert "partly out of the frame: a0" in lines["frame margin"].detail
 
 
-def test_the_rim_is_looked_for_only_where_a_mirror_reaches(bench: OpticalSetup) -> None:
+def test_the_rim_is_looked_for_only_where_a_mirror_reaches(optical_setup: OpticalSetup) -> None:
     """A mirror that sees little fails for that, and not for being out of frame as well."""
-    found = coverage.measure(bench)
+    found = coverage.measure(optical_setup)
     short = replace(found, fitted=np.full_like(found.fitted, 10.0))
-    ring = pixels._ring(bench, bench.cameras[0], short)
+    ring = pixels._ring(optical_setup, optical_setup.cameras[0], short)
     from tbcad_verify.mesh.surfaces import miss_distances
 
     np.testing.assert_allclose(miss_distances(ring.lines), 5.0, atol=1e-6)
 
 
-def test_margins_by_hand(bench: OpticalSetup) -> None:
-    camera = bench.cameras[0]
+def test_margins_by_hand(optical_setup: OpticalSetup) -> None:
+    camera = optical_setup.cameras[0]
     corner = camera.forward + camera.right * np.tan(camera.hfov / 2)
     d = np.stack([camera.forward, corner, -camera.forward], axis=1)
     found = image_rim.margins(camera, d)
@@ -210,12 +211,12 @@ def test_margins_by_hand(bench: OpticalSetup) -> None:
     assert found[2] == -np.inf
 
 
-def test_a_mirror_without_pixels_fails(good: Path) -> None:
-    design = json.loads((good / "design.json").read_text())
+def test_a_mirror_without_pixels_fails(export_folder: Path) -> None:
+    design = json.loads((export_folder / "design.json").read_text())
     for camera in design["cameras"]:
         camera["width_px"], camera["height_px"] = 13, 10
-    (good / "design.json").write_text(json.dumps(design))
-    report = verify(good, options=replace(HERE, write=False))
+    (export_folder / "design.json").write_text(json.dumps(design))
+    report = verify(export_folder, options=replace(IN_PROCESS, write=False))
     lines = {c.name: c for c in report.checks}
-    assert lines["pixels a virtual camera"].passed is False
-    assert lines["pixels a virtual camera"].measured == 0
+    assert lines["pixels, minimum"].passed is False
+    assert lines["pixels, minimum"].measured == 0

@@ -14,32 +14,31 @@ from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
-from tests.verify.benches import bench_of
+from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells, Design, export
 
 RNG = np.random.default_rng(7)
 PINHOLE = np.array([100.0, 0, -100])
 
 
-def test_every_facet_goes_to_its_mirror(bench: OpticalSetup, made: tuple[Path, Cells]) -> None:
-    cells = made[1]
-    owner = bench.owner()[bench.recovery.segments.label]
-    count = len(cells.faces)
-    ids = bench.export.mirrors.ids
-    names = [f"a{cells.mirrors[k]['number']:04d}" for k in cells.face_mirror]
+def test_every_facet_goes_to_its_mirror(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
+    owner = optical_setup.owner()[optical_setup.recovery.segments.label]
+    count = len(exact_cells.faces)
+    ids = optical_setup.export.mirrors.ids
+    names = [f"a{exact_cells.mirrors[k]['number']:04d}" for k in exact_cells.face_mirror]
     assert [ids[k] for k in owner[:count]] == names
-    walls = len(bench.mesh.faces) // 2
+    walls = len(optical_setup.mesh.faces) // 2
     assert (owner[count:walls] == -1).all()
 
 
-def test_recovered_within_a_micrometre(bench: OpticalSetup) -> None:
-    assert bench.match.centre_error.max() < 1e-3
-    assert bench.match.radius_error.max() < 1e-3
-    assert all(check.passed for check in checks(bench, "x"))
+def test_recovered_within_a_micrometre(optical_setup: OpticalSetup) -> None:
+    assert optical_setup.match.centre_error.max() < 1e-3
+    assert optical_setup.match.radius_error.max() < 1e-3
+    assert all(check.passed for check in checks(optical_setup, "x"))
 
 
 def failing(folder: Path) -> dict[str, str]:
-    return {c.name: c.detail for c in checks(bench_of(folder), "x") if c.passed is not True}
+    return {c.name: c.detail for c in checks(optical_setup_of(folder), "x") if c.passed is not True}
 
 
 def test_a_mirror_moved_by_twenty_micrometres_is_named(tmp_path: Path) -> None:
@@ -67,29 +66,31 @@ def test_a_missing_mirror_is_named(tmp_path: Path) -> None:
     assert "missing: a0010, b0010" in failing(folder)["mirrors found"]
 
 
-def test_centres_swapped_in_the_record_are_named(good: Path) -> None:
-    bench = bench_of(good)
-    order = np.arange(len(bench.export.mirrors))
+def test_centres_swapped_in_the_record_are_named(export_folder: Path) -> None:
+    optical_setup = optical_setup_of(export_folder)
+    order = np.arange(len(optical_setup.export.mirrors))
     order[[15, 16]] = 16, 15
-    other = bench.export.mirrors.take(order)
+    other = optical_setup.export.mirrors.take(order)
     spheres = {name: getattr(other, name) for name in ("cx", "cy", "cz", "radius_mm")}
-    mirrors = bench.export.mirrors.model_copy(update=spheres)
-    swapped = replace(bench, export=replace(bench.export, mirrors=mirrors))
-    errors = np.linalg.norm(bench.mirrors.centre() - mirrors.columns("cx", 3), axis=0)
-    swapped = replace(swapped, match=replace(bench.match, centre_error=errors))
+    mirrors = optical_setup.export.mirrors.model_copy(update=spheres)
+    swapped = replace(optical_setup, export=replace(optical_setup.export, mirrors=mirrors))
+    errors = np.linalg.norm(optical_setup.mirrors.centre() - mirrors.columns("cx", 3), axis=0)
+    swapped = replace(swapped, match=replace(optical_setup.match, centre_error=errors))
     said = {c.name: c.detail for c in checks(swapped, "x")}
     assert "a0016 has the place of a0017, a0017 has the place of a0016" in said["centre error"]
 
 
-def test_inches_are_recognised(good: Path) -> None:
+def test_inches_are_recognised(export_folder: Path) -> None:
     from tests.verify.synthetic_export import stl
 
     for name in ("shell_a.stl", "shell_b.stl"):
         data = np.frombuffer(
-            (good / name).read_bytes()[84:], dtype=[("v", "<f4", 12), ("a", "<u2")]
+            (export_folder / name).read_bytes()[84:], dtype=[("v", "<f4", 12), ("a", "<u2")]
         )
-        (good / name).write_bytes(stl(data["v"][:, 3:].reshape(-1, 3, 3) * np.float32(25.4)))
-    said = failing(good)
+        (export_folder / name).write_bytes(
+            stl(data["v"][:, 3:].reshape(-1, 3, 3) * np.float32(25.4))
+        )
+    said = failing(export_folder)
     assert " x the record's size" in said["mirrors found"]
 
 

@@ -42,7 +42,7 @@ from tbcad_verify.types import Bools, Floats, Ints
 CHECKS = {
     "cells": "directions",
     "coverage, balls": "mm",
-    "coverage, balls, off the record": "mm",
+    "coverage, balls, deviation from record": "mm",
     "light of the balls": "blocked rays",
     "rays of the balls": "rays",
     "pixels kept by the balls": "% of the shell's",

@@ -37,9 +37,9 @@ ROUND = 0.25  # by which an outline's turns about the origin may differ from one
 CHECKS = {
     "coverage, facets": "mm",
     "coverage, spheres": "mm",
-    "mirrors seen": "hidden points",
+    "mirrors visible": "hidden points",
     "seam gap": "mm",
-    "coverage, off the record": "mm",
+    "coverage, deviation from record": "mm",
 }
 
 
@@ -63,40 +63,40 @@ class Coverage:
     blockers: tuple[str, ...]
 
 
-def measure(bench: OpticalSetup) -> Coverage:
+def measure(setup: OpticalSetup) -> Coverage:
     """Trace every mirror's outline from its camera."""
-    cameras, virtual, u = bench.cameras, bench.virtual, bench.u
-    patches = bench.patches()
-    outlines = [trace_outline(bench.mesh, patches, bench.mine(c), virtual.halved) for c in cameras]
+    cameras, virtual, u = setup.cameras, setup.virtual, setup.u
+    patches = setup.patches()
+    outlines = [trace_outline(setup.mesh, patches, setup.mine(c), virtual.halved) for c in cameras]
     pairs = list(zip(cameras, outlines, strict=True))
-    fitted = [reflect_on_fits(outline, bench.seen(camera)) for camera, outline in pairs]
-    facet = [reflect_on_facets(o, camera.pinhole, bench.scene.planes) for camera, o in pairs]
+    fitted = [reflect_on_fits(outline, setup.seen(camera)) for camera, outline in pairs]
+    facet = [reflect_on_facets(o, camera.pinhole, setup.scene.planes) for camera, o in pairs]
     turned = np.abs(
         sum(winding_numbers(o, at, virtual, u) for o, at in zip(outlines, fitted, strict=True))
     )
-    hits = [_hidden(bench, camera, outline) for camera, outline in pairs]
+    hits = [_hidden(setup, camera, outline) for camera, outline in pairs]
     hidden, blockers = (np.concatenate([pair[k] for pair in hits]) for k in range(2))
     return Coverage(
-        _diameters(bench, outlines, facet, turned),
-        _diameters(bench, outlines, fitted, turned),
-        seam.gaps(outlines, fitted, virtual, u, bench.radius),
-        np.bincount(hidden, minlength=len(bench.export.mirrors)).astype(np.float64),
-        tuple(bench.names(blockers)),
+        _diameters(setup, outlines, facet, turned),
+        _diameters(setup, outlines, fitted, turned),
+        seam.gaps(outlines, fitted, virtual, u, setup.radius),
+        np.bincount(hidden, minlength=len(setup.export.mirrors)).astype(np.float64),
+        tuple(setup.names(blockers)),
     )
 
 
-def checks(bench: OpticalSetup, found: Coverage, files: str) -> list[Check]:
+def checks(setup: OpticalSetup, found: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
     facets, spheres, seen, gap, off = ((name, files, unit) for name, unit in CHECKS.items())
     worst = np.argsort(-found.hidden, kind="stable")[: np.count_nonzero(found.hidden)]
-    who = worst_offenders(bench.export.mirrors.ids, found.hidden, "points", worst, ".0f")
-    widest = bench.virtual_ids[int(np.argmax(found.gap))]
+    who = worst_offenders(setup.export.mirrors.ids, found.hidden, "points", worst, ".0f")
+    widest = setup.virtual_ids[int(np.argmax(found.gap))]
     return [
-        _covers(bench, facets, found.facet),
-        _covers(bench, spheres, found.fitted),
+        _covers(setup, facets, found.facet),
+        _covers(setup, spheres, found.fitted),
         at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {short_list(found.blockers)}"),
         informative(gap, float(found.gap.max()), f"widest at {widest}"),
-        informative(off, _off_the_record(bench, found)),
+        informative(off, _off_the_record(setup, found)),
     ]
 
 
@@ -110,52 +110,52 @@ def columns(setup: OpticalSetup, covered: Coverage) -> dict[str, Floats]:
 
 
 def _diameters(
-    bench: OpticalSetup, outlines: list[Outline], lines: list[ReflectedRays], turned: Floats
+    setup: OpticalSetup, outlines: list[Outline], lines: list[ReflectedRays], turned: Floats
 ) -> Floats:
-    virtual = bench.virtual
+    virtual = setup.virtual
     each = [minimum_miss_distance(o, at, virtual) for o, at in zip(outlines, lines, strict=True)]
     least = np.min(each, axis=0)
     least[np.abs(turned - 1) > ROUND] = 0.0
-    least[virtual.index[bench.match.segment < 0]] = np.nan
+    least[virtual.index[setup.match.segment < 0]] = np.nan
     return np.asarray(2 * least)
 
 
-def _covers(bench: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
-    target, lost = bench.export.target_mm, np.isnan(diameter)
+def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
+    target, lost = setup.export.target_mm, np.isnan(diameter)
     known = np.where(lost, np.inf, diameter)
     worst = np.argsort(known, kind="stable")
     worst = worst[known[worst] < target]
-    said = ["sees too little: " + worst_offenders(bench.virtual_ids, diameter, "mm", worst)]
-    unseen = [bench.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
+    said = ["sees too little: " + worst_offenders(setup.virtual_ids, diameter, "mm", worst)]
+    unseen = [setup.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
     said += [f"unknown, for want of a mirror: {short_list(unseen)}"] if unseen else []
     measured = -np.inf if lost.all() else float(known.min())
     # One missing mirror is as bad as one that sees nothing.
     return at_least(name, 0.0 if unseen else measured, target, "; ".join(said))
 
 
-def _off_the_record(bench: OpticalSetup, found: Coverage) -> float:
+def _off_the_record(setup: OpticalSetup, found: Coverage) -> float:
     """Largest difference between coverage on fitted surfaces and as the designer computed it."""
-    recorded = bench.export.mirrors.coverage_mm
-    off = np.abs(found.fitted[bench.virtual.index] - recorded)
+    recorded = setup.export.mirrors.coverage_mm
+    off = np.abs(found.fitted[setup.virtual.index] - recorded)
     return float(np.nan_to_num(off, nan=-1).max())
 
 
 def _hidden(
-    bench: OpticalSetup, camera: Camera, outline: Outline
+    setup: OpticalSetup, camera: Camera, outline: Outline
 ) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
     """Mirrors of points that the pinhole does not see first, and the facets it sees instead.
 
     The points are the outline's, a little inside, and the middle of every facet of the mirrors.
     """
-    owner = np.append(bench.owner()[bench.recovery.segments.label], -1).astype(np.int32)
-    facets = np.flatnonzero((owner[:-1] >= 0) & bench.mine(camera)[owner[:-1]])
+    owner = np.append(setup.owner()[setup.recovery.segments.label], -1).astype(np.int32)
+    facets = np.flatnonzero((owner[:-1] >= 0) & setup.mine(camera)[owner[:-1]])
     origin = camera.pinhole[:, None]
 
     def edges(part: slice) -> NDArray[np.int32]:
-        return first_hits(bench.scene, origin, outline.inside[:, part] - origin)
+        return first_hits(setup.scene, origin, outline.inside[:, part] - origin)
 
     def insides(part: slice) -> NDArray[np.int32]:
-        return first_hits(bench.scene, origin, facet_centres(bench.mesh, facets[part]) - origin)
+        return first_hits(setup.scene, origin, facet_centres(setup.mesh, facets[part]) - origin)
 
     jobs = [(edges, part) for part in chunks(outline.mirror.size, RAYS_A_CHUNK)]
     jobs += [(insides, part) for part in chunks(facets.size, RAYS_A_CHUNK)]

@@ -41,7 +41,7 @@ MANIFEST = (("manifest", "manifest.json", "wrong files"), ("other files", "", "f
 TOPOLOGY = {
     "watertight": "bad edges",
     "facets": "bad facets",
-    "outward": "mm^3",
+    "signed volume": "mm^3",
     "components": "solids",
     "manifold3d": "complaints",
 }

@@ -22,23 +22,23 @@ from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.types import Floats
 
 CHECKS = {
-    "light path": "blocked pixels",
-    "object clear": "mm",
-    "pixels a virtual camera": "px",
+    "light paths": "blocked pixels",
+    "object clearance": "mm",
+    "pixels, minimum": "px",
     "pixels, median": "px",
-    "pixels, most": "px",
-    "in frame": "px",
-    "second mirrors": "% of pixels",
+    "pixels, maximum": "px",
+    "frame margin": "px",
+    "double reflections": "% of pixels",
     "facet error, median": "mm",
     "facet error, 95 %": "mm",
 }
 
 
-def checks(bench: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
+def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
     """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show.
 
     Args:
-        bench: what to look at.
+        setup: what to look at.
         seen: what the mirrors cover; no rim is looked for where they do not reach. None takes
             them to reach the whole object.
         files: where, for the report.
@@ -46,74 +46,74 @@ def checks(bench: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
     path, clear, least, median, most, framed, second, half, nearly_all = (
         (name, files, unit) for name, unit in CHECKS.items()
     )
-    tally = light.total([light.full_sensor(bench.stage(camera)) for camera in bench.cameras])
-    rings = [(camera, _ring(bench, camera, seen)) for camera in bench.cameras]
-    each = np.bincount(bench.virtual.index, tally.pixels, bench.virtual.count)
-    none = [bench.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
+    tally = light.total([light.full_sensor(setup.stage(camera)) for camera in setup.cameras])
+    rings = [(camera, _ring(setup, camera, seen)) for camera in setup.cameras]
+    each = np.bincount(setup.virtual.index, tally.pixels, setup.virtual.count)
+    none = [setup.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
     spread = np.percentile(tally.spread, [50, 95]) if tally.spread.size else [np.nan, np.nan]
     return tally.pixels.astype(np.float64), [
-        _path(bench, path, tally),
-        _clear(bench, clear, tally, rings),
+        _path(setup, path, tally),
+        _clear(setup, clear, tally, rings),
         at_least(least, float(each.min()), 1, f"no pixel sees the object in {short_list(none)}"),
         informative(median, float(np.median(each))),
         informative(most, float(each.max())),
-        _framed(bench, framed, rings),
+        _framed(setup, framed, rings),
         informative(second, 100 * tally.twice / max(tally.on_mirrors, 1)),
         informative(half, float(spread[0])),
         informative(nearly_all, float(spread[1])),
     ]
 
 
-def _ring(bench: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_rim.RimRays:
-    mine = np.flatnonzero(bench.mine(camera))
-    start = bench.recovery.fits.middle[:, bench.match.segment[mine]]
+def _ring(setup: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_rim.RimRays:
+    mine = np.flatnonzero(setup.mine(camera))
+    start = setup.recovery.fits.middle[:, setup.match.segment[mine]]
     found = image_rim.rim_rays(
-        bench.seen(camera), mine, start, bench.u[:, mine], _reach(bench, seen)[mine]
+        setup.seen(camera), mine, start, setup.u[:, mine], _reach(setup, seen)[mine]
     )
     # A halved mirror shows the camera only what its own half reflects.
     side = np.repeat(np.sign(start[0]), image_rim.AZIMUTHS)
-    own = ~bench.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
+    own = ~setup.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
     return image_rim.chosen(found, own)
 
 
-def _reach(bench: OpticalSetup, seen: Coverage | None) -> Floats:
+def _reach(setup: OpticalSetup, seen: Coverage | None) -> Floats:
     """(M,) radius about the origin that each mirror sees, the capture sphere's at most, mm."""
     if seen is None:
-        return np.full(len(bench.export.mirrors), bench.radius)
-    each = np.nan_to_num(seen.fitted / 2, nan=np.inf)[bench.virtual.index]
-    return np.asarray(np.minimum(each, bench.radius))
+        return np.full(len(setup.export.mirrors), setup.radius)
+    each = np.nan_to_num(seen.fitted / 2, nan=np.inf)[setup.virtual.index]
+    return np.asarray(np.minimum(each, setup.radius))
 
 
-def _path(bench: OpticalSetup, name: CheckName, tally: light.PixelTally) -> Check:
+def _path(setup: OpticalSetup, name: CheckName, tally: light.PixelTally) -> Check:
     blocked = tally.blocked.astype(np.float64)
     worst = np.argsort(-blocked, kind="stable")[: np.count_nonzero(blocked)]
-    who = worst_offenders(bench.export.mirrors.ids, blocked, "px", worst, ".0f")
-    by = short_list(bench.names(tally.blockers))
+    who = worst_offenders(setup.export.mirrors.ids, blocked, "px", worst, ".0f")
+    by = short_list(setup.names(tally.blockers))
     return at_most(name, int(blocked.sum()), 0, f"{who}; blocked by {by}")
 
 
 def _clear(
-    bench: OpticalSetup,
+    setup: OpticalSetup,
     name: CheckName,
     tally: light.PixelTally,
     rings: list[tuple[Camera, image_rim.RimRays]],
 ) -> Check:
     ways = [
-        distance_before_mirror(bench.seen(camera), ring.direction, ring.lines.reach)
+        distance_before_mirror(setup.seen(camera), ring.direction, ring.lines.reach)
         for camera, ring in rings
     ]
     least = np.nanmin(np.concatenate([tally.nearest, *ways]))
     reason = "the object stands between a camera and its mirrors"
-    return at_least(name, float(least) - bench.radius, 0, reason)
+    return at_least(name, float(least) - setup.radius, 0, reason)
 
 
 def _framed(
-    bench: OpticalSetup, name: CheckName, rings: list[tuple[Camera, image_rim.RimRays]]
+    setup: OpticalSetup, name: CheckName, rings: list[tuple[Camera, image_rim.RimRays]]
 ) -> Check:
     mirror = np.concatenate([ring.mirror for _, ring in rings])
     error = np.concatenate([ring.error for _, ring in rings])
     margin = np.concatenate([image_rim.margins(camera, ring.direction) for camera, ring in rings])
-    ids = bench.export.mirrors.ids
+    ids = setup.export.mirrors.ids
     lost = [ids[k] for k in np.unique(mirror[~(error < image_rim.CLOSE_MM)]).tolist()]
     if lost or not margin.size:
         return unknown(
