@@ -25,7 +25,7 @@ from tbcad_verify.types import Floats
 
 FARTHEST_MM = 1e6  # of any point in a JSON file from the origin
 SHOWN = 60  # characters of a refused value that are shown
-_KINDS = {"boolean": "true or false", "null": "null", "object": "an object"}
+_KINDS = {"boolean": "true or false", "null": "none", "object": "an object"}
 _LIMITS = {
     "exclusiveMinimum": "above {:g}",
     "minimum": "from {:g}",
