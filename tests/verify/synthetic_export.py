@@ -90,9 +90,42 @@ def poses(design: Design) -> list[dict[str, Any]]:
             "n": normal[k],
             "c": apex[k] - r[k] * normal[k],
             "r": float(r[k]),
+            "figures": figures(design, u[k]),
         }
         for k in range(len(u))
     ]
+
+
+def figures(design: Design, u: np.ndarray) -> dict[str, float]:
+    """What DESIGN.md section 2 calls l, theta_0, theta_1, polar angle and azimuth of a direction.
+
+    theta_0 is the least angle at the virtual camera between its axis and a plane through it and
+    the line in which the mirror's tangent plane meets that of any other vertex.
+    """
+    c, every = np.linalg.norm(PIN) / 2, vertices(design.n)
+    a, w = np.hypot(B, c), unit(PIN)
+    apex = every * (B**2 / (a - c * (every @ w)))[:, None]
+    normal = unit(unit(PIN - apex) - every)
+    own = int((every @ u).argmax())
+    others = every @ u < 1 - 1e-9
+    mine, theirs = np.broadcast_to(normal[own], normal[others].shape), normal[others]
+    edge = np.cross(mine, theirs)
+    heights = np.stack([mine @ apex[own], (theirs * apex[others]).sum(1), 0 * edge[:, 0]], axis=1)
+    meet = np.linalg.solve(np.stack([mine, theirs, edge], axis=1), heights[:, :, None])[:, :, 0]
+    least = np.arcsin(np.abs(unit(np.cross(meet - 2 * a * u, edge)) @ u)).min()
+    rho = np.linalg.norm(apex[own])
+    width = (2 * a - rho) * np.tan(least)
+    zero = unit(np.array([0, 0, 1.0]) - w[2] * w)
+    degrees = np.degrees(
+        [
+            least,
+            np.arctan2(design.target / 2 - width, rho),
+            np.arccos(u @ w),
+            np.arctan2(u @ np.cross(w, zero), u @ zero),
+        ]
+    )
+    keys = ("theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg")
+    return {"size_mm": float(width), **dict(zip(keys, degrees.tolist(), strict=True))}
 
 
 class Cells:
@@ -293,7 +326,9 @@ def rows(design: Design, record: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 for axis, value in zip("xyz", (v * s + 0.0).tolist(), strict=True):
                     row[name + axis] = None if flat and name == "c" else value
             row["radius_mm"] = None if flat else m["r"]
-            row |= {key: 1.0 for key in COLUMNS.split(",")[15:]}
+            row |= m["figures"]
+            row["azimuth_deg"] *= sign
+            row |= {"cell_area_mm2": 1.0, "coverage_mm": 1.0}
             out.append(row)
     return out
 

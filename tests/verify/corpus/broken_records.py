@@ -16,6 +16,7 @@ from tests.verify.corpus.record_changes import (
     cut_line,
     design,
     exchange,
+    figure,
     first_part,
     foot,
     half,
@@ -45,6 +46,10 @@ RECORDS: tuple[Mutation, ...] = (
     fails("a radius 1 nm off", TABLE, mirror(radius(1e-6)), "step surfaces"),
     fails("a centre 10 nm off the normal", TABLE, mirror(centre), "poses"),
     fails("a cell's area", TABLE, mirror(cell), "cell areas"),
+    *(
+        fails(f"a mirror's {key}", TABLE, mirror(figure(key)), "figures")
+        for key in ("size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg")
+    ),
     fails("a mirror 1 um further out", TABLE, mirror(apex), "poses"),
     fails(
         "a mirror not in the record",

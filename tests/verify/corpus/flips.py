@@ -17,8 +17,10 @@ from tests.verify.corpus import facets, part21
 FREE = re.compile(
     r"spec\.(name|schema|step|printer|prototype|shell|mesh|mirrors\.(radius_rule|margin_mm|max_))"
 )
+FREE_COLUMN = "coverage_mm"
 TINY = 1e-8  # mm or of the value: what the proof's tightest limits let pass
-STEP_TINY = 2e-6  # mm; a face's area and middle are held to about this
+STEP_FREE_COLUMN = "coverage_mm"
+TINY = 2e-6  # mm; a face's area and middle are held to about this
 FREE_STEP = re.compile(
     r"(APPLICATION|PRODUCT|SHAPE_ASPECT|PROPERTY_DEFINITION|SHAPE_DEFINITION|REPRESENTATION|"
     r"MEASURE_REP|DERIVED|\( GEOMETRIC|UNCERTAINTY|\( NAMED_UNIT|SHAPE_REP)"
@@ -56,13 +58,18 @@ def _close(one: Any, two: Any) -> bool:
 
 
 def _table(before: Path, after: Path) -> bool:
-    one, two = (list(csv.reader(path.read_text().splitlines())) for path in (before, after))
-    return [list(map(_value, row)) for row in one] == [list(map(_value, row)) for row in two]
+    one, two = (list(csv.DictReader(path.read_text().splitlines())) for path in (before, after))
+    return len(one) == len(two) and all(
+        _close(_value(row.get(key)), _value(other.get(key)))
+        for row, other in zip(one, two, strict=True)
+        for key in row.keys() | other.keys()
+        if key != FREE_COLUMN
+    )
 
 
-def _value(word: str) -> str | float:
+def _value(word: str | None) -> str | float | None:
     try:
-        return float(word)
+        return word if word is None else float(word)
     except ValueError:
         return word
 

@@ -13,6 +13,7 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mesh import Topology
 from tbcad_verify.record.export import Export
+from tbcad_verify.record.figures import figure_errors
 from tbcad_verify.record.files import digest, listing
 from tbcad_verify.record.poses import (
     POSE_MM,
@@ -33,6 +34,7 @@ from tbcad_verify.report.checks import (
     worst_offenders,
 )
 from tbcad_verify.report.report import NAME
+from tbcad_verify.types import Floats
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
@@ -80,13 +82,14 @@ RECORD = (
     ("requirements", "design.json", "unlike its spec"),
     ("ids", "mirrors.csv", "bad ids"),
     ("poses", "mirrors.csv", "mm off"),
+    ("figures", "mirrors.csv", "mm off"),
     ("directions", "mirrors.csv", "misplaced or missing"),
 )
 
 
 def record_checks(export: Export) -> list[Check]:
     """Record and spec agree, and mirrors are where DESIGN.md section 2 puts them."""
-    work = (_requirements, _ids, _poses, _directions)
+    work = (_requirements, _ids, _poses, _figures, _directions)
     return [_guard(name, job, export) for name, job in zip(RECORD, work, strict=True)]
 
 
@@ -153,16 +156,29 @@ def _ids(name: CheckName, export: Export) -> Check:
 
 
 def _poses(name: CheckName, export: Export) -> Check:
-    errors = pose_errors(export)
+    return _within(
+        name,
+        export,
+        pose_errors(export),
+        "off the ellipsoid, not bisecting, or centre off the normal: ",
+    )
+
+
+def _figures(name: CheckName, export: Export) -> Check:
+    return _within(
+        name,
+        export,
+        figure_errors(export),
+        "polar angle, azimuth, theta_0, half width or theta_1 is another: ",
+    )
+
+
+def _within(name: CheckName, export: Export, errors: Floats, reason: str) -> Check:
+    """Errors of the mirrors, mm, against the limit for poses."""
     worst = np.argsort(-errors, kind="stable")
     worst = worst[errors[worst] > POSE_MM]
-    return at_most(
-        name,
-        float(errors.max()),
-        POSE_MM,
-        "off the ellipsoid, not bisecting, or centre off the normal: "
-        + worst_offenders(export.mirrors.ids, errors, "mm", worst, ".3g"),
-    )
+    detail = reason + worst_offenders(export.mirrors.ids, errors, "mm", worst, ".3g")
+    return at_most(name, float(errors.max()), POSE_MM, detail)
 
 
 def _directions(name: CheckName, export: Export) -> Check:
