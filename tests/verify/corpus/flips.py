@@ -19,8 +19,7 @@ FREE = re.compile(
 )
 FREE_COLUMN = "coverage_mm"
 TINY = 1e-8  # mm or of the value: what the proof's tightest limits let pass
-STEP_FREE_COLUMN = "coverage_mm"
-TINY = 2e-6  # mm; a face's area and middle are held to about this
+STEP_TINY = 2e-6  # mm; a face's area and middle are held to about this
 FREE_STEP = re.compile(
     r"(APPLICATION|PRODUCT|SHAPE_ASPECT|PROPERTY_DEFINITION|SHAPE_DEFINITION|REPRESENTATION|"
     r"MEASURE_REP|DERIVED|\( GEOMETRIC|UNCERTAINTY|\( NAMED_UNIT|SHAPE_REP)"
