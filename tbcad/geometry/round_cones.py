@@ -96,8 +96,8 @@ def _ratio(over: tuple[Floats, ...], under: tuple[Floats, ...], share: Floats) -
     return 1 + np.divide(top, bottom, out=on_axis, where=bottom > 0)
 
 
-def _stationary(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> tuple[Floats, Floats]:
-    """Shares in [0, 1] where the ratio's derivative is zero, or an end."""
+def _stationary(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> list[Floats]:
+    """Shares in [0, 1] where the ratio may be lowest between the ends; else an end."""
     (a, b, c), (m, n) = over, under
     square, half, constant = a * m, a * n, b * n - c * m
     root = np.sqrt(np.maximum(half**2 - square * constant, 0))
@@ -105,4 +105,6 @@ def _stationary(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> tuple[Fl
     larger = -(half + np.where(half >= 0, root, -root))
     first = np.divide(larger, square, out=np.zeros_like(larger), where=square != 0)
     second = np.divide(constant, larger, out=np.zeros_like(larger), where=larger != 0)
-    return np.clip(first, 0, 1), np.clip(second, 0, 1)
+    # On the axis the ratio is infinite by the quadratic's sign, so the quadratic's vertex decides.
+    vertex = np.divide(-b, 2 * a, out=np.zeros_like(larger), where=a > 0)
+    return [np.clip(share, 0, 1) for share in (first, second, vertex)]

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
@@ -52,4 +53,16 @@ def test_polar_angle_and_azimuth() -> None:
     u = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0], [0, -1.0, 0]])
     polar, azimuth = np.degrees(ellipsoid.polar_azimuth(u))
     assert polar == pytest.approx([45, 135, 90, 90])
-    assert azimuth == pytest.approx([0, 0, -90, 90]) or azimuth == pytest.approx([0, 0, 90, -90])
+    # Counter-clockwise seen against the axis, which runs down to +x: from the zenith to -y.
+    assert azimuth == pytest.approx([0, 0, -90, 90])
+
+
+@given(cameras, st.floats(0.01, 3.1), st.floats(-3.1, 3.1))
+def test_azimuth_is_the_right_handed_rotation_about_the_axis(
+    camera: tuple[float, float, float, float], polar: float, azimuth: float
+) -> None:
+    ellipsoid = Ellipsoid(np.array(camera[:3]), camera[3])
+    axis, zero, _ = ellipsoid.frame()
+    at_zero = np.cos(polar) * axis + np.sin(polar) * zero
+    u = Rotation.from_rotvec(azimuth * axis).apply(at_zero)[None]
+    assert np.ravel(ellipsoid.polar_azimuth(u)) == pytest.approx([polar, azimuth], abs=1e-9)

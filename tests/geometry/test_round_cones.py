@@ -17,13 +17,13 @@ def test_two_balls_of_one_height_touch_at_the_chord() -> None:
     assert found == pytest.approx(2 * np.arcsin(24 / 160), rel=1e-12)
 
 
-def test_wall_is_added_to_the_reach() -> None:
+def test_margin_is_added_to_the_radii() -> None:
     balls = spheres(at(-20, 80), np.array([15.0])).grown(4)
     found = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
     assert found == pytest.approx(2 * np.arcsin(28 / 160), rel=1e-12)
 
 
-def test_balls_far_along_the_axis_never_meet() -> None:
+def test_balls_far_apart_along_the_axis_never_meet() -> None:
     assert contact_angle(at(30, 80), np.array([9.0]), spheres(at(-20, 80), np.array([15.0]))) == 0
 
 
@@ -32,7 +32,14 @@ def test_ball_over_the_axis_is_always_met() -> None:
     assert contact_angle(at(0, 4), np.array([2.0]), cone)[0, 0] == np.pi
 
 
-def test_capsule_across_the_way_is_met_at_the_tangent() -> None:
+def test_rod_on_the_axis_is_met_between_its_ends() -> None:
+    """Neither end is within reach of the ball, the middle is at every angle."""
+    rod = RoundCones(at(20, 0), at(-20, 0), np.array([1.0]), np.array([1.0]))
+    assert contact_angle(at(0, 1.9), np.array([1.0]), rod)[0, 0] == np.pi
+    assert contact_angle(at(0, 2.1), np.array([1.0]), rod)[0, 0] == 0
+
+
+def test_capsule_across_the_orbit_is_met_at_the_tangent() -> None:
     """A ray out from the axis at the ball's height: sin(angle) * out = radii."""
     cone = RoundCones(at(0, 0), at(0, 1000), np.array([3.0]), np.array([3.0]))
     found = contact_angle(at(0, 100), np.array([7.0]), cone)[0, 0]

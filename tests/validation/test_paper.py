@@ -1,6 +1,6 @@
 """Figures of the paper (J. Imaging Sci. Technol. 66(6) 060406) and of the first measurements.
 
-Where an exact figure differs from one measured before, the test states both.
+Where an exact figure differs from one measured first, the test states both.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def test_flat_capture_diameter(n: int, paper_mm: float) -> None:
 
 
 def test_traced_coverage_of_flat_mirrors_agrees_with_their_cones() -> None:
-    """Two ways to one figure: least coverage of traced planar cells, and 2 d sin(theta_0).
+    """Two ways to one figure: minimum coverage of traced planar cells, and 2 d sin(theta_0).
 
     Measured on cells the shell's own borders count, seam and foot, not the neighbours beyond.
     """
@@ -120,5 +120,19 @@ def test_graph_of_the_cells(paper_half: MirrorArray) -> None:
 def test_equatorial_mirrors_stay_whole(paper_half: MirrorArray) -> None:
     """The foot plane lies half a mirror below z = 0: all of their apices and widths are above."""
     equator = paper_half.u[:, 2] == 0
-    assert equator.sum() == 36 or equator.sum() == 37
     assert (paper_half.half_width[equator] <= -paper_half.foot + 1e-12).all()
+
+
+def test_number_of_equatorial_mirrors(paper_half: MirrorArray) -> None:
+    """37 a camera, by Table I: it gives 1657 virtual cameras for n = 18, z = 0 included.
+
+    The polyhedron has 10 n^2 + 2 = 3242 vertices and mirror symmetry in z = 0, so 2 * 1657 - 3242
+    = 72 of them are on the equator. It is symmetric in x = 0, too, and as n is even the edges'
+    middles (0, 1, 0) and (0, -1, 0) are vertices: two of the 72 are on the seam and count for
+    both cameras, the other 70 are shared evenly.
+    """
+    on_equator = numbered_directions(18)[0][:, 2] == 0
+    assert on_equator.sum() == 2 * 1657 - 3242 == 72
+    equatorial = paper_half.u[paper_half.u[:, 2] == 0]
+    assert (equatorial[:, 0] == 0).sum() == 2
+    assert len(equatorial) == 70 // 2 + 2 == 37
