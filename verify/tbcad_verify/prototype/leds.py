@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.distances import distance_to_facets
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, manifold
+from tbcad_verify.prototype.measured_parts import (
+    MeasuredPart,
+    distance_to_facets,
+    joined_meshes,
+    manifold,
+)
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats
 

@@ -128,6 +128,19 @@ def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
     return join_meshes(meshes), owner
 
 
+def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:
+    """Minimum distance of a point (3,) from some facets of a mesh, mm; infinite without any.
+
+    Facets without area are left out: their edges are their neighbours' too.
+    """
+    from trimesh.triangles import closest_point
+
+    solid = facets[norm(mesh.area[:, facets]) > 0]
+    triangles = mesh.points[mesh.faces[solid]]
+    nearest = closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
+    return float(np.linalg.norm(nearest - point, axis=1).min(initial=np.inf))
+
+
 def manifold(points: Floats, faces: Any) -> Any:
     """The solid that manifold3d makes of points (V, 3), mm, and facets (F, 3)."""
     import manifold3d

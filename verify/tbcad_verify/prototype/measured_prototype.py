@@ -16,7 +16,7 @@ from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
-from tbcad_verify.prototype.seats import MeasuredSeats
+from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
 
@@ -63,7 +63,7 @@ class MeasuredPrototype:
 
 def measure_prototype(
     context: PrototypeContext,
-    seats: MeasuredSeats,
+    seats: list[MeasuredSeat],
     caps: list[MeasuredCap],
     parts: list[MeasuredPart],
 ) -> MeasuredPrototype:
@@ -73,9 +73,9 @@ def measure_prototype(
         Unknown: a centre, a cap or a mesh is not known.
     """
     balls = context.prototype.balls
-    if missing := [reason for reason in seats.reason if reason]:
+    if missing := [seat.reason for seat in seats if seat.reason]:
         raise Unknown(missing[0])
-    body, radius = seats.centre.T.copy(), balls.radius_mm.copy()
+    body, radius = np.array([seat.centre for seat in seats]).T.copy(), balls.radius_mm.copy()
     centre, body_radius = body.copy(), balls.body_radius_mm.copy()
     without = {*np.flatnonzero(balls.cap).tolist()} - {cap.ball for cap in caps}
     if without:

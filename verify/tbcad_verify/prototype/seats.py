@@ -11,7 +11,7 @@ from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import half_edge_vectors
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.distances import distance_to_facets
+from tbcad_verify.prototype.measured_parts import distance_to_facets
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -60,16 +60,6 @@ class MeasuredSeat:
 
 
 @dataclass(frozen=True)
-class MeasuredSeats:
-    """The figures of `MeasuredSeat` for K balls: (K, 3), (K,), (K,), and K texts."""
-
-    centre: Floats
-    margin: Floats
-    clear: Floats
-    reason: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Pad:
     """A plane n.x = d, n toward the ball, and its facets."""
 
@@ -78,27 +68,30 @@ class Pad:
     facets: Ints
 
 
-def measure_seats(context: PrototypeContext, base: Mesh) -> MeasuredSeats:
+def measure_seats(context: PrototypeContext, base: Mesh) -> list[MeasuredSeat]:
     """Recover the balls' centres from the mesh of all base parts, in the frame of the shell."""
-    seats = [_seat(context, base, k) for k in range(len(context.prototype.balls))]
-    return MeasuredSeats(
-        np.array([seat.centre for seat in seats]),
-        np.array([seat.margin for seat in seats]),
-        np.array([seat.clear for seat in seats]),
-        tuple(seat.reason for seat in seats),
-    )
+    return [_seat(context, base, k) for k in range(len(context.prototype.balls))]
 
 
-def checks(names: list[CheckName], context: PrototypeContext, seats: MeasuredSeats) -> list[Check]:
+def centre_errors(context: PrototypeContext, seats: list[MeasuredSeat]) -> Floats:
+    """(K,) distances of the balls' centres from the recorded ones, um; NaN where not known."""
+    centre = np.array([seat.centre for seat in seats]).T
+    return 1000 * norm(centre - context.prototype.balls.columns("bx", 3))
+
+
+def checks(
+    names: list[CheckName], context: PrototypeContext, seats: list[MeasuredSeat]
+) -> list[Check]:
     """Centres against the record, contacts against the pads, balls against the base."""
     centre, pads, clear, clearance = names
-    balls, limit = context.prototype.balls, context.prototype.pad_um
-    error = 1000 * norm(seats.centre.T - balls.columns("bx", 3))
-    missing = [f"ball {k + 1}: {reason}" for k, reason in enumerate(seats.reason) if reason]
+    error, limit = centre_errors(context, seats), context.prototype.pad_um
+    missing = [f"ball {k}: {seat.reason}" for k, seat in enumerate(seats, 1) if seat.reason]
+    margin = np.array([seat.margin for seat in seats])
+    gap = np.array([seat.clear for seat in seats])
 
     def worst(values: Floats, bad: Bools, unit: str = "mm") -> str:
         order = np.argsort(-values, kind="stable")
-        ids = balls.names(np.arange(values.size))
+        ids = context.prototype.balls.names(np.arange(values.size))
         return worst_offenders(ids, values, unit, order[bad[order]], ".3g")
 
     return [
@@ -108,9 +101,9 @@ def checks(names: list[CheckName], context: PrototypeContext, seats: MeasuredSea
             limit,
             "; ".join(missing[:LISTED]) or worst(error, error > limit, "um"),
         ),
-        at_least(pads, float(seats.margin.min()), 0, worst(-seats.margin, seats.margin < 0)),
-        at_least(clear, float(seats.clear.min()), -SUNK_MM, worst(-seats.clear, seats.clear < 0)),
-        informative(clearance, float(seats.clear.min())),
+        at_least(pads, float(margin.min()), 0, worst(-margin, margin < 0)),
+        at_least(clear, float(gap.min()), -SUNK_MM, worst(-gap, gap < 0)),
+        informative(clearance, float(gap.min())),
     ]
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.prototype import assembly, ball_views, caps, leds, plan_checks, seats, swing
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.ball_views import BallViews, ball_coverage
@@ -23,7 +22,7 @@ from tbcad_verify.prototype.measured_parts import (
     stl_names,
 )
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
-from tbcad_verify.prototype.seats import MeasuredSeats
+from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import (
@@ -99,7 +98,7 @@ def _add(sink: ResultSink, units: Mapping[str, str], files: str, work: Work) -> 
 
 def _seats(
     context: PrototypeContext, parts: list[MeasuredPart], sink: ResultSink
-) -> MeasuredSeats | None:
+) -> list[MeasuredSeat] | None:
     base, no_base = attempt(lambda: joined_meshes(of_roles(parts, "base"))[0])
     held, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
     files = stl_names(parts, "base")
@@ -165,14 +164,14 @@ def _swing(
 
 
 def json_rows(
-    context: PrototypeContext, held: MeasuredSeats | None, views: BallViews | None
+    context: PrototypeContext, held: list[MeasuredSeat] | None, views: BallViews | None
 ) -> Row:
     """Ball by ball and stop by stop, as verify.json has it; what is not known is null."""
     balls = context.prototype.balls
     count = len(balls)
     error = minimum = pixels = shell = np.full(count, np.nan)
     if held is not None:
-        error = 1000 * norm(held.centre.T - balls.columns("bx", 3))
+        error = seats.centre_errors(context, held)
     if views is not None:
         minimum = ball_coverage(context, views.coverage)
         pixels = np.round(np.bincount(context.ball, views.pixels, count))
