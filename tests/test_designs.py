@@ -8,12 +8,12 @@ import pytest
 
 from tbcad.mirrors.array import design
 from tbcad.spec.design import Spec
-from tbcad.spec.errors import allowed, fields, section_of
+from tbcad.spec.errors import allowed_text, dotted_fields, section_of
 from tbcad.spec.load import load_spec
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 PAPER = DESIGNS / "turtleback.toml"
-KEYS = {key: field for key, field in fields(Spec) if section_of(field) is None}
+KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
 
 
 def dotted(table: dict[str, object], prefix: str = "") -> set[str]:
@@ -52,7 +52,7 @@ def test_the_papers_design_tells_what_each_key_allows(key: str) -> None:
     assert len(comment.split()) > 3
     kind = KEYS[key].annotation
     if kind in (int, float):
-        limits = allowed(kind, KEYS[key].metadata).split(maxsplit=3 if kind is int else 2)[-1]
+        limits = allowed_text(kind, KEYS[key].metadata).split(maxsplit=3 if kind is int else 2)[-1]
         assert limits in re.sub(r"\s+", " ", comment)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from tbcad.spec.errors import SpecError, shown
+from tbcad.spec.errors import SpecError, short_text
 from tbcad.spec.files import read_text
 
 Row = dict[str, str]
@@ -65,7 +65,7 @@ def positive_number(where: str, row: Row, column: str, maximum: float) -> float:
         value = math.nan
     if not 0 < value <= maximum:
         raise SpecError(
-            f"{where}, column {column}: {shown(row[column])}, allowed is a number above 0 to "
+            f"{where}, column {column}: {short_text(row[column])}, allowed is a number above 0 to "
             f"{maximum:g}: change it"
         )
     return value
@@ -78,5 +78,5 @@ def check_unique(where: str, row: Row, column: str, known: set[str]) -> None:
         SpecError: when it is one of them; it names the place and the column.
     """
     if row[column] in known:
-        raise SpecError(f"{where}, column {column}: {shown(row[column])} twice: remove one")
+        raise SpecError(f"{where}, column {column}: {short_text(row[column])} twice: remove one")
     known.add(row[column])

@@ -1,4 +1,4 @@
-"""What is said when a design is refused: one line with what, where, what is allowed, what next."""
+"""Errors of a design: one line with what is wrong, where, what is allowed and what to do."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pydantic_core import ErrorDetails
 
 from tbcad.errors import InputError, one_line
 
-_LONGEST_VALUE = 60
-_LEAST_LIKENESS = 0.6
+_MAX_VALUE_LENGTH = 60
+_MIN_LIKENESS = 0.6
 _ORDER = {Gt: "above", Ge: "from", Lt: "below", Le: "to"}
 
 
@@ -22,22 +22,22 @@ class SpecError(InputError, ValueError):
     """A design that cannot be read or built; its text is one line."""
 
 
-def shown(value: object) -> str:
+def short_text(value: object) -> str:
     """Return a value as short text of one line."""
     try:
         text = one_line(repr(value))
     except ValueError:  # Python refuses to write integers of more than 4300 digits
         text = "a number of thousands of digits"
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+    return text if len(text) <= _MAX_VALUE_LENGTH else text[: _MAX_VALUE_LENGTH - 3] + "..."
 
 
-def fields(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+def dotted_fields(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
     """Yield every dotted key of a model with its field, sections before their keys."""
     for name, field in model.model_fields.items():
         key = prefix + (field.alias or name)
         yield key, field
         if section := section_of(field):
-            yield from fields(section, key + ".")
+            yield from dotted_fields(section, key + ".")
 
 
 def section_of(field: FieldInfo) -> type[BaseModel] | None:
@@ -46,8 +46,8 @@ def section_of(field: FieldInfo) -> type[BaseModel] | None:
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 
-def allowed(kind: Any, limits: Iterable[object] = ()) -> str:
-    """Return in words what a type and its limits allow."""
+def allowed_text(kind: Any, limits: Iterable[object] = ()) -> str:
+    """Return what a type and its limits allow, as text: "a number above 0 to 90"."""
     if get_origin(kind) is tuple:
         return "[" + ", ".join(_allowed_item(item) for item in get_args(kind)) + "]"
     if get_origin(kind) is Literal:
@@ -58,7 +58,7 @@ def allowed(kind: Any, limits: Iterable[object] = ()) -> str:
 
 def _allowed_item(item: Any) -> str:
     kind, *metadata = get_args(item) or (item,)
-    return allowed(kind, [limit for field in metadata for limit in field.metadata])
+    return allowed_text(kind, [limit for field in metadata for limit in field.metadata])
 
 
 def _limits(limits: Iterable[object]) -> Iterator[str]:
@@ -69,10 +69,10 @@ def _limits(limits: Iterable[object]) -> Iterator[str]:
             yield f"that matches {pattern}"
 
 
-def nearest(key: str, known: Iterable[str]) -> str | None:
-    """Return the known dotted key most like a given one, None if all are far from it."""
+def nearest_key(key: str, known: Iterable[str]) -> str | None:
+    """Return the known dotted key most similar to a given one, None if none is similar."""
     likeness, best = max((_likeness(key, other), other) for other in known)
-    return best if likeness >= _LEAST_LIKENESS else None
+    return best if likeness >= _MIN_LIKENESS else None
 
 
 def _likeness(key: str, other: str) -> float:
@@ -84,12 +84,12 @@ def _likeness(key: str, other: str) -> float:
 
 def unknown_key(where: str, key: str, model: type[BaseModel]) -> SpecError:
     """Return the error for a key that does not exist, or is a section where a key must be."""
-    known = [name for name, _ in fields(model)]
+    known = [name for name, _ in dotted_fields(model)]
     if key in known:
         return SpecError(
             f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}"
         )
-    likely = nearest(key, known)
+    likely = nearest_key(key, known)
     hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(_siblings(key, known))
     return SpecError(f"{where}: unknown key {key}: {hint}")
 
@@ -102,14 +102,14 @@ def _inside(section: str, known: list[str]) -> list[str]:
     return [key for key in known if key.rpartition(".")[0] == section]
 
 
-def refused(
+def validation_error(
     error: ValidationError, model: type[BaseModel], file: str, options: Collection[str] = ()
 ) -> SpecError:
-    """Return the first fault of a validation as one line, and how many more there are.
+    """Return the first error of a validation as one line, and how many more there are.
 
     Args:
         error: what pydantic found.
-        model: the model that refused.
+        model: the model that was validated.
         file: where the design came from.
         options: dotted keys that options have set.
     """
@@ -122,12 +122,12 @@ def refused(
     where = "option" if key in options else file
     if first["type"] == "extra_forbidden":
         return SpecError(f"{unknown_key(where, key, model)}{more}")
-    return SpecError(f"{where}: {_fault(first, key, model)}{more}")
+    return SpecError(f"{where}: {_wrong_value(first, key, model)}{more}")
 
 
-def _fault(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
-    field = dict(fields(model))[key]
+def _wrong_value(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
+    field = dict(dotted_fields(model))[key]
     entry = "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
-    what = "missing" if first["type"] == "missing" else shown(first["input"])
-    may = allowed(field.annotation, field.metadata)
-    return f"{key}{entry} is {what}, allowed is {may}: change it"
+    value = "missing" if first["type"] == "missing" else short_text(first["input"])
+    permitted = allowed_text(field.annotation, field.metadata)
+    return f"{key}{entry} is {value}, allowed is {permitted}: change it"

@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError, fields, refused, section_of, unknown_key
+from tbcad.spec.errors import SpecError, dotted_fields, section_of, unknown_key, validation_error
 from tbcad.spec.files import Table, read_toml, toml_value
 
 _BUILT_IN = "built-in design"
@@ -33,7 +33,7 @@ def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = 
         return Spec.model_validate(table)
     except ValidationError as error:
         where = _BUILT_IN if path is None else str(path)
-        raise refused(error, Spec, where, {key for key, _ in options}) from None
+        raise validation_error(error, Spec, where, {key for key, _ in options}) from None
 
 
 def spec_dict(spec: Spec) -> Table:
@@ -56,7 +56,7 @@ def _option(text: str) -> tuple[str, object]:
 
 def _full_key(key: str) -> str:
     """The whole key that a key or its end means: the one nearest to the top of the design."""
-    known = {name for name, field in fields(Spec) if section_of(field) is None}
+    known = {name for name, field in dotted_fields(Spec) if section_of(field) is None}
     if key in known:
         return key
     ending = [name for name in known if name.endswith("." + key)]

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
-from tbcad.spec.errors import shown
+from tbcad.spec.errors import short_text
 from tbcad.spec.section import Section, as_tuple
 
 MOST_BALLS = 1000
@@ -40,7 +40,7 @@ def _count(value: object) -> object:
     if value == "auto" or (type(value) is int and 1 <= value <= MOST_BALLS):
         return value
     raise ValueError(
-        f"{shown(value)} is not allowed: give a whole number from 1 to {MOST_BALLS}, or auto"
+        f"{short_text(value)} is not allowed: give a whole number from 1 to {MOST_BALLS}, or auto"
     )
 
 
@@ -48,7 +48,9 @@ def _names(value: object) -> object:
     names = as_tuple(value)
     if isinstance(names, tuple) and names and all(isinstance(name, str) for name in names):
         return names
-    raise ValueError(f'{shown(value)} is not allowed: give a list such as ["metric", "my.csv"]')
+    raise ValueError(
+        f'{short_text(value)} is not allowed: give a list such as ["metric", "my.csv"]'
+    )
 
 
 def _places(value: object) -> object:
@@ -56,7 +58,7 @@ def _places(value: object) -> object:
     if isinstance(places, tuple) and (not places or LEAST_LEDS <= len(places) <= MOST_LEDS):
         return places
     raise ValueError(
-        f"{shown(value)} is not allowed: give {LEAST_LEDS} to {MOST_LEDS} places [x, y, z], "
+        f"{short_text(value)} is not allowed: give {LEAST_LEDS} to {MOST_LEDS} places [x, y, z], "
         "or [] for a stage without"
     )
 

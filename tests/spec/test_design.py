@@ -15,12 +15,12 @@ from pydantic import ValidationError
 from tbcad.errors import InputError
 from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.spec.design import FootFlangeSpec, OpticsSpec, Spec
-from tbcad.spec.errors import SpecError, allowed, fields, nearest, section_of
+from tbcad.spec.errors import SpecError, allowed_text, dotted_fields, nearest_key, section_of
 from tbcad.spec.load import load_spec, spec_dict
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import GradeName
 
-KEYS = {key: field for key, field in fields(Spec) if section_of(field) is None}
+KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
 NUMBERS = {key: field for key, field in KEYS.items() if field.annotation in (int, float)}
 
 
@@ -70,7 +70,9 @@ class TestPlainDict:
         assert Spec.model_validate(table) == spec
 
     def test_has_the_order_of_the_spec(self) -> None:
-        assert list(spec_dict(Spec())) == [key for key in dict(fields(Spec)) if "." not in key]
+        assert list(spec_dict(Spec())) == [
+            key for key in dict(dotted_fields(Spec)) if "." not in key
+        ]
         backwards = {"optics": {"semi_minor_mm": 100.0, "n": 18}, "schema": 2, "name": "x"}
         assert list(spec_dict(Spec.model_validate(backwards))) == list(spec_dict(Spec()))
 
@@ -172,7 +174,7 @@ class TestUnknownKey:
     @given(st.sampled_from(sorted(KEYS)), st.data())
     def test_one_wrong_letter_is_understood(self, key: str, data: st.DataObject) -> None:
         at = data.draw(st.integers(key.rfind(".") + 1, len(key) - 1))
-        likely = nearest(key[:at] + "#" + key[at + 1 :], KEYS)
+        likely = nearest_key(key[:at] + "#" + key[at + 1 :], KEYS)
         # One letter may be all of a leaf, and only the section is then known.
         assert likely == key or len(key.rpartition(".")[2]) == 1
 
@@ -188,7 +190,7 @@ class TestValue:
             step = 1 if field.annotation is int else abs(value) * 1e-9 or 1e-9
             said = refusal(None, f"{key}={value + outward * step!r}")
             assert said.startswith(f"option: {key} is ")
-            assert allowed(field.annotation, field.metadata) in said
+            assert allowed_text(field.annotation, field.metadata) in said
             assert f"{value:g}" in said
 
     @pytest.mark.parametrize("key", NUMBERS)

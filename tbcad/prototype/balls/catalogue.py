@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.spec.errors import SpecError, shown
+from tbcad.spec.errors import SpecError, short_text
 from tbcad.types import Floats
 
 STEEL_DENSITY_G_CM3 = 7.81  # 100Cr6 (AISI 52100), the usual steel of bearing balls
@@ -164,7 +164,7 @@ def _grades(where: str, row: Row, known_grades: frozenset[str]) -> frozenset[str
     grades = frozenset(row["grades"].split())
     if not grades or not grades <= known_grades:
         raise SpecError(
-            f"{where}, column grades: {shown(row['grades'])}, allowed are "
+            f"{where}, column grades: {short_text(row['grades'])}, allowed are "
             f"{' '.join(load_grades())} with spaces between: change it"
         )
     return grades

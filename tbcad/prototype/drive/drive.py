@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, package_lists
 from tbcad.spec.csv_rows import Row, positive_number, read_rows
-from tbcad.spec.errors import SpecError, shown
+from tbcad.spec.errors import SpecError, short_text
 
 DRIVE_COLUMNS = ("drive", "motor", "pinion", "wheel", "belt", "coupling", "efficiency", "source")
 KINDS = {  # of the parts that each of these columns may name
@@ -145,7 +145,9 @@ def _named_part(where: str, row: Row, column: str, parts: Parts) -> PurchasedPar
     part = parts.get(row[column])
     if part is None or part.kind not in KINDS[column]:
         lists = " or ".join(f"{kind}.csv" for kind in KINDS[column])
-        raise SpecError(f"{where}, column {column}: {shown(row[column])} is not in {lists}: add it")
+        raise SpecError(
+            f"{where}, column {column}: {short_text(row[column])} is not in {lists}: add it"
+        )
     return part
 
 
@@ -158,7 +160,7 @@ def choose_drive(name: str, required_torque: float, drives: Sequence[Drive]) -> 
     candidates = [drive for drive in drives if drive.name == name]
     if not candidates:
         known = ", ".join(dict.fromkeys(drive.name for drive in drives))
-        raise SpecError(f"no drive {shown(name)} in drives.csv: use one of {known}")
+        raise SpecError(f"no drive {short_text(name)} in drives.csv: use one of {known}")
     for drive in candidates:
         if drive.holds_nmm >= required_torque:
             return drive

@@ -10,7 +10,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance, cap_volume
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
-from tbcad.spec.errors import SpecError, shown
+from tbcad.spec.errors import SpecError, short_text
 from tbcad.spec.prototype import MotionSpec
 
 COLUMNS = (
@@ -166,7 +166,7 @@ def _asked(needed: PartsNeeded, parts: Parts) -> list[list[Cell]]:
     """Parts by name, in the order of the lists; those of none are left out."""
     counts = Counter({**ALWAYS, needed.led: needed.leds}) + Counter(needed.bought)
     if unknown := [name for name in counts if name not in parts]:
-        raise SpecError(f"{shown(unknown[0])} is in no list of purchased parts: add it to one")
+        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
     return [_bought(part, counts[name]) for name, part in parts.items() if counts[name]]
 
 

@@ -16,7 +16,14 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, ValidationError
 
 from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.spec.errors import SpecError, fields, refused, section_of, shown, unknown_key
+from tbcad.spec.errors import (
+    SpecError,
+    dotted_fields,
+    section_of,
+    short_text,
+    unknown_key,
+    validation_error,
+)
 from tbcad.spec.files import Table, read_toml, toml_value
 from tbcad.spec.prototype import GradeName
 from tbcad.spec.section import Section
@@ -158,7 +165,7 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
     try:
         return Process.model_validate(table)
     except ValidationError as error:
-        raise refused(error, Process, name, {key for key, _ in options}) from None
+        raise validation_error(error, Process, name, {key for key, _ in options}) from None
 
 
 def process_dict(process: Process) -> Table:
@@ -206,7 +213,7 @@ def _own(path: Path) -> Table:
         return table
     if base not in BUILT_IN:
         raise SpecError(
-            f"{path}: based_on is {shown(base)}, allowed is {' or '.join(BUILT_IN)}: change it"
+            f"{path}: based_on is {short_text(base)}, allowed is {' or '.join(BUILT_IN)}: change it"
         )
     return {**_built_in(base), "name": path.stem, **table}
 
@@ -215,7 +222,8 @@ def _no_process(which: str) -> SpecError:
     close = get_close_matches(which.lower(), BUILT_IN, 1)
     hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
     return SpecError(
-        f"process {shown(which)} is neither built in ({', '.join(BUILT_IN)}) nor a file: {hint}"
+        f"process {short_text(which)} is neither built in ({', '.join(BUILT_IN)}) nor a file: "
+        f"{hint}"
     )
 
 
@@ -223,7 +231,7 @@ def _option(text: str) -> tuple[str, object]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key:
         raise SpecError(f"option {text!r} is not kind=value: write for instance seat_um=20")
-    known = dict(fields(Process))
+    known = dict(dotted_fields(Process))
     if key in known and section_of(known[key]):
         key += ".magnitude"
     elif key not in known:
