@@ -14,6 +14,6 @@ def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
 
 
 @pytest.fixture(scope="session")
-def small_prototype(small_design: MirrorDesign) -> PrototypeLayout:
+def prototype(small_design: MirrorDesign) -> PrototypeLayout:
     """A quick one: four balls for the mirrors of n = 6."""
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)

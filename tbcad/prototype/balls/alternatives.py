@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.catalogue import Catalogue
+from tbcad.prototype.balls.fit import ball_fit
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
     ball_candidates,
-    ball_fit,
     choose_balls,
 )
 from tbcad.spec.design import Spec

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -16,11 +16,6 @@ from tbcad.types import Floats
 
 STEEL_DENSITY_G_CM3 = 7.81  # 100Cr6 (AISI 52100), the usual steel of bearing balls
 BUILT_IN = ("metric", "inch")
-COLUMNS = ("size", "diameter_mm", "standard", "grades", "mass_g", "source")
-GRADE_COLUMNS = (
-    *("grade", "sphericity_um", "diameter_variation_um", "roughness_ra_um", "lot_variation_um"),
-    "standard",
-)
 MAX_DIAMETER_MM = 1000.0
 MAX_MASS_G = 1e7
 
@@ -44,6 +39,9 @@ class StockBall:
     grades: frozenset[str]
     mass_g: float
     source: str
+
+
+COLUMNS = tuple(field.name for field in fields(StockBall))
 
 
 @dataclass(frozen=True)
@@ -95,6 +93,9 @@ class Grade:
     standard: str
 
 
+GRADE_COLUMNS = tuple(field.name for field in fields(Grade))
+
+
 def load_grades() -> dict[str, Grade]:
     """All grades by name, the best first."""
     rows = (row for _, row in read_rows(_built_in("grades"), "grades", GRADE_COLUMNS))
@@ -102,8 +103,9 @@ def load_grades() -> dict[str, Grade]:
 
 
 def _grade(row: Row) -> Grade:
-    sphericity, diameter, roughness, lot = (float(row[key]) for key in GRADE_COLUMNS[1:5])
-    return Grade(row["grade"], sphericity, diameter, roughness, lot, row["standard"])
+    grade, *deviations, standard = row.values()
+    sphericity, diameter, roughness, lot = map(float, deviations)
+    return Grade(grade, sphericity, diameter, roughness, lot, standard)
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:

@@ -14,6 +14,7 @@ from tbcad.prototype.balls.clearance import (
     obstacles,
     seat_half_angles,
 )
+from tbcad.prototype.balls.fit import BallFit, ball_fit
 from tbcad.prototype.balls.groups import MirrorGroups, group_mirrors, max_groups
 from tbcad.prototype.balls.placement import (
     Placement,
@@ -21,14 +22,7 @@ from tbcad.prototype.balls.placement import (
     greedy_placement,
     min_swing_placement,
 )
-from tbcad.prototype.balls.selection import (
-    BallCandidates,
-    BallFit,
-    Balls,
-    ball_candidates,
-    ball_fit,
-    choose_balls,
-)
+from tbcad.prototype.balls.selection import BallCandidates, Balls, ball_candidates, choose_balls
 from tbcad.prototype.balls.stops import (
     StopPlan,
     StopRequests,

@@ -1,4 +1,4 @@
-"""The balls of the prototype: which one replaces each group of mirrors, and what it shows."""
+"""The balls of the prototype: which one replaces each group of mirrors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import BallPoses, ball_poses, field_angles, pixel_counts, used_outlines
+from tbcad.optics.ball_light import BallPoses, ball_poses, field_angles, used_outlines
 from tbcad.optics.windows import Windows, cell_windows
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
@@ -87,36 +87,6 @@ class Balls:
             f"cap R {radius:.1f} mm" if place == CAP else self.catalogue.balls[place].size
             for radius, place in zip(self.radius, self.stock, strict=True)
         )
-
-
-@dataclass(frozen=True)
-class BallFit:
-    """How well balls replace mirrors, m mirrors.
-
-    Attributes:
-        ball: that replaces the mirror, (m,).
-        polar_error: polar angle of the ball less that of the mirror, radians, (m,).
-        coverage: coverage diameter within the mirror's cell moved with the ball, mm, (m,).
-        coverage_fixed: the same within the cell left in its place; zero where the ball shows the
-            origin outside of it, mm, (m,).
-        coverable: whether any ball on sale shows the whole target with the pictures as the spec
-            has them, (m,).
-        pixels_shell: pixels of the capture sphere in the shell's picture, (m,).
-        pixels: the same in the ball's picture, (m,).
-    """
-
-    ball: Ints
-    polar_error: Floats
-    coverage: Floats
-    coverage_fixed: Floats
-    coverable: Bools
-    pixels_shell: Floats
-    pixels: Floats
-
-    @property
-    def kept_share(self) -> float:
-        """Share of the shell's pixels that the balls keep."""
-        return float(self.pixels.sum() / self.pixels_shell.sum())
 
 
 @dataclass(frozen=True)
@@ -222,32 +192,6 @@ def coverable(candidates: BallCandidates, catalogue: Catalogue, moved: bool) -> 
     """
     smallest = np.full(len(candidates.groups), catalogue.diameter[0] / 2)
     return candidates.coverage(smallest, moved) >= candidates.target - COVERAGE_ROUNDING_MM
-
-
-def ball_fit(candidates: BallCandidates, balls: Balls, spec: PrototypeSpec) -> BallFit:
-    """What the balls show in place of the mirrors."""
-    half, groups = candidates.half, candidates.groups
-    shell = used_outlines(
-        ball_poses(half.ellipsoid, half.polar),
-        half.mirrors.radius,
-        2 * half.ellipsoid.linear_eccentricity,
-        candidates.target / 2,
-    )
-    return BallFit(
-        ball=groups.group_of,
-        polar_error=groups.polar[groups.group_of] - half.polar,
-        coverage=candidates.coverage(balls.radius, moved=True),
-        coverage_fixed=candidates.coverage(balls.radius, moved=False),
-        coverable=coverable(candidates, balls.catalogue, spec.picture == "moved"),
-        pixels_shell=_pixels(half, shell),
-        pixels=_pixels(half, balls.outline[groups.group_of]),
-    )
-
-
-def _pixels(half: MirrorArray, outline: Floats) -> Floats:
-    """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
-    share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
-    return share * pixel_counts(half.camera, half.ellipsoid.frame(), outline, half.azimuth)
 
 
 def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, Ints]:

@@ -129,12 +129,6 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
     return _with_clear_pads(_with_clear_paths(seats))
 
 
-def shifted_contacts(seats: Seats, offsets: Floats) -> Floats:
-    """Contacts (k, o, 3, 3) along the rows of axes with pads moved by offsets (o,) off the ball."""
-    distance = seats.radius[:, None] + offsets
-    return -distance[..., None, None] * seats.local_normals[:, None]
-
-
 def _axes(prototype: PrototypeLayout) -> Floats:
     frame, azimuth = prototype.half.ellipsoid.frame(), prototype.placement.azimuth
     against = np.stack([0 * azimuth, np.sin(azimuth), -np.cos(azimuth)], axis=1) @ frame

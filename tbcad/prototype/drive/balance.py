@@ -84,12 +84,8 @@ class BaseBalance:
     @property
     def torque_amplitude(self) -> float:
         """Torque with the centre of gravity beside the axis, the largest at any angle, N mm."""
-        return self.moment * GRAVITY * 1e-3 * self._lean
-
-    @property
-    def _lean(self) -> float:
-        """Sine of the angle between the axis and the vertical."""
-        return float(np.hypot(*self.frame[1:, 2]))
+        sine_of_lean = float(np.hypot(*self.frame[1:, 2]))
+        return self.moment * GRAVITY * 1e-3 * sine_of_lean
 
     @property
     def _up(self) -> float:
@@ -112,14 +108,6 @@ class BaseBalance:
         if extreme + half_turns * np.pi <= high:
             return self.torque_amplitude
         return float(np.abs(self.torque(np.array([low, high]))).max())
-
-    def max_tilting_moment(self, along: float) -> float:
-        """Largest moment across the axis at a point of it (mm from the origin), N mm.
-
-        Bearings or a stage must bear it beside the torque, at any base angle.
-        """
-        lever = self.first_moment[0] - self.mass_g * along
-        return GRAVITY * 1e-3 * float(abs(lever) * self._lean + self.moment * abs(self.frame[0, 2]))
 
     def required_torque(self, low: float, high: float, acceleration: float, safety: float) -> float:
         """Holding torque that a drive must have on the base, N mm.
@@ -162,13 +150,6 @@ def ball_masses(prototype: PrototypeLayout, cap_density: float) -> PointMasses:
     volume = cap_volume(prototype.balls)
     mass = prototype.balls.mass_g + volume * cap_density * 1e-3
     return PointMasses(mass, prototype.body_centres())
-
-
-def counterweight_masses(weight: Counterweight, along: float, frame: Floats) -> PointMasses:
-    """A counterweight at a place along the axis (mm from the origin)."""
-    cosine, sine = np.cos(weight.azimuth), np.sin(weight.azimuth)
-    place = np.array([[along, weight.radius * cosine, weight.radius * sine]])
-    return PointMasses(np.array([weight.mass_g]), place @ frame)
 
 
 def cap_volume(balls: Balls) -> Floats:

@@ -10,12 +10,12 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.alternatives import ball_alternatives
+from tbcad.prototype.balls.fit import ball_fit
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
     ball_candidates,
-    ball_fit,
     choose_balls,
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
@@ -150,11 +150,7 @@ class TestPlaces:
             for j in range(len(prototype)):
                 turn = prototype.placement.azimuth[j]
                 rotation = np.array(
-                    [
-                        [1, 0, 0],
-                        [0, np.cos(turn), -np.sin(turn)],
-                        [0, np.sin(turn), np.cos(turn)],
-                    ]
+                    [[1, 0, 0], [0, np.cos(turn), -np.sin(turn)], [0, np.sin(turn), np.cos(turn)]]
                 )
                 x, n = point[j] @ rotation.T @ frame, normal[j] @ rotation.T @ frame
                 out = reflected_rays(camera, x, n)

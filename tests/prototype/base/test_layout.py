@@ -20,12 +20,7 @@ from tbcad.prototype.base.profile import (
     thinned,
     trimmed,
 )
-from tbcad.prototype.base.seats import (
-    OFF_PATH_MM,
-    insertion_clearance,
-    seat_layout,
-    shifted_contacts,
-)
+from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import BaseSpec
@@ -75,8 +70,8 @@ class TestSeats:
         pads = seat.radius * np.sin(seat.tilt) - seat.pad * np.cos(seat.tilt)
         assert (seat.pocket < pads).all()
 
-    def test_glue_needs_no_magnet(self, small_prototype: PrototypeLayout) -> None:
-        seat = seat_layout(keys(hold="glue"), small_prototype)
+    def test_glue_needs_no_magnet(self, prototype: PrototypeLayout) -> None:
+        seat = seat_layout(keys(hold="glue"), prototype)
         assert (seat.magnet == 0).all()
         assert seat.bottom == pytest.approx(seat.radius + KEYS.magnet_gap_mm)
 
@@ -86,8 +81,8 @@ class TestSeats:
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
         self, paper_design: MirrorDesign
     ) -> None:
-        small_prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
-        seat = seat_layout(KEYS, small_prototype)
+        prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
+        seat = seat_layout(KEYS, prototype)
         slant = np.degrees(
             np.arccos(np.clip(-dot(seat.insertion, seat.axis) / norm(seat.insertion), -1, 1))
         )
@@ -95,10 +90,6 @@ class TestSeats:
         # On its way out it leaves its own pads.
         assert dot(seat.insertion[:, None], seat.pad_normals).min() > 0
         assert insertion_clearance(seat).min() > OFF_PATH_MM
-
-    def test_moved_pads(self, whole: BaseLayout) -> None:
-        moved = shifted_contacts(whole.seats, np.array([0.0, 0.2]))
-        assert norm(moved[:, 1]) - norm(moved[:, 0]) == pytest.approx(np.full((16, 3), 0.2))
 
 
 class TestLight:
@@ -126,9 +117,9 @@ class TestLight:
         inside = region.excess(weights @ facets).min(axis=1)
         assert (region.min_excess(facets) <= inside + 1e-9).all()
 
-    def test_a_boss_in_the_light_is_refused(self, small_prototype: PrototypeLayout) -> None:
+    def test_a_boss_in_the_light_is_refused(self, prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
-            base_layout(keys(light_clearance_mm=12.0), small_prototype)
+            base_layout(keys(light_clearance_mm=12.0), prototype)
 
 
 class TestProfile:
@@ -207,34 +198,28 @@ class TestRefused:
             ({"magnets_mm": [40.0]}, "no magnet fits between the pads of ball 1: add one of"),
         ],
     )
-    def test_seats(
-        self, small_prototype: PrototypeLayout, changed: dict[str, object], text: str
-    ) -> None:
+    def test_seats(self, prototype: PrototypeLayout, changed: dict[str, object], text: str) -> None:
         with pytest.raises(SpecError, match=text):
-            base_layout(keys(**changed), small_prototype)
+            base_layout(keys(**changed), prototype)
 
-    def test_pads_in_the_way_of_other_balls(self, small_prototype: PrototypeLayout) -> None:
-        close = replace(small_prototype.placement, azimuth=small_prototype.placement.azimuth * 0)
+    def test_pads_in_the_way_of_other_balls(self, prototype: PrototypeLayout) -> None:
+        close = replace(prototype.placement, azimuth=prototype.placement.azimuth * 0)
         small = replace(
-            small_prototype.balls.poses,
-            apex=small_prototype.balls.poses.apex * 0 + small_prototype.balls.poses.apex[:1],
+            prototype.balls.poses,
+            apex=prototype.balls.poses.apex * 0 + prototype.balls.poses.apex[:1],
         )
-        crowded = replace(
-            small_prototype, placement=close, balls=replace(small_prototype.balls, poses=small)
-        )
+        crowded = replace(prototype, placement=close, balls=replace(prototype.balls, poses=small))
         with pytest.raises(SpecError, match="is where another ball is inserted"):
             seat_layout(KEYS, crowded)
 
-    def test_a_ball_next_to_the_axis(self, small_prototype: PrototypeLayout) -> None:
-        seat = seat_layout(KEYS, small_prototype)
-        frame = small_prototype.half.ellipsoid.frame()
+    def test_a_ball_next_to_the_axis(self, prototype: PrototypeLayout) -> None:
+        seat = seat_layout(KEYS, prototype)
+        frame = prototype.half.ellipsoid.frame()
         near = replace(seat, centre=seat.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
         with pytest.raises(SpecError, match="is too near to the axis for its seat"):
-            sector(KEYS, near, small_prototype)
+            sector(KEYS, near, prototype)
 
-    def test_balls_all_round_the_axis(self, small_prototype: PrototypeLayout) -> None:
-        spread = replace(
-            small_prototype.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0])
-        )
+    def test_balls_all_round_the_axis(self, prototype: PrototypeLayout) -> None:
+        spread = replace(prototype.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0]))
         with pytest.raises(SpecError, match=r"would go 3\d\d degrees round its axis"):
-            base_layout(KEYS, replace(small_prototype, placement=spread))
+            base_layout(KEYS, replace(prototype, placement=spread))

@@ -42,8 +42,8 @@ def cut_up(numbers: BaseLayout, printer: PrinterSpec) -> Cut:
 
 
 @pytest.fixture(scope="module")
-def small(small_prototype: PrototypeLayout) -> Cut:
-    return cut_up(base_layout(BaseSpec(), small_prototype), PRINTER)
+def small(prototype: PrototypeLayout) -> Cut:
+    return cut_up(base_layout(BaseSpec(), prototype), PRINTER)
 
 
 @pytest.fixture(scope="module")

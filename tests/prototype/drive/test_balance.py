@@ -8,10 +8,10 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
     BaseBalance,
+    Counterweight,
     PointMasses,
     ball_masses,
     cap_volume,
-    counterweight_masses,
     sum_masses,
 )
 
@@ -102,16 +102,9 @@ class TestCentre:
         assert both.mass_g == 400
         assert FRAME @ both.centre == pytest.approx([22.5, 100, 0])
 
-    def test_tilting_is_the_greatest_moment_across(self) -> None:
-        load, along = at(60, 80, 0.7), -40.0
-        moments = []
-        for angle in np.linspace(0, 2 * np.pi, 721):
-            lever = turned(load, angle).centre[0] - along * FRAME[0]
-            moment = np.cross(lever, [0, 0, -GRAVITY * 0.1])
-            moments.append(np.linalg.norm(moment - (moment @ FRAME[0]) * FRAME[0]))
-        assert sum_masses(FRAME, load).max_tilting_moment(along) == pytest.approx(
-            max(moments), rel=1e-4
-        )
+
+def placed(weight: Counterweight, along: float) -> PointMasses:
+    return at(along, weight.radius, weight.azimuth, weight.mass_g)
 
 
 class TestCounterweight:
@@ -120,42 +113,39 @@ class TestCounterweight:
         load = at(30, 90, azimuth, mass)
         weight = sum_masses(FRAME, load).counterweight(radius)
         assert weight.mass_g == pytest.approx(mass * 90 / radius)
-        left = sum_masses(FRAME, load, counterweight_masses(weight, -80, FRAME))
+        left = sum_masses(FRAME, load, placed(weight, -80))
         assert left.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
         assert left.mass_g == pytest.approx(mass + weight.mass_g)
 
-    def test_of_a_prototype(self, small_prototype: PrototypeLayout) -> None:
-        load = ball_masses(small_prototype, 1.27)
-        before = sum_masses(small_prototype.half.ellipsoid.frame(), load)
+    def test_of_a_prototype(self, prototype: PrototypeLayout) -> None:
+        load = ball_masses(prototype, 1.27)
+        before = sum_masses(prototype.half.ellipsoid.frame(), load)
         weight = before.counterweight(100)
-        after = sum_masses(before.frame, load, counterweight_masses(weight, -70, before.frame))
+        after = sum_masses(before.frame, load, placed(weight, -70))
         assert before.torque_amplitude > 100
         assert after.torque_amplitude < 1e-9 * before.torque_amplitude
 
 
 class TestBalls:
-    def test_balls_weigh_where_they_sit(self, small_prototype: PrototypeLayout) -> None:
-        load = ball_masses(small_prototype, 1.27)
-        bought = ~small_prototype.balls.cap
-        assert len(load) == len(small_prototype)
-        assert load.mass_g[bought].sum() == pytest.approx(small_prototype.mass_g)
-        assert (load.centre == small_prototype.body_centres()).all()
+    def test_balls_weigh_where_they_sit(self, prototype: PrototypeLayout) -> None:
+        load = ball_masses(prototype, 1.27)
+        bought = ~prototype.balls.cap
+        assert len(load) == len(prototype)
+        assert load.mass_g[bought].sum() == pytest.approx(prototype.mass_g)
+        assert (load.centre == prototype.body_centres()).all()
 
-    def test_turning_the_base_turns_the_balls(self, small_prototype: PrototypeLayout) -> None:
-        frame = small_prototype.half.ellipsoid.frame()
-        still = sum_masses(frame, ball_masses(small_prototype, 1.27))
+    def test_turning_the_base_turns_the_balls(self, prototype: PrototypeLayout) -> None:
+        frame = prototype.half.ellipsoid.frame()
+        still = sum_masses(frame, ball_masses(prototype, 1.27))
         moved = sum_masses(
-            frame,
-            PointMasses(
-                ball_masses(small_prototype, 1.27).mass_g, small_prototype.body_centres(0.4)
-            ),
+            frame, PointMasses(ball_masses(prototype, 1.27).mass_g, prototype.body_centres(0.4))
         )
         assert still.torque(np.array([0.4])) == pytest.approx(moved.torque(np.array([0.0])))
         assert still.inertia == pytest.approx(moved.inertia)
 
-    def test_caps_by_slices(self, small_prototype: PrototypeLayout) -> None:
+    def test_caps_by_slices(self, prototype: PrototypeLayout) -> None:
         """Their volume as the sum of thin discs: within both spheres."""
-        balls = small_prototype.balls
+        balls = prototype.balls
         assert balls.cap.any()
         for j in np.flatnonzero(balls.cap):
             body, radius, depth = balls.body_radius[j], balls.radius[j], balls.body_depth[j]
@@ -167,8 +157,8 @@ class TestBalls:
             area = np.pi * np.where(x < drop, front, np.maximum(back, 0))
             assert cap_volume(balls)[j] == pytest.approx(np.trapezoid(area, x), rel=1e-5)
 
-    def test_balls_have_no_cap(self, small_prototype: PrototypeLayout) -> None:
-        assert (cap_volume(small_prototype.balls)[~small_prototype.balls.cap] == 0).all()
+    def test_balls_have_no_cap(self, prototype: PrototypeLayout) -> None:
+        assert (cap_volume(prototype.balls)[~prototype.balls.cap] == 0).all()
 
 
 def test_one_mass_is_its_own_sum() -> None:
