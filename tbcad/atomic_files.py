@@ -35,6 +35,6 @@ def write_errors_as_input_errors(folder: Path) -> Iterator[None]:
     """Raise errors of the file system as an InputError that names the folder."""
     try:
         yield
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, a null character
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{folder} cannot be written: {reason}: choose another folder") from error

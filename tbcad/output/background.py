@@ -3,8 +3,9 @@
 import multiprocessing
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing.connection import Connection
 from typing import Any
 
 
@@ -22,35 +23,23 @@ def in_background(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
         Exception: what the work raised.
         RuntimeError: its process ended before it was done.
     """
-    context = multiprocessing.get_context("spawn")
-    mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(theirs, work, arguments), daemon=True)
-    process.start()
-    theirs.close()
-    try:
-        yield
-        _wait(mine)
-    finally:
-        process.kill()
-        process.join()
-        mine.close()
+    others = multiprocessing.active_children()
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn, initializer=_ignore_interrupts) as pool:
+        result = pool.submit(work, *arguments)
+        try:
+            yield
+            result.result()
+        except BrokenProcessPool:
+            raise RuntimeError(
+                "a process ended before its work was done: is memory short?"
+            ) from None
+        except BaseException:
+            for process in set(multiprocessing.active_children()) - set(others):
+                process.kill()
+            raise
 
 
-def _work(answer: Connection, work: Callable[..., None], arguments: tuple[Any, ...]) -> None:
-    """In the other process: an interrupt is for the one that waits, which then ends this one."""
+def _ignore_interrupts() -> None:
+    """An interrupt is for the process that waits, which then ends this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        work(*arguments)
-    except Exception as error:
-        answer.send(error)
-    else:
-        answer.send(None)
-
-
-def _wait(answer: Connection) -> None:
-    try:
-        error = answer.recv()
-    except EOFError:
-        raise RuntimeError("a process ended before its work was done: is memory short?") from None
-    if error is not None:
-        raise error

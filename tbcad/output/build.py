@@ -24,7 +24,7 @@ def write_export(
     """Write an export into an empty folder.
 
     Args:
-        design: of mirrors.
+        design: the mirrors.
         folder: to write into.
         parts: some of PARTS.
         progress: told of each stage.
@@ -39,9 +39,9 @@ def write_export(
     elif SHELL not in parts:
         export_prototype(design, folder, progress)
     else:
-        shell_envelope(design)  # flanges that do not fit are told at once
+        shell_envelope(design)  # refuses flanges that do not fit before anything is built
         with in_background(write_shells, design, folder):
-            with _or_left_out():
+            with _suggesting_shell_alone():
                 export_prototype(design, folder, progress)
             progress("shells")
     progress("manifest")
@@ -49,8 +49,8 @@ def write_export(
 
 
 @contextmanager
-def _or_left_out() -> Iterator[None]:
-    """Say of the prototype's faults that it need not be built."""
+def _suggesting_shell_alone() -> Iterator[None]:
+    """Add to an error of the prototype that it can be left out."""
     try:
         yield
     except SpecError as error:

@@ -1,9 +1,9 @@
 """The output folder, replaced as a whole or not at all.
 
 A new export is written into a hidden folder beside the old one, `.tbcad-<digest>-<pid>.new`, which
-its writer holds locked; then the two are swapped in one step of the system. Where a system has no
-such step the old one is first moved aside, as `.old`; a kill between the two moves is repaired
-when the folder is next used. What killed writers left behind is removed then too. POSIX only.
+its writer locks; then both are exchanged by one system call. Where a system has no such call, the
+old one is first moved aside, as `.old`; a kill between the two moves is repaired when the folder is
+next used. Hidden folders of killed writers are removed then too. POSIX only.
 """
 
 import ctypes
@@ -16,12 +16,13 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from tbcad.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
 from tbcad.output.foreign_files import foreign_files, is_file, keep_files
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
-_NAMED = 3
+_MAX_NAMES = 3  # of foreign files in an error
 
 
 def check_replaceable(out: Path, force: bool) -> None:
@@ -34,12 +35,12 @@ def check_replaceable(out: Path, force: bool) -> None:
     Raises:
         InputError: it cannot; the text says why and what to do.
     """
-    with _in_words(out):
+    with write_errors_as_input_errors(out):
         target = _target(out)
         if target.parent.is_dir():
             with _locked(target.parent):
                 _clear(out, target)
-        _checked_leftovers(out, target, force)
+        _files_to_keep(out, target, force)
 
 
 @contextmanager
@@ -54,33 +55,28 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
         InputError: out cannot be replaced; it is then as before.
     """
     with ExitStack() as undo:
-        with _in_words(out):
+        with write_errors_as_input_errors(out):
             target = _target(out)
             _make_parents(target.parent, undo)
             new = _open_new(out, target, force, undo)
         yield new
-        with _in_words(out):
+        with write_errors_as_input_errors(out):
             _finish(out, new, force)
 
 
-@contextmanager
-def _in_words(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, a null character
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{out} cannot be written: {reason}: choose another folder") from error
-
-
 def _target(out: Path) -> Path:
-    """Return the real place of an output folder, when it is one that may be replaced."""
+    """Return the absolute path of an output folder, links resolved, if it may be replaced."""
     target = out.resolve()
-    home, here = Path(os.path.expanduser("~")).resolve(), Path.cwd()
-    if here.is_relative_to(target) or home.is_relative_to(target):
-        whose = (
-            "the folder you are in" if here == target else "your home or a folder above your work"
+    home, current = Path(os.path.expanduser("~")).resolve(), Path.cwd()
+    if current == target:
+        raise InputError(
+            f"{out} is the folder you are in and would be replaced: name a folder inside it"
         )
-        raise InputError(f"{out} is {whose} and would be replaced: name a folder inside it")
+    if current.is_relative_to(target) or home.is_relative_to(target):
+        raise InputError(
+            f"{out} is your home or a folder above your work and would be replaced: "
+            "name a folder inside it"
+        )
     if target.exists() and not target.is_dir():
         raise InputError(f"{out} is a file, not a folder: choose another name")
     if os.path.ismount(target):
@@ -90,30 +86,27 @@ def _target(out: Path) -> Path:
 
 
 def _check_writable(out: Path, target: Path) -> None:
-    for folder in [target, *target.parents]:
-        if not folder.exists():
-            continue
-        if not folder.is_dir():
-            raise InputError(f"{out} cannot be made: {folder} is a file: choose another folder")
-        if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+    nearest = next(folder for folder in target.parents if folder.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{out} cannot be made: {nearest} is a file: choose another folder")
+    for folder in (target, nearest):
+        if folder.exists() and not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             raise InputError(
                 f"{out} cannot be written: {folder} is read-only: choose another folder"
             )
-        if folder != target:
-            return
 
 
-def _checked_leftovers(out: Path, target: Path, force: bool) -> list[Path]:
-    """Return what in a folder must be kept, when it may be there."""
-    found = foreign_files(target) if target.is_dir() else []
-    if found and not force:
-        names = ", ".join(path.name for path in found[:_NAMED])
-        more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+def _files_to_keep(out: Path, target: Path, force: bool) -> list[Path]:
+    """Return the user's files in a folder; without force they are refused."""
+    foreign = foreign_files(target) if target.is_dir() else []
+    if foreign and not force:
+        names = ", ".join(path.name for path in foreign[:_MAX_NAMES])
+        more = f" and {len(foreign) - _MAX_NAMES} more" if len(foreign) > _MAX_NAMES else ""
         raise InputError(
             f"{out} holds what tbcad did not write ({names}{more}): "
             "choose another folder, or keep them in the new one with --force"
         )
-    return found
+    return foreign
 
 
 def _make_parents(folder: Path, undo: ExitStack) -> None:
@@ -129,13 +122,13 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _open_new(out: Path, target: Path, force: bool, undo: ExitStack) -> Path:
-    """Make the folder for the new export, locked until the end of undo, which removes it."""
+    """Make the folder for the new export; undo unlocks and removes it."""
     with _locked(target.parent):
         _clear(out, target)
-        _checked_leftovers(out, target, force)
+        _files_to_keep(out, target, force)
         new = target.parent / f"{_prefix(target)}{os.getpid()}.new"
         new.mkdir()
-        undo.callback(_discard, new)  # the old export, once the two are swapped
+        undo.callback(_discard, new)  # the old export, once both are exchanged
         undo.enter_context(_locked(new))
     return new
 
@@ -149,7 +142,7 @@ def _prefix(target: Path) -> str:
 def _locked(folder: Path) -> Iterator[None]:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        with suppress(OSError):  # no locks here: process numbers must do, see _is_written
+        with suppress(OSError):  # a file system without locks: see _is_written
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
@@ -158,21 +151,22 @@ def _locked(folder: Path) -> Iterator[None]:
 
 def _clear(out: Path, target: Path) -> None:
     """Repair and remove what killed writers left; refuse when another one is at work."""
-    aside = [
+    hidden = [
         path
         for path in target.parent.glob(f"{_prefix(target)}*")
         if path.is_dir() and not path.is_symlink()
     ]
-    if any(_is_written(path) for path in aside):
+    if any(_is_written(path) for path in hidden):
         raise InputError(f"{out} is being written by another tbcad: wait for it to end")
-    moved = [path for path in aside if path.suffix == ".old"]
-    if moved and not target.exists():
-        moved[0].rename(target)
-    for path in aside:
+    moved_aside = [path for path in hidden if path.suffix == ".old"]
+    if moved_aside and not target.exists():
+        moved_aside[0].rename(target)
+    for path in hidden:
         _discard(path)
 
 
 def _is_written(folder: Path) -> bool:
+    """Tell whether the writer of a hidden folder is alive."""
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     except OSError:
@@ -181,26 +175,16 @@ def _is_written(folder: Path) -> bool:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
-    except OSError:
-        return _runs(folder.stem.rpartition("-")[2])
+    except OSError:  # a file system without locks
+        return Path("/proc", folder.stem.rpartition("-")[2]).exists()
     finally:
         os.close(descriptor)
     return False
 
 
-def _runs(process: str) -> bool:
-    try:
-        os.kill(int(process), 0)
-    except (ProcessLookupError, ValueError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
 def _finish(out: Path, new: Path, force: bool) -> None:
     target = _target(out)  # again: the user may have been at work since
-    keep_files(_checked_leftovers(out, target, force), new)
+    keep_files(_files_to_keep(out, target, force), new)
     if target.is_dir():
         shutil.copymode(target, new)
     _sync(new)
@@ -210,12 +194,10 @@ def _finish(out: Path, new: Path, force: bool) -> None:
 
 
 def _sync(folder: Path) -> None:
-    for inner, _, files in os.walk(folder):
-        for name in files:
-            path = Path(inner, name)
-            if is_file(path):
+    for inner, _, names in os.walk(folder):
+        for path in (*(Path(inner, name) for name in names), Path(inner)):
+            if path == Path(inner) or is_file(path):
                 _sync_entry(path)
-        _sync_entry(Path(inner))
 
 
 def _sync_entry(path: Path) -> None:
@@ -235,12 +217,12 @@ def _swap(new: Path, target: Path) -> None:
 
 
 def _exchange(one: Path, other: Path) -> bool:
-    """Swap two folders in one step; False where the system or file system has no such step."""
-    swap = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if swap is None:
+    """Exchange two folders by one system call; False where the system has no such call."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
         return False
     names = [os.fsencode(one), os.fsencode(other)]
-    if swap(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
+    if rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
         return True
     if (number := ctypes.get_errno()) in _NO_EXCHANGE:
         return False

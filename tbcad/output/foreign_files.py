@@ -1,38 +1,55 @@
-"""What a user has put into an output folder, and how it is kept when the folder is replaced."""
+"""Files of the user in an output folder, and how they are kept when the folder is replaced."""
 
-import json
 import os
-import re
 import shutil
 import stat
-from collections.abc import Iterator
+from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, VERDICT, fingerprint
 
-_LARGEST_MANIFEST = 4_000_000  # bytes
-_MANY_FILES = 10_000
-_SHA256 = re.compile("[0-9a-f]{64}")
+_MAX_MANIFEST_BYTES = 4_000_000
+_MAX_FILES = 10_000
+
+
+def _plain_name(name: str) -> str:
+    if name in ("", ".", "..") or {"/", "\\", "\0"} & {*name}:
+        raise ValueError("not the name of a file in the folder")
+    return name
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    size: int = Field(ge=0)
+
+
+class _Manifest(BaseModel):
+    schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")
+    files: dict[Annotated[str, AfterValidator(_plain_name)], _Entry] = Field(max_length=_MAX_FILES)
 
 
 def foreign_files(folder: Path) -> list[Path]:
-    """Return what stands in a folder that tbcad did not write, sorted.
+    """Return the files and folders that tbcad did not write, sorted.
 
     tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself and
     verify.json. It makes no folders, so each folder is the user's, as a whole.
 
     Raises:
-        InputError: a folder inside is a mount point, which cannot be kept.
         OSError: the folder cannot be read.
     """
-    listed = _listed(folder / MANIFEST)
-    own = {MANIFEST, VERDICT} if listed is not None else set()
+    manifest = _read_manifest(folder / MANIFEST)
+    own = {MANIFEST, VERDICT} if manifest else set()
+    listed = manifest.files if manifest else {}
     return [
         path
         for path in sorted(folder.iterdir())
-        if not (is_file(path) and (path.name in own or _is_listed(path, listed or {})))
+        if not (is_file(path) and (path.name in own or _is_listed(path, listed.get(path.name))))
     ]
 
 
@@ -40,10 +57,17 @@ def keep_files(paths: list[Path], into: Path) -> None:
     """Give files, links and folders a second place in another folder, as `.kept` where taken.
 
     Raises:
+        InputError: a path is a mount point, or neither a file nor a link nor a folder.
         OSError: a file can neither be linked nor copied.
     """
     for path in paths:
-        _keep(path, into / _free_name(path.name, into))
+        to = into / _free_name(path.name, into)
+        if path.is_dir() and not path.is_symlink():
+            shutil.copytree(
+                path, to, symlinks=True, ignore=_refuse_mount_point, copy_function=_link_or_copy
+            )
+        else:
+            _link_or_copy(path, to)
 
 
 def is_file(path: Path) -> bool:
@@ -51,78 +75,44 @@ def is_file(path: Path) -> bool:
     return stat.S_ISREG(path.lstat().st_mode)
 
 
-def _is_listed(path: Path, listed: dict[str, dict[str, Any]]) -> bool:
-    entry = listed.get(path.name)
+def _is_listed(path: Path, entry: _Entry | None) -> bool:
     # The size first: it settles most without reading the file.
     return (
-        entry is not None and entry["size"] == path.lstat().st_size and entry == fingerprint(path)
+        entry is not None
+        and entry.size == path.lstat().st_size
+        and entry.model_dump() == fingerprint(path)
     )
 
 
-def _listed(manifest: Path) -> dict[str, dict[str, Any]] | None:
-    """Return the files of a manifest that tbcad can have written, None for any other."""
+def _read_manifest(path: Path) -> _Manifest | None:
+    """Return a manifest that tbcad can have written, None for any other file."""
     try:
-        if not is_file(manifest) or manifest.lstat().st_size > _LARGEST_MANIFEST:
+        if not is_file(path) or path.lstat().st_size > _MAX_MANIFEST_BYTES:
             return None
-        document = json.loads(manifest.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        return _Manifest.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
         return None
-    return document["files"] if _is_manifest(document) else None
-
-
-def _is_manifest(document: object) -> bool:
-    match document:
-        case {"schema": str(schema), "files": dict(files)}:
-            ours = schema.startswith("tbcad-manifest/") and len(files) <= _MANY_FILES
-            return ours and all(_is_entry(*entry) for entry in files.items())
-    return False
-
-
-def _is_entry(name: str, entry: object) -> bool:
-    match entry:
-        case {"sha256": str(digest), "size": int(size), **others}:
-            plain = not re.search(r"[/\\\0]", name) and name not in ("", ".", "..")
-            counted = not isinstance(size, bool) and size >= 0
-            return plain and not others and counted and bool(_SHA256.fullmatch(digest))
-    return False
 
 
 def _free_name(name: str, folder: Path) -> str:
-    return next(free for free in _names(name) if not os.path.lexists(folder / free))
+    names = chain([name, f"{name}.kept"], (f"{name}.kept{number}" for number in count(2)))
+    return next(free for free in names if not os.path.lexists(folder / free))
 
 
-def _names(name: str) -> Iterator[str]:
-    yield name
-    yield f"{name}.kept"
-    number = 2
-    while True:
-        yield f"{name}.kept{number}"
-        number += 1
+def _refuse_mount_point(folder: str, _: list[str]) -> list[str]:
+    """Ignore no file of a folder that is copied, but refuse to copy a mount point."""
+    if os.path.ismount(folder):
+        raise InputError(
+            f"{folder} is a mount point, which cannot be kept: unmount it or move it out"
+        )
+    return []
 
 
-def _keep(path: Path, to: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        _keep_folder(path, to)
-        return
+def _link_or_copy(path: Path | str, to: Path | str) -> None:
+    """Give a file a second name: what a program still writes into it is not lost."""
     try:
-        # A second name of the same file: what a program still writes into it is not lost.
         os.link(path, to, follow_symlinks=False)
     except OSError:
-        _copy(path, to)
-
-
-def _keep_folder(path: Path, to: Path) -> None:
-    if os.path.ismount(path):
-        raise InputError(
-            f"{path} is a mount point, which cannot be kept: unmount it or move it out"
-        )
-    to.mkdir()
-    for inner in path.iterdir():
-        _keep(inner, to / inner.name)
-    shutil.copystat(path, to)
-
-
-def _copy(path: Path, to: Path) -> None:
-    if not (path.is_symlink() or is_file(path)):
-        raise InputError(f"{path} is no plain file and cannot be kept: move it out")
-    shutil.copy2(path, to, follow_symlinks=False)
+        if not (os.path.islink(path) or is_file(Path(path))):
+            raise InputError(f"{path} is no plain file and cannot be kept: move it out") from None
+        shutil.copy2(path, to, follow_symlinks=False)

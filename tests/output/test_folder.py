@@ -13,9 +13,9 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.output import folder as folder_module
-from tbcad.output import foreign_files as leftovers_module
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.manifest import write_manifest
+from tbcad.output.foreign_files import is_file
+from tbcad.output.manifest import fingerprint, write_manifest
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("design.json", "mirrors.csv", "shell_a.stl")
@@ -26,7 +26,7 @@ def fill(folder: Path, version: int) -> None:
     for name in NAMES:
         (folder / name).write_text(f"{name} of version {version}\n" * 50)
     document = {"schema": "tbcad-manifest/1", "files": {}}
-    document["files"] = {name: leftovers_module.fingerprint(folder / name) for name in NAMES}
+    document["files"] = {name: fingerprint(folder / name) for name in NAMES}
     (folder / "manifest.json").write_text(json.dumps(document))
     (folder / "verify.json").write_text(str(version))
 
@@ -57,7 +57,7 @@ def hidden(parent: Path) -> list[str]:
 def tree(folder: Path) -> dict[str, bytes | None]:
     """Every path below a folder, with the content of the plain files."""
     return {
-        str(path.relative_to(folder)): path.read_bytes() if leftovers_module.is_file(path) else None
+        str(path.relative_to(folder)): path.read_bytes() if is_file(path) else None
         for path in sorted(folder.rglob("*"))
     }
 
@@ -364,7 +364,7 @@ import os, signal, sys
 sys.path[:0] = [{root!r}]
 from pathlib import Path
 from tbcad.output import folder
-from tests.output.test_folder import check_target, export, fill, replacing, version_of
+from tests.output.test_folder import check_replaceable, export, fill, replacing, version_of
 
 os.fsync = lambda _: None  # which only a power cut could tell from the real one
 if {moves}:
@@ -393,7 +393,7 @@ export(out, 1)
 while dies_at(limit):
     if {moves} and not out.exists():
         seen.add("missing")
-        check_target(out, True)
+        check_replaceable(out, True)
     seen.add(version_of(out))
     assert (out / "mine").read_text() == "mine"
     export(out, 1, force=True)
