@@ -75,15 +75,15 @@ class Design(MirrorDesign):
         from tbcad.cad.part import as_part
 
         return {
-            printed.name: as_part(printed.name, printed.part.shape)
-            for printed in self._prototype.pieces
+            printed.name: as_part(printed.name, printed.solid.shape)
+            for printed in self._prototype.printed
         }
 
     @cached_property
     def _prototype(self) -> Any:
-        from tbcad.prototype.machine import machine
+        from tbcad.prototype.model import build_prototype_model
 
-        return machine(self)
+        return build_prototype_model(self)
 
 
 @dataclass(frozen=True)

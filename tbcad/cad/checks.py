@@ -1,4 +1,4 @@
-"""Checks of solids that a boolean of the kernel made: it can fail and pass for valid."""
+"""Checks of the kernel's booleans: a wrong result may pass for valid."""
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
@@ -48,16 +48,18 @@ def check_mesh(name: str, mesh: Mesh) -> None:
         raise InvalidSolidError(f"{name}: the kernel's mesh of the solid is not closed")
 
 
-def check_volume(name: str, solid: TopoDS_Solid, expected: float) -> None:
-    """Refuse a solid whose volume is not what booleans of meshes give.
+def check_volume(
+    name: str, solid: TopoDS_Solid, expected: float, error: float = VOLUME_ERROR
+) -> None:
+    """Refuse a solid whose volume is not what booleans of meshes give, within a share of it.
 
     A boolean of the kernel can lose bodies so that its result passes for valid.
 
     Raises:
         InvalidSolidError: as said.
     """
-    if abs((found := volume(solid)) - expected) > VOLUME_ERROR * expected:
-        raise InvalidSolidError(f"{name}: the kernel made {found:.0f} mm^3 of {expected:.0f}")
+    if abs((actual := volume(solid)) - expected) > error * expected:
+        raise InvalidSolidError(f"{name}: the kernel made {actual:.0f} mm^3 of {expected:.0f}")
 
 
 def check_pads(name: str, shape: TopoDS_Shape, contacts: Floats, radius: Floats) -> None:
@@ -66,9 +68,9 @@ def check_pads(name: str, shape: TopoDS_Shape, contacts: Floats, radius: Floats)
     Raises:
         InvalidSolidError: as said.
     """
-    middle, area = plane_faces(shape)
-    near = norm(contacts[:, None] - middle).argmin(axis=1)
-    away = norm(contacts - middle[near])
-    bad = (away > NEAR_MM) | (np.abs(area[near] - np.pi * radius**2) > NEAR_MM)
-    if bad.any():
-        raise InvalidSolidError(f"{name}: the kernel lost pad {int(bad.argmax()) + 1}")
+    centre, area = plane_faces(shape)
+    nearest = norm(contacts[:, None] - centre).argmin(axis=1)
+    distance = norm(contacts - centre[nearest])
+    lost = (distance > NEAR_MM) | (np.abs(area[nearest] - np.pi * radius**2) > NEAR_MM)
+    if lost.any():
+        raise InvalidSolidError(f"{name}: the kernel lost pad {int(lost.argmax()) + 1}")

@@ -31,7 +31,7 @@ SIGNS = {
 SPACE = 1  # squares between signs
 
 
-def width(text: str) -> int:
+def text_width(text: str) -> int:
     """Squares across a text."""
     return sum(len(SIGNS[sign][0]) + SPACE for sign in text) - SPACE
 
@@ -49,7 +49,7 @@ def relief(
         axes: rows to the right, up and out of the face, (3, 3).
         at: middle of the text on the face, mm, (3,).
     """
-    square, start, found = height / ROWS, -width(text) / 2, []
+    square, start, found = height / ROWS, -text_width(text) / 2, []
     for sign in text:
         for face in _faces(SIGNS[sign], start, square, sunk):
             solid = prism(face, np.array([0.0, 0.0, raised + sunk]))
@@ -58,9 +58,9 @@ def relief(
     return found
 
 
-def fitting(text: str, height: float, radius: float) -> float:
+def fitting_height(text: str, height: float, radius: float) -> float:
     """Height at which a text, no higher than this, fits in a circle of a radius (mm)."""
-    reach = float(np.hypot(width(text), ROWS)) / ROWS / 2
+    reach = float(np.hypot(text_width(text), ROWS)) / ROWS / 2
     return min(height, radius / reach)
 
 

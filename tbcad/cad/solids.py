@@ -3,9 +3,10 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+from cadquery import Shape
 from manifold3d import Manifold, Mesh64, OpType
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
@@ -20,19 +21,22 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeVertex,
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
-from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
-from OCP.Geom import Geom_Plane
+from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakePrism,
+    BRepPrimAPI_MakeRevol,
+    BRepPrimAPI_MakeSphere,
+)
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
-from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_ShapeEnum, TopAbs_SOLID
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 from OCP.TopTools import TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
@@ -50,11 +54,15 @@ FEW = 8
 
 def polygon(points: Floats) -> TopoDS_Face:
     """Plane face inside a closed polygon (n, 3), its normal by the right-hand rule."""
+    return BRepBuilderAPI_MakeFace(_closed_wire(points), True).Face()
+
+
+def _closed_wire(points: Floats) -> TopoDS_Wire:
     wire = BRepBuilderAPI_MakePolygon()
-    for p in points.tolist():
-        wire.Add(gp_Pnt(*p))
+    for point in points.tolist():
+        wire.Add(gp_Pnt(*point))
     wire.Close()
-    return BRepBuilderAPI_MakeFace(wire.Wire(), True).Face()
+    return wire.Wire()
 
 
 def revolved(face: TopoDS_Face, angle: float = 2 * np.pi) -> TopoDS_Shape:
@@ -62,7 +70,7 @@ def revolved(face: TopoDS_Face, angle: float = 2 * np.pi) -> TopoDS_Shape:
     return BRepPrimAPI_MakeRevol(face, gp_Ax1(ORIGIN, UP), angle).Shape()
 
 
-def ring(profile: Floats, start: float, angle: float) -> TopoDS_Shape:
+def revolved_polygon(profile: Floats, start: float, angle: float) -> TopoDS_Shape:
     """Solid of revolution about z of a polygon (n, 2) of (z, r), between two azimuths."""
     z, r = profile.T
     at = np.stack([r * np.cos(start), r * np.sin(start), z], axis=1)
@@ -78,6 +86,19 @@ def cylinder(start: Floats, axis: Floats, radius: float, length: float) -> TopoD
     """Solid cylinder from a point along a unit axis."""
     frame = gp_Ax2(gp_Pnt(*start.tolist()), gp_Dir(*axis.tolist()))
     return BRepPrimAPI_MakeCylinder(frame, radius, length).Shape()
+
+
+def sphere(centre: Floats, radius: float) -> TopoDS_Solid:
+    """A ball about a point (3,), mm."""
+    return one_solid("sphere", BRepPrimAPI_MakeSphere(gp_Pnt(*centre.tolist()), radius).Shape())
+
+
+def pyramid(apex: Floats, corners: Floats) -> TopoDS_Solid:
+    """The pyramid between a point (3,) and a plane polygon (n, 3), mm."""
+    loft = BRepOffsetAPI_ThruSections(True, True)
+    loft.AddVertex(BRepBuilderAPI_MakeVertex(gp_Pnt(*apex.tolist())).Vertex())
+    loft.AddWire(_closed_wire(corners))
+    return one_solid("pyramid", loft.Shape())
 
 
 def moved(shape: TopoDS_Shape, axes: Floats, origin: Floats) -> TopoDS_Shape:
@@ -132,19 +153,12 @@ def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
 
 def solids(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
     """All solids of a shape."""
-    return [TopoDS.Solid_s(one) for one in _each(shape, TopAbs_SOLID)]
+    return [solid.wrapped for solid in Shape.cast(shape).Solids()]
 
 
 def faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
     """All faces of a shape."""
-    return [TopoDS.Face_s(one) for one in _each(shape, TopAbs_FACE)]
-
-
-def _each(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
-    explorer = TopExp_Explorer(shape, kind)
-    while explorer.More():
-        yield explorer.Current()
-        explorer.Next()
+    return [face.wrapped for face in Shape.cast(shape).Faces()]
 
 
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
@@ -163,30 +177,19 @@ def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
 
 def volume(shape: TopoDS_Shape) -> float:
     """Volume, mm^3."""
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
-    return float(properties.Mass())
+    return float(Shape.cast(shape).Volume())
 
 
 def centroid(shape: TopoDS_Shape) -> Floats:
-    """Centre of gravity of an even solid, mm, (3,)."""
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
-    centre = properties.CentreOfMass()
-    return np.array([centre.X(), centre.Y(), centre.Z()])
+    """Centre of gravity of a homogeneous solid, mm, (3,)."""
+    return np.array(Shape.centerOfMass(Shape.cast(shape)).toTuple())
 
 
 def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
-    """Middles (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
-    middle, area = [], []
-    for face in faces(shape):
-        if isinstance(BRep_Tool.Surface_s(face), Geom_Plane):
-            properties = GProp_GProps()
-            BRepGProp.SurfaceProperties_s(face, properties)
-            centre = properties.CentreOfMass()
-            middle.append((centre.X(), centre.Y(), centre.Z()))
-            area.append(properties.Mass())
-    return np.array(middle).reshape(-1, 3), np.array(area)
+    """Centres (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
+    planes = [face for face in Shape.cast(shape).Faces() if face.geomType() == "PLANE"]
+    centre = [Shape.centerOfMass(face).toTuple() for face in planes]
+    return np.array(centre).reshape(-1, 3), np.array([face.Area() for face in planes])
 
 
 def volume_by_meshes(
@@ -257,10 +260,10 @@ def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
 def _joined(points: Floats, triangles: Ints) -> Mesh:
     """Corners that agree to a nanometre become one; facets that lose a corner go."""
     _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
-    return without_lost(points[first], of.reshape(-1)[triangles])
+    return without_degenerate(points[first], of.reshape(-1)[triangles])
 
 
-def without_lost(vertices: Floats, triangles: Ints) -> Mesh:
+def without_degenerate(vertices: Floats, triangles: Ints) -> Mesh:
     """A mesh without the facets of which two corners became one."""
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     return Mesh(vertices, triangles[whole])

@@ -36,3 +36,8 @@ def even_angles(count: int) -> Floats:
 def unit_circle(angle: Floats) -> Floats:
     """Points (..., 2) of the unit circle at angles (...), radians."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def bolt_circle(radius: float) -> Floats:
+    """Places (4, 2) of four holes evenly on a circle, none on an axis."""
+    return radius * unit_circle(np.pi / 4 + even_angles(4))

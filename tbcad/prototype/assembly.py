@@ -1,12 +1,12 @@
-"""The rig as it stands: groups of named, coloured solids in the frame of the shell."""
+"""The assembled prototype: groups of named, coloured solids in the frame of the shell."""
 
 import numpy as np
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
-from tbcad.cad.primitives import pyramid, sphere
+from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.frame import frame_solids as frames
-from tbcad.prototype.machine import Machine
+from tbcad.prototype.model import PrototypeModel
+from tbcad.prototype.printing.component_solids import component_solid
 from tbcad.prototype.printing.parts import Role
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)
@@ -21,63 +21,59 @@ COLOURS: dict[Role, Colour] = {
 }
 
 
-def rig(built: Machine) -> tuple[SolidGroup, ...]:
-    """All bodies of the prototype where they stand with the base at angle zero.
+def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
+    """All bodies of the assembled prototype, the base at angle zero.
 
-    Coupons are tools, and not in it. What light passes through is there to be looked at, and
+    Coupons are tools and left out. What light passes through is included to be looked at, and
     transparent: the capture sphere, and what the camera sees.
     """
     return (
-        _printed("base", built, ("base", "cap")),
-        _balls(built),
-        _printed("stage", built, ("stage",)),
-        _printed("frame", built, ("frame",)),
-        _bought(built),
-        _views(built),
+        _printed("base", prototype, ("base", "cap")),
+        _balls(prototype),
+        _printed("stage", prototype, ("stage",)),
+        _printed("frame", prototype, ("frame",)),
+        _purchased(prototype),
+        _views(prototype),
     )
 
 
-def _printed(name: str, built: Machine, roles: tuple[str, ...]) -> SolidGroup:
-    return SolidGroup(
-        name,
-        tuple(
-            ColouredSolid(piece.name, piece.part.shape, COLOURS[piece.role])
-            for piece in built.pieces
-            if piece.role in roles
-        ),
+def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> SolidGroup:
+    solids = (
+        ColouredSolid(part.name, part.solid.shape, COLOURS[part.role])
+        for part in prototype.printed
+        if part.role in roles
     )
+    return SolidGroup(name, tuple(solids))
 
 
-def _bought(built: Machine) -> SolidGroup:
-    bodies = (ColouredSolid(name, shape, METAL) for name, shape in frames.bought(built.frame))
-    return SolidGroup("bought", tuple(bodies))
-
-
-def _balls(built: Machine) -> SolidGroup:
-    balls, centre = built.made.balls, built.made.body_centres()
-    bought = (~balls.cap).nonzero()[0].tolist()
-    return SolidGroup(
-        "balls",
-        tuple(
-            ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
-            for k in bought
-        ),
+def _purchased(prototype: PrototypeModel) -> SolidGroup:
+    solids = (
+        ColouredSolid(component.name, component_solid(component), METAL)
+        for component in prototype.frame.purchased
     )
+    return SolidGroup("bought", tuple(solids))
 
 
-def _views(built: Machine) -> SolidGroup:
-    """The capture sphere, and what the camera sees as far as beyond it."""
-    view, radius = built.made.half.camera, built.target / 2
-    length = float(norm(view.pinhole)) + radius
-    wide = length * np.tan(view.hfov / 2)
-    high = wide * view.height_px / view.width_px
-    middle, up = view.pinhole + length * view.forward, np.cross(view.right, view.forward)
+def _balls(prototype: PrototypeModel) -> SolidGroup:
+    balls, centre = prototype.layout.balls, prototype.layout.body_centres()
+    solids = (
+        ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
+        for k in (~balls.cap).nonzero()[0].tolist()
+    )
+    return SolidGroup("balls", tuple(solids))
+
+
+def _views(prototype: PrototypeModel) -> SolidGroup:
+    """The capture sphere, and what the camera sees up to the sphere's far end."""
+    camera, radius = prototype.layout.half.camera, prototype.capture_radius
+    length = float(norm(camera.pinhole)) + radius
+    width = length * np.tan(camera.hfov / 2)
+    height = width * camera.height_px / camera.width_px
+    middle, up = camera.pinhole + length * camera.forward, np.cross(camera.right, camera.forward)
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    corners = middle + signs @ np.stack([wide * view.right, high * up])
-    return SolidGroup(
-        "views",
-        (
-            ColouredSolid("capture_sphere", sphere(np.zeros(3), radius), SEEN),
-            ColouredSolid("camera_view", pyramid(view.pinhole, corners), LIGHT),
-        ),
+    corners = middle + signs @ np.stack([width * camera.right, height * up])
+    solids = (
+        ColouredSolid("capture_sphere", sphere(np.zeros(3), radius), SEEN),
+        ColouredSolid("camera_view", pyramid(camera.pinhole, corners), LIGHT),
     )
+    return SolidGroup("views", solids)

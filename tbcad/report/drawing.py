@@ -55,7 +55,7 @@ def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str
     Raises:
         InputError: when there is neither a screen nor a virtual one.
     """
-    module, what = ("pictures", []) if subject == SHELL else ("rig_pictures", [subject])
+    module, what = ("shell_pictures", []) if subject == SHELL else ("prototype_pictures", [subject])
     command = [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
     if os.environ.get("DISPLAY") or sys.platform != "linux":
         return command

@@ -1,10 +1,26 @@
-"""Prototypes that several test files look at."""
+"""Prototypes that several test files look at, and a small one's surroundings."""
 
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.frame.layout import FrameLayout, frame_layout
+from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.prototype.stage.layout import StageLayout, stage_layout
 from tbcad.spec.load import load_spec
+from tbcad.spec.prototype import PrototypeSpec
+
+# One of its balls is so near to the hub that a motor's pinion clears it by 2 mm only.
+SMALL = load_spec(None, ["n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5"])
+CAPTURE_RADIUS = 30.0
+
+
+@pytest.fixture(scope="session")
+def spec() -> PrototypeSpec:
+    return SMALL.prototype
 
 
 @pytest.fixture(scope="session")
@@ -16,4 +32,32 @@ def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
 @pytest.fixture(scope="session")
 def prototype(small_design: MirrorDesign) -> PrototypeLayout:
     """A quick one: four balls for the mirrors of n = 6."""
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+    return prototype_layout(SMALL, small_design)
+
+
+@pytest.fixture(scope="session")
+def carrier(spec: PrototypeSpec, small_prototype: PrototypeLayout) -> BaseLayout:
+    return base_layout(spec.base, small_prototype)
+
+
+@pytest.fixture(scope="session")
+def keep_out(small_prototype: PrototypeLayout, carrier: BaseLayout) -> KeepOut:
+    return keep_out_volume(small_prototype, carrier, CAPTURE_RADIUS, 0.0)
+
+
+@pytest.fixture(scope="session")
+def stage(spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut) -> StageLayout:
+    return stage_layout(spec, small_prototype, keep_out, load_parts())
+
+
+@pytest.fixture(scope="session")
+def frame(
+    spec: PrototypeSpec,
+    small_prototype: PrototypeLayout,
+    carrier: BaseLayout,
+    stage: StageLayout,
+    keep_out: KeepOut,
+) -> FrameLayout:
+    parts = load_parts()
+    drive = load_drives(parts)[0]
+    return frame_layout(spec, small_prototype, carrier, stage, drive, keep_out, parts)

@@ -11,12 +11,12 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_mesh, check_pads
-from tbcad.cad.glyphs import ROWS, relief, width
-from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, ring
+from tbcad.cad.glyphs import ROWS, relief, text_width
+from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, revolved_polygon
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import seat_hollow
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.printing.bed import room
+from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
@@ -92,7 +92,7 @@ def _bar_width(spec: BaseSpec) -> float:
 
 
 def _text_width(text: str, spec: BaseSpec) -> float:
-    return width(text) * spec.digit_mm / ROWS
+    return text_width(text) * spec.digit_mm / ROWS
 
 
 def _offsets_width(spec: BaseSpec) -> float:
@@ -112,7 +112,7 @@ def _short(number: str) -> str:
 
 def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[list[Place]]]:
     """Rows on shelves, shelves on plates, each with its left end on the shelf's middle line."""
-    bed_width, bed_depth = room(printer)[:2]
+    bed_width, bed_depth = usable_size(printer)[:2]
     shelves: list[list[Place]] = []
     y = x = depth = 0.0
     for row in rows:
@@ -132,7 +132,7 @@ def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[li
 
 def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
     row_width, depth = row.size
-    if (np.array(row.size) > room(printer)[:2]).any():
+    if (np.array(row.size) > usable_size(printer)[:2]).any():
         raise SpecError(
             f"the coupon's seats for {row.name} mm take {row_width:.0f} x {depth:.0f} mm: make "
             "printer.bed_mm larger or prototype.base.coupon_offsets_mm shorter"
@@ -183,7 +183,7 @@ def _seat_middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
 
 def _seat(seats: Seats, spec: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
     """A seat in its own frame."""
-    wall = ring(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
+    wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
     return cut(wall, [seat_hollow(seats, k, offset)])
 
 

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from tbcad.geometry.rotations import unit_circle
+from tbcad.geometry.rotations import bolt_circle
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec, Drive
 from tbcad.types import Floats
@@ -112,7 +110,7 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         disc=disc,
         boss=boss,
         bore=bore,
-        holes=_corners_of_square(pattern.circle / 2),
+        holes=bolt_circle(pattern.circle / 2),
         hole=hole,
         depth=spec.insert_depth_mm if pattern.boss else thickness,
         head=pattern.head,
@@ -129,8 +127,3 @@ def _check_shaft(spec: BaseSpec, pattern: HolePattern, hole: float) -> None:
             f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
             f"make prototype.base.shaft_mm {largest:g} or less"
         )
-
-
-def _corners_of_square(radius: float) -> Floats:
-    """Corners (4, 2) of a square in a circle, none on the axes."""
-    return radius * unit_circle(np.pi / 4 + np.arange(4) * np.pi / 2)

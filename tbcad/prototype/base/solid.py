@@ -8,8 +8,8 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
-from tbcad.cad.glyphs import fitting, relief
-from tbcad.cad.solids import cut, fused, polygon, prism, ring, volume_by_meshes
+from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.solids import cut, fused, polygon, prism, revolved_polygon, volume_by_meshes
 from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout
@@ -101,7 +101,7 @@ def _at_seats(seats: Seats, shapes: list[TopoDS_Shape]) -> list[TopoDS_Shape]:
 
 def _wall(base: BaseLayout) -> TopoDS_Shape:
     low, high = base.sector
-    return ring(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
+    return revolved_polygon(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
 
 
 def _struts(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
@@ -110,7 +110,7 @@ def _struts(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
     # Their ends are within the ribs at the edges, not in a plane with other faces.
     inside = base.spec.rib_mm / 2 / float(base.inner[:, 1].max())
     rings = [
-        ring(section, start, end - start)
+        revolved_polygon(section, start, end - start)
         for section in base.rings
         for start, end in ring_arcs(base, section, low + inside, high - inside)
     ]
@@ -166,7 +166,7 @@ def _number(base: BaseLayout, seats: Seats, k: int) -> list[TopoDS_Shape]:
     """The ball's number, from 1, on the end of its boss; its top is toward the camera."""
     text, spec = str(k + 1), base.spec
     up, _, out = seats.axes[k]
-    height = fitting(text, spec.digit_mm, LABEL_ROOM * float(seats.boss[k]))
+    height = fitting_height(text, spec.digit_mm, LABEL_ROOM * float(seats.boss[k]))
     axes = np.stack([np.cross(up, out), up, out])
     at = seats.centre[k] + seats.back[k] * out
     return relief(text, height, spec.relief_mm, SUNK_MM, axes, at)

@@ -20,7 +20,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split_points import STEP_MM, base_points, bosses_and_hub
-from tbcad.prototype.printing.bed import as_text, needed, shortfall
+from tbcad.prototype.printing.bed import min_bed, shortfall, size_text
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Bools, Floats, Ints
@@ -73,7 +73,7 @@ def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
             return split
     raise SpecError(
         "no way was found to cut the base for the printer's bed: make printer.bed_mm at least "
-        f"{as_text(search.min_bed())}, or prototype.largest_ball_mm or prototype.k smaller"
+        f"{size_text(search.min_bed())}, or prototype.largest_ball_mm or prototype.k smaller"
     )
 
 
@@ -152,7 +152,7 @@ class _SplitSearch:
         return self._needed_bed(WHOLE)
 
     def _needed_bed(self, piece: Floats) -> Floats:
-        return needed(self._corners(piece), downward_directions(self.base, piece), self.printer)
+        return min_bed(self._corners(piece), downward_directions(self.base, piece), self.printer)
 
     def _ranked_planes(self, piece: Floats) -> list[tuple[float, CutPlane]]:
         """Planes that part a piece, with the larger shortfall of both sides, the smallest first."""

@@ -7,8 +7,16 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import checked
-from tbcad.cad.glyphs import fitting, relief
-from tbcad.cad.solids import common, cut, cylinder, polygon, prism, ring, volume_by_cut_mesh
+from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.solids import (
+    common,
+    cut,
+    cylinder,
+    polygon,
+    prism,
+    revolved_polygon,
+    volume_by_cut_mesh,
+)
 from tbcad.geometry.vectors import unit
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (
@@ -43,7 +51,7 @@ def flange_solids(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
 def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
     low, high = base.sector
     inside = FLANGE_END * base.spec.rib_mm / float(base.inner[:, 1].max())
-    band = ring(flange_profile(base), low + inside, high - low - 2 * inside)
+    band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
     thickness, normal = base.spec.joint_mm, joint.plane.normal
     slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
     return cut(common(band, slab), [_beyond(row) for row in joint.region])
@@ -92,7 +100,7 @@ def _number(base: BaseLayout, split: BaseSplit, out: Floats, place: Floats) -> l
     from_axis = at * [1.0, 1.0, 0.0]
     up = unit(from_axis - (from_axis @ out) * out)
     text = str(split.piece_of(at) + 1)
-    height = fitting(text, base.spec.digit_mm, LABEL_ROOM * LABEL_MM)
+    height = fitting_height(text, base.spec.digit_mm, LABEL_ROOM * LABEL_MM)
     axes = np.stack([np.cross(up, out), up, out])
     return relief(text, height, base.spec.relief_mm, SUNK_MM, axes, at)
 

@@ -22,13 +22,13 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
-LONGEST = 79
+MAX_LINE_LENGTH = 79
 DECIMALS = 4  # of a degree: far below a microstep, and 7 digits are what GRBL's floats hold
 SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
 
 
 @dataclass(frozen=True)
-class Run:
+class StopSequence:
     """What the base does, twice: once for each turn of the object.
 
     Attributes:
@@ -42,13 +42,13 @@ class Run:
     mirrors: NDArray[np.int64]
 
 
-def run(made: PrototypeLayout, motion: MotionSpec) -> Run:
+def stop_sequence(made: PrototypeLayout, motion: MotionSpec) -> StopSequence:
     """The stops, and where to begin so that play in the drive is taken up before the first.
 
     Raises:
         SpecError: when the program would have to start where post or camera stand in the way.
     """
-    low, high = free(made)
+    low, high = free_base_angles(made)
     home = math.radians(motion.home_deg)
     if not low <= home <= high:
         raise SpecError(
@@ -57,23 +57,23 @@ def run(made: PrototypeLayout, motion: MotionSpec) -> Run:
         )
     angle = np.degrees(made.stops.angle)
     start = max(float(angle[0]) - motion.approach_deg, min(math.degrees(low), float(angle[0])))
-    return Run(start, angle, np.bincount(made.stops.stop, minlength=len(angle)))
+    return StopSequence(start, angle, np.bincount(made.stops.stop, minlength=len(angle)))
 
 
-def free(made: PrototypeLayout) -> tuple[float, float]:
+def free_base_angles(made: PrototypeLayout) -> tuple[float, float]:
     """Base angles between which post, camera and the largest swing leave the balls, radians."""
     problem, azimuth = made.problem, made.placement.azimuth
     low = max(float((problem.min_azimuth - azimuth).max()), -problem.max_swing / 2)
     return low, min(float((problem.max_azimuth - azimuth).min()), problem.max_swing / 2)
 
 
-def program(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str]:
+def gcode_program(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str]:
     """Lines of the program, each shorter than 80 characters.
 
     Raises:
         SpecError: when it would have to start where post or camera stand in the way.
     """
-    todo = run(made, motion)
+    todo = stop_sequence(made, motion)
     lines = [
         *_header(todo, drive, motion),
         f"M0 (MSG, base at {motion.home_deg:g} degrees, object straight? Then resume)",
@@ -87,7 +87,7 @@ def program(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str
         "G92.1",
         "M2",
     ]
-    assert max(len(line) for line in lines) <= LONGEST
+    assert max(len(line) for line in lines) <= MAX_LINE_LENGTH
     return lines
 
 
@@ -96,7 +96,7 @@ def write_program(path: Path, lines: list[str]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
-def minutes(todo: Run, motion: MotionSpec) -> float:
+def duration_minutes(todo: StopSequence, motion: MotionSpec) -> float:
     """How long the program takes, without the pauses and without what people do."""
     way = 2 * (float(todo.angle[-1]) - todo.start) * 2
     rest = motion.settle_s
@@ -105,9 +105,10 @@ def minutes(todo: Run, motion: MotionSpec) -> float:
     return way / motion.feed_deg_min + 2 * len(todo.angle) * rest / 60
 
 
-def _header(todo: Run, drive: Drive, motion: MotionSpec) -> Iterator[str]:
+def _header(todo: StopSequence, drive: Drive, motion: MotionSpec) -> Iterator[str]:
     number = SETTING[motion.axis]
-    yield f"(rotation plan: {len(todo.angle)} stops, twice, about {minutes(todo, motion):.0f} min)"
+    minutes = duration_minutes(todo, motion)
+    yield f"(rotation plan: {len(todo.angle)} stops, twice, about {minutes:.0f} min)"
     yield f"({drive.name}, {drive.motor.name}, {drive.ratio:g} turns of the motor a turn)"
     yield "(settings for the controller, to be sent before:)"
     yield "($1=255: motor always on, for the base falls without it)"
@@ -118,7 +119,7 @@ def _header(todo: Run, drive: Drive, motion: MotionSpec) -> Iterator[str]:
         yield "(the camera's release is a relay on the coolant output)"
 
 
-def _photographs(todo: Run, motion: MotionSpec) -> Iterator[str]:
+def _photographs(todo: StopSequence, motion: MotionSpec) -> Iterator[str]:
     """One run through all stops, from below."""
     yield f"G1 {_place(todo.start, motion)} F{motion.feed_deg_min:g}"
     stops = zip(todo.angle.tolist(), todo.mirrors.tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""Files of the printed parts: STEP where they stand in the rig, STL and 3MF on the bed."""
+"""Files of the printed parts: STEP as assembled, STL and 3MF on the printer's bed."""
 
 from pathlib import Path
 from typing import Any
@@ -7,41 +7,40 @@ from tbcad.cad.brep import Solid
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
-from tbcad.prototype.printing.parts import PrintedPart, printed
+from tbcad.prototype.printing.parts import PrintedPart, part_mesh
 
 KINDS = ("step", "stl", "3mf")
 
 
-def files(piece: PrintedPart) -> dict[str, str]:
+def file_names(part: PrintedPart) -> dict[str, str]:
     """Names of a part's files by their kind."""
-    return {kind: f"{piece.name}.{kind}" for kind in KINDS}
+    return {kind: f"{part.name}.{kind}" for kind in KINDS}
 
 
-def write_piece(folder: Path, piece: PrintedPart, tolerance: float, pcurves: bool) -> None:
+def write_part(folder: Path, part: PrintedPart, tolerance: float, pcurves: bool) -> None:
     """Write a part's files.
 
     Args:
         folder: to write into.
-        piece: the part.
+        part: with its solid.
         tolerance: largest distance of facets from the surface, mm.
         pcurves: as `write_step`.
     """
-    names, mesh = files(piece), printed(piece, tolerance)
-    write_step(folder / names["step"], Solid(piece.name, piece.part.shape, ()), pcurves)
+    names, mesh = file_names(part), part_mesh(part, tolerance)
+    write_step(folder / names["step"], Solid(part.name, part.solid.shape, ()), pcurves)
     write_stl(folder / names["stl"], mesh)
-    write_3mf(folder / names["3mf"], piece.name, mesh)
+    write_3mf(folder / names["3mf"], part.name, mesh)
 
 
-def record(piece: PrintedPart) -> dict[str, Any]:
+def part_record(part: PrintedPart) -> dict[str, Any]:
     """Record of a part for prototype.json; y = x @ axes + origin is a point on the bed."""
-    part = piece.part
     return {
-        "name": piece.name,
-        "what": piece.what,
-        **files(piece),
-        "role": piece.role,
-        "ball": piece.ball + 1 if piece.ball >= 0 else None,
-        "quantity": piece.quantity,
-        "axes": (part.axes + 0.0).tolist(),
-        "origin_mm": (part.origin + 0.0).tolist(),
+        "name": part.name,
+        "what": part.what,
+        **file_names(part),
+        "role": part.role,
+        "ball": part.ball + 1 if part.ball >= 0 else None,
+        "quantity": part.quantity,
+        "axes": (part.solid.axes + 0.0).tolist(),
+        "origin_mm": (part.solid.origin + 0.0).tolist(),
     }

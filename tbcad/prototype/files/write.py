@@ -8,13 +8,13 @@ from tbcad.formats.csv_table import write_table
 from tbcad.formats.glb import write_glb
 from tbcad.formats.step_assembly import write_assembly
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.assembly import rig
+from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
-from tbcad.prototype.files.part_files import record, write_piece
-from tbcad.prototype.machine import Machine, machine
-from tbcad.prototype.stage.layout import leds
+from tbcad.prototype.files.part_files import part_record, write_part
+from tbcad.prototype.model import PrototypeModel, build_prototype_model
+from tbcad.prototype.stage.layout import led_poses
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Progress
@@ -34,22 +34,22 @@ def export_prototype(
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    built, spec = machine(design, progress), design.spec
+    built, spec = build_prototype_model(design, progress), design.spec
     progress("prototype: files")
-    for piece in built.pieces:
-        write_piece(folder, piece, spec.mesh.structure_error_mm, spec.step.pcurves)
+    for part in built.printed:
+        write_part(folder, part, spec.mesh.structure_error_mm, spec.step.pcurves)
     _write_tables(built, design, folder)
     progress("prototype: assembly")
-    groups = [group for group in rig(built) if group.bodies]
+    groups = [group for group in assembly_groups(built) if group.bodies]
     write_assembly(folder / STEP, "prototype", groups)
     write_glb(folder / GLB, "prototype", groups)
     text = json.dumps(document(built, design), indent=1, allow_nan=False) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8")
 
 
-def document(built: Machine, design: MirrorDesign) -> dict[str, Any]:
+def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers."""
-    made, keys = built.made, design.spec.prototype
+    made, keys = built.layout, design.spec.prototype
     axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
     return {
         "schema": SCHEMA,
@@ -62,14 +62,14 @@ def document(built: Machine, design: MirrorDesign) -> dict[str, Any]:
         "balls": BALLS_FILE,
         "choices": _choices(made, design.spec),
         "seats": _seats(built),
-        "parts": [record(piece) for piece in built.pieces],
+        "parts": [part_record(part) for part in built.printed],
         "leds": [
             {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
-            for name, place, way in leds(built.stage)
+            for name, place, way in led_poses(built.stage)
         ],
         "bought": [
             {"name": item.name, "what": item.what, "part": item.part, "turns": item.turns}
-            for item in built.frame.bought
+            for item in built.frame.purchased
         ],
         "stand": {
             "plate": built.frame.plate.name,
@@ -100,14 +100,14 @@ def _choices(made: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
     ]
 
 
-def _swing(built: Machine, motion: MotionSpec) -> list[float]:
+def _swing(built: PrototypeModel, motion: MotionSpec) -> list[float]:
     """Base angles that the program drives between: it starts below the first stop."""
-    todo = gcode.run(built.made, motion)
+    todo = gcode.stop_sequence(built.layout, motion)
     angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
     return [min(angles), max(angles)]
 
 
-def _seats(built: Machine) -> list[dict[str, Any]]:
+def _seats(built: PrototypeModel) -> list[dict[str, Any]]:
     """Record of each seat: its axis, away from the light, and its three pads."""
     seats = built.base.seats
     return [
@@ -122,9 +122,9 @@ def _seats(built: Machine) -> list[dict[str, Any]]:
     ]
 
 
-def _write_tables(built: Machine, design: MirrorDesign, folder: Path) -> None:
-    made, motion = built.made, design.spec.prototype.motion
-    bill = bom_csv.rows(made, built.drive, _needed(built, design), built.parts)
+def _write_tables(built: PrototypeModel, design: MirrorDesign, folder: Path) -> None:
+    made, motion = built.layout, design.spec.prototype.motion
+    bill = bom_csv.bom_rows(made, built.drive, _needed(built, design), built.parts)
     for name, columns, rows in (
         (BALLS_FILE, balls_csv.COLUMNS, balls_csv.rows(made)),
         ("rotation_plan.csv", plan_csv.COLUMNS, plan_csv.rows(planned_pictures(made))),
@@ -133,18 +133,18 @@ def _write_tables(built: Machine, design: MirrorDesign, folder: Path) -> None:
         ("bom.csv", bom_csv.COLUMNS, bill),
     ):
         write_table(folder / name, columns, rows)
-    gcode.write_program(folder / "rotation_plan.nc", gcode.program(made, built.drive, motion))
+    gcode.write_program(folder / "rotation_plan.nc", gcode.gcode_program(made, built.drive, motion))
 
 
-def _needed(built: Machine, design: MirrorDesign) -> bom_csv.PartsNeeded:
+def _needed(built: PrototypeModel, design: MirrorDesign) -> bom_csv.PartsNeeded:
     return bom_csv.PartsNeeded(
-        bought=built.bought,
+        purchased=built.purchased,
         leds=len(built.stage.leds),
         led=built.stage.led.name,
         printed=tuple(
-            bom_csv.Printed(piece.name, piece.what, piece.part.volume, piece.quantity)
-            for piece in built.pieces
-            if piece.role != "cap"
+            bom_csv.PrintedItem(part.name, part.what, part.solid.volume, part.quantity)
+            for part in built.printed
+            if part.role != "cap"
         ),
         print_density=design.spec.printer.density_g_cm3,
     )

@@ -1,6 +1,6 @@
-"""The frame in numbers: base plate, two uprights with the bearings' head, and all brackets.
+"""The frame: base plate, two uprights with the bearing head, and all brackets.
 
-Head, uprights and feet stand behind the base, where neither its swing nor any light comes.
+Head, uprights and feet are behind the base, where neither its swing nor any light comes.
 """
 
 from collections import Counter
@@ -16,29 +16,31 @@ from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
     Bracket,
-    drilled,
-    fitting,
-    rig_axes,
-    screw,
+    choose_part,
+    choose_screw,
+    drilled_holes,
+    frame_axes,
 )
 from tbcad.prototype.frame.feet import camera_bracket, stage_foot, upright_foot
-from tbcad.prototype.frame.head import Head, head
+from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.purchased import PLATE_MM
-from tbcad.prototype.keepout import Room, least
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.keepout import KeepOut, min_distance
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import FrameSpec as FrameKeys
-from tbcad.spec.prototype import PrototypeSpec
+from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
 
-ROUND_MM = 10.0  # plate beyond the brackets' feet
-TIGHT_MM = 4.0  # least of a screw beyond what it holds
-MOTOR_THREAD_MM = 3.0
+PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
+ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
+MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
+UPRIGHT_SCREWS = 4 + 2 * 2  # of the head, and of two feet
+FOOT_INSERT, FOOT_SCREW_MM = "INSERT-M4", (4.0, 20.0)  # of the stage's clamp: thread, length
 CAMERA_SCREW = "UNC1/4-20x12.7"
 TNUT, POST_SCREW = "TNUT-M5-6", "SET-M3x6"
-LIT = ("camera",)  # light goes into it
-HELD = ("rotary_stage",)  # the hub is bolted on it
+MAY_BE_LIT = ("camera",)  # light goes into it
+MAY_BE_SWEPT = ("rotary_stage",)  # the hub is bolted on it
+HEAD_PARTS = ("bearing_front", "bearing_rear", "collar", "shaft")
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class FrameLayout:
         axes: of the frame, as rows: level under the axis w, across it, up, (3, 3).
         head: bearings and motor.
         printed: brackets to print.
-        bought: bodies of purchased parts, for the assembly.
+        purchased: simple bodies of purchased parts, for the assembly.
         holes: tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2).
         holds: bracket that each hole holds.
         corner: the plate's, from where its holes are measured, (x, y) as the holes, mm, (2,).
@@ -57,14 +59,14 @@ class FrameLayout:
         upright: part that the uprights are cut from.
         length: of the uprights, mm.
         screws: quantity of screws and nuts, by name.
-        light: least distance of each to the light in use, mm.
-        swept: least distance of each to what the base sweeps, mm.
+        light: smallest distance of each to the light in use, mm.
+        swept: smallest distance of each to what the base sweeps, mm.
     """
 
     axes: Floats
-    head: Head
+    head: BearingHead
     printed: tuple[Component, ...]
-    bought: tuple[Component, ...]
+    purchased: tuple[Component, ...]
     holes: Floats
     holds: tuple[str, ...]
     corner: Floats
@@ -76,176 +78,180 @@ class FrameLayout:
     swept: dict[str, float]
 
 
-def frame(
-    spec: tuple[FrameKeys, PrototypeSpec],
-    made: PrototypeLayout,
+def frame_layout(
+    spec: PrototypeSpec,
+    prototype: PrototypeLayout,
     base: BaseLayout,
     stage: StageLayout,
     drive: Drive,
-    space: Room,
+    keep_out: KeepOut,
     parts: Parts,
 ) -> FrameLayout:
     """The frame round a base and a stage.
 
     Args:
-        spec: the sections of frame and prototype.
-        made: the prototype.
+        spec: of the prototype.
+        prototype: balls, their places and stops.
         base: that turns.
-        stage: that the object stands on.
+        stage: that carries the object.
         drive: chosen for the base.
-        space: room that is left.
+        keep_out: what the frame must keep out of.
         parts: purchased parts.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
     """
-    keys, own = spec
-    axes = rig_axes(base.frame[0])
-    top = head(keys, base, drive, axes, parts)
-    brackets = _brackets(keys, own, made, axes, stage, top, parts)
-    upright, length, bars = _uprights(keys, axes, top, parts)
-    plate, ground, corner = _plate(keys, axes, brackets, parts)
-    bought = (ground, *bars, *top.bought, *_camera(own, made))
-    printed = (top.item, *(bracket.item for bracket in brackets))
-    light, swept = _clear(keys, (*printed, *bought), space)
+    axes = frame_axes(base.frame[0])
+    head = bearing_head(spec.frame, base, drive, axes, parts)
+    brackets = _brackets(spec, prototype, axes, stage, head, parts)
+    upright, length, bars = _uprights(spec.frame, axes, head, parts)
+    plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
+    purchased = (plate_body, *bars, *head.purchased, *_camera(spec, prototype))
+    printed = (head.component, *(bracket.component for bracket in brackets))
+    light, swept = _check_clearances((*printed, *purchased), keep_out, spec.frame.clearance_mm)
     return FrameLayout(
         axes=axes,
-        head=top,
+        head=head,
         printed=printed,
-        bought=bought,
+        purchased=purchased,
         holes=np.vstack([bracket.holes for bracket in brackets]),
-        holds=tuple(bracket.item.name for bracket in brackets for _ in bracket.holes),
+        holds=tuple(bracket.component.name for bracket in brackets for _ in bracket.holes),
         corner=corner,
         plate=plate,
         upright=upright,
         length=length,
-        screws=_screws(keys, own, drive, brackets, parts),
+        screws=_screws(spec, drive, brackets, parts),
         light=light,
         swept=swept,
     )
 
 
-def bought_parts(numbers: FrameLayout, stage: StageLayout) -> dict[str, int]:
+def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
     """Quantity of purchased parts of stage and frame by name, without the drive and the LEDs."""
-    kinds = ("bearing_front", "bearing_rear", "collar", "shaft")
-    found = Counter(item.part for item in numbers.bought if item.name in kinds and item.part)
-    found.update(numbers.screws)
-    found.update({numbers.plate.name: 1, numbers.upright.name: 2})
-    found.update({POST_SCREW: 1} if stage.items else {})
-    return dict(sorted(found.items()))
+    in_head = [item.part for item in frame.purchased if item.name in HEAD_PARTS and item.part]
+    counts = Counter(in_head) + Counter(frame.screws)
+    counts.update({frame.plate.name: 1, frame.upright.name: 2, POST_SCREW: 1})
+    return dict(sorted(counts.items()))
 
 
 def _brackets(
-    keys: FrameKeys,
-    own: PrototypeSpec,
-    made: PrototypeLayout,
+    spec: PrototypeSpec,
+    prototype: PrototypeLayout,
     axes: Floats,
     stage: StageLayout,
-    top: Head,
+    head: BearingHead,
     parts: Parts,
 ) -> list[Bracket]:
-    found = [upright_foot(keys, axes, top.face, side) for side in (1, -1)]
-    found.append(stage_foot(keys, axes, stage, parts["INSERT-M4"]))
-    if own.camera_diameter_mm > 0:
-        found.append(camera_bracket(keys, axes, own, made.half.camera))
-    return found
+    brackets = [upright_foot(spec.frame, axes, head.face, side) for side in (1, -1)]
+    brackets.append(stage_foot(spec.frame, axes, stage, parts[FOOT_INSERT]))
+    if spec.camera_diameter_mm > 0:
+        brackets.append(camera_bracket(spec, axes, prototype.half.camera))
+    return brackets
 
 
 def _uprights(
-    keys: FrameKeys, axes: Floats, top: Head, parts: Parts
+    spec: FrameSpec, axes: Floats, head: BearingHead, parts: Parts
 ) -> tuple[PurchasedPart, float, list[Component]]:
     """Part and length of the uprights, and their bodies."""
-    length = top.top - keys.floor_mm
+    length = head.top - spec.floor_mm
     hint = "make prototype.frame.floor_mm greater, or add a longer one"
-    part = fitting(parts, "extrusions", "prototype.frame.floor_mm", hint, length_mm=length)
-    half, items = EXTRUSION_MM / 2, []
+    part = choose_part(parts, "extrusions", "prototype.frame.floor_mm", hint, length_mm=length)
+    half, uprights = EXTRUSION_MM / 2, []
     for name, sign in (("upright_left", 1), ("upright_right", -1)):
-        y = sign * keys.uprights_mm / 2
-        low = np.array([top.face - EXTRUSION_MM, y - half, keys.floor_mm])
-        body = box(low, np.array([top.face, y + half, top.top]), axes)
+        y = sign * spec.uprights_mm / 2
+        low = np.array([head.face - EXTRUSION_MM, y - half, spec.floor_mm])
+        body = box(low, np.array([head.face, y + half, head.top]), axes)
         what = f"{part.what}, cut to {length:.1f} mm"
-        items.append(Component(name, what, (body,), part=part.name))
-    return part, length, items
+        uprights.append(Component(name, what, (body,), part=part.name))
+    return part, length, uprights
 
 
 def _plate(
-    keys: FrameKeys, axes: Floats, brackets: list[Bracket], parts: Parts
+    spec: FrameSpec, axes: Floats, brackets: list[Bracket], parts: Parts
 ) -> tuple[PurchasedPart, Component, Floats]:
-    """The least plate under all feet, its middle under theirs, with tapped holes; its corner."""
+    """The smallest plate under all feet, centred under them, with tapped holes; its corner."""
     feet = np.vstack([bracket.foot for bracket in brackets])
-    low, high = feet.min(axis=0) - ROUND_MM, feet.max(axis=0) + ROUND_MM
-    middle = (low + high) / 2
-    fit = [
+    low, high = feet.min(axis=0) - PLATE_BORDER_MM, feet.max(axis=0) + PLATE_BORDER_MM
+    middle, (length, width) = (low + high) / 2, high - low
+    candidates = [
         part
-        for part in parts.values()
-        if part.kind == "plates"
-        and part["length_mm"] >= high[0] - low[0]
-        and part["width_mm"] >= high[1] - low[1]
+        for part in of_kind(parts, "plates")
+        if part["length_mm"] >= length and part["width_mm"] >= width
     ]
-    if not fit:
+    if not candidates:
         raise SpecError(
-            f"no base plate in plates.csv is {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} mm: "
-            "add one, or make prototype.camera_diameter_mm smaller"
+            f"no base plate in plates.csv is {length:.0f} x {width:.0f} mm: add one, or make "
+            "prototype.camera_diameter_mm smaller"
         )
-    part = min(fit, key=lambda one: one["length_mm"] * one["width_mm"])
+    part = min(candidates, key=lambda plate: plate["length_mm"] * plate["width_mm"])
     half = np.array([part["length_mm"], part["width_mm"]]) / 2
-    bottom = keys.floor_mm - part["thickness_mm"]
-    corners = np.array([*(middle - half), bottom]), np.array([*(middle + half), keys.floor_mm])
-    places = [np.array([*p, bottom]) @ axes for b in brackets for p in b.holes]
-    holes = drilled(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
-    item = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
-    return part, item, middle - half
+    bottom = spec.floor_mm - part["thickness_mm"]
+    corners = np.array([*(middle - half), bottom]), np.array([*(middle + half), spec.floor_mm])
+    places = [np.array([*hole, bottom]) @ axes for bracket in brackets for hole in bracket.holes]
+    holes = drilled_holes(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
+    body = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
+    return part, body, middle - half
 
 
-def _camera(own: PrototypeSpec, made: PrototypeLayout) -> list[Component]:
-    if own.camera_diameter_mm == 0:
+def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
+    if spec.camera_diameter_mm == 0:
         return []
-    view, radius = made.half.camera, own.camera_diameter_mm / 2
-    body = Cylinder(view.pinhole, -view.forward, radius, own.camera_length_mm)
+    camera, radius = prototype.half.camera, spec.camera_diameter_mm / 2
+    body = Cylinder(camera.pinhole, -camera.forward, radius, spec.camera_length_mm)
     return [Component("camera", "camera behind its pinhole", (body,))]
 
 
 def _screws(
-    keys: FrameKeys, own: PrototypeSpec, drive: Drive, brackets: list[Bracket], parts: Parts
+    spec: PrototypeSpec, drive: Drive, brackets: list[Bracket], parts: Parts
 ) -> dict[str, int]:
     """Screws and nuts: on the uprights with T-nuts, in the plate, of motor, clamp and camera."""
-    on_uprights = 4 + 2 * 2
-    in_plate = sum(len(bracket.holes) for bracket in brackets)
-    found = Counter({TNUT: on_uprights, "INSERT-M4": 1, screw(parts, 4.0, 20.0): 1})
-    found[screw(parts, 5.0, keys.flange_mm + TIGHT_MM)] += on_uprights
-    found[screw(parts, 5.0, keys.flange_mm + 2 * TIGHT_MM)] += in_plate
+    flange, in_plate = spec.frame.flange_mm, sum(len(bracket.holes) for bracket in brackets)
+    counts = Counter({TNUT: UPRIGHT_SCREWS, FOOT_INSERT: 1, choose_screw(parts, *FOOT_SCREW_MM): 1})
+    counts[choose_screw(parts, 5.0, flange + ENGAGEMENT_MM)] += UPRIGHT_SCREWS
+    counts[choose_screw(parts, 5.0, flange + 2 * ENGAGEMENT_MM)] += in_plate
     if drive.motor.kind == "motors":
-        found[screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)] += 4
+        counts[choose_screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)] += 4
     else:
-        found[screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)] += 4
-    if own.camera_diameter_mm > 0:
-        found[CAMERA_SCREW] += 1
-    return dict(found)
+        counts[choose_screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)] += 4
+    if spec.camera_diameter_mm > 0:
+        counts[CAMERA_SCREW] += 1
+    return dict(counts)
 
 
-def _clear(
-    keys: FrameKeys, items: tuple[Component, ...], space: Room
+def _check_clearances(
+    components: tuple[Component, ...], keep_out: KeepOut, clearance: float
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Least distances to light and to what the base sweeps, of all that stands still.
+    """Smallest distances of all static parts to light and to what the base sweeps.
 
     Raises:
-        SpecError: when one is less than the spec's.
+        SpecError: when one is less than the clearance.
     """
-    still = [item for item in items if not item.turns]
-    swept = {item.name: least(space.swept, item.added) for item in still if item.name not in HELD}
-    light = {item.name: least(space.light, item.added) for item in still if item.name not in LIT}
-    for of, found in (("light of the balls", light), ("balls and base as they swing", swept)):
-        name = min(found, key=lambda one: found[one])
-        if found[name] < keys.clearance_mm:
+    static = {component.name: component.added for component in components if not component.turns}
+    swept = {
+        name: min_distance(keep_out.to_swept, bodies)
+        for name, bodies in static.items()
+        if name not in MAY_BE_SWEPT
+    }
+    light = {
+        name: min_distance(keep_out.to_light, bodies)
+        for name, bodies in static.items()
+        if name not in MAY_BE_LIT
+    }
+    for obstacle, distances in (
+        ("light of the balls", light),
+        ("balls and base as they swing", swept),
+    ):
+        name, distance = min(distances.items(), key=lambda item: item[1])
+        if distance < clearance:
             raise SpecError(
-                f"{name.replace('_', ' ')}: {found[name]:.1f} mm from the {of}, less than "
-                f"prototype.frame.clearance_mm {keys.clearance_mm:g}: make {_remedy(name)}"
+                f"{name.replace('_', ' ')}: {distance:.1f} mm from the {obstacle}, less than "
+                f"prototype.frame.clearance_mm {clearance:g}: make {_remedy(name)}"
             )
     return light, swept
 
 
 def _remedy(name: str) -> str:
-    """What to change so that a part has more room."""
+    """What to change so that a part has more clearance."""
     if name.startswith("camera"):
         return "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
     if name in ("plate", "stage_foot"):

@@ -1,4 +1,4 @@
-"""The printer's bed: the ways a part can be laid on it, by its corners alone."""
+"""The printer's bed: the orientations in which a part fits, from its corners alone."""
 
 from collections.abc import Sequence
 
@@ -10,16 +10,17 @@ from tbcad.types import Floats
 
 # Parts are measured by coarse meshes whose facets may lie this far inside of them.
 SLACK_MM = 0.4
-TURNS = np.radians(np.arange(0, 180, 5))
+ROTATIONS = np.radians(np.arange(0, 180, 5))  # about the vertical
+MARGINS = np.array([2, 2, 1])  # free on both sides of width and depth, and above
 
 
-def room(printer: PrinterSpec) -> Floats:
+def usable_size(printer: PrinterSpec) -> Floats:
     """Width, depth and height that a part may have, mm, (3,)."""
-    return np.array(printer.bed_mm) - np.array([2, 2, 1]) * printer.bed_margin_mm - SLACK_MM
+    return np.array(printer.bed_mm) - MARGINS * printer.bed_margin_mm - SLACK_MM
 
 
-def fitting(corners: Floats, down: Floats, printer: PrinterSpec) -> Floats | None:
-    """A way of laying a part so that it fits, or None.
+def fitting_orientation(corners: Floats, down: Floats, printer: PrinterSpec) -> Floats | None:
+    """An orientation in which a part fits, or None.
 
     Args:
         corners: of the part, mm, (n, 3).
@@ -29,48 +30,44 @@ def fitting(corners: Floats, down: Floats, printer: PrinterSpec) -> Floats | Non
     Returns:
         Rows that the axes become, (3, 3).
     """
-    ways = _ways(down)
-    fits = (np.ptp(corners @ ways, axis=1) <= room(printer)).all(axis=1)
-    return ways[int(fits.argmax())] if fits.any() else None
+    orientations = _orientations(down)
+    fits = (np.ptp(corners @ orientations, axis=1) <= usable_size(printer)).all(axis=1)
+    return orientations[int(fits.argmax())] if fits.any() else None
 
 
 def shortfall(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> float:
     """By how much the bed is too small for corners (n, 3), mm; 0 or less: they fit."""
-    return float(_lacks(_sizes(corners, downs), printer).min())
+    return float(_shortfalls(_sizes(corners, downs), printer).min())
 
 
-def needed(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> Floats:
-    """Least bed for corners (n, 3), laid the way that lacks least of the bed, mm, (3,)."""
+def min_bed(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> Floats:
+    """Smallest bed for corners (n, 3) in the orientation nearest to fitting, mm, (3,)."""
     sizes = _sizes(corners, downs)
-    size = sizes[_lacks(sizes, printer).argmin()]
-    least: Floats = np.ceil(size + np.array(printer.bed_mm) - room(printer))
-    return least
+    size = sizes[_shortfalls(sizes, printer).argmin()]
+    bed: Floats = np.ceil(size + np.array(printer.bed_mm) - usable_size(printer))
+    return bed
 
 
 def _sizes(corners: Floats, downs: Sequence[Floats]) -> Floats:
-    """Width, depth and height in all ways to lay corners down, (w, 3)."""
-    return np.concatenate([np.ptp(corners @ _ways(down), axis=1) for down in downs])
+    """Width, depth and height in all orientations of corners, (w, 3)."""
+    return np.concatenate([np.ptp(corners @ _orientations(down), axis=1) for down in downs])
 
 
-def _lacks(sizes: Floats, printer: PrinterSpec) -> Floats:
-    result: Floats = (sizes - room(printer)).max(axis=1)
+def _shortfalls(sizes: Floats, printer: PrinterSpec) -> Floats:
+    result: Floats = (sizes - usable_size(printer)).max(axis=1)
     return result
 
 
-def as_text(bed: Floats) -> str:
-    """A bed's sizes (3,) as they are said in errors."""
+def size_text(bed: Floats) -> str:
+    """A bed's sizes (3,) as errors give them."""
     return " x ".join(f"{size:.0f}" for size in bed)
 
 
-def _ways(down: Floats) -> Floats:
-    """Rows that the axes become when a direction points down, for each turn, (t, 3, 3)."""
-    cosine, sine, still = np.cos(TURNS), np.sin(TURNS), np.zeros(len(TURNS))
-    spin = [[cosine, sine, still], [-sine, cosine, still], [still, still, still + 1]]
-    ways: Floats = _upright(down) @ np.moveaxis(np.array(spin), -1, 0)
-    return ways
-
-
-def _upright(down: Floats) -> Floats:
-    """Rows that the axes become when a direction becomes -z."""
+def _orientations(down: Floats) -> Floats:
+    """Rows that the axes become when a direction points down, for each rotation, (t, 3, 3)."""
+    cosine, sine, zero = np.cos(ROTATIONS), np.sin(ROTATIONS), np.zeros(len(ROTATIONS))
+    rotation = [[cosine, sine, zero], [-sine, cosine, zero], [zero, zero, zero + 1]]
     side = unit(np.cross(np.eye(3)[np.argmin(np.abs(down))], down))
-    return np.stack([side, np.cross(-down, side), -down]).T
+    upright = np.stack([side, np.cross(-down, side), -down]).T
+    orientations: Floats = upright @ np.moveaxis(np.array(rotation), -1, 0)
+    return orientations

@@ -9,14 +9,14 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, without_lost
+from tbcad.cad.solids import meshed, without_degenerate
 from tbcad.prototype.printing.placing import PlacedSolid
 
-# base and cap turn with the base, stage and frame stand still; a tool is not in the rig.
+# base and cap turn with the base, stage and frame stand still; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 
-# The kernel's mesher takes the ends of an edge shorter than this for one, on one side at times.
-SAME_MM = 2e-5
+# The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
+MERGE_MM = 2e-5
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,14 @@ class PrintedPart:
     """One printed part.
 
     Attributes:
-        part: its solid, and how it is laid on the bed.
+        solid: in its place, and how it is laid on the bed.
         role: what it belongs to.
         what: it is for.
         ball: of a cap, the number of its seat, from 0; -1 for all others.
         quantity: how many are printed.
     """
 
-    part: PlacedSolid
+    solid: PlacedSolid
     role: Role
     what: str
     ball: int = -1
@@ -40,32 +40,31 @@ class PrintedPart:
     @property
     def name(self) -> str:
         """Name of the part and of its files."""
-        return self.part.name
+        return self.solid.name
 
 
-def printed(piece: PrintedPart, tolerance: float) -> Mesh:
-    """The part's mesh on the printer's bed, its coordinates those of an STL, of 32 bits.
+def part_mesh(part: PrintedPart, tolerance: float) -> Mesh:
+    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL.
 
     Args:
-        piece: to be printed.
+        part: to be printed.
         tolerance: largest distance of facets from the surface, mm.
     """
-    return rounded(welded(meshed(piece.part.on_bed, tolerance)))
+    return rounded(welded(meshed(part.solid.on_bed, tolerance)))
 
 
 def welded(mesh: Mesh) -> Mesh:
     """The mesh with corners that are the same to SAME_MM made one, and lost facets dropped."""
-    pairs = cKDTree(mesh.vertices).query_pairs(SAME_MM, output_type="ndarray")
+    pairs = cKDTree(mesh.vertices).query_pairs(MERGE_MM, output_type="ndarray")
     size = len(mesh.vertices)
     near = coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size))
-    count, of = connected_components(near, directed=False)
-    first = np.zeros(count, dtype=np.int64)
-    first[of[::-1]] = np.arange(size)[::-1]
-    return without_lost(mesh.vertices[first], of.astype(np.int64)[mesh.triangles])
+    _, group = connected_components(near, directed=False)
+    _, first = np.unique(group, return_index=True)
+    return without_degenerate(mesh.vertices[first], group.astype(np.int64)[mesh.triangles])
 
 
 def rounded(mesh: Mesh) -> Mesh:
-    """The mesh with coordinates of 32 bits; corners that become the same are one."""
+    """The mesh with coordinates rounded to 32 bits; vertices that become equal are merged."""
     single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
-    corners, of = np.unique(single, axis=0, return_inverse=True)
-    return without_lost(corners, of.reshape(-1)[mesh.triangles])
+    corners, group = np.unique(single, axis=0, return_inverse=True)
+    return without_degenerate(corners, group.reshape(-1)[mesh.triangles])

@@ -1,4 +1,4 @@
-"""How a part is laid on the printer's bed: the first way that fits with the least to support."""
+"""Placing a part on the printer's bed: the orientation that fits and needs the least support."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,26 +10,26 @@ from scipy.spatial import ConvexHull
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, moved, one_solid, volume
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.printing.bed import SLACK_MM, as_text, fitting, needed
+from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 # Only to measure with; the parts themselves are meshed finely when they are written.
 COARSE_MM, COARSE_ANGLE = SLACK_MM / 2, 0.4
-STEEP = np.cos(np.radians(45))
-TOUCHING_MM = 0.05
+MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
+TOUCHING_MM = 0.05  # a facet no higher lies on the bed
 
 
 @dataclass(frozen=True)
 class PlacedSolid:
-    """A printed part.
+    """A solid in its place, and its pose on the printer's bed.
 
     Attributes:
         name: of the part.
         shape: one closed solid in the frame of the shell, the base at angle zero.
         axes: what x, y and z become on the printer's bed, as rows, (3, 3).
-        origin: where the origin comes to lie on the bed, mm, (3,).
+        origin: place of the origin on the bed, mm, (3,).
     """
 
     name: str
@@ -55,7 +55,7 @@ class PlacedSolid:
 def placed_on_bed(
     name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, printer: PrinterSpec
 ) -> PlacedSolid:
-    """A part on the bed, the way round that needs the least support of those that fit.
+    """A part on the bed, in the orientation that needs the least support of those that fit.
 
     Args:
         name: of the part.
@@ -65,15 +65,16 @@ def placed_on_bed(
         printer: with its bed.
 
     Raises:
-        SpecError: when it fits no way round.
+        SpecError: when it fits in no orientation.
         InvalidSolidError: when it is not one closed solid.
     """
     coarse = meshed(shape, COARSE_MM, COARSE_ANGLE)
     corners = coarse.vertices[ConvexHull(coarse.vertices).vertices]
-    ways = [way for down in downs if (way := fitting(corners, down, printer)) is not None]
-    if not ways:
+    orientations = [fitting_orientation(corners, down, printer) for down in downs]
+    fitting = [orientation for orientation in orientations if orientation is not None]
+    if not fitting:
         raise SpecError(_too_large(name, corners, downs, printer))
-    best = ways[int(np.argmin([round(_overhang(coarse, way), 3) for way in ways]))]
+    best = min(fitting, key=lambda orientation: round(_overhang(coarse, orientation), 3))
     placed = coarse.vertices @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
@@ -82,19 +83,19 @@ def placed_on_bed(
 
 
 def _too_large(name: str, corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> str:
-    """What to say of a part that does not fit: the bed that the nearest way needs."""
-    bed = as_text(needed(corners, downs, printer))
+    """What to say of a part that does not fit: the smallest bed that would do."""
+    bed = size_text(min_bed(corners, downs, printer))
     return (
         f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
         "prototype.largest_ball_mm or prototype.k smaller"
     )
 
 
-def _overhang(mesh: Mesh, way: Floats) -> float:
+def _overhang(mesh: Mesh, orientation: Floats) -> float:
     """Area that hangs over by more than 45 degrees and does not lie on the bed, mm^2."""
-    corner = (mesh.vertices @ way)[mesh.triangles]
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = norm(across) / 2
+    corner = (mesh.vertices @ orientation)[mesh.triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = norm(normal) / 2
     height = corner[..., 2].max(axis=1) - corner[..., 2].min()
-    hangs = (-across[:, 2] > STEEP * 2 * area) & (height > TOUCHING_MM)
-    return float(area[hangs].sum())
+    overhangs = (-normal[:, 2] > MAX_OVERHANG * 2 * area) & (height > TOUCHING_MM)
+    return float(area[overhangs].sum())

@@ -1,4 +1,4 @@
-"""The bodies of the stage: crown with pockets and channels, turning disc, post."""
+"""The components of the stage: crown with pockets and channels, turning disc, post."""
 
 from dataclasses import dataclass
 
@@ -13,6 +13,7 @@ from tbcad.geometry.primitives import (
     box,
     cylinder_between,
 )
+from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
@@ -20,27 +21,41 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
-DISC_MM = 3.0
+DISC_MM = 3.0  # thickness of the disc
 INSIDE_MM = 0.3  # how far the crown stays inside the capture sphere
-RIM_MM = 1.8  # its thickness at the rim
-ARC = 8  # parts of its underside
-SHOULDER_MM = 2.0
-PLUG_MM, PLUG_PLAY_MM = 15.0, 0.1
+RIM_MM = 1.8  # thickness of the crown at its rim
+ARC_CHORDS = 8  # of the crown's underside
+SHOULDER_MM = 2.0  # height of the post's full width above the joint
+PLUG_MM, PLUG_PLAY_MM = 15.0, 0.1  # length of the plug in the post, and its play
 SET_SCREW_MM = 2.8  # hole that an M3 set screw cuts its thread in
-SEAT_MM = 1.0  # depth of the plug's hole for its end
-GROOVE_MM = 1.6
+SEAT_MM = 1.0  # depth of the plug's hole for the set screw's end
+GROOVE_MM = 1.6  # depth of the wires' grooves
 OPEN_MM = 0.5  # by which a groove reaches into the pillar that it comes from
-STUD_MM, STUD_HEIGHT_MM, STUD_PLAY_MM = 1.5, 2.5, 0.15
-STUDS = 0.65  # of the disc's radius
-POCKET = 0.75  # of an LED's body below the middle of its dome
-THROUGH_MM = 1.0  # tools stick out
+STUD_MM, STUD_HEIGHT_MM, STUD_PLAY_MM = 1.5, 2.5, 0.15  # largest radius, height, play in the disc
+DISC_PER_STUD = 10.0  # smallest ratio of the diameter of the disc to the radius of a stud
+STUD_PLACE = 0.65  # of the disc's radius
+STUD_GAP_MM, STUD_EDGE_MM = 0.2, 0.8  # material between a stud and the bore, and the disc's edge
+POCKET = 0.75  # height of a pocket's wall: share of the LED's body below the centre of its dome
+THROUGH_MM = 1.0  # by which a removed body extends beyond the part
+ROOT_MM = 1.0  # by which studs reach into the plate
+SCREW_DIRECTION = np.array([0.0, -1.0, 0.0])
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
-SIDE = np.array([0.0, -1.0, 0.0])
+LEVEL = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Sizes:
-    """Of the crown: heights of plate and joint, and radii (post's wall: thickness), mm."""
+class CrownSizes:
+    """Sizes of the crown, mm.
+
+    Attributes:
+        plate: z of its upper face.
+        rim: radius of its rim.
+        neck: radius where it leaves the capture sphere.
+        wire: radius of its bore for the wires.
+        post: radius of the post.
+        wall: thickness of the post's wall.
+        joint: z of the post's upper end.
+    """
 
     plate: float
     rim: float
@@ -56,24 +71,24 @@ class Sizes:
         return self.post - self.wall - PLUG_PLAY_MM
 
 
-def crown(
-    keys: StageSpec, led: PurchasedPart, leds: Floats, pockets: Floats, at: Sizes
+def crown_component(
+    stage: StageSpec, led: PurchasedPart, leds: Floats, pockets: Floats, sizes: CrownSizes
 ) -> Component:
-    """Plate, neck and plug in one turned body, with pillars and studs on it."""
-    studs = [
-        Cylinder(np.array([*place, at.plate - 1]), np.array(UP), _stud(keys), STUD_HEIGHT_MM + 1)
-        for place in _studs(keys, leds, at.wire)
+    """Plate, neck and plug in one revolved body, with pillars and studs on it."""
+    stud, root = _stud_radius(stage), sizes.plate - ROOT_MM
+    added: list[Primitive] = [Revolved(_profile(sizes))]
+    added += [
+        Cylinder(np.array([*place, root]), np.array(UP), stud, STUD_HEIGHT_MM + ROOT_MM)
+        for place in _stud_places(stage, leds, sizes.wire)
     ]
-    added: list[Primitive] = [Revolved(_profile(at)), *studs]
     removed: list[Primitive] = []
-    for place, floor in zip(leds, pockets.tolist(), strict=True):
-        middle = float(place[2])
-        end = floor + POCKET * (middle - floor)
-        foot, top = np.array([*place[:2], at.plate - INSIDE_MM]), np.array([*place[:2], end])
-        added.append(cylinder_between(foot, top, pillar_radius(keys, led)))
-        removed += _pocket(keys, led, place, floor, end, at.plate)
-    inward = np.array([*(SIDE[:2] * (at.plug - SEAT_MM)), at.joint - PLUG_MM / 2])
-    removed.append(Cylinder(inward, SIDE, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
+    for dome, floor in zip(leds, pockets.tolist(), strict=True):
+        rim = floor + POCKET * (float(dome[2]) - floor)
+        foot, top = np.array([*dome[:2], sizes.plate - INSIDE_MM]), np.array([*dome[:2], rim])
+        added.append(cylinder_between(foot, top, pillar_radius(stage, led)))
+        removed += _pocket(stage, led, dome, (floor, rim), sizes.plate)
+    seat = (sizes.plug - SEAT_MM) * SCREW_DIRECTION + [0, 0, sizes.joint - PLUG_MM / 2]
+    removed.append(Cylinder(seat, SCREW_DIRECTION, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
     return Component(
         "stage_crown",
         "crown of the object stage with pockets for LEDs",
@@ -83,95 +98,98 @@ def crown(
     )
 
 
-def _profile(at: Sizes) -> Floats:
+def _profile(sizes: CrownSizes) -> Floats:
     """The crown's section (z, r) from the plate's middle round to the bore."""
-    inside = float(np.hypot(at.rim, at.plate - RIM_MM))
+    inside = float(np.hypot(sizes.rim, sizes.plate - RIM_MM))
     # Chords of the sphere stay inside of it.
-    turn = np.linspace(np.arcsin(at.rim / inside), np.arcsin(at.neck / inside), ARC + 1)
-    arc = inside * np.stack([-np.cos(turn), np.sin(turn)], axis=1)
-    shoulder = at.joint + SHOULDER_MM
-    low = at.joint - PLUG_MM
-    return np.vstack(
-        [
-            [[at.plate, at.wire], [at.plate, at.rim]],
-            arc,
-            [[shoulder + at.post - at.neck, at.neck], [shoulder, at.post], [at.joint, at.post]],
-            [[at.joint, at.plug], [low, at.plug], [low, at.wire]],
-        ]
+    polar = np.linspace(
+        np.arcsin(sizes.rim / inside), np.arcsin(sizes.neck / inside), ARC_CHORDS + 1
     )
+    arc = inside * np.stack([-np.cos(polar), np.sin(polar)], axis=1)
+    joint, shoulder, low = sizes.joint, sizes.joint + SHOULDER_MM, sizes.joint - PLUG_MM
+    cone = [[shoulder + sizes.post - sizes.neck, sizes.neck], [shoulder, sizes.post]]
+    plug = [[joint, sizes.plug], [low, sizes.plug], [low, sizes.wire]]
+    plate = [[sizes.plate, sizes.wire], [sizes.plate, sizes.rim]]
+    return np.vstack([plate, arc, cone, [[joint, sizes.post]], plug])
 
 
 def _pocket(
-    keys: StageSpec, led: PurchasedPart, place: Floats, floor: float, end: float, plate: float
+    stage: StageSpec, led: PurchasedPart, dome: Floats, heights: tuple[float, float], plate: float
 ) -> list[Primitive]:
-    """Pocket, the wires' way down, and their groove to the bore."""
-    hole, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
-    low, middle = np.array([*place[:2], groove]), np.array([*place[:2], floor])
+    """Pocket between two heights, the wires' way down, and their groove to the bore."""
+    floor, rim = heights
+    radius, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
+    low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
     return [
-        cylinder_between(middle, np.array([*place[:2], end + THROUGH_MM]), hole),
-        cylinder_between(low, middle + THROUGH_MM * np.array(UP), keys.wire_mm / 2),
-        _groove(keys, place, groove, plate + OPEN_MM),
+        cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
+        cylinder_between(low, bottom + THROUGH_MM * np.array(UP), stage.wire_mm / 2),
+        _groove(stage, dome, groove, plate + OPEN_MM),
     ]
 
 
-def _groove(keys: StageSpec, place: Floats, low: float, high: float) -> Prism:
-    out = np.array([*place[:2], 0.0]) / norm(place[:2])
+def _groove(stage: StageSpec, dome: Floats, low: float, high: float) -> Prism:
+    """A groove from the axis outward to an LED, between two heights."""
+    out = np.array([*dome[:2], 0.0]) / norm(dome[:2])
     axes = np.stack([out, np.cross(UP, out), UP])
-    half, length = keys.wire_mm / 2, float(norm(place[:2]))
+    half, length = stage.wire_mm / 2, float(norm(dome[:2]))
     return box(np.array([0.0, -half, low]), np.array([length, half, high]), axes)
 
 
-def _stud(keys: StageSpec) -> float:
-    return min(STUD_MM, keys.disc_mm / 10)
+def _stud_radius(stage: StageSpec) -> float:
+    return min(STUD_MM, stage.disc_mm / DISC_PER_STUD)
 
 
-def _studs(keys: StageSpec, leds: Floats, wire: float) -> Floats:
+def _stud_places(stage: StageSpec, leds: Floats, wire: float) -> Floats:
     """Places (2, 2) of the disc's studs, where they are farthest from the grooves."""
-    away = max(STUDS * keys.disc_mm / 2, wire + 0.2 + _stud(keys))
-    if away + _stud(keys) + 0.8 > keys.disc_mm / 2:
+    stud = _stud_radius(stage)
+    radius = max(STUD_PLACE * stage.disc_mm / 2, wire + STUD_GAP_MM + stud)
+    min_disc = radius + stud + STUD_EDGE_MM
+    if min_disc > stage.disc_mm / 2:
         raise SpecError(
-            f"prototype.stage.disc_mm {keys.disc_mm:g} has no room for its studs: make it at least "
-            f"{2 * (away + _stud(keys) + 0.8):.1f}"
+            f"prototype.stage.disc_mm {stage.disc_mm:g} has no room for its studs: make it at "
+            f"least {2 * min_disc:.1f}"
         )
-    turn = np.radians(np.arange(0, 180, 5.0))
+    candidates = np.radians(np.arange(0, 180, 5.0))
     azimuth = np.arctan2(leds[:, 1], leds[:, 0])
-    apart = np.abs(np.sin(turn[:, None] - azimuth)).min(axis=1, initial=1.0)
-    best = float(turn[np.round(apart, 9).argmax()])
-    if away * apart.max() < _stud(keys) + keys.wire_mm / 2:
+    apart = np.abs(np.sin(candidates[:, None] - azimuth)).min(axis=1, initial=1.0)
+    best = candidates[np.round(apart, 9).argmax()]
+    if radius * apart.max() < stud + stage.wire_mm / 2:
         raise SpecError(
             "prototype.stage.leds_mm: the wires' grooves leave no room for the disc's studs: move "
             "LEDs to more even azimuths, or make prototype.stage.wire_mm smaller"
         )
-    one = away * np.array([np.cos(best), np.sin(best)])
-    return np.stack([one, -one])
+    place = radius * unit_circle(best)
+    return np.stack([place, -place])
 
 
-def disc(keys: StageSpec, leds: Floats, plate: float, wire: float) -> Component:
+def disc_component(stage: StageSpec, leds: Floats, sizes: CrownSizes) -> Component:
     """The disc under the object; its holes take the studs two ways round, half a turn apart."""
-    holes = _studs(keys, leds, wire)
-    radius = _stud(keys) + STUD_PLAY_MM
-    low = plate - THROUGH_MM
+    low = sizes.plate - THROUGH_MM
+    radius, depth = _stud_radius(stage) + STUD_PLAY_MM, DISC_MM + 2 * THROUGH_MM
     return Component(
         "stage_disc",
         "disc under the object, turned by 180 degrees for the other half",
-        (Cylinder(np.array([0, 0, plate]), np.array(UP), keys.disc_mm / 2, DISC_MM),),
+        (Cylinder(np.array([0, 0, sizes.plate]), np.array(UP), stage.disc_mm / 2, DISC_MM),),
         tuple(
-            Cylinder(np.array([*at, low]), np.array(UP), radius, DISC_MM + 2 * THROUGH_MM)
-            for at in holes
+            Cylinder(np.array([*place, low]), np.array(UP), radius, depth)
+            for place in _stud_places(stage, leds, sizes.wire)
         ),
         (DOWN,),
     )
 
 
-def post_tube(post: float, wall: float, joint: float, foot: float) -> Component:
-    """A tube, with a hole for the set screw that holds the plug."""
-    top, bottom = np.array([0, 0, joint]), np.array([0, 0, foot])
+def post_component(sizes: CrownSizes, foot: float) -> Component:
+    """A tube down to a height (mm), with a hole for the set screw that holds the plug."""
+    top, bottom = np.array([0, 0, sizes.joint]), np.array([0, 0, foot])
     beyond = np.array([0, 0, THROUGH_MM])
-    screw = Cylinder(top - [0, 0, PLUG_MM / 2], SIDE, SET_SCREW_MM / 2, post + THROUGH_MM)
+    screw = top - [0, 0, PLUG_MM / 2]
     return Component(
         "stage_post",
         "post of the object stage",
-        (cylinder_between(bottom, top, post),),
-        (cylinder_between(bottom - beyond, top + beyond, post - wall), screw),
-        (DOWN, UP, (1.0, 0.0, 0.0)),
+        (cylinder_between(bottom, top, sizes.post),),
+        (
+            cylinder_between(bottom - beyond, top + beyond, sizes.post - sizes.wall),
+            Cylinder(screw, SCREW_DIRECTION, SET_SCREW_MM / 2, sizes.post + THROUGH_MM),
+        ),
+        (DOWN, UP, LEVEL),
     )

@@ -13,7 +13,7 @@ from OCP.Geom import Geom_SphericalSurface
 
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
-from tbcad.cad.glyphs import ROWS, SIGNS, fitting, loops, relief
+from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
 from tbcad.cad.solids import (
     bounds,
     centroid,
@@ -177,7 +177,7 @@ class TestCarrier:
             top = found.centre[k] + (found.back[k] + KEYS.relief_mm) * found.axis[k]
             near = norm(mesh.triangles_center - top) < found.boss[k]
             area = mesh.area_faces[in_plane(mesh, top, found.axis[k]) & near].sum()
-            square = fitting(str(k + 1), KEYS.digit_mm, 0.85 * found.boss[k]) / ROWS
+            square = fitting_height(str(k + 1), KEYS.digit_mm, 0.85 * found.boss[k]) / ROWS
             squares = "".join(SIGNS[str(k + 1)]).count("#")
             assert area == pytest.approx(squares * square**2, rel=1e-6)
 

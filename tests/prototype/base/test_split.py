@@ -14,7 +14,7 @@ from tbcad.prototype.base.profile import distance_outside
 from tbcad.prototype.base.purchased import base_purchased_parts, fasteners, magnets
 from tbcad.prototype.base.screws import access_radius, joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.printing.bed import needed, room, shortfall
+from tbcad.prototype.printing.bed import min_bed, shortfall, usable_size
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
@@ -184,8 +184,8 @@ class TestBed:
         corners = np.array(np.meshgrid([0, 100], [0, 50], [0, 20]), dtype=float).reshape(3, -1).T
         exact = PrinterSpec(bed_mm=(100.0, 50.0, 20.0), bed_margin_mm=0.0)
         assert shortfall(corners, DOWN, exact) == pytest.approx(0.4)
-        assert needed(corners, DOWN, exact).tolist() == [101, 51, 21]
-        assert room(PrinterSpec()).tolist() == pytest.approx([249.6, 249.6, 252.6])
+        assert min_bed(corners, DOWN, exact).tolist() == [101, 51, 21]
+        assert usable_size(PrinterSpec()).tolist() == pytest.approx([249.6, 249.6, 252.6])
 
     def test_it_is_turned_to_fit(self) -> None:
         corners = np.array([[0, 0, 0], [0, 120, 0], [10, 0, 0], [10, 120, 0]], dtype=float)

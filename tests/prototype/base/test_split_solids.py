@@ -12,7 +12,7 @@ from OCP.Geom import Geom_CylindricalSurface
 
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_mesh
-from tbcad.cad.glyphs import ROWS, SIGNS, fitting
+from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
@@ -151,7 +151,7 @@ class TestSmall:
             mesh = meshes[n]
             flat = np.abs((mesh.triangles - top) @ out).max(axis=1) < 1e-6
             flat &= (mesh.face_normals @ out > 1 - 1e-9) & (norm(mesh.triangles_center - top) < 6)
-            square = fitting(str(n + 1), numbers.spec.digit_mm, 0.95 * LABEL_MM) / ROWS
+            square = fitting_height(str(n + 1), numbers.spec.digit_mm, 0.95 * LABEL_MM) / ROWS
             squares = "".join(SIGNS[str(n + 1)]).count("#")
             assert mesh.area_faces[flat].sum() == pytest.approx(squares * square**2, rel=1e-6)
 

@@ -14,9 +14,9 @@ from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.bom_csv import (
     COLUMNS,
     PartsNeeded,
-    Printed,
+    PrintedItem,
+    bom_rows,
     drive_record,
-    rows,
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
@@ -26,11 +26,11 @@ from tbcad.spec.prototype import MotionSpec
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
 NEEDED = PartsNeeded(
-    bought={
+    purchased={
         **{"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 1},
         **{"MAGNET-4x3": 2, "MAGNET-8x3": 3},
     },
-    printed=(Printed("base", "carrier", 5e5), Printed("foot", "below the plate", 1e3, 4)),
+    printed=(PrintedItem("base", "carrier", 5e5), PrintedItem("foot", "below the plate", 1e3, 4)),
 )
 Read = list[dict[str, str]]
 
@@ -51,7 +51,7 @@ def drive() -> Drive:
 @pytest.fixture(scope="module")
 def read(made: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
-    write_table(path, COLUMNS, rows(made, drive, NEEDED, PARTS))
+    write_table(path, COLUMNS, bom_rows(made, drive, NEEDED, PARTS))
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -74,7 +74,7 @@ def test_rows(read: Read) -> None:
 
 def test_totals_are_the_sum_of_the_parts(made: PrototypeLayout, drive: Drive, read: Read) -> None:
     balls = made.mass_g + 1.27e-3 * cap_volume(made.balls).sum()
-    bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.bought.items())
+    bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.purchased.items())
     electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
     printed = 1.27e-3 * (5e5 + 4e3)
     expected = balls + bought + electronics + printed + 4 * PARTS["LED-3"].mass_g
@@ -97,7 +97,7 @@ def test_equal_balls_share_a_row(made: PrototypeLayout, drive: Drive) -> None:
     stock = made.balls.stock.copy()
     stock[:] = 10
     alike = replace(made, balls=replace(made.balls, stock=stock))
-    first, *others = rows(alike, drive, PartsNeeded(), PARTS)
+    first, *others = bom_rows(alike, drive, PartsNeeded(), PARTS)
     assert first["quantity"] == len(made)
     assert not any(str(row["part"]).startswith("ball ") for row in others)
 
@@ -124,22 +124,14 @@ def test_drive_is_in_it(drive: Drive, read: Read) -> None:
         assert of(read, part.name)["quantity"] == "1"
 
 
-def test_turned_caps(made: PrototypeLayout, drive: Drive) -> None:
-    needed = PartsNeeded(cap_material="steel")
-    caps = [row for row in rows(made, drive, needed, PARTS) if row["from"] == "turned"]
-    weights = 7.81e-3 * cap_volume(made.balls)[made.balls.cap]
-    assert [row["mass_g"] for row in caps] == pytest.approx(weights.tolist())
-    assert {row["material"] for row in caps} == {"steel"}
-
-
 def test_unknown_part(made: PrototypeLayout, drive: Drive) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
-        rows(made, drive, PartsNeeded(bought={"M3x11": 1}), PARTS)
+        bom_rows(made, drive, PartsNeeded(purchased={"M3x11": 1}), PARTS)
 
 
 def test_same_bytes(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        write_table(tmp_path / name, COLUMNS, rows(made, drive, NEEDED, load_parts()))
+        write_table(tmp_path / name, COLUMNS, bom_rows(made, drive, NEEDED, load_parts()))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 

@@ -10,7 +10,14 @@ import pytest
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
-from tbcad.prototype.files.gcode import DECIMALS, free, minutes, program, run, write_program
+from tbcad.prototype.files.gcode import (
+    DECIMALS,
+    duration_minutes,
+    free_base_angles,
+    gcode_program,
+    stop_sequence,
+    write_program,
+)
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
@@ -113,7 +120,7 @@ def drive() -> Drive:
 
 
 def test_every_stop_twice_in_order_within_a_step(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(program(made, drive, MOTION))
+    machine = sent(gcode_program(made, drive, MOTION))
     angle = np.degrees(made.stops.angle)
     step = 1 / drive.steps_per_deg(MOTION.microsteps)
     off = np.abs(np.array(machine.shots) - np.tile(angle, 2))
@@ -121,7 +128,7 @@ def test_every_stop_twice_in_order_within_a_step(made: PrototypeLayout, drive: D
 
 
 def test_it_stays_in_the_swing_but_for_the_approach(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(program(made, drive, MOTION))
+    machine = sent(gcode_program(made, drive, MOTION))
     ends = np.degrees(made.stops.angle[[0, -1]])
     half = np.degrees(made.placement.swing) / 2
     assert ends.min() >= -half - 1e-9
@@ -134,7 +141,7 @@ def test_it_stays_in_the_swing_but_for_the_approach(made: PrototypeLayout, drive
 
 
 def test_every_stop_is_reached_from_below(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(program(made, drive, MOTION))
+    machine = sent(gcode_program(made, drive, MOTION))
     steps = list(zip(machine.moves, machine.moves[1:], strict=False))
     for shot in set(machine.shots):
         came = [old for old, new in steps if new == shot]
@@ -143,28 +150,28 @@ def test_every_stop_is_reached_from_below(made: PrototypeLayout, drive: Drive) -
 
 
 def test_pauses_for_people(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(program(made, drive, MOTION))
+    machine = sent(gcode_program(made, drive, MOTION))
     (before, first), (between, second) = machine.pauses
     assert before is None
     assert "base at 0 degrees" in first
     assert "turn the object by 180 degrees" in second
-    assert between == pytest.approx(run(made, MOTION).start, abs=1e-3)
+    assert between == pytest.approx(stop_sequence(made, MOTION).start, abs=1e-3)
 
 
 def test_it_ends_where_it_began(made: PrototypeLayout, drive: Drive) -> None:
     motion = MotionSpec(home_deg=-12.5)
-    assert sent(program(made, drive, motion)).at == -12.5
+    assert sent(gcode_program(made, drive, motion)).at == -12.5
 
 
 def test_other_axis(made: PrototypeLayout, drive: Drive) -> None:
-    plain, other = (program(made, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
+    plain, other = (gcode_program(made, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
     assert sent(other, "A").shots == sent(plain).shots
     assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
     assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
 
 
 def test_a_person_as_trigger(made: PrototypeLayout, drive: Drive) -> None:
-    lines = program(made, drive, MotionSpec(trigger="pause"))
+    lines = gcode_program(made, drive, MotionSpec(trigger="pause"))
     machine = sent(lines)
     assert not machine.shots
     assert len(machine.pauses) == 2 + 2 * len(made.stops)
@@ -172,17 +179,19 @@ def test_a_person_as_trigger(made: PrototypeLayout, drive: Drive) -> None:
 
 
 def test_comments_count_the_mirrors(made: PrototypeLayout, drive: Drive) -> None:
-    lines = program(made, drive, MOTION)
+    lines = gcode_program(made, drive, MOTION)
     counts = [int(c) for line in lines for c in re.findall(r"of \d+: (\d+) mirrors", line)]
     assert sum(counts) == 2 * len(made.half)
     assert f"(stop 1 of {len(made.stops)}: {len(made.stops.mirrors(0))} mirrors)" in lines
 
 
 def test_time(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(program(made, drive, MOTION))
-    todo = run(made, MOTION)
+    machine = sent(gcode_program(made, drive, MOTION))
+    todo = stop_sequence(made, MOTION)
     way = 2 * 2 * (todo.angle[-1] - todo.start)
-    assert minutes(todo, MOTION) == pytest.approx(machine.rest / 60 + way / MOTION.feed_deg_min)
+    assert duration_minutes(todo, MOTION) == pytest.approx(
+        machine.rest / 60 + way / MOTION.feed_deg_min
+    )
 
 
 @pytest.mark.parametrize(
@@ -194,8 +203,8 @@ def test_time(made: PrototypeLayout, drive: Drive) -> None:
     ],
 )
 def test_other_motions(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
-    machine = sent(program(made, drive, motion))
-    low, high = np.degrees(free(made))
+    machine = sent(gcode_program(made, drive, motion))
+    low, high = np.degrees(free_base_angles(made))
     assert low <= min(machine.moves)
     assert max(machine.moves) <= high
     assert len(machine.shots) == 2 * len(made.stops)
@@ -204,18 +213,18 @@ def test_other_motions(made: PrototypeLayout, drive: Drive, motion: MotionSpec) 
 def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
     tight = prototype_layout(spec, small_design)
-    start = run(tight, MotionSpec(approach_deg=20)).start
-    assert start == pytest.approx(np.degrees(free(tight)[0]))
+    start = stop_sequence(tight, MotionSpec(approach_deg=20)).start
+    assert start == pytest.approx(np.degrees(free_base_angles(tight)[0]))
     assert start == pytest.approx(-90)
 
 
 def test_a_start_out_of_reach(made: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
-        run(made, MotionSpec(home_deg=170))
+        stop_sequence(made, MotionSpec(home_deg=170))
 
 
 def test_written(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
-    lines = program(made, drive, MOTION)
+    lines = gcode_program(made, drive, MOTION)
     for name in ("a.nc", "b.nc"):
         write_program(tmp_path / name, lines)
     data = (tmp_path / "a.nc").read_bytes()

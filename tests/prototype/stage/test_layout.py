@@ -1,5 +1,6 @@
-"""The stage and the room it stands in: closed forms against other ways to the same figures."""
+"""The stage and its keep-out volume: closed forms against sampled distances."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -19,54 +20,52 @@ from tbcad.geometry.primitives import (
 )
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.keepout import EXACT, EXACT_MM, Room, Section, least, room
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.keepout import (
+    EXACT,
+    EXACT_MM,
+    KeepOut,
+    SweptSection,
+    keep_out_volume,
+    min_distance,
+)
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, leds, stage
+from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import FrameSpec, StageSpec
+from tbcad.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
 
 PARTS = load_parts()
-SPEC = load_spec(None, ["n=6", "prototype.k=4"])
 CAPTURE = 30.0
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(SPEC, small_design)
+def stage_with(
+    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut, **changed: object
+) -> StageLayout:
+    sections = {
+        "post_diameter_mm": changed.pop("post", 20.0),
+        "stage": StageSpec.model_validate(changed),
+        "frame": FrameSpec(),
+    }
+    return stage_layout(spec.model_copy(update=sections), small_prototype, keep_out, PARTS)
 
 
 @pytest.fixture(scope="module")
-def carrier(made: PrototypeLayout) -> BaseLayout:
-    return base_layout(SPEC.prototype.base, made)
+def refusal(
+    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> Callable[..., str]:
+    def refused(keep_out: KeepOut = keep_out, **changed: object) -> str:
+        with pytest.raises(SpecError) as caught:
+            stage_with(spec, small_prototype, keep_out, **changed)
+        return str(caught.value)
 
-
-@pytest.fixture(scope="module")
-def space(made: PrototypeLayout, carrier: BaseLayout) -> Room:
-    return room(made, carrier, CAPTURE, 0.0)
-
-
-def staged(made: PrototypeLayout, space: Room, **changed: object) -> StageLayout:
-    post = changed.pop("post", 20.0)
-    own = SPEC.prototype.model_copy(update={"post_diameter_mm": post})
-    return stage((StageSpec.model_validate(changed), FrameSpec(), own), made, space, PARTS)
-
-
-def refusal(made: PrototypeLayout, space: Room, **changed: object) -> str:
-    with pytest.raises(SpecError) as caught:
-        staged(made, space, **changed)
-    return str(caught.value)
+    return refused
 
 
 class TestStage:
-    def test_leds_stand_where_the_spec_has_them_and_look_up(
-        self, made: PrototypeLayout, space: Room
-    ) -> None:
-        found = leds(staged(made, space))
+    def test_leds_are_where_the_spec_has_them_and_point_up(self, stage: StageLayout) -> None:
+        found = led_poses(stage)
         assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
         assert np.array([place for _, place, _ in found]).tolist() == [
             list(place) for place in StageSpec().leds_mm
@@ -81,32 +80,30 @@ class TestStage:
         area = max(float(norm(np.cross(sides[i], sides[j]))) for i, j in ((0, 1), (0, 2), (1, 2)))
         assert abs(np.linalg.det(sides)) / area > 2.0
 
-    def test_room_below_the_object_is_what_was_found(
-        self, made: PrototypeLayout, space: Room
-    ) -> None:
-        numbers = staged(made, space)
-        assert numbers.light > -GRAZING_MM
-        assert numbers.swept > FrameSpec().clearance_mm
-        assert numbers.post == 10.0
+    def test_it_is_clear_of_light_and_base(self, stage: StageLayout) -> None:
+        assert stage.light > -GRAZING_MM
+        assert stage.swept > FrameSpec().clearance_mm
+        assert stage.post == 10.0
 
-    def test_a_stage_without_leds(self, made: PrototypeLayout, space: Room) -> None:
-        numbers = staged(made, space, leds_mm=[])
-        assert leds(numbers) == []
-        assert [item.name for item in numbers.items] == ["stage_disc", "stage_crown", "stage_post"]
-
-    def test_the_studs_take_the_disc_two_ways_round(
-        self, made: PrototypeLayout, space: Room
+    def test_a_stage_without_leds(
+        self, spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
     ) -> None:
-        disc, crown, _ = staged(made, space).items
+        bare = stage_with(spec, small_prototype, keep_out, leds_mm=[])
+        assert led_poses(bare) == []
+        names = [component.name for component in bare.components]
+        assert names == ["stage_disc", "stage_crown", "stage_post"]
+
+    def test_the_studs_take_the_disc_two_ways_round(self, stage: StageLayout) -> None:
+        disc, crown, _ = stage.components
         holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Cylinder)])
         studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Cylinder)])
         assert holes == pytest.approx(studs)
         assert holes[0] == pytest.approx(-holes[1])
 
     @pytest.mark.parametrize(
-        ("changed", "words"),
+        ("changed", "message"),
         [
-            ({"post": 0.0}, "hollow hub is not made yet"),
+            ({"post": 0.0}, "hollow hub is not supported"),
             ({"post": 6.0}, "8 or more"),
             ({"top_mm": -29.0}, "set prototype.stage.top_mm from"),
             ({"top_mm": 5.0}, "to 0"),
@@ -116,63 +113,64 @@ class TestStage:
         ],
     )
     def test_what_does_not_fit_is_refused(
-        self, made: PrototypeLayout, space: Room, changed: dict[str, object], words: str
+        self, refusal: Callable[..., str], changed: dict[str, object], message: str
     ) -> None:
-        assert words in refusal(made, space, **changed)
+        assert message in refusal(**changed)
 
     def test_a_post_in_the_light_or_in_the_base_is_refused(
-        self, made: PrototypeLayout, space: Room
+        self, refusal: Callable[..., str], keep_out: KeepOut
     ) -> None:
-        below = replace(space, used=space.used + np.pi)
-        assert "mm in the light of the balls" in refusal(made, below)
+        below = replace(keep_out, used=keep_out.used + np.pi)
+        assert "mm inside the light of the balls" in refusal(below)
         disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
-        words = refusal(made, replace(space, sections=(Section(disc, -np.pi, np.pi),)))
-        assert "the base comes within" in words
-        assert "prototype.post_diameter_mm or prototype.k smaller" in words
+        message = refusal(replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),)))
+        assert "the base comes within" in message
+        assert "prototype.post_diameter_mm or prototype.k smaller" in message
 
     @pytest.mark.parametrize(
-        ("number", "place", "words"),
+        ("number", "place", "message"),
         [
             (1, (20.0, 7.5, -19.0), "LED 1 with its pillar reaches"),
-            (1, (10.6, 7.5, -22.0), "LED 1 stands too low for its pocket"),
-            (3, (-3.4, 8.0, -13.5), "LED 3 stands in the disc"),
+            (1, (10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
+            (3, (-3.4, 8.0, -13.5), "LED 3 is inside the disc"),
             (4, (-5.4, 12.0, -7.0), "LED 4 collides with LED 3"),
             (1, (10.6, 7.5, -5.0), "is hidden from mirror"),
         ],
     )
-    def test_leds_that_do_not_do_are_refused(
+    def test_unusable_leds_are_refused(
         self,
-        made: PrototypeLayout,
-        space: Room,
+        refusal: Callable[..., str],
         number: int,
         place: tuple[float, float, float],
-        words: str,
+        message: str,
     ) -> None:
         places = list(StageSpec().leds_mm)
         places[number - 1] = place
-        assert words in refusal(made, space, leds_mm=places)
+        assert message in refusal(leds_mm=places)
 
-    def test_leds_in_one_plane_are_refused(self, made: PrototypeLayout, space: Room) -> None:
+    def test_leds_in_one_plane_are_refused(self, refusal: Callable[..., str]) -> None:
         places = [(x, y, -15.0) for x, y, _ in StageSpec().leds_mm]
-        assert "nearly in one plane" in refusal(made, space, leds_mm=places)
+        assert "nearly in one plane" in refusal(leds_mm=places)
 
-    def test_a_floor_too_high_is_refused(self, made: PrototypeLayout, space: Room) -> None:
+    def test_a_floor_too_high_is_refused(
+        self, spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
+    ) -> None:
+        high = spec.model_copy(update={"frame": FrameSpec(floor_mm=-60.0)})
         with pytest.raises(SpecError, match=r"make prototype\.frame\.floor_mm"):
-            stage((StageSpec(), FrameSpec(floor_mm=-60.0), SPEC.prototype), made, space, PARTS)
+            stage_layout(high, small_prototype, keep_out, PARTS)
 
     def test_three_leds_are_refused_by_the_spec(self) -> None:
         with pytest.raises(ValidationError, match="4 to 12 places"):
             StageSpec.model_validate({"leds_mm": StageSpec().leds_mm[:3]})
 
     def test_no_led_is_hidden_in_a_march_along_its_rays(
-        self, made: PrototypeLayout, space: Room
+        self, small_prototype: PrototypeLayout, stage: StageLayout
     ) -> None:
-        numbers = staged(made, space)
-        crown = numbers.items[1]
+        crown = stage.components[1]
         pillars = [body for body in crown.added[3:] if isinstance(body, Cylinder)]
         assert len(pillars) == 4
-        cameras = made.half.ellipsoid.camera_distance * made.half.u
-        for i, place in enumerate(numbers.leds):
+        cameras = small_prototype.half.ellipsoid.camera_distance * small_prototype.half.u
+        for i, place in enumerate(stage.leds):
             way = unit(cameras - place)
             points = place + np.arange(0.0, 60.0, 0.25)[:, None, None] * way
             for j, pillar in enumerate(pillars):
@@ -181,30 +179,32 @@ class TestStage:
                 assert i == j or not (low & near).any()
 
 
-class TestRoom:
-    def test_light_is_where_rays_are(self, made: PrototypeLayout, space: Room) -> None:
+class TestKeepOut:
+    def test_light_is_where_rays_are(
+        self, small_prototype: PrototypeLayout, keep_out: KeepOut
+    ) -> None:
         """Rays from points of the capture sphere to points of the part in use, at its stops."""
         rng = np.random.default_rng(5)
-        outline, stops = made.balls.outline, made.stops
-        frame = made.half.ellipsoid.frame()
-        for mirror in rng.choice(len(made.half), 12, replace=False).tolist():
-            ball = int(made.fit.ball[mirror])
-            azimuth = made.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
+        outline, stops = small_prototype.balls.outline, small_prototype.stops
+        frame = small_prototype.half.ellipsoid.frame()
+        for mirror in rng.choice(len(small_prototype.half), 12, replace=False).tolist():
+            ball = int(small_prototype.fit.ball[mirror])
+            azimuth = small_prototype.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
             rim = rotated_about_x(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
             start = CAPTURE * unit(rng.normal(size=(len(rim), 3)))
-            ends = [start, np.broadcast_to(made.half.camera.pinhole, rim.shape)]
+            ends = [start, np.broadcast_to(small_prototype.half.camera.pinhole, rim.shape)]
             for other in ends:
                 share = rng.uniform(size=(len(rim), 1))
-                assert (space.light(other + share * (rim - other)) < 1e-6).all()
+                assert (keep_out.to_light(other + share * (rim - other)) < 1e-6).all()
 
-    def test_light_hull_is_no_larger_than_its_spheres(self, space: Room) -> None:
+    def test_light_hull_is_no_larger_than_its_spheres(self, keep_out: KeepOut) -> None:
         """Distances by many spheres between both ends, at many azimuths."""
         points = np.random.default_rng(6).uniform(-200, 200, (40, 3))
         share = np.linspace(0, 1, 401)[:, None]
-        local = points @ space.frame.T
+        local = points @ keep_out.frame.T
         found = np.full(len(points), np.inf)
-        cones = space.cones
-        for k, (low, high) in enumerate(space.used.tolist()):
+        cones = keep_out.cones
+        for k, (low, high) in enumerate(keep_out.used.tolist()):
             middle = cones.start[k] + share * (cones.end[k] - cones.start[k])
             radius = cones.start_radius[k] + share[:, 0] * (
                 cones.end_radius[k] - cones.start_radius[k]
@@ -213,55 +213,59 @@ class TestRoom:
             for azimuth in np.linspace(low, high, 241):
                 centre = rotated_about_x(flat, np.full(len(flat), azimuth))
                 found = np.minimum(found, (norm(local[:, None] - centre) - radius).min(axis=1))
-        exact = space.light(points)
+        exact = keep_out.to_light(points)
         assert (exact <= found + 1e-9).all()
         outside = exact > 0
         assert outside.sum() > 10
         assert exact[outside] == pytest.approx(found[outside], abs=0.8)
 
     def test_swept_holds_carrier_and_balls_at_all_angles(
-        self, made: PrototypeLayout, carrier: BaseLayout, space: Room
+        self, small_prototype: PrototypeLayout, carrier: BaseLayout, keep_out: KeepOut
     ) -> None:
         seat = carrier.seats
-        for angle in np.linspace(made.stops.angle[0], made.stops.angle[-1], 7).tolist():
+        for angle in np.linspace(
+            small_prototype.stops.angle[0], small_prototype.stops.angle[-1], 7
+        ).tolist():
             ends = seat.centre + seat.back[:, None] * seat.axis
             local = rotated_about_x(ends @ carrier.frame.T, np.full(len(ends), angle))
-            assert (space.swept(local @ carrier.frame) == 0).all()
-            assert (space.swept(made.body_centres(angle)) < -5).all()
+            assert (keep_out.to_swept(local @ carrier.frame) == 0).all()
+            assert (keep_out.to_swept(small_prototype.body_centres(angle)) < -5).all()
             for azimuth in carrier.sector:
                 turn = np.full(len(carrier.outer), azimuth + angle)
                 line = np.column_stack([carrier.outer, 0 * turn])
                 points = rotated_about_x(line, turn) @ carrier.frame
-                assert space.swept(points).max() < 1e-6
+                assert keep_out.to_swept(points).max() < 1e-6
 
-    def test_swept_is_a_distance_off_the_sector(self, carrier: BaseLayout, space: Room) -> None:
+    def test_swept_is_a_distance_off_the_sector(
+        self, carrier: BaseLayout, keep_out: KeepOut
+    ) -> None:
         """Beyond the outermost azimuth, to the edge's half-plane."""
-        high = max(one.high for one in space.sections if one.high < np.pi)
+        high = max(one.high for one in keep_out.sections if one.high < np.pi)
         at = carrier.middle[len(carrier.middle) // 2]
         along = np.array([[at[0], at[1], 0.0]])
         for beyond in (0.05, 0.1):
             point = rotated_about_x(along, np.array([high + beyond])) @ carrier.frame
             away = at[1] * np.sin(beyond)
-            assert space.swept(point)[0] <= away + 1e-9
-            assert space.swept(point)[0] > 0.5 * away
+            assert keep_out.to_swept(point)[0] <= away + 1e-9
+            assert keep_out.to_swept(point)[0] > 0.5 * away
 
     def test_approach_widens_what_is_swept(
-        self, made: PrototypeLayout, carrier: BaseLayout
+        self, small_prototype: PrototypeLayout, carrier: BaseLayout
     ) -> None:
-        near = room(made, carrier, CAPTURE, 0.0).sections[0]
-        far = room(made, carrier, CAPTURE, 0.1).sections[0]
+        near = keep_out_volume(small_prototype, carrier, CAPTURE, 0.0).sections[0]
+        far = keep_out_volume(small_prototype, carrier, CAPTURE, 0.1).sections[0]
         assert far.low == pytest.approx(near.low - 0.1)
         assert far.high == near.high
 
-    def test_the_sphere_is_no_obstacle_to_itself(self, space: Room) -> None:
+    def test_the_sphere_is_no_obstacle_to_itself(self, keep_out: KeepOut) -> None:
         inside = 0.9 * CAPTURE * unit(np.random.default_rng(7).normal(size=(50, 3)))
-        assert (space.light(inside) < 0).all()
-        assert (space.scene(inside) > 0).all()
+        assert (keep_out.to_light(inside) < 0).all()
+        assert (keep_out.to_light_outside_sphere(inside) > 0).all()
 
-    def test_least_distance_of_a_box_to_a_point(self) -> None:
+    def test_smallest_distance_of_a_box_to_a_point(self) -> None:
         body = box(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), np.eye(3))
         for point, away in ((np.zeros(3), np.sqrt(14)), (np.array([2.0, 3.0, 10.0]), 4.0)):
-            found = least(partial(distance, point), [body])
+            found = min_distance(partial(distance, point), [body])
             assert away - max(EXACT_MM, EXACT * away) - 1e-9 <= found <= away
 
 
@@ -308,6 +312,7 @@ class TestBodies:
         assert [end.start[0] for end in ends if isinstance(end, Cylinder)] == [-3, 3]
 
 
-def test_the_same_stage_twice(made: PrototypeLayout, space: Room) -> None:
-    first, second = (replace(staged(made, space), led=PARTS["LED-3"]) for _ in range(2))
-    assert repr(first) == repr(second)
+def test_the_same_stage_twice(
+    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut, stage: StageLayout
+) -> None:
+    assert repr(stage_layout(spec, small_prototype, keep_out, PARTS)) == repr(stage)

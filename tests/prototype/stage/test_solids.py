@@ -10,45 +10,27 @@ import trimesh
 from tbcad.cad.brep import Solid
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.keepout import Room, room
+from tbcad.prototype.keepout import KeepOut
+from tbcad.prototype.printing.component_solids import placed_component
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
-from tbcad.prototype.stage.layout import StageLayout, stage
-from tbcad.prototype.stage.stage_solids import parts
+from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec, FrameSpec, StageSpec
+from tbcad.spec.prototype import StageSpec
 from tests.helpers import as_trimesh
 
-LISTS = load_parts()
 CAPTURE = 30.0
 PRINTER = PrinterSpec()
 
 
-@pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=4"]), small_design)
+def placed(stage: StageLayout, printer: PrinterSpec) -> dict[str, PlacedSolid]:
+    return {part.name: placed_component(part, printer) for part in stage.components}
 
 
 @pytest.fixture(scope="module")
-def space(made: PrototypeLayout) -> Room:
-    return room(made, base_layout(BaseSpec(), made), CAPTURE, 0.0)
-
-
-@pytest.fixture(scope="module")
-def numbers(made: PrototypeLayout, space: Room) -> StageLayout:
-    own = load_spec(None).prototype
-    return stage((StageSpec(), FrameSpec(), own), made, space, LISTS)
-
-
-@pytest.fixture(scope="module")
-def solids(numbers: StageLayout) -> dict[str, PlacedSolid]:
-    return {part.name: part for part in parts(numbers, PRINTER)}
+def solids(stage: StageLayout) -> dict[str, PlacedSolid]:
+    return placed(stage, PRINTER)
 
 
 @pytest.fixture(scope="module")
@@ -66,24 +48,25 @@ class TestSolids:
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
 
-    def test_volume_of_the_disc(self, solids: dict[str, PlacedSolid], numbers: StageLayout) -> None:
-        stud = min(STUD_MM, numbers.disc / 5) + STUD_PLAY_MM
-        area = np.pi * (numbers.disc**2 - 2 * stud**2)
+    def test_volume_of_the_disc(self, solids: dict[str, PlacedSolid]) -> None:
+        disc = StageSpec().disc_mm / 2
+        stud = min(STUD_MM, disc / 5) + STUD_PLAY_MM
+        area = np.pi * (disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
 
-    def test_volume_of_the_post(self, solids: dict[str, PlacedSolid], numbers: StageLayout) -> None:
+    def test_volume_of_the_post(self, solids: dict[str, PlacedSolid], stage: StageLayout) -> None:
         wall = StageSpec().wall_mm
-        tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (numbers.joint - numbers.foot)
+        tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (stage.joint - stage.foot)
         # The set screw's hole is nearly as long as the wall is thick.
         hole = np.pi * 1.4**2 * wall
         assert solids["stage_post"].volume == pytest.approx(tube - hole, abs=0.1 * hole)
 
     def test_led_places_are_recovered_from_the_pockets(
-        self, numbers: StageLayout, crown: trimesh.Trimesh
+        self, stage: StageLayout, crown: trimesh.Trimesh
     ) -> None:
-        led = numbers.led
+        led = stage.led
         radius = led["flange_mm"] / 2 + 0.1
-        for place in numbers.leds:
+        for place in stage.leds:
             floor = place[2] - (led["height_mm"] - led["diameter_mm"] / 2)
             flat = (np.abs(crown.triangles[..., 2] - floor).max(axis=1) < 1e-6) & (
                 crown.face_normals[:, 2] > 0.999
@@ -99,13 +82,13 @@ class TestSolids:
             assert norm(middle - place[:2]) < 1e-6
 
     def test_wires_come_from_every_pocket_to_the_bores_end(
-        self, numbers: StageLayout, crown: trimesh.Trimesh
+        self, stage: StageLayout, crown: trimesh.Trimesh
     ) -> None:
         """A way of points in the open: down from the pocket, along the groove, down the bore."""
-        groove = numbers.plate - 0.8
+        groove = stage.plate - 0.8
         end = crown.bounds[0, 2] - 1
         steps = np.linspace(0, 1, 40)[:, None]
-        for place, floor in zip(numbers.leds, numbers.pockets, strict=True):
+        for place, floor in zip(stage.leds, stage.pockets, strict=True):
             corners = np.array(
                 [
                     [*place[:2], floor + 0.5],
@@ -119,23 +102,23 @@ class TestSolids:
             assert crown.contains(way[39:41] - [0, 0, 1.5]).all()  # the plate below the groove
 
     def test_all_inside_the_sphere_is_inside_or_in_the_dark(
-        self, solids: dict[str, PlacedSolid], space: Room
+        self, solids: dict[str, PlacedSolid], keep_out: KeepOut
     ) -> None:
         for part in solids.values():
             mesh = as_trimesh(part.shape, 0.01)
             points, _ = trimesh.sample.sample_surface(mesh, 20_000, seed=2)
             outside = points[norm(points) > CAPTURE]
             if len(outside):
-                assert space.light(outside).min() > -0.15
-                assert space.swept(outside).min() > 3
+                assert keep_out.to_light(outside).min() > -0.15
+                assert keep_out.to_swept(outside).min() > 3
 
-    def test_a_bed_too_small_is_refused(self, numbers: StageLayout) -> None:
+    def test_a_bed_too_small_is_refused(self, stage: StageLayout) -> None:
         with pytest.raises(SpecError, match="stage_post does not fit"):
-            parts(numbers, PrinterSpec(bed_mm=(120.0, 120.0, 120.0)))
+            placed(stage, PrinterSpec(bed_mm=(120.0, 120.0, 120.0)))
 
 
-def test_the_same_bytes_twice(numbers: StageLayout, tmp_path: Path) -> None:
+def test_the_same_bytes_twice(stage: StageLayout, tmp_path: Path) -> None:
     for name in ("one", "two"):
-        crown = parts(numbers, PRINTER)[1]
+        crown = placed_component(stage.components[1], PRINTER)
         write_step(tmp_path / name, Solid(crown.name, crown.shape, ()))
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

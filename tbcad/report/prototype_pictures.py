@@ -1,6 +1,6 @@
 """Pictures of the prototype, drawn from an export's records, STL files and assembly.
 
-Run as a program (`python -m tbcad.report.rig_pictures DIR SUBJECT FILE`), as `pictures`.
+Run as a program, as `shell_pictures`: `python -m tbcad.report.prototype_pictures DIR SUBJECT FILE`.
 """
 
 import csv

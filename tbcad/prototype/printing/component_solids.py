@@ -1,0 +1,63 @@
+"""Solids of components: added primitives fused, removed ones cut out."""
+
+import numpy as np
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+
+from tbcad.cad.checks import check_volume
+from tbcad.cad.solids import (
+    cut,
+    cylinder,
+    fused,
+    one_solid,
+    polygon,
+    prism,
+    revolved_polygon,
+    volume_by_meshes,
+)
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved
+from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.spec.printer import PrinterSpec
+from tbcad.types import Floats
+
+COARSE_MM = 0.02
+VOLUME_ERROR = 2e-3
+
+
+def primitive_solid(body: Primitive) -> TopoDS_Shape:
+    """The solid of a primitive."""
+    if isinstance(body, Cylinder):
+        return cylinder(body.start, body.axis, body.radius, body.length)
+    if isinstance(body, Revolved):
+        return revolved_polygon(body.profile, 0.0, 2 * np.pi)
+    return prism(polygon(_outward(body)), body.along)
+
+
+def component_solid(component: Component) -> TopoDS_Solid:
+    """The one solid of a component, in the frame of the shell.
+
+    Raises:
+        InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
+    """
+    added = [primitive_solid(body) for body in component.added]
+    removed = [primitive_solid(body) for body in component.removed]
+    solid = one_solid(component.name, cut(fused(added), removed))
+    expected = volume_by_meshes(added, removed, COARSE_MM)
+    check_volume(component.name, solid, expected, VOLUME_ERROR)
+    return solid
+
+
+def placed_component(component: Component, printer: PrinterSpec) -> PlacedSolid:
+    """A component placed on the printer's bed.
+
+    Raises:
+        SpecError: when it does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    downs = [np.array(down) for down in component.downs]
+    return placed_on_bed(component.name, component_solid(component), downs, np.eye(3), printer)
+
+
+def _outward(body: Prism) -> Floats:
+    """The corners in the order that turns the prism's faces outward."""
+    a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
+    return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
