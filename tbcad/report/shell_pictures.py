@@ -1,7 +1,7 @@
 """Pictures of the shells, drawn from an export's STL files and mirrors.csv.
 
-Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing without a screen may crash
-the process, so the command starts it as a child.
+Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing without a screen may
+crash the process, so the command starts it as a child.
 """
 
 import csv
