@@ -11,7 +11,7 @@ import trimesh
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.rays import build_scene
 from tbcad_verify.mesh.surfaces import prepare_for_rays
-from tbcad_verify.record.poses import Virtual
+from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell import coverage, seam
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
@@ -27,7 +27,7 @@ from tbcad_verify.shell.recover import follows_fit, recover
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import PIN, Cells, Design, export, poses, unit
 
-ONE = Virtual(np.array([0]), 1, np.array([False]))
+ONE = VirtualCameras(np.array([0]), 1, np.array([False]))
 
 
 def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad_verify.prototype import axis
 from tbcad_verify.record.export import Camera, Export
-from tbcad_verify.record.poses import HALVED
+from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats, Ints
@@ -70,7 +70,7 @@ class PrototypeContext:
     @cached_property
     def halved(self) -> Bools:
         """(m,) mirrors that the seam cuts."""
-        return np.asarray(np.abs(self.export.mirrors.ux[self.mirror_rows]) < HALVED)
+        return np.asarray(np.abs(self.export.mirrors.ux[self.mirror_rows]) < ON_SEAM)
 
     @cached_property
     def plan_rows(self) -> Ints:

@@ -75,17 +75,13 @@ class Columns(BaseModel):
 
     def __len__(self) -> int:
         """Number of rows."""
-        return len(next(iter(self.__dict__.values())))
+        return len(getattr(self, next(iter(type(self).model_fields))))
 
     def columns(self, first: str, count: int = 1) -> Floats:
         """Consecutive columns of numbers, shape (count, rows)."""
         names = list(type(self).model_fields)
         start = names.index(first)
         return np.stack([getattr(self, name) for name in names[start : start + count]])
-
-    def take(self, index: NDArray[np.integer]) -> Self:
-        """The rows with these numbers, from 0, in this order."""
-        return self.model_copy(update={name: of[index] for name, of in self.__dict__.items()})
 
 
 def _place(location: tuple[int | str, ...]) -> str:

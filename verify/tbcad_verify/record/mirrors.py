@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad_verify.record.columns import Columns, Texts, numbers, numbers_or_empty
 from tbcad_verify.types import Bools, Floats
@@ -44,10 +46,15 @@ class Mirrors(Columns):
     cell_area_mm2: Numbers
     coverage_mm: Numbers
 
-    @property
+    @cached_property
     def ids(self) -> tuple[str, ...]:
         """Names of the mirrors."""
         return tuple(self.id.tolist())
+
+    def take(self, index: NDArray[np.integer]) -> Mirrors:
+        """The mirrors with these numbers, from 0, in this order."""
+        columns = {name: getattr(self, name)[index] for name in Mirrors.model_fields}
+        return Mirrors.model_construct(**columns)
 
     @property
     def flat(self) -> Bools:

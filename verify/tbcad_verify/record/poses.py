@@ -1,4 +1,4 @@
-"""What DESIGN.md section 2 demands of the recorded mirrors, worked out again from the cameras."""
+"""Recorded mirrors against DESIGN.md section 2, worked out again from the cameras."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
-HALVED = 1e-9  # |ux| below which the seam cuts a mirror in two
+ON_SEAM = 1e-9  # |ux| below which the seam cuts a mirror in two
+SAME_DIRECTION = 1e-9  # of unit vectors
+UNLIKE_SPEC = 1e-9  # by which a number may be off that of the spec
 WELL_FORMED = re.compile(r"[a-z][0-9]{4,}")
 
 
 @dataclass(frozen=True)
-class Virtual:
+class VirtualCameras:
     """Virtual cameras: one a mirror, but one for the two halves of a mirror on the seam.
 
     Attributes:
@@ -35,19 +37,19 @@ class Virtual:
     halved: NDArray[np.bool_]
 
 
-def virtual_cameras(mirrors: Mirrors) -> Virtual:
+def virtual_cameras(mirrors: Mirrors) -> VirtualCameras:
     """Pair mirrors on x = 0 that have the same number and the same direction."""
     u = mirrors.columns("ux", 3)
     first: dict[str, int] = {}
     index = np.arange(len(mirrors))
     halved = np.zeros(len(mirrors), dtype=np.bool_)
-    for row in np.flatnonzero(np.abs(u[0]) < HALVED).tolist():
+    for row in np.flatnonzero(np.abs(u[0]) < ON_SEAM).tolist():
         other = first.setdefault(mirrors.ids[row][1:], row)
-        if other != row and np.abs(u[:, row] - u[:, other]).max() < HALVED:
+        if other != row and np.abs(u[:, row] - u[:, other]).max() < ON_SEAM:
             index[row] = other
             halved[[row, other]] = True
     unique, index = np.unique(index, return_inverse=True)
-    return Virtual(index, len(unique), halved)
+    return VirtualCameras(index, len(unique), halved)
 
 
 def malformed(mirrors: Mirrors) -> list[str]:
@@ -66,8 +68,8 @@ def pose_errors(export: Export) -> Floats:
     """(M,) largest deviation of each mirror from the design, mm; inf where its camera is unknown.
 
     Checked, angles as lengths at 1 mm: u and n are unit; p lies along u and on the ellipsoid with
-    the spec's semi-minor axis and foci at the origin and the pinhole; n bisects -u and the way to
-    the pinhole; c = p - r n.
+    the spec's semi-minor axis and foci at the origin and the pinhole; n bisects -u and the
+    direction to the pinhole; c = p - r n.
     """
     mirrors = export.mirrors
     errors = np.full(len(mirrors), np.inf)
@@ -82,38 +84,38 @@ def missing_directions(export: Export) -> tuple[list[str], int]:
 
     Every vertex with z >= 0 needs a mirror of camera a where x >= 0 and one of b where x <= 0.
     """
-    odd: list[str] = []
-    lost = 0
+    misplaced: list[str] = []
+    missing = 0
     vertices = geodesic(int(export.spec["optics"]["n"]))
     for camera in export.cameras.values():
         side = np.sign(camera.pinhole[0])
-        wanted = vertices[:, (vertices[2] > -1e-9) & (side * vertices[0] > -1e-9)]
+        expected = vertices[:, (vertices[2] > -ON_SEAM) & (side * vertices[0] > -ON_SEAM)]
         rows = np.flatnonzero(export.mirrors.camera == camera.id)
-        bad, free = _taken(export.mirrors.columns("ux", 3)[:, rows], wanted)
-        odd += [export.mirrors.ids[row] for row in rows[bad].tolist()]
-        lost += free
-    return sorted(odd), lost
+        wrong, free = _match_vertices(export.mirrors.columns("ux", 3)[:, rows], expected)
+        misplaced += [export.mirrors.ids[row] for row in rows[wrong].tolist()]
+        missing += free
+    return sorted(misplaced), missing
 
 
 def contradictions(export: Export) -> list[str]:
-    """What the record asks for against what the spec it carries asks for, by name."""
+    """Names of what the record has otherwise than the spec that it carries."""
     optics, sensor = export.spec["optics"], export.spec["camera"]
-    asked = {
+    pairs = {
         "target_mm": (export.target_mm, optics["capture_diameter_mm"]),
         "coating_mm": (export.coating_mm, export.spec["mirrors"]["coating_um"] / 1000),
     }
     for camera in export.cameras.values():
         mirrored = camera.pinhole * np.sign([camera.pinhole[0] * optics["camera_mm"][0], 1, 1])
-        asked |= {
+        pairs |= {
             f"camera {camera.id} pinhole {k}": (mirrored[k], optics["camera_mm"][k])
             for k in range(3)
         }
-        asked |= {
+        pairs |= {
             f"camera {camera.id} width": (camera.width, sensor["width_px"]),
             f"camera {camera.id} height": (camera.height, sensor["height_px"]),
             f"camera {camera.id} hfov": (np.degrees(camera.hfov), sensor["hfov_deg"]),
         }
-    return sorted(name for name, (one, two) in asked.items() if abs(one - two) > 1e-9)
+    return sorted(name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC)
 
 
 def geodesic(n: int) -> Floats:
@@ -153,11 +155,12 @@ def _deviations(mirrors: Mirrors, rows: NDArray[np.intp], camera: Camera, b: flo
     return np.asarray(deviations)
 
 
-def _taken(u: Floats, wanted: Floats) -> tuple[NDArray[np.intp], int]:
-    distance, vertex = cKDTree(wanted.T).query(u.T)
-    counts = np.bincount(vertex, minlength=wanted.shape[1])
-    bad = (distance > 1e-9) | (counts[vertex] > 1)
-    return np.flatnonzero(bad), int((counts == 0).sum())
+def _match_vertices(u: Floats, vertices: Floats) -> tuple[NDArray[np.intp], int]:
+    """Directions (3, M) that are no vertex (3, V) of their own, and how many vertices are left."""
+    distance, vertex = cKDTree(vertices.T).query(u.T)
+    counts = np.bincount(vertex, minlength=vertices.shape[1])
+    wrong = (distance > SAME_DIRECTION) | (counts[vertex] > 1)
+    return np.flatnonzero(wrong), int((counts == 0).sum())
 
 
 def _icosahedron() -> Floats:

@@ -11,7 +11,7 @@ from tbcad_verify.mesh.mesh import Mesh, join_meshes
 from tbcad_verify.mesh.rays import RayScene, build_scene
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.export import Camera, Export, Part
-from tbcad_verify.record.poses import Virtual, virtual_cameras
+from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match
 from tbcad_verify.shell.outline import Patches
@@ -40,7 +40,7 @@ class OpticalSetup:
     recovery: Recovery
     part: NDArray[np.intp]
     match: Match
-    virtual: Virtual
+    virtual: VirtualCameras
     scene: RayScene
     mirrors: Surfaces
 

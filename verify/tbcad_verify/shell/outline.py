@@ -22,7 +22,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect_directions,
 )
 from tbcad_verify.mesh.vectors import dot, norm
-from tbcad_verify.record.poses import Virtual
+from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.types import Floats, Ints
 
 SAMPLES = np.linspace(0.0, 1.0, 4)
@@ -118,7 +118,9 @@ def reflect_on_fits(outline: Outline, seen: PreparedSurfaces) -> ReflectedRays:
     return reflect(seen, outline.mirror, outline.point - seen.origin[:, None])
 
 
-def minimum_miss_distance(outline: Outline, lines: ReflectedRays, virtual: Virtual) -> Floats:
+def minimum_miss_distance(
+    outline: Outline, lines: ReflectedRays, virtual: VirtualCameras
+) -> Floats:
     """(V,) least distance from the origin over each virtual camera's outer edges, mm; inf: none.
 
     Between samples the image of an edge is taken for straight, as it is for a flat facet.
@@ -134,7 +136,9 @@ def minimum_miss_distance(outline: Outline, lines: ReflectedRays, virtual: Virtu
     return least
 
 
-def winding_numbers(outline: Outline, lines: ReflectedRays, virtual: Virtual, u: Floats) -> Floats:
+def winding_numbers(
+    outline: Outline, lines: ReflectedRays, virtual: VirtualCameras, u: Floats
+) -> Floats:
     """(V,) how often each virtual camera's reflected outline runs round the origin.
 
     The sign is dropped. What is not about 1 does not surround the object's middle at all, however

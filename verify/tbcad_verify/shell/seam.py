@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.lines import crossings
 from tbcad_verify.mesh.surfaces import ReflectedRays
-from tbcad_verify.record.poses import Virtual
+from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell.outline import Outline
 from tbcad_verify.types import Floats
 
@@ -21,7 +21,7 @@ STEPS = 121
 def gaps(
     outlines: list[Outline],
     lines: list[ReflectedRays],
-    virtual: Virtual,
+    virtual: VirtualCameras,
     u: Floats,
     radius_mm: float,
 ) -> Floats:
@@ -55,7 +55,7 @@ def gaps(
 def _cut(
     outline: Outline,
     lines: ReflectedRays,
-    virtual: Virtual,
+    virtual: VirtualCameras,
     u: Floats,
     halves: NDArray[np.intp],
     radius_mm: float,
