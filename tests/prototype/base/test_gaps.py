@@ -25,9 +25,9 @@ def test_arcs_miss_every_number(base: BaseLayout) -> None:
             azimuth = np.linspace(low, high, 500)
             points = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), 0 * azimuth + z], axis=1)
             for k in range(len(seats)):
-                away = points - (seats.centre[k] + seats.back[k] * seats.axis[k])
-                along = away @ seats.axis[k]
-                beside = np.linalg.norm(away - along[:, None] * seats.axis[k], axis=1)
+                offset = points - (seats.centre[k] + seats.back[k] * seats.axis[k])
+                along = offset @ seats.axis[k]
+                beside = np.linalg.norm(offset - along[:, None] * seats.axis[k], axis=1)
                 assert not ((along > 0) & (beside < seats.boss[k])).any()
 
 

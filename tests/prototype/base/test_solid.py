@@ -30,8 +30,7 @@ from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.base import hub_solids as hubs
-from tbcad.prototype.base import seat_solids as seat
+from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.cap_solids import cap_parts, cap_pocket, flat_depth
 from tbcad.prototype.base.coupon import _wall_section as seat_section
 from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
@@ -47,7 +46,7 @@ from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh
 
 UP = np.array([0.0, 0.0, 1.0])
-KEYS = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
+SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
 PRINTER = PrinterSpec()
 
 
@@ -58,13 +57,13 @@ def prototype(small_design: MirrorDesign) -> PrototypeLayout:
 
 
 @pytest.fixture(scope="module")
-def numbers(prototype: PrototypeLayout) -> BaseLayout:
-    return base_layout(KEYS, prototype)
+def base(prototype: PrototypeLayout) -> BaseLayout:
+    return base_layout(SPEC, prototype)
 
 
 @pytest.fixture(scope="module")
-def part(numbers: BaseLayout) -> PlacedSolid:
-    (only,) = carrier_parts(numbers, split_base(numbers, PRINTER), PRINTER)
+def part(base: BaseLayout) -> PlacedSolid:
+    (only,) = carrier_parts(base, split_base(base, PRINTER), PRINTER)
     return only
 
 
@@ -75,8 +74,8 @@ def mesh(part: PlacedSolid) -> trimesh.Trimesh:
 
 def in_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Facets that lie in a plane and look along its normal."""
-    away = np.abs((mesh.triangles - point) @ normal).max(axis=1)
-    return (away < 1e-6) & (mesh.face_normals @ normal > 1 - 1e-9)
+    distance = np.abs((mesh.triangles - point) @ normal).max(axis=1)
+    return (distance < 1e-6) & (mesh.face_normals @ normal > 1 - 1e-9)
 
 
 def quartered(corners: np.ndarray) -> np.ndarray:
@@ -95,11 +94,11 @@ class TestCarrier:
         assert part.mass_g(1.27) == pytest.approx(part.volume * 1.27e-3)
 
     def test_ball_centres_are_recovered_from_the_pads(
-        self, numbers: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
+        self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
         centre, radius = prototype.body_centres(), prototype.balls.body_radius
         for k, (contacts, normals) in enumerate(
-            zip(numbers.seats.contacts, numbers.seats.pad_normals, strict=True)
+            zip(base.seats.contacts, base.seats.pad_normals, strict=True)
         ):
             planes = []
             for contact, normal in zip(contacts, normals, strict=True):
@@ -113,10 +112,10 @@ class TestCarrier:
             recovered = np.linalg.solve([n for n, _ in planes], [d for _, d in planes])
             assert norm(recovered - centre[k]) < 1e-3
 
-    def test_pads_are_whole(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
+    def test_pads_are_whole(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
         areas = mesh.area_faces
         for contacts, normals, pad in zip(
-            numbers.seats.contacts, numbers.seats.pad_normals, numbers.seats.pad, strict=True
+            base.seats.contacts, base.seats.pad_normals, base.seats.pad, strict=True
         ):
             for contact, normal in zip(contacts, normals, strict=True):
                 near = norm(mesh.triangles_center - contact) < pad
@@ -124,82 +123,76 @@ class TestCarrier:
                 assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
     def test_balls_touch_nothing_but_their_pads(
-        self, numbers: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
+        self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
     ) -> None:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=1)
         points = np.vstack([points, mesh.vertices])
         for contacts, centre, pad, radius in zip(
-            numbers.seats.contacts,
+            base.seats.contacts,
             prototype.body_centres(),
-            numbers.seats.pad,
+            base.seats.pad,
             prototype.balls.body_radius,
             strict=True,
         ):
             room = norm(points - centre) - radius
-            at_pad = norm(points[:, None] - contacts).min(axis=1) < pad + KEYS.clearance_mm
+            at_pad = norm(points[:, None] - contacts).min(axis=1) < pad + SPEC.clearance_mm
             assert room.min() > -1e-6
-            assert room[~at_pad].min() > KEYS.clearance_mm - 0.03
+            assert room[~at_pad].min() > SPEC.clearance_mm - 0.03
 
-    def test_no_facet_reaches_into_the_light(
-        self, numbers: BaseLayout, mesh: trimesh.Trimesh
-    ) -> None:
-        corners = mesh.triangles @ numbers.frame.T
+    def test_no_facet_reaches_into_the_light(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
+        corners = mesh.triangles @ base.frame.T
         for _ in range(4):
             # The bound is below all of a facet; where it is too low, of its quarters.
-            corners = quartered(corners[numbers.light.min_excess(corners) < 0])
+            corners = quartered(corners[base.light.min_excess(corners) < 0])
         assert not len(corners)
-        assert numbers.light.excess(mesh.vertices @ numbers.frame.T).min() > 0
+        assert base.light.excess(mesh.vertices @ base.frame.T).min() > 0
 
-    def test_volume_against_booleans_of_meshes(
-        self, numbers: BaseLayout, part: PlacedSolid
-    ) -> None:
+    def test_volume_against_booleans_of_meshes(self, base: BaseLayout, part: PlacedSolid) -> None:
         """The kernel's booleans can lose a piece and pass for valid; other booleans tell."""
-        seats = numbers.local_seats
-        added, removed = added_solids(numbers, seats), removed_solids(numbers, seats)
+        seats = base.local_seats
+        added, removed = added_solids(base, seats), removed_solids(base, seats)
         assert part.volume == pytest.approx(volume_by_meshes(added, removed, 0.01), rel=2e-4)
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
             check_volume("carrier", part.shape, part.volume * 1.01)
 
-    def test_balls_can_be_put_in(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
+    def test_balls_can_be_put_in(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
         points = np.vstack([mesh.vertices, mesh.triangles_center])
-        found = numbers.seats
-        for centre, way, radius in zip(found.centre, found.insertion, found.radius, strict=True):
-            length = norm(way)
-            away = points - centre
-            along = away @ way / length
-            beside = norm(away - along[:, None] * way / length)
+        seats = base.seats
+        for centre, path, radius in zip(seats.centre, seats.insertion, seats.radius, strict=True):
+            length = norm(path)
+            offset = points - centre
+            along = offset @ path / length
+            beside = norm(offset - along[:, None] * path / length)
             inside = (along > 0) & (along < length) & (beside < radius)
             assert not inside.any()
 
-    def test_numbers_stand_on_the_bosses(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
-        found = numbers.seats
-        for k in range(len(found)):
-            top = found.centre[k] + (found.back[k] + KEYS.relief_mm) * found.axis[k]
-            near = norm(mesh.triangles_center - top) < found.boss[k]
-            area = mesh.area_faces[in_plane(mesh, top, found.axis[k]) & near].sum()
-            square = fitting_height(str(k + 1), KEYS.digit_mm, 0.85 * found.boss[k]) / ROWS
+    def test_numbers_stand_on_the_bosses(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
+        seats = base.seats
+        for k in range(len(seats)):
+            top = seats.centre[k] + (seats.back[k] + SPEC.relief_mm) * seats.axis[k]
+            near = norm(mesh.triangles_center - top) < seats.boss[k]
+            area = mesh.area_faces[in_plane(mesh, top, seats.axis[k]) & near].sum()
+            square = fitting_height(str(k + 1), SPEC.digit_mm, 0.85 * seats.boss[k]) / ROWS
             squares = "".join(SIGNS[str(k + 1)]).count("#")
             assert area == pytest.approx(squares * square**2, rel=1e-6)
 
-    def test_nothing_stands_over_the_numbers(
-        self, numbers: BaseLayout, mesh: trimesh.Trimesh
-    ) -> None:
-        found = numbers.seats
-        turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-        for k in range(len(found)):
+    def test_nothing_stands_over_the_numbers(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
+        seats = base.seats
+        angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+        for k in range(len(seats)):
             rings = [
-                share * found.boss[k] * np.array([np.cos(turn), np.sin(turn)]).T
+                share * seats.boss[k] * np.array([np.cos(angle), np.sin(angle)]).T
                 for share in (0.3, 0.6, 0.9)
             ]
-            start = found.centre[k] + (found.back[k] + KEYS.relief_mm + 0.01) * found.axis[k]
-            points = start + np.vstack(rings) @ found.axes[k, :2]
-            ways = np.broadcast_to(found.axis[k], points.shape)
+            start = seats.centre[k] + (seats.back[k] + SPEC.relief_mm + 0.01) * seats.axis[k]
+            points = start + np.vstack(rings) @ seats.axes[k, :2]
+            ways = np.broadcast_to(seats.axis[k], points.shape)
             assert not mesh.ray.intersects_any(points, ways).any()
 
-    def test_the_hub_is_about_the_axis(self, numbers: BaseLayout, mesh: trimesh.Trimesh) -> None:
-        local = mesh.vertices @ numbers.frame.T
-        assert local[:, 0].min() == pytest.approx(numbers.hub.face)
-        bore = np.isclose(norm(local[:, 1:]), KEYS.shaft_mm / 2)
+    def test_the_hub_is_about_the_axis(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
+        local = mesh.vertices @ base.frame.T
+        assert local[:, 0].min() == pytest.approx(base.hub.face)
+        bore = np.isclose(norm(local[:, 1:]), SPEC.shaft_mm / 2)
         assert bore.sum() > 40
 
     def test_it_is_laid_on_the_bed(self, part: PlacedSolid) -> None:
@@ -208,46 +201,43 @@ class TestCarrier:
         assert (high - low <= np.array(PRINTER.bed_mm) - [6, 6, 3]).all()
         assert volume(part.on_bed) == pytest.approx(part.volume)
 
-    def test_a_bed_too_small(self, numbers: BaseLayout, part: PlacedSolid) -> None:
+    def test_a_bed_too_small(self, base: BaseLayout, part: PlacedSolid) -> None:
         small = PrinterSpec(bed_mm=(120.0, 120.0, 120.0))
-        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least \d+ x \d+") as said:
+        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least \d+ x \d+") as caught:
             placed_on_bed(
-                "carrier",
-                part.shape,
-                downward_directions(numbers, np.zeros((0, 4))),
-                np.eye(3),
-                small,
+                "carrier", part.shape, downward_directions(base, np.zeros((0, 4))), np.eye(3), small
             )
         bed = [
-            float(size) for size in re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))[0]
+            float(size) for size in re.findall(r"least (\d+) x (\d+) x (\d+)", str(caught.value))[0]
         ]
         assert placed_on_bed(
             "carrier",
             part.shape,
-            downward_directions(numbers, np.zeros((0, 4))),
+            downward_directions(base, np.zeros((0, 4))),
             np.eye(3),
             PrinterSpec(bed_mm=tuple(bed)),
         )
 
-    def test_the_same_bytes(self, numbers: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
-        (rebuilt,) = carrier_parts(numbers, split_base(numbers, PRINTER), PRINTER)
+    def test_the_same_bytes(self, base: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
+        (rebuilt,) = carrier_parts(base, split_base(base, PRINTER), PRINTER)
         for name, again in (("one", part), ("two", rebuilt)):
             write_step(tmp_path / name, Solid(again.name, again.shape, ()))
         assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_booleans_in_parallel_give_the_same_bytes(
-    numbers: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    base: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Faces come in the same order, in two threads or one, by oriented boxes or plain ones."""
-    found = numbers.local_seats
+    seats = base.local_seats
 
     def step(name: str) -> bytes:
         bosses = [
-            seat.moved_to_seat(seat.boss_solid(found, k), found, k) for k in range(len(found))
+            seat_solids.moved_to_seat(seat_solids.boss_solid(seats, k), seats, k)
+            for k in range(len(seats))
         ]
         rod = cylinder(np.array([0.0, 0.0, -300.0]), UP, 200.0, 600.0)
-        solid = one_solid("block", cut(fused([rod, *bosses]), removed_solids(numbers, found)))
+        solid = one_solid("block", cut(fused([rod, *bosses]), removed_solids(base, seats)))
         write_step(tmp_path / name, Solid("block", solid, ()))
         return (tmp_path / name).read_bytes()
 
@@ -269,21 +259,23 @@ def plain(kind: type, used: list[str]) -> type:
 
 
 class TestSeat:
-    def test_volume_against_a_closed_form(self, numbers: BaseLayout) -> None:
-        found = numbers.seats
-        for k in range(len(found)):
+    def test_volume_against_a_closed_form(self, base: BaseLayout) -> None:
+        seats = base.seats
+        for k in range(len(seats)):
             cup, pad, radius, pocket_radius = (
-                float(value[k]) for value in (found.cup, found.pad, found.radius, found.pocket)
+                float(value[k]) for value in (seats.cup, seats.pad, seats.radius, seats.pocket)
             )
             front, back, bottom = (
-                float(value[k]) for value in (found.front, found.back, found.bottom)
+                float(value[k]) for value in (seats.front, seats.back, seats.bottom)
             )
             low = np.sqrt(cup**2 - pocket_radius**2)
             zone = np.pi * (cup**2 * (low - front) - (low**3 - front**3) / 3)
             well = np.pi * pocket_radius**2 * (bottom - low)
             post = 2 * np.pi / 3 * (cup**3 - (cup**2 - pad**2) ** 1.5) - np.pi * pad**2 * radius
-            whole = np.pi * float(found.boss[k]) ** 2 * (back - front)
-            solid = one_solid("seat", cut(seat.boss_solid(found, k), [seat.seat_hollow(found, k)]))
+            whole = np.pi * float(seats.boss[k]) ** 2 * (back - front)
+            solid = one_solid(
+                "seat", cut(seat_solids.boss_solid(seats, k), [seat_solids.seat_hollow(seats, k)])
+            )
             assert volume(solid) == pytest.approx(whole - zone - well + 3 * post, rel=1e-6)
 
 
@@ -293,29 +285,31 @@ class TestHub:
     def test_every_drive(self, drive: str, lock: str) -> None:
         keys = BaseSpec.model_validate({"drive": drive, "lock": lock})
         held = hub_layout(keys, -60.0)
-        solid = one_solid("hub", cut(fused(hubs.hub_bodies(held)), hubs.hub_holes(held, keys)))
+        solid = one_solid(
+            "hub", cut(fused(hub_solids.hub_bodies(held)), hub_solids.hub_holes(held, keys))
+        )
         assert as_trimesh(solid).is_watertight
         assert bounds(solid)[:, 2] == pytest.approx([held.face, held.front])
 
     def test_volume_of_a_stages_hub(self) -> None:
         keys = BaseSpec(drive="stage-60")
-        held = hub_layout(keys, -60.0)
-        solid = cut(fused(hubs.hub_bodies(held)), hubs.hub_holes(held, keys))
-        thick = held.front - held.face
+        hub = hub_layout(keys, -60.0)
+        solid = cut(fused(hub_solids.hub_bodies(hub)), hub_solids.hub_holes(hub, keys))
+        thick = hub.front - hub.face
         hole = 3.3**2 * (thick - 6.5) + 5.5**2 * 6.5
-        expected = np.pi * (held.disc**2 * thick - 4.0**2 * thick - 4 * hole)
+        expected = np.pi * (hub.disc**2 * thick - 4.0**2 * thick - 4 * hole)
         assert volume(solid) == pytest.approx(expected)
 
 
 class TestCaps:
     def test_fronts_and_bodies_are_exact_spheres(
-        self, numbers: BaseLayout, prototype: PrototypeLayout
+        self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        parts = cap_parts(numbers, prototype)
+        parts = cap_parts(base, prototype)
         assert len(parts) == prototype.balls.cap.sum() > 0
-        for k, found in zip(np.flatnonzero(prototype.balls.cap), parts, strict=True):
+        for k, cap in zip(np.flatnonzero(prototype.balls.cap), parts, strict=True):
             spheres = {}
-            for face in faces(found.shape):
+            for face in faces(cap.shape):
                 surface = BRep_Tool.Surface_s(face)
                 if isinstance(surface, Geom_SphericalSurface):
                     middle = surface.Location()
@@ -328,39 +322,39 @@ class TestCaps:
             assert second == pytest.approx(prototype.centres()[k], abs=1e-9)
 
     def test_volume_against_a_closed_form(
-        self, numbers: BaseLayout, prototype: PrototypeLayout
+        self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        for k, found in zip(
-            np.flatnonzero(prototype.balls.cap), cap_parts(numbers, prototype), strict=True
+        for k, cap in zip(
+            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype), strict=True
         ):
             body, front = float(prototype.balls.body_radius[k]), float(prototype.balls.radius[k])
-            edge, behind = body / np.sqrt(2), flat_depth(numbers, k)
+            edge, behind = body / np.sqrt(2), flat_depth(base, k)
             drop = front - np.sqrt(front**2 - edge**2)
             lens = np.pi * drop**2 * (3 * front - drop) / 3
             zone = np.pi * (body**2 * (behind + edge) - (behind**3 + edge**3) / 3)
-            wide, deep = cap_pocket(numbers, k, float(prototype.balls.body_depth[k]))
-            assert found.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
+            wide, deep = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
+            assert cap.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
 
     def test_they_are_watertight_and_printed_front_up(
-        self, numbers: BaseLayout, prototype: PrototypeLayout
+        self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        for k, found in zip(
-            np.flatnonzero(prototype.balls.cap), cap_parts(numbers, prototype), strict=True
+        for k, cap in zip(
+            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype), strict=True
         ):
-            whole = as_trimesh(found.shape)
+            whole = as_trimesh(cap.shape)
             assert whole.is_watertight
             assert (norm(whole.vertices - prototype.apices()[k])).min() < 1e-6
-            low, high = bounds(found.on_bed)
+            low, high = bounds(cap.on_bed)
             assert low[2] == pytest.approx(0, abs=1e-6)
-            assert high[2] == pytest.approx(flat_depth(numbers, k) + prototype.balls.body_depth[k])
+            assert high[2] == pytest.approx(flat_depth(base, k) + prototype.balls.body_depth[k])
 
-    def test_they_rest_on_the_pads(self, numbers: BaseLayout, prototype: PrototypeLayout) -> None:
+    def test_they_rest_on_the_pads(self, base: BaseLayout, prototype: PrototypeLayout) -> None:
         for k in np.flatnonzero(prototype.balls.cap).tolist():
-            along = dot(numbers.seats.contacts[k] - numbers.seats.centre[k], numbers.seats.axis[k])
-            steep = np.cos(numbers.seats.tilt)
-            assert along == pytest.approx(np.full(3, steep * numbers.seats.radius[k]))
-            edge = along + numbers.seats.pad[k] * np.sin(numbers.seats.tilt)
-            assert edge.max() < flat_depth(numbers, k)
+            along = dot(base.seats.contacts[k] - base.seats.centre[k], base.seats.axis[k])
+            steep = np.cos(base.seats.tilt)
+            assert along == pytest.approx(np.full(3, steep * base.seats.radius[k]))
+            edge = along + base.seats.pad[k] * np.sin(base.seats.tilt)
+            assert edge.max() < flat_depth(base, k)
 
     def test_glued_caps_have_no_pocket(self, prototype: PrototypeLayout) -> None:
         glued = base_layout(BaseSpec(hold="glue"), prototype)
@@ -369,8 +363,8 @@ class TestCaps:
 
 
 @pytest.fixture(scope="module")
-def plates(numbers: BaseLayout) -> list[PlacedSolid]:
-    return coupon_plates(numbers, PRINTER)
+def plates(base: BaseLayout) -> list[PlacedSolid]:
+    return coupon_plates(base, PRINTER)
 
 
 class TestCoupon:
@@ -380,51 +374,52 @@ class TestCoupon:
             assert (np.ptp(bounds(plate.shape), axis=0) < 256).all()
 
     def test_every_size_has_pads_at_every_offset(
-        self, numbers: BaseLayout, plates: list[PlacedSolid]
+        self, base: BaseLayout, plates: list[PlacedSolid]
     ) -> None:
         """A seat's pads are sqrt(3) sin(tilt) times the radius of the sphere in it apart."""
-        found = numbers.seats
-        rows = coupon_rows(found, KEYS)
-        assert len(rows) == len(np.unique(np.round(found.radius, 6)))
+        seats = base.seats
+        rows = coupon_rows(seats, SPEC)
+        assert len(rows) == len(np.unique(np.round(seats.radius, 6)))
         planes = [plane_faces(plate.shape) for plate in plates]
         middle = np.concatenate([one + 1e4 * n for n, (one, _) in enumerate(planes)])
         area = np.concatenate([one for _, one in planes])
         for row in rows:
-            pads = middle[np.isclose(area, np.pi * found.pad[row.seat] ** 2, rtol=1e-6)]
-            away = norm(pads[:, None] - pads)
-            for offset in KEYS.coupon_offsets_mm:
-                apart = np.sqrt(3) * np.sin(found.tilt) * (found.radius[row.seat] + offset)
-                assert (np.abs(away - apart) < 1e-6).sum() == 6
-        sizes = len(rows) * len(KEYS.coupon_offsets_mm)
-        assert np.isin(np.round(area, 5), np.round(np.pi * found.pad**2, 5)).sum() == 3 * sizes
+            pads = middle[np.isclose(area, np.pi * seats.pad[row.seat] ** 2, rtol=1e-6)]
+            distance = norm(pads[:, None] - pads)
+            for offset in SPEC.coupon_offsets_mm:
+                apart = np.sqrt(3) * np.sin(seats.tilt) * (seats.radius[row.seat] + offset)
+                assert (np.abs(distance - apart) < 1e-6).sum() == 6
+        sizes = len(rows) * len(SPEC.coupon_offsets_mm)
+        assert np.isin(np.round(area, 5), np.round(np.pi * seats.pad**2, 5)).sum() == 3 * sizes
 
-    def test_walls_are_thick_enough(self, numbers: BaseLayout, plates: list[PlacedSolid]) -> None:
+    def test_walls_are_thick_enough(self, base: BaseLayout, plates: list[PlacedSolid]) -> None:
         """Nowhere from a cup or pocket outward is there less than on the carrier."""
-        found = numbers.seats
-        for k in range(len(found)):
-            wall = seat_section(replace(found, back=found.bottom + KEYS.floor_mm), KEYS, k)
+        seats = base.seats
+        for k in range(len(seats)):
+            wall = seat_section(replace(seats, back=seats.bottom + SPEC.floor_mm), SPEC, k)
             ends = np.stack([wall, np.roll(wall, -1, axis=0)], axis=1)[:-1]
             outer = ends[(ends[..., 1] > 0).any(axis=1)][1:]
             along = np.linspace(outer[:, 0], outer[:, 1], 50).reshape(-1, 2)
-            deep = along[along[:, 0] > found.front[k]]
-            assert norm(deep).min() > found.cup[k] + 0.6 * KEYS.cup_wall_mm
-            pocket = deep[deep[:, 0] < found.bottom[k]]
-            assert pocket[:, 1].min() >= found.pocket[k] + KEYS.cup_wall_mm - 1e-9
-            assert deep[:, 0].max() == pytest.approx(found.bottom[k] + KEYS.floor_mm)
+            deep = along[along[:, 0] > seats.front[k]]
+            assert norm(deep).min() > seats.cup[k] + 0.6 * SPEC.cup_wall_mm
+            pocket = deep[deep[:, 0] < seats.bottom[k]]
+            assert pocket[:, 1].min() >= seats.pocket[k] + SPEC.cup_wall_mm - 1e-9
+            assert deep[:, 0].max() == pytest.approx(seats.bottom[k] + SPEC.floor_mm)
 
     def test_it_takes_less_than_the_carrier(
         self, plates: list[PlacedSolid], part: PlacedSolid
     ) -> None:
         assert sum(plate.volume for plate in plates) < part.volume / 3
 
-    def test_offsets_move_the_pads(self, numbers: BaseLayout) -> None:
-        found = numbers.seats
+    def test_offsets_move_the_pads(self, base: BaseLayout) -> None:
+        seats = base.seats
         shapes = [
-            cut(seat.boss_solid(found, 0), [seat.seat_hollow(found, 0, by)]) for by in (0.0, 0.2)
+            cut(seat_solids.boss_solid(seats, 0), [seat_solids.seat_hollow(seats, 0, by)])
+            for by in (0.0, 0.2)
         ]
-        pad, normal = found.pad[0], found.local_normals[0, 0]
+        pad, normal = seats.pad[0], seats.local_normals[0, 0]
         for shape, by in zip(shapes, (0.0, 0.2), strict=True):
-            plane = -(found.radius[0] + by) * normal
+            plane = -(seats.radius[0] + by) * normal
             solid = as_trimesh(shape)
             area = solid.area_faces[in_plane(solid, plane, normal)].sum()
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
@@ -453,11 +448,11 @@ def test_several_solids_are_refused() -> None:
         one_solid("pair", apart)
 
 
-def test_a_lost_pad_is_noticed(numbers: BaseLayout) -> None:
-    found = numbers.seats
-    whole = cut(seat.boss_solid(found, 0), [seat.seat_hollow(found, 0)])
-    contacts = -found.radius[0] * found.local_normals[0]
-    pads = np.full(3, found.pad[0])
+def test_a_lost_pad_is_noticed(base: BaseLayout) -> None:
+    seats = base.seats
+    whole = cut(seat_solids.boss_solid(seats, 0), [seat_solids.seat_hollow(seats, 0)])
+    contacts = -seats.radius[0] * seats.local_normals[0]
+    pads = np.full(3, seats.pad[0])
     check_pads("seat", whole, contacts, pads)
     damaged = cut(whole, [cylinder(contacts[1] + 0.5 * UP, UP, 1.0, 5.0)])
     with pytest.raises(InvalidSolidError, match="the kernel lost pad 2"):

@@ -20,12 +20,12 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 
-KEYS = BaseSpec()
+SPEC = BaseSpec()
 DOWN = [np.array([0.0, 0.0, -1.0])]
 
 
-def keys(**changed: object) -> BaseSpec:
-    return BaseSpec.model_validate(KEYS.model_dump() | changed)
+def changed_spec(**changed: object) -> BaseSpec:
+    return BaseSpec.model_validate(SPEC.model_dump() | changed)
 
 
 def cube(size: float) -> PrinterSpec:
@@ -42,19 +42,19 @@ def cut(
         "paper in three": (paper_prototype, 160.0),
     }
     chosen, bed = at[request.param]
-    numbers = base_layout(KEYS, chosen)
-    plan = split_base(numbers, cube(bed))
+    base = base_layout(SPEC, chosen)
+    plan = split_base(base, cube(bed))
     assert len(plan.pieces) == (3 if "three" in request.param else 2)
-    return numbers, plan
+    return base, plan
 
 
-def rims(numbers: BaseLayout) -> np.ndarray:
+def rims(base: BaseLayout) -> np.ndarray:
     """Points round both ends of all bosses, (k, 2, n, 3)."""
-    found, turn = numbers.local_seats, np.linspace(0, 2 * np.pi, 90)
-    circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    around = found.boss[:, None, None] * (circle @ found.axes)
-    ends = np.stack([found.front, found.back], axis=1)[..., None] * found.axis[:, None]
-    return (found.centre[:, None] + ends)[:, :, None] + around[:, None]
+    seats, angle = base.local_seats, np.linspace(0, 2 * np.pi, 90)
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    around = seats.boss[:, None, None] * (circle @ seats.axes)
+    ends = np.stack([seats.front, seats.back], axis=1)[..., None] * seats.axis[:, None]
+    return (seats.centre[:, None] + ends)[:, :, None] + around[:, None]
 
 
 class TestPlanes:
@@ -62,25 +62,25 @@ class TestPlanes:
         self, prototype: PrototypeLayout, paper_prototype: PrototypeLayout
     ) -> None:
         for one in (prototype, paper_prototype):
-            plan = split_base(base_layout(KEYS, one), PrinterSpec())
+            plan = split_base(base_layout(SPEC, one), PrinterSpec())
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
 
     def test_no_boss_and_no_way_of_a_ball_is_cut(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
-        numbers, plan = cut
-        corners = rims(numbers).reshape(len(numbers.seats), -1, 3)
+        base, plan = cut
+        corners = rims(base).reshape(len(base.seats), -1, 3)
         for joint in plan.joints:
             inside = (corners @ joint.region[:, :3].T <= joint.region[:, 3]).all(axis=(1, 2))
-            away = joint.plane.height(corners[inside])
-            assert ((away.min(axis=1) > 0.99) | (away.max(axis=1) < -0.99)).all()
-            assert (away.min(axis=1) > 0).any()
-            assert (away.max(axis=1) < 0).any()
+            distance = joint.plane.height(corners[inside])
+            assert ((distance.min(axis=1) > 0.99) | (distance.max(axis=1) < -0.99)).all()
+            assert (distance.min(axis=1) > 0).any()
+            assert (distance.max(axis=1) < 0).any()
 
     def test_the_hub_is_whole_in_the_first_piece(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
-        numbers, plan = cut
-        held, turn = numbers.hub, np.linspace(0, 2 * np.pi, 60)
-        for z in (held.face, held.front):
-            rim = np.stack([held.disc * np.cos(turn), held.disc * np.sin(turn), 0 * turn + z], 1)
+        base, plan = cut
+        hub, angle = base.hub, np.linspace(0, 2 * np.pi, 60)
+        for z in (hub.face, hub.front):
+            rim = np.stack([hub.disc * np.cos(angle), hub.disc * np.sin(angle), 0 * angle + z], 1)
             assert {plan.piece_of(point) for point in rim} == {0}
 
     def test_pieces_fill_space_once(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
@@ -90,18 +90,18 @@ class TestPlanes:
         assert all(one.any() for one in inside)
 
     def test_the_same_again(self, prototype: PrototypeLayout) -> None:
-        one, two = (split_base(base_layout(KEYS, prototype), cube(150.0)) for _ in range(2))
+        one, two = (split_base(base_layout(SPEC, prototype), cube(150.0)) for _ in range(2))
         for first, second in zip(one.joints, two.joints, strict=True):
             assert (first.screws == second.screws).all()
             assert (first.plane.normal == second.plane.normal).all()
 
     def test_a_bed_too_small_names_one_that_does(self, prototype: PrototypeLayout) -> None:
-        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as said:
-            split_base(base_layout(KEYS, prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
-        (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(said.value))
+        with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as caught:
+            split_base(base_layout(SPEC, prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
+        (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(caught.value))
         width, depth, height = map(float, bed)
         larger = PrinterSpec(bed_mm=(width, depth, height))
-        assert len(split_base(base_layout(KEYS, prototype), larger).pieces) == 2
+        assert len(split_base(base_layout(SPEC, prototype), larger).pieces) == 2
 
 
 class TestJoints:
@@ -118,51 +118,51 @@ class TestJoints:
     def test_holes_are_in_the_flanges_and_off_all_seats(
         self, cut: tuple[BaseLayout, BaseSplit]
     ) -> None:
-        numbers, plan = cut
-        seat, used = numbers.local_seats, numbers.spec
+        base, plan = cut
+        seat, used = base.local_seats, base.spec
         for joint in plan.joints:
             along = np.linspace(-used.joint_mm, used.joint_mm, 40)[:, None, None]
             axes = np.vstack([joint.dowels, joint.screws]) + along * joint.plane.normal
             at = np.stack([axes[..., 2], norm(axes[..., :2])], axis=-1)
-            assert distance_outside(numbers.inner, at).min() > used.insert_hole_mm / 2 + 1
+            assert distance_outside(base.inner, at).min() > used.insert_hole_mm / 2 + 1
             balls = norm(axes[..., None, :] - seat.centre) - seat.cup
             assert balls.min() > used.insert_hole_mm / 2 + 1
             # And beside the magnets.
-            away = axes[..., None, :] - seat.centre
-            deep = (away * seat.axis).sum(axis=-1)
-            beside = norm(away - deep[..., None] * seat.axis) - seat.pocket
+            offset = axes[..., None, :] - seat.centre
+            deep = (offset * seat.axis).sum(axis=-1)
+            beside = norm(offset - deep[..., None] * seat.axis) - seat.pocket
             assert (beside[(deep > 0) & (deep < seat.back)] > used.insert_hole_mm / 2 + 1).all()
 
     def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
-        numbers, plan = cut
-        free = access_radius(joint_hardware(numbers.spec))
+        base, plan = cut
+        free = access_radius(joint_hardware(base.spec))
         assert free > 5.5 / 2
         for joint in plan.joints:
             for place, side in zip(joint.screws, joint.heads, strict=True):
-                steps = numbers.spec.joint_mm + np.linspace(0, 25, 60)
+                steps = base.spec.joint_mm + np.linspace(0, 25, 60)
                 axis = place + side * steps[:, None] * joint.plane.normal
                 at = np.stack([axis[:, 2], norm(axis[:, :2])], axis=-1)
-                assert distance_outside(numbers.outer, at).min() > 5.5 / 2
-                for rim, up in zip(rims(numbers), numbers.local_seats.axis, strict=True):
+                assert distance_outside(base.outer, at).min() > 5.5 / 2
+                for rim, up in zip(rims(base), base.local_seats.axis, strict=True):
                     ends = rim.mean(axis=1)
                     deep = np.clip((axis - ends[0]) @ up, 0, (ends[1] - ends[0]) @ up)
-                    away = norm(axis - ends[0] - deep[:, None] * up)
-                    assert away.min() > norm(rim[0, 0] - ends[0]) + 5.5 / 2 - 0.1
+                    distance = norm(axis - ends[0] - deep[:, None] * up)
+                    assert distance.min() > norm(rim[0, 0] - ends[0]) + 5.5 / 2 - 0.1
 
     def test_flanges_are_behind_the_light(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
-        numbers, _ = cut
-        line = flange_profile(numbers)
+        base, _ = cut
+        line = flange_profile(base)
         parts = np.stack([line, np.roll(line, -1, axis=0)], axis=1)
-        assert numbers.light.min_excess(parts).min() > 0
-        assert line[:, 1].min() > numbers.hub.disc
+        assert base.light.min_excess(parts).min() > 0
+        assert line[:, 1].min() > base.hub.disc
 
     def test_sizes_are_in_the_lists(self) -> None:
-        found, parts = joint_hardware(KEYS), load_parts()
-        assert parts[found.dowel].sizes == (3.0, 12.0)
-        assert found.dowel_depth + 1 <= KEYS.joint_mm
-        length = parts[found.screw].sizes[1]
+        hardware, parts = joint_hardware(SPEC), load_parts()
+        assert parts[hardware.dowel].sizes == (3.0, 12.0)
+        assert hardware.dowel_depth + 1 <= SPEC.joint_mm
+        length = parts[hardware.screw].sizes[1]
         # 1.3 diameters in the insert, and not through its hole.
-        assert 1.3 * 3 <= length - KEYS.joint_mm <= KEYS.insert_depth_mm
+        assert 1.3 * 3 <= length - SPEC.joint_mm <= SPEC.insert_depth_mm
 
     @pytest.mark.parametrize(
         ("changed", "text"),
@@ -176,7 +176,7 @@ class TestJoints:
         self, prototype: PrototypeLayout, changed: dict[str, object], text: str
     ) -> None:
         with pytest.raises(SpecError, match=text):
-            split_base(base_layout(keys(**changed), prototype), cube(150.0))
+            split_base(base_layout(changed_spec(**changed), prototype), cube(150.0))
 
 
 class TestBed:
@@ -195,43 +195,43 @@ class TestBed:
 
 class TestBought:
     def test_a_whole_base(self, paper_prototype: PrototypeLayout) -> None:
-        carrier = base_layout(KEYS, paper_prototype)
-        found = base_purchased_parts(carrier, split_base(carrier, PrinterSpec()))
-        magnet = {name: count for name, count in found.items() if name.startswith("MAGNET")}
+        carrier = base_layout(SPEC, paper_prototype)
+        counts = base_purchased_parts(carrier, split_base(carrier, PrinterSpec()))
+        magnet = {name: count for name, count in counts.items() if name.startswith("MAGNET")}
         assert sum(magnet.values()) == len(paper_prototype.balls.body_radius)
         # Four of the drive, two of the set screws.
-        assert found["INSERT-M3"] == 6
-        (screw,) = (name for name in found if name.startswith("SET"))
-        assert found[screw] == 2
+        assert counts["INSERT-M3"] == 6
+        (screw,) = (name for name in counts if name.startswith("SET"))
+        assert counts[screw] == 2
         # From the shaft to no farther than the hub's face.
         assert load_parts()[screw].sizes[1] <= 19.0 - 4.0
-        assert set(found) <= set(load_parts())
-        assert not any(name.startswith(("DOWEL", "M3x")) for name in found)
+        assert set(counts) <= set(load_parts())
+        assert not any(name.startswith(("DOWEL", "M3x")) for name in counts)
 
     def test_joints_need_more(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
-        numbers, plan = cut
-        found, screws = fasteners(numbers, plan), sum(len(j.screws) for j in plan.joints)
+        base, plan = cut
+        found, screws = fasteners(base, plan), sum(len(j.screws) for j in plan.joints)
         assert found["DOWEL-3x12"] == 2 * len(plan.joints)
         assert found["M3x12"] == screws
         assert found["INSERT-M3"] == 6 + screws
 
     def test_other_hubs(self, prototype: PrototypeLayout) -> None:
-        whole = split_base(base_layout(KEYS, prototype), PrinterSpec())
-        clamp = base_purchased_parts(base_layout(keys(lock="clamp"), prototype), whole)
+        whole = split_base(base_layout(SPEC, prototype), PrinterSpec())
+        clamp = base_purchased_parts(base_layout(changed_spec(lock="clamp"), prototype), whole)
         assert clamp["INSERT-M3"] == 5
         assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
         stage = base_purchased_parts(
-            base_layout(keys(drive="stage-60", hold="glue"), prototype), whole
+            base_layout(changed_spec(drive="stage-60", hold="glue"), prototype), whole
         )
         assert stage == {}
 
     def test_not_in_a_list(self, prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
-            magnets(base_layout(keys(magnet_height_mm=4.0), prototype))
-        numbers = base_layout(keys(insert_hole_mm=4.4), prototype)
-        whole = split_base(numbers, PrinterSpec())
+            magnets(base_layout(changed_spec(magnet_height_mm=4.0), prototype))
+        base = base_layout(changed_spec(insert_hole_mm=4.4), prototype)
+        whole = split_base(base, PrinterSpec())
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
-            fasteners(numbers, whole)
-        short = replace(numbers, hub=replace(numbers.hub, boss=6.0), spec=KEYS)
+            fasteners(base, whole)
+        short = replace(base, hub=replace(base.hub, boss=6.0), spec=SPEC)
         with pytest.raises(SpecError, match=r"no M3 screw of at most 2\.0 mm is in setscrews\.csv"):
             fasteners(short, whole)

@@ -35,10 +35,10 @@ Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
 Cut = tuple[BaseLayout, PrinterSpec, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
-def cut_up(numbers: BaseLayout, printer: PrinterSpec) -> Cut:
-    plan = split_base(numbers, printer)
-    parts = carrier_parts(numbers, plan, printer)
-    return numbers, printer, plan, parts, [as_trimesh(part.shape) for part in parts]
+def cut_up(base: BaseLayout, printer: PrinterSpec) -> Cut:
+    plan = split_base(base, printer)
+    parts = carrier_parts(base, plan, printer)
+    return base, printer, plan, parts, [as_trimesh(part.shape) for part in parts]
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +74,11 @@ def check_pieces(cut: Cut) -> None:
 
 
 def check_pads(cut: Cut) -> None:
-    numbers, _, _, parts, _ = cut
+    base, _, _, parts, _ = cut
     planes = [plane_faces(part.shape) for part in parts]
     middle = np.concatenate([one for one, _ in planes])
     area = np.concatenate([one for _, one in planes])
-    for contacts, pad in zip(numbers.seats.contacts, numbers.seats.pad, strict=True):
+    for contacts, pad in zip(base.seats.contacts, base.seats.pad, strict=True):
         for contact in contacts:
             near = norm(middle - contact) < 1e-4
             assert area[near] == pytest.approx([np.pi * pad**2], rel=1e-6)
@@ -92,34 +92,34 @@ class TestSmall:
         check_pads(small)
 
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
-        numbers, _, plan, parts, _ = small
-        seats = numbers.local_seats
-        added, removed = added_solids(numbers, seats, plan), removed_solids(numbers, seats)
+        base, _, plan, parts, _ = small
+        seats = base.local_seats
+        added, removed = added_solids(base, seats, plan), removed_solids(base, seats)
         with_flanges = volume_by_meshes(added, removed, 0.01)
-        assert with_flanges > volume_by_meshes(added_solids(numbers, seats), removed, 0.01) + 10_000
-        assert volume(carrier_solid(numbers, plan)) == pytest.approx(with_flanges, rel=2e-4)
+        assert with_flanges > volume_by_meshes(added_solids(base, seats), removed, 0.01) + 10_000
+        assert volume(carrier_solid(base, plan)) == pytest.approx(with_flanges, rel=2e-4)
         # Holes of both sides begin beyond the plane, so each piece has its own taken out.
         assert len(plan.pieces) == 2
         (joint,) = plan.joints
         drilled = sum(part.volume for part in parts)
-        assert drilled < with_flanges - hole_volume(numbers, joint)
-        assert drilled > with_flanges - hole_volume(numbers, joint) - heads_volume(numbers, joint)
+        assert drilled < with_flanges - hole_volume(base, joint)
+        assert drilled > with_flanges - hole_volume(base, joint) - heads_volume(base, joint)
 
     def test_holes_of_both_sides_are_coaxial(self, small: Cut) -> None:
-        numbers, _, plan, parts, _ = small
+        base, _, plan, parts, _ = small
         (joint,) = plan.joints
-        used, size = numbers.spec, joint_hardware(numbers.spec)
-        turn = numbers.axes
+        used, size = base.spec, joint_hardware(base.spec)
+        angle = base.axes
         press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
         sides = {
             -1: cylinders(parts[piece_at(plan, joint, -1)]),
             1: cylinders(parts[piece_at(plan, joint, 1)]),
         }
-        normal = joint.plane.normal @ turn
-        for place in joint.dowels @ turn:
+        normal = joint.plane.normal @ angle
+        for place in joint.dowels @ angle:
             assert on_axis(sides[-1], place, normal) == pytest.approx([press / 2])
             assert on_axis(sides[1], place, normal) == pytest.approx([slip / 2])
-        for place, head in zip(joint.screws @ turn, joint.heads.tolist(), strict=True):
+        for place, head in zip(joint.screws @ angle, joint.heads.tolist(), strict=True):
             assert on_axis(sides[-head], place, normal) == pytest.approx([used.insert_hole_mm / 2])
             found = on_axis(sides[head], place, normal)
             assert found[0] == pytest.approx(SCREW_MM / 2)
@@ -127,53 +127,53 @@ class TestSmall:
 
     def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
         """Straight from the plane into the material, until the mesh is met."""
-        numbers, _, plan, _, meshes = small
+        base, _, plan, _, meshes = small
         (joint,) = plan.joints
-        used, depth = numbers.spec, joint_hardware(numbers.spec).dowel_depth
+        used, depth = base.spec, joint_hardware(base.spec).dowel_depth
         for side in (-1, 1):
             mesh = meshes[piece_at(plan, joint, side)]
-            out = side * joint.plane.normal @ numbers.axes
-            for place in joint.dowels @ numbers.axes:
+            out = side * joint.plane.normal @ base.axes
+            for place in joint.dowels @ base.axes:
                 assert first_hit(mesh, place, out) == pytest.approx(depth, abs=1e-4)
-            for place, head in zip(joint.screws @ numbers.axes, joint.heads, strict=True):
+            for place, head in zip(joint.screws @ base.axes, joint.heads, strict=True):
                 expected = used.insert_depth_mm if side != head else np.inf
                 hit = first_hit(mesh, place, out)
                 assert hit == pytest.approx(expected, abs=1e-4) if side != head else hit > 25
 
     def test_each_piece_bears_its_number(self, small: Cut) -> None:
-        numbers, _, plan, _, meshes = small
+        base, _, plan, _, meshes = small
         (joint,) = plan.joints
         for side, place in zip((-1, 1), joint.labels, strict=True):
             n = piece_at(plan, joint, side)
-            out = side * joint.plane.normal @ numbers.axes
-            far = numbers.spec.joint_mm + numbers.spec.relief_mm
-            top = place @ numbers.axes + far * out
+            out = side * joint.plane.normal @ base.axes
+            far = base.spec.joint_mm + base.spec.relief_mm
+            top = place @ base.axes + far * out
             mesh = meshes[n]
             flat = np.abs((mesh.triangles - top) @ out).max(axis=1) < 1e-6
             flat &= (mesh.face_normals @ out > 1 - 1e-9) & (norm(mesh.triangles_center - top) < 6)
-            square = fitting_height(str(n + 1), numbers.spec.digit_mm, 0.95 * LABEL_MM) / ROWS
+            square = fitting_height(str(n + 1), base.spec.digit_mm, 0.95 * LABEL_MM) / ROWS
             squares = "".join(SIGNS[str(n + 1)]).count("#")
             assert mesh.area_faces[flat].sum() == pytest.approx(squares * square**2, rel=1e-6)
 
     def test_no_facet_reaches_into_the_light(self, small: Cut) -> None:
-        numbers, _, _, _, meshes = small
+        base, _, _, _, meshes = small
         for mesh in meshes:
             points = np.vstack([mesh.vertices, mesh.triangles_center])
-            assert numbers.light.excess(points @ numbers.frame.T).min() > 0
+            assert base.light.excess(points @ base.frame.T).min() > 0
 
     def test_balls_can_be_put_in(self, small: Cut) -> None:
-        numbers, _, _, _, meshes = small
+        base, _, _, _, meshes = small
         points = np.vstack([np.vstack([m.vertices, m.triangles_center]) for m in meshes])
-        found = numbers.seats
-        for centre, way, radius in zip(found.centre, found.insertion, found.radius, strict=True):
-            away, length = points - centre, norm(way)
-            along = away @ way / length
-            beside = norm(away - along[:, None] * way / length)
+        seats = base.seats
+        for centre, path, radius in zip(seats.centre, seats.insertion, seats.radius, strict=True):
+            distance, length = points - centre, norm(path)
+            along = distance @ path / length
+            beside = norm(distance - along[:, None] * path / length)
             assert not ((along > 0) & (along < length) & (beside < radius)).any()
 
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
-        numbers, printer, plan, parts, _ = small
-        for name, again in (("one", parts), ("two", carrier_parts(numbers, plan, printer))):
+        base, printer, plan, parts, _ = small
+        for name, again in (("one", parts), ("two", carrier_parts(base, plan, printer))):
             for part in again:
                 write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))
         for part in parts:
@@ -193,9 +193,9 @@ def piece_at(plan: BaseSplit, joint: Joint, side: int) -> int:
     return plan.piece_of(joint.dowels[0] + side * joint.plane.normal)
 
 
-def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
+def hole_volume(base: BaseLayout, joint: Joint) -> float:
     """Of dowels' and screws' holes and of inserts, without what is taken off for the heads."""
-    used, depth = numbers.spec, joint_hardware(numbers.spec).dowel_depth
+    used, depth = base.spec, joint_hardware(base.spec).dowel_depth
     pins = [used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm]
     dowels = len(joint.dowels) * sum(np.pi / 4 * pin**2 * depth for pin in pins)
     insert = np.pi / 4 * used.insert_hole_mm**2 * used.insert_depth_mm
@@ -203,11 +203,9 @@ def hole_volume(numbers: BaseLayout, joint: Joint) -> float:
     return float(dowels + len(joint.screws) * (insert + through))
 
 
-def heads_volume(numbers: BaseLayout, joint: Joint) -> float:
+def heads_volume(base: BaseLayout, joint: Joint) -> float:
     """At most all of what is kept clear for the heads."""
-    return float(
-        len(joint.screws) * np.pi * access_radius(joint_hardware(numbers.spec)) ** 2 * 25.2
-    )
+    return float(len(joint.screws) * np.pi * access_radius(joint_hardware(base.spec)) ** 2 * 25.2)
 
 
 def cylinders(part: PlacedSolid) -> list[Cylinder]:
@@ -241,9 +239,9 @@ def first_hit(mesh: trimesh.Trimesh, at: np.ndarray, out: np.ndarray) -> float:
 
 
 def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
-    numbers, *_ = small
+    base, *_ = small
     plan = BaseSplit((np.zeros((0, 4)),), ())
-    assert piece_holes(numbers, plan, 0) == []
+    assert piece_holes(base, plan, 0) == []
 
 
 def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:
