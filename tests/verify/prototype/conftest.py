@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.verify.prototype.synthetic_prototype import Machine, export
+from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export
 
 
 @pytest.fixture(scope="session")
-def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return export(tmp_path_factory.mktemp("machine") / "export", Machine())
+def synthetic_prototype(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export(tmp_path_factory.mktemp("prototype") / "export", SyntheticPrototype())
 
 
 @pytest.fixture
-def made(machine: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(machine, tmp_path / "export"))
+def prototype_folder(synthetic_prototype: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(synthetic_prototype, tmp_path / "export"))

@@ -48,7 +48,7 @@ BALL_COLUMNS = (
 
 
 @dataclass
-class Machine:
+class SyntheticPrototype:
     """What to make.
 
     `pads` shifts pads off their balls, by ball and pad; `bump` is how deep a knob of the base
@@ -107,24 +107,24 @@ class Ball:
     normals: np.ndarray
 
 
-def balls(machine: Machine) -> list[Ball]:
+def make_balls(spec: SyntheticPrototype) -> list[Ball]:
     half = np.linalg.norm(PIN) / 2
-    made = []
+    balls = []
     for k, (polar, azimuth) in enumerate(zip(POLAR, AZIMUTH, strict=True)):
         u = direction(polar, azimuth)
         p = B**2 / (np.hypot(B, half) - half * (u @ unit(PIN))) * u
         n = unit(unit(PIN - p) - u)
-        radius, body, depth = machine.radius, machine.radius, machine.radius
+        radius, body, depth = spec.radius, spec.radius, spec.radius
         if k == CAP:
-            radius = machine.front
+            radius = spec.front
             body, depth = np.sqrt(2) * EDGE, radius - np.sqrt(radius**2 - EDGE**2) + EDGE
         side = unit(np.cross(n, [0.3, 0.2, 0.9]))
         across = np.cross(n, side)
         turn = np.radians([0.0, 120, 240])[:, None]
         lean = np.cos(turn) * side + np.sin(turn) * across
         normals = np.cos(TILT) * n - np.sin(TILT) * lean
-        made.append(Ball(p, n, radius, body, p - radius * n, p - depth * n, normals))
-    return made
+        balls.append(Ball(p, n, radius, body, p - radius * n, p - depth * n, normals))
+    return balls
 
 
 def cylinder(start: np.ndarray, along: np.ndarray, radius: float, length: float) -> Any:
@@ -136,20 +136,20 @@ def cylinder(start: np.ndarray, along: np.ndarray, radius: float, length: float)
     return upright.transform(np.hstack([axes, start[:, None]]))
 
 
-def base(machine: Machine, made: list[Ball]) -> Any:
+def base(spec: SyntheticPrototype, balls: list[Ball]) -> Any:
     """Bosses with three posts each, and bars between them behind the ellipsoid."""
     bodies = []
-    for k, ball in enumerate(made):
+    for k, ball in enumerate(balls):
         back = -ball.n
         bodies.append(cylinder(ball.b + (ball.body + 1) * back, back, 1.2 * ball.body + 2, 6.0))
         for j, normal in enumerate(ball.normals):
-            away = ball.body + machine.pads.get((k, j), 0.0)
+            away = ball.body + spec.pads.get((k, j), 0.0)
             bodies.append(cylinder(ball.b - away * normal, -normal, PAD / 2, 0.6 * ball.body + 4))
-    if machine.bump:
-        ball = made[0]
-        start = ball.b + (ball.body - machine.bump) * -ball.n
+    if spec.bump:
+        ball = balls[0]
+        start = ball.b + (ball.body - spec.bump) * -ball.n
         bodies.append(cylinder(start, -ball.n, 0.5, 4.0))
-    for one, two in pairwise(made):
+    for one, two in pairwise(balls):
         bodies += bars(one.b - (one.body + 4) * one.n, two.b - (two.body + 4) * two.n)
     return manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
 
@@ -163,9 +163,9 @@ def bars(start: np.ndarray, end: np.ndarray) -> list[Any]:
     return [manifold3d.Manifold.batch_hull(pair) for pair in pairwise(knots)]
 
 
-def cap(machine: Machine, ball: Ball) -> Any:
+def cap(spec: SyntheticPrototype, ball: Ball) -> Any:
     """Body and front turned about the normal, every corner on its sphere."""
-    radius = ball.radius + machine.grown
+    radius = ball.radius + spec.grown
     depth = (ball.p - ball.b) @ ball.n
     rim = np.arcsin(EDGE / radius)
     front = np.linspace(0, rim, 24)[1:]
@@ -178,7 +178,7 @@ def cap(machine: Machine, ball: Ball) -> Any:
             ball.body * np.stack([np.sin(body[:-1]), np.cos(body[:-1])], axis=1),
         ]
     )
-    return lathe(line, depth + machine.grown, -ball.body, ball.b, ball.n)
+    return lathe(line, depth + spec.grown, -ball.body, ball.b, ball.n)
 
 
 def lathe(line: np.ndarray, top: float, bottom: float, at: np.ndarray, z: np.ndarray) -> Any:
@@ -209,7 +209,9 @@ def facets(shape: Any) -> np.ndarray:
     return mesh.vert_properties[:, :3][mesh.tri_verts]
 
 
-def pictures(machine: Machine, made: list[Ball], record: list[dict[str, Any]]) -> list[list[Any]]:
+def pictures(
+    spec: SyntheticPrototype, balls: list[Ball], record: list[dict[str, Any]]
+) -> list[list[Any]]:
     """The plan's rows: every mirror at a stop of its own, the ball of nearest polar angle."""
     shown = []
     for m in record:
@@ -222,9 +224,8 @@ def pictures(machine: Machine, made: list[Ball], record: list[dict[str, Any]]) -
     twin = {m["number"]: image(m, record) for m in record}
     for turn in (0, 180):
         for angle, k, m in shown:
-            at = turned(made[k].p, angle)
+            at = turned(balls[k].p, angle)
             polar, azimuth = angles(at) - angles(m["u"])
-            error = np.degrees(np.arccos(np.clip(unit(at) @ m["u"], -1, 1)))
             chord = np.linalg.norm(unit(at) - m["u"])
             error = np.degrees(2 * np.arcsin(chord / 2))
             name = f"a{m['number']:04d}" if turn == 0 else f"b{twin[m['number']]:04d}"
@@ -260,9 +261,11 @@ def program(stops: list[list[Any]]) -> str:
     return "\n".join([*lines, "G1 X0.0000", "M2"]) + "\n"
 
 
-def ball_rows(machine: Machine, made: list[Ball], plan: list[list[Any]]) -> list[dict[str, Any]]:
+def ball_rows(
+    spec: SyntheticPrototype, balls: list[Ball], plan: list[list[Any]]
+) -> list[dict[str, Any]]:
     out = []
-    for k, ball in enumerate(made):
+    for k, ball in enumerate(balls):
         mine = [row for row in plan if row[4] == k + 1 and row[1] == 0]
         named = ("cap", "cap", None, None, None) if k == CAP else ("ball", "b", "G40", "ISO", 4.0)
         row: dict[str, Any] = {"number": k + 1, "kind": named[0], "size": named[1]}
@@ -292,29 +295,31 @@ def text(columns: str, lines: list[list[Any]]) -> bytes:
     return stream.getvalue().encode()
 
 
-def parts(machine: Machine, made: list[Ball]) -> dict[str, tuple[str, int | None, np.ndarray]]:
+def parts(
+    spec: SyntheticPrototype, balls: list[Ball]
+) -> dict[str, tuple[str, int | None, np.ndarray]]:
     """Facets in the frame of the shell, by name, with role and ball."""
-    r = machine.stage_mm
+    r = spec.stage_mm
     shapes = {
-        "carrier": ("base", None, base(machine, made)),
-        "cap_4": ("cap", CAP + 1, cap(machine, made[CAP])),
+        "carrier": ("base", None, base(spec, balls)),
+        "cap_4": ("cap", CAP + 1, cap(spec, balls[CAP])),
         "stage": ("stage", None, box([-r, -r, -8.0], [r, r, -6.0])),
         "foot": ("frame", None, box([-140, -40, -300], [140, 40, -290])),
         "coupon": ("tool", None, box([0, 0, 0], [20, 10, 5])),
     }
-    shapes |= {name: (role, None, box(*ends)) for name, (role, *ends) in machine.more.items()}
+    shapes |= {name: (role, None, box(*ends)) for name, (role, *ends) in spec.more.items()}
     return {name: (role, ball, facets(shape)) for name, (role, ball, shape) in shapes.items()}
 
 
-def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
+def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes]]:
     """prototype.json as a value, and all other files of the prototype."""
-    record, made = poses(shell_of(machine)), balls(machine)
+    record, balls = poses(shell_of(spec)), make_balls(spec)
     plan = [
         [float(x) if isinstance(x, np.floating) else x for x in row]
-        for row in pictures(machine, made, record)
+        for row in pictures(spec, balls, record)
     ]
     stops = stop_rows(plan)
-    rows_ = ball_rows(machine, made, plan)
+    rows_ = ball_rows(spec, balls, plan)
     files = {
         "balls.csv": text(BALL_COLUMNS, [list(row.values()) for row in rows_]),
         "rotation_plan.csv": text(
@@ -326,8 +331,8 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
         "rotation_plan.nc": program(stops).encode(),
     }
     entries = []
-    drawn = {"motor": facets(box(*machine.motor))}
-    for name, (role, ball, corners) in parts(machine, made).items():
+    drawn = {"motor": facets(box(*spec.motor))}
+    for name, (role, ball, corners) in parts(spec, balls).items():
         if role != "tool":
             drawn[name] = corners
         low = float((corners @ TURN)[..., 2].min())
@@ -345,16 +350,16 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
                 "origin_mm": origin.tolist(),
             }
         )
-    for k, ball_ in enumerate(made):
+    for k, ball_ in enumerate(balls):
         if k != CAP:
             whole = trimesh.creation.uv_sphere(ball_.body, count=[32, 32])
             drawn[f"ball_{k + 1}"] = whole.triangles + ball_.b
-    files["whole.glb"] = glb(machine, drawn)
+    files["whole.glb"] = glb(spec, drawn)
     found = {
         "schema": "tbcad-prototype/2",
         "camera": "a",
-        "target_mm": machine.target,
-        "picture": "moved" if machine.moved else "fixed",
+        "target_mm": spec.target,
+        "picture": "moved" if spec.moved else "fixed",
         "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
         "swing_deg": [stops[0][1], stops[-1][1]],
         "target_pad_um": 10,
@@ -367,7 +372,7 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
                 "contacts_mm": (ball.b - ball.body * ball.normals).tolist(),
                 "pad_diameter_mm": PAD,
             }
-            for k, ball in enumerate(made)
+            for k, ball in enumerate(balls)
         ],
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
@@ -377,11 +382,11 @@ def prototype(machine: Machine) -> tuple[dict[str, Any], dict[str, bytes]]:
     return found, files
 
 
-def glb(machine: Machine, drawn: dict[str, np.ndarray]) -> bytes:
+def glb(spec: SyntheticPrototype, drawn: dict[str, np.ndarray]) -> bytes:
     """Triangles (F, 3, 3) in mm, z up, as glTF has them: metres, y up."""
     scene = trimesh.Scene()
     for name, corners in drawn.items():
-        away = np.add(corners, [machine.drawn_off.get(name, 0.0), 0, 0])
+        away = np.add(corners, [spec.drawn_off.get(name, 0.0), 0, 0])
         points = away.reshape(-1, 3)[:, [0, 2, 1]] * [1e-3, 1e-3, -1e-3]
         faces = np.arange(len(points)).reshape(-1, 3)
         scene.add_geometry(
@@ -390,23 +395,23 @@ def glb(machine: Machine, drawn: dict[str, np.ndarray]) -> bytes:
     return bytes(trimesh.exchange.gltf.export_glb(scene))
 
 
-def shell_of(machine: Machine) -> Shell:
-    return Shell(target=machine.target)
+def shell_of(spec: SyntheticPrototype) -> Shell:
+    return Shell(target=spec.target)
 
 
-def export(folder: Path, machine: Machine) -> Path:
+def export(folder: Path, spec: SyntheticPrototype) -> Path:
     """Write a whole export; without a shell unless asked."""
-    design = shell_of(machine)
+    design = shell_of(spec)
     record = poses(design)
     mirrors = rows(design, record)
     found = document(design)
     files: dict[str, bytes] = {"mirrors.csv": table(mirrors)}
-    if machine.shell:
+    if spec.shell:
         a = solid(Cells(design, record))
         files |= {"shell_a.stl": stl(a), "shell_b.stl": stl(mirrored(a))}
     else:
         found["parts"] = []
     files["design.json"] = json.dumps(found).encode()
-    made, more = prototype(machine)
-    files |= {"prototype.json": json.dumps(made, indent=1).encode(), **more}
+    value, more = prototype(spec)
+    files |= {"prototype.json": json.dumps(value, indent=1).encode(), **more}
     return write_files(folder, files)

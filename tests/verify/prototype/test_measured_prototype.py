@@ -41,7 +41,13 @@ from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
-from tests.verify.prototype.synthetic_prototype import Machine, balls, export, shell_of, turned
+from tests.verify.prototype.synthetic_prototype import (
+    SyntheticPrototype,
+    export,
+    make_balls,
+    shell_of,
+    turned,
+)
 from tests.verify.synthetic_export import Cells, poses, sign
 
 
@@ -64,8 +70,8 @@ def measured_of(context: PrototypeContext) -> MeasuredPrototype:
 
 
 @pytest.fixture(scope="module")
-def context(machine: Path) -> PrototypeContext:
-    return context_of(machine)
+def context(synthetic_prototype: Path) -> PrototypeContext:
+    return context_of(synthetic_prototype)
 
 
 @pytest.fixture(scope="module")
@@ -74,17 +80,17 @@ def measured(context: PrototypeContext) -> MeasuredPrototype:
 
 
 def test_centres_are_where_the_pads_were_put(measured: MeasuredPrototype) -> None:
-    made = balls(Machine())
-    np.testing.assert_allclose(measured.body.T, [ball.b for ball in made], atol=1e-5)
-    np.testing.assert_allclose(measured.centre.T, [ball.c for ball in made], atol=2e-4)
-    np.testing.assert_allclose(measured.radius, [ball.radius for ball in made], atol=2e-4)
+    expected = make_balls(SyntheticPrototype())
+    np.testing.assert_allclose(measured.body.T, [ball.b for ball in expected], atol=1e-5)
+    np.testing.assert_allclose(measured.centre.T, [ball.c for ball in expected], atol=2e-4)
+    np.testing.assert_allclose(measured.radius, [ball.radius for ball in expected], atol=2e-4)
 
 
 def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
     """The centre moves along the line that both other planes leave it."""
-    context = context_of(export(tmp_path / "x", Machine(pads={(1, 2): 0.02})))
+    context = context_of(export(tmp_path / "x", SyntheticPrototype(pads={(1, 2): 0.02})))
     base, _ = joined_meshes(of_roles(parts_of(context), "base"))
-    ball = balls(Machine())[1]
+    ball = make_balls(SyntheticPrototype())[1]
     shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
     np.testing.assert_allclose(
         seats.measure_seats(context, base)[1].centre, ball.b + shift, atol=1e-5
@@ -142,7 +148,7 @@ def test_turns_about_the_axis(context: PrototypeContext) -> None:
 
 def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> None:
     """`Cells` goes through all pairs of cutting planes, with no camera."""
-    design = shell_of(Machine())
+    design = shell_of(SyntheticPrototype())
     hand = Cells(design, poses(design))
     found = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
     for k, outline in hand.outlines.items():
@@ -211,20 +217,20 @@ def test_coverage_by_rays_on_a_fine_outline(
     transfer = ray_transfer.ray_transfer(measured)
     for i in (5, 20, 40):
         ball, angle = int(context.ball[i]), float(np.degrees(context.angle[i]))
-        made = balls(Machine())[ball]
-        centre = turned(made.c, angle)
+        sphere = make_balls(SyntheticPrototype())[ball]
+        centre = turned(sphere.c, angle)
         least = np.inf
         middle = transfer.merged[:, :, i] @ edge.chief[:, i]
         for d in edge.direction[:, i].T[edge.is_edge[i]]:
             way = transfer.merged[:, :, i] @ d
             away = context.pinhole - centre
-            b, c = way @ away, away @ away - made.radius**2
+            b, c = way @ away, away @ away - sphere.radius**2
             while b * b <= c:  # beside the ball: back to where it ends
                 way = way + 1e-4 * (middle - way)
                 way /= np.linalg.norm(way)
                 b = way @ away
             point = context.pinhole + (-b - np.sqrt(b * b - c)) * way
-            normal = (point - centre) / made.radius
+            normal = (point - centre) / sphere.radius
             out = way - 2 * (way @ normal) * normal
             at = point + max(-(point @ out), 0) * out
             least = min(least, 2 * float(np.linalg.norm(at)))
@@ -308,8 +314,8 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
     return sign(folder, [p.name for p in folder.iterdir() if p.name != "manifest.json"])
 
 
-def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None:
-    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+def test_the_step_file_is_held_against_the_mesh_in_its_place(prototype_folder: Path) -> None:
+    context = context_of(stepped(prototype_folder, [-4, -4, -8], [4, 4, -6]))
     masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
     checks = {
         check.name: check
@@ -319,7 +325,7 @@ def test_the_step_file_is_held_against_the_mesh_in_its_place(made: Path) -> None
     assert checks["step box"].measured == pytest.approx(0, abs=1e-5)
 
 
-def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
+def test_a_step_file_elsewhere_or_of_another_size_fails(prototype_folder: Path) -> None:
     for low, high, names in (
         ([-4, -4, -7.7], [4, 4, -5.7], {"step box", "step centroid", "step properties"}),
         (
@@ -328,23 +334,23 @@ def test_a_step_file_elsewhere_or_of_another_size_fails(made: Path) -> None:
             {"step box", "step centroid", "step properties", "step volume", "step area"},
         ),
     ):
-        context = context_of(stepped(made, low, high))
+        context = context_of(stepped(prototype_folder, low, high))
         masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
         checks = part_step_checks(context.export, masses, read_step_files(context.export, 60))
         assert {check.name for check in checks if not check.passed} == names
 
 
-def test_one_broken_step_file_leaves_the_others_known(made: Path) -> None:
-    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+def test_one_broken_step_file_leaves_the_others_known(prototype_folder: Path) -> None:
+    context = context_of(stepped(prototype_folder, [-4, -4, -8], [4, 4, -6]))
     good = load(context.export.folder, "stage.step")
-    (made / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
-    bad = load(made, "bad.step")
+    (prototype_folder / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
+    bad = load(prototype_folder, "bad.step")
     found = examine_all([bad, good, bad], 60)
     assert [isinstance(one, StepFile) for one in found] == [False, True, False]
 
 
 def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
-    made: Path, monkeypatch: pytest.MonkeyPatch
+    prototype_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tbcad_verify.step import step_file
 
@@ -359,7 +365,7 @@ def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
         [command[0], "-c", "import os; os.abort()"], place, limits
     )
     monkeypatch.setattr(step_file, "run", killed)
-    context = context_of(stepped(made, [-4, -4, -8], [4, 4, -6]))
+    context = context_of(stepped(prototype_folder, [-4, -4, -8], [4, 4, -6]))
     good = load(context.export.folder, "stage.step")
     found = examine_all([good, good], 60)
     assert [isinstance(one, StepFile) for one in found] == [True, True]

@@ -15,7 +15,7 @@ from tbcad_verify.report.checks import Check
 
 from tests.csv_files import Rows, edit_csv
 from tests.verify.optical_setups import IN_PROCESS
-from tests.verify.prototype.synthetic_prototype import Machine, balls, export
+from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export, make_balls
 from tests.verify.synthetic_export import sign
 
 Row = dict[str, Any]
@@ -43,7 +43,7 @@ def signed(folder: Path) -> Path:
     return sign(folder, sorted(p.name for p in folder.iterdir() if p.name != "manifest.json"))
 
 
-def found(folder: Path) -> dict[str, Check]:
+def failures(folder: Path) -> dict[str, Check]:
     """Failed and unknown checks by name."""
     report = verify(folder, options=replace(IN_PROCESS, write=False))
     return {check.name: check for check in report.checks if check.passed is not True}
@@ -66,11 +66,11 @@ def moved(row: dict[str, str], name: str, by: float) -> None:
     row[name + "x"] = repr(float(row[name + "x"]) + by)
 
 
-def test_a_good_prototype_passes(made: Path) -> None:
-    report = verify(made, options=IN_PROCESS)
+def test_a_good_prototype_passes(prototype_folder: Path) -> None:
+    report = verify(prototype_folder, options=IN_PROCESS)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert report.verdict.startswith("PASS: no shell in this export; prototype: 4 balls at 48")
-    section = json.loads((made / "verify.json").read_text())["prototype"]
+    section = json.loads((prototype_folder / "verify.json").read_text())["prototype"]
     assert [ball["kind"] for ball in section["balls"]] == ["ball", "ball", "ball", "cap"]
     assert max(ball["centre_error_um"] for ball in section["balls"]) < 0.01
     assert sum(stop["mirrors"] for stop in section["stops"]) == 49
@@ -78,21 +78,21 @@ def test_a_good_prototype_passes(made: Path) -> None:
     assert all(stop["coverage_mm"] > 25 for stop in section["stops"])
 
 
-def test_the_proof_in_another_process_is_the_same(made: Path) -> None:
-    here = verify(made, options=replace(IN_PROCESS, write=False))
-    apart = verify(made, options=replace(IN_PROCESS, write=False, apart=True))
+def test_verification_in_another_process_is_the_same(prototype_folder: Path) -> None:
+    here = verify(prototype_folder, options=replace(IN_PROCESS, write=False))
+    apart = verify(prototype_folder, options=replace(IN_PROCESS, write=False, apart=True))
     assert apart.to_json() == here.to_json()
 
 
 def test_a_prototype_beside_a_shell(tmp_path: Path) -> None:
-    report = verify(export(tmp_path / "x", Machine(shell=True)), options=IN_PROCESS)
+    report = verify(export(tmp_path / "x", SyntheticPrototype(shell=True)), options=IN_PROCESS)
     assert report.passed, [c for c in report.checks if not c.passed]
     assert "virtual cameras see" in report.verdict
     assert "prototype: 4 balls" in report.verdict
 
 
-def test_the_shell_is_not_asked_for_when_there_is_none(made: Path) -> None:
-    names = {check.name for check in verify(made, options=IN_PROCESS).checks}
+def test_the_shell_is_not_asked_for_when_there_is_none(prototype_folder: Path) -> None:
+    names = {check.name for check in verify(prototype_folder, options=IN_PROCESS).checks}
     assert "poses" in names
     assert not names & {"coverage, spheres", "light paths", "mirrors found"}
 
@@ -153,7 +153,7 @@ def turned_over(axes: list[list[float]]) -> list[list[float]]:
 
 
 PLAN = "rotation_plan.csv"
-FIN = 0.5 * balls(Machine())[1].p  # half way from the object to a ball
+FIN = 0.5 * make_balls(SyntheticPrototype())[1].p  # half way from the object to a ball
 # How, which checks may fail (the first must), and a word of its detail.
 RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     "another target": (in_record("target_mm", to=24.0), ("prototype requirements",), "target"),
@@ -273,24 +273,24 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
 
 
 @pytest.mark.parametrize("how", RECORDS)
-def test_a_broken_record_fails(made: Path, how: str) -> None:
+def test_a_broken_record_fails(prototype_folder: Path, how: str) -> None:
     change, names, words = RECORDS[how]
-    failed = found(change(made))
+    failed = failures(change(prototype_folder))
     assert names[0] in failed
     assert set(failed) <= set(names)
     assert any(words in check.detail for check in failed.values()), failed
 
 
 # What is made, which checks may fail (the first must), and a word of its detail.
-MACHINES: dict[str, tuple[Machine, tuple[str, ...], str]] = {
-    "pad moved by 20 um": (Machine(pads={(1, 2): 0.02}), ("ball centres",), "ball 2"),
+PROTOTYPES: dict[str, tuple[SyntheticPrototype, tuple[str, ...], str]] = {
+    "pad moved by 20 um": (SyntheticPrototype(pads={(1, 2): 0.02}), ("ball centres",), "ball 2"),
     "all pads of a ball too low": (
-        Machine(pads={(0, j): 0.05 for j in range(3)}),
+        SyntheticPrototype(pads={(0, j): 0.05 for j in range(3)}),
         ("ball centres",),
         "ball 1",
     ),
     "no pad": (
-        Machine(pads={(0, 0): 3.0}),
+        SyntheticPrototype(pads={(0, 0): 3.0}),
         (
             "ball centres",
             "pads",
@@ -299,107 +299,108 @@ MACHINES: dict[str, tuple[Machine, tuple[str, ...], str]] = {
         ),
         "no pad",
     ),
-    "a knob in the seat": (Machine(bump=0.01), ("balls clear",), "ball 1"),
-    "cap's front 20 um too large": (Machine(grown=0.02), ("cap fronts",), "ball 4"),
+    "a knob in the seat": (SyntheticPrototype(bump=0.01), ("balls clear",), "ball 1"),
+    "cap's front 20 um too large": (SyntheticPrototype(grown=0.02), ("cap fronts",), "ball 4"),
     "cap shows too little": (
-        Machine(target=40.0, front=400.0),
+        SyntheticPrototype(target=40.0, front=400.0),
         ("coverage, balls", "light of the balls"),
         "a00",
     ),
     "wall in the light": (
-        Machine(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])}),
+        SyntheticPrototype(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])}),
         ("light of the balls", "swing"),
-        "blocked by",
+        "blocked by wall",
     ),
-    "stage in the light": (Machine(stage_mm=16.0), ("light of the balls",), "blocked by stage"),
+    "stage in the light": (
+        SyntheticPrototype(stage_mm=16.0),
+        ("light of the balls",),
+        "blocked by stage",
+    ),
     "wall on the base": (
-        Machine(more={"fin": ("base", FIN - 3, FIN + 3)}),
+        SyntheticPrototype(more={"fin": ("base", FIN - 3, FIN + 3)}),
         ("light of the balls", "swing"),
         "blocked by",
     ),
     "frame where the base swings": (
-        Machine(more={"bar": ("frame", [-150, -150, 60], [150, 150, 62])}),
+        SyntheticPrototype(more={"bar": ("frame", [-150, -150, 60], [150, 150, 62])}),
         ("swing", "light of the balls"),
         "share",
     ),
     "motor where the base swings": (
-        Machine(motor=([-150, -150, 60], [150, 150, 62])),
+        SyntheticPrototype(motor=([-150, -150, 60], [150, 150, 62])),
         ("swing",),
         "motor",
     ),
     "a ball drawn elsewhere": (
-        Machine(drawn_off={"ball_1": 0.5}),
+        SyntheticPrototype(drawn_off={"ball_1": 0.5}),
         ("assembly",),
         "ball_1",
     ),
     "a part drawn elsewhere": (
-        Machine(drawn_off={"foot": 1.0}),
+        SyntheticPrototype(drawn_off={"foot": 1.0}),
         ("assembly",),
         "foot",
     ),
     "two parts in one place": (
-        Machine(more={"brick": ("frame", [-10, -10, -295], [10, 10, -250])}),
+        SyntheticPrototype(more={"brick": ("frame", [-10, -10, -295], [10, 10, -250])}),
         ("parts apart",),
         "foot and brick",
     ),
     "pictures left where they are": (
-        Machine(moved=False),
+        SyntheticPrototype(moved=False),
         ("coverage, balls", "light of the balls"),
         "shows too little",
     ),
 }
 
 
-@pytest.mark.parametrize("how", MACHINES)
-def test_a_broken_machine_fails(tmp_path: Path, how: str) -> None:
-    machine, names, words = MACHINES[how]
-    failed = found(export(tmp_path / "x", machine))
+@pytest.mark.parametrize("how", PROTOTYPES)
+def test_a_broken_prototype_fails(tmp_path: Path, how: str) -> None:
+    spec, names, words = PROTOTYPES[how]
+    failed = failures(export(tmp_path / "x", spec))
     assert names[0] in failed
     assert set(failed) <= set(names)
     assert any(words in check.detail for check in failed.values()), failed
 
 
-def test_what_stands_in_the_light_is_named(tmp_path: Path) -> None:
-    wall = Machine(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])})
-    assert "wall" in found(export(tmp_path / "x", wall))["light of the balls"].detail
+def test_parts_of_a_prototype_are_listed_or_fail(prototype_folder: Path) -> None:
+    (prototype_folder / "stray.stl").write_bytes((prototype_folder / "stage.stl").read_bytes())
+    signed(prototype_folder)
+    assert "stray.stl" in failures(prototype_folder)["manifest"].detail
 
 
-def test_parts_of_a_prototype_are_listed_or_fail(made: Path) -> None:
-    (made / "stray.stl").write_bytes((made / "stage.stl").read_bytes())
-    signed(made)
-    assert "stray.stl" in found(made)["manifest"].detail
+def test_a_prototype_that_the_manifest_does_not_list_fails(prototype_folder: Path) -> None:
+    names = [
+        p.name
+        for p in prototype_folder.iterdir()
+        if p.name not in ("manifest.json", "prototype.json")
+    ]
+    sign(prototype_folder, names)
+    assert "prototype.json" in failures(prototype_folder)["manifest"].detail
 
 
-def test_a_prototype_that_the_manifest_does_not_list_fails(made: Path) -> None:
-    names = [p.name for p in made.iterdir() if p.name not in ("manifest.json", "prototype.json")]
-    sign(made, names)
-    assert "prototype.json" in found(made)["manifest"].detail
-
-
-def test_a_mesh_with_a_hole_fails(made: Path) -> None:
-    data = (made / "stage.stl").read_bytes()
+def test_a_mesh_with_a_hole_fails(prototype_folder: Path) -> None:
+    data = (prototype_folder / "stage.stl").read_bytes()
     count = int.from_bytes(data[80:84], "little") - 1
-    (made / "stage.stl").write_bytes(data[:80] + np.uint32(count).tobytes() + data[84:-50])
-    failed = found(signed(made))
+    (prototype_folder / "stage.stl").write_bytes(
+        data[:80] + np.uint32(count).tobytes() + data[84:-50]
+    )
+    failed = failures(signed(prototype_folder))
     assert failed["watertight"].file == "stage.stl"
 
 
-def test_a_machine_that_cannot_make_the_parts_fails(made: Path) -> None:
-    report = verify(made, options=replace(IN_PROCESS, write=False, printers=("sla",)))
+def test_a_machine_that_cannot_make_the_parts_fails(prototype_folder: Path) -> None:
+    report = verify(prototype_folder, options=replace(IN_PROCESS, write=False, printers=("sla",)))
     assert {c.file for c in report.checks if c.name == "print sla" and not c.passed} >= {"foot.stl"}
 
 
-def deep(*path: Any, to: Any) -> Callable[[Path], Path]:
-    return in_record(*path, to=to)
-
-
 REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
-    "schema": (deep("schema", to="x"), "schema"),
+    "schema": (in_record("schema", to="x"), "schema"),
     "schema before": (
-        deep("schema", to="tbcad-prototype/1"),
+        in_record("schema", to="tbcad-prototype/1"),
         "schema is tbcad-prototype/1, this version verifies tbcad-prototype/2; write",
     ),
-    "balls elsewhere": (deep("balls", to="../balls.csv"), "balls is ../balls.csv, allowed is"),
+    "balls elsewhere": (in_record("balls", to="../balls.csv"), "balls is ../balls.csv, allowed is"),
     "no balls": (in_table("balls.csv", list.clear), "balls.csv: 0 rows"),
     "many balls": (in_table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
     "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
@@ -417,27 +418,33 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "ball infinite": (ball(2, lambda row: row.update(px="1e300")), "line 3: px is 1e300"),
     "ball without radius": (ball(2, lambda row: row.update(radius_mm="0")), "line 3: radius_mm"),
     "ball of negative mass": (ball(1, lambda row: row.update(mass_g="-1")), "line 2: mass_g"),
-    "seat missing": (deep("seats", to=lambda v: v[:-1]), "one for each ball"),
+    "seat missing": (in_record("seats", to=lambda v: v[:-1]), "one for each ball"),
     "seat short": (
-        deep("seats", 0, "normals", to=[[1, 0, 0]]),
+        in_record("seats", 0, "normals", to=[[1, 0, 0]]),
         "seats[0].normals is [[1, 0, 0]], allowed is three rows of three numbers",
     ),
-    "part above": (deep("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
-    "part absolute": (deep("parts", 0, "step", to="/etc/passwd"), "plain file name"),
-    "part role": (deep("parts", 0, "role", to="hat"), "allowed is base, cap, stage, frame or tool"),
-    "part twice": (deep("parts", 0, "name", to="stage"), "names of their own"),
-    "mesh twice": (deep("parts", 0, "stl", to="stage.stl"), "STL of their own"),
-    "cap of no ball": (deep("parts", 1, "ball", to=9), "a cap's ball or null"),
-    "base of a ball": (deep("parts", 0, "ball", to=1), "a cap's ball or null"),
-    "quantity": (deep("parts", 0, "quantity", to=0), "a whole number from 1 to 1000"),
-    "axes": (deep("parts", 0, "axes", to=[1, 2, 3]), "three numbers"),
-    "camera": (deep("camera", to="z"), "camera 'z'"),
-    "picture": (deep("picture", to="blurred"), "picture is blurred, allowed is moved or fixed"),
-    "swing": (deep("swing_deg", to=[3, 2]), "swing_deg must ascend"),
-    "frame": (deep("frame", to=[]), "frame is [], allowed is an object"),
-    "bought": (deep("bought", 0, "turns", to="no"), "turns is no, allowed is true or false"),
-    "assembly": (deep("assembly", to={"step": "a/b.step"}), "plain file name"),
-    "led": (deep("leds", 0, "position_mm", to=[1, 2]), "leds[0].position_mm is [1, 2]"),
+    "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
+    "part absolute": (in_record("parts", 0, "step", to="/etc/passwd"), "plain file name"),
+    "part role": (
+        in_record("parts", 0, "role", to="hat"),
+        "allowed is base, cap, stage, frame or tool",
+    ),
+    "part twice": (in_record("parts", 0, "name", to="stage"), "names of their own"),
+    "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
+    "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
+    "base of a ball": (in_record("parts", 0, "ball", to=1), "a cap's ball or null"),
+    "quantity": (in_record("parts", 0, "quantity", to=0), "a whole number from 1 to 1000"),
+    "axes": (in_record("parts", 0, "axes", to=[1, 2, 3]), "three numbers"),
+    "camera": (in_record("camera", to="z"), "camera 'z'"),
+    "picture": (
+        in_record("picture", to="blurred"),
+        "picture is blurred, allowed is moved or fixed",
+    ),
+    "swing": (in_record("swing_deg", to=[3, 2]), "swing_deg must ascend"),
+    "frame": (in_record("frame", to=[]), "frame is [], allowed is an object"),
+    "bought": (in_record("bought", 0, "turns", to="no"), "turns is no, allowed is true or false"),
+    "assembly": (in_record("assembly", to={"step": "a/b.step"}), "plain file name"),
+    "led": (in_record("leds", 0, "position_mm", to=[1, 2]), "leds[0].position_mm is [1, 2]"),
     "plan missing": (lambda f: (f / PLAN).unlink(), f"{PLAN}: missing"),
     "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),
     "plan nan": (in_table(PLAN, lambda r: r[3].update(base_angle_deg="nan")), "base_angle_deg is"),
@@ -469,12 +476,12 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
 
 @pytest.mark.parametrize("how", REFUSED)
 def test_a_malformed_prototype_is_refused(
-    made: Path, how: str, capsys: pytest.CaptureFixture[str]
+    prototype_folder: Path, how: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     change, words = REFUSED[how]
-    change(made)
-    assert main([str(made), "-q"]) == 2
+    change(prototype_folder)
+    assert main([str(prototype_folder), "-q"]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
     assert words in lines[0]
-    assert not (made / "verify.json").exists()
+    assert not (prototype_folder / "verify.json").exists()
