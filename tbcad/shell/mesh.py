@@ -1,8 +1,5 @@
 """Triangles of a whole half: mirrors' facets and the casing's, on shared vertices."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import manifold3d
 import numpy as np
 
@@ -12,6 +9,7 @@ from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
 from tbcad.shell.boundary import boundary_chain
+from tbcad.shell.casing_edges import ARC_ENDS, casing_lines, outline
 from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.spec.design import Spec
@@ -24,7 +22,6 @@ ROUNDED_DIGITS = 12
 X, Y, Z = np.eye(3)
 # Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
 FROM_X, FROM_Z = [1, 2], [0, 1]
-LOW, HIGH = [0], [-1]
 
 
 def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:
@@ -111,96 +108,63 @@ class _MeshBuilder:
             self.strip(np.append(far[-1], far[-1][0]), np.append(near[-1], near[-1][0]))
         return near, far
 
-    def plane(
-        self, view: list[int], outline: Sequence[Ints], holes: list[Ints], away: bool = False
-    ) -> None:
+    def plane(self, view: list[int], ring: Ints, holes: list[Ints], away: bool = False) -> None:
         """A planar face with holes.
 
         Args:
-            view: the two coordinates in which the outline turns left and the holes right.
-            outline: lines of vertices that follow each other round the face.
-            holes: a ring of vertices for each.
+            view: the two coordinates in which the outer ring turns left and the holes right.
+            ring: vertices round the face.
+            holes: vertices round each hole.
             away: whether the face looks away from that view.
         """
-        rings = [np.concatenate(outline), *holes]
+        rings = [ring, *holes]
         polygons = [self.points[ring][:, view] for ring in rings]
         triangles = np.concatenate(rings)[np.asarray(manifold3d.triangulate(polygons))]
         self.triangles.append(triangles[:, ::-1] if away else triangles)
 
 
-@dataclass(frozen=True)
-class _CasingLines:
-    """Vertices along the edges of the casing, named as in Envelope, from low to high y.
-
-    seam_rim_back is the seam flange's outer edge on its other face, foot_rim_top the foot
-    flange's. seam_front and foot_front are where the mirrors end.
-    """
-
-    seam_back: Ints
-    foot_back: Ints
-    seam_rim: Ints
-    seam_rim_back: Ints
-    foot_rim: Ints
-    foot_rim_top: Ints
-    seam_front: Ints
-    foot_front: Ints
-
-
 def _add_casing(builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope) -> None:
     """Back, flanges, rims and holes: all faces but the mirrors'."""
-    lines = _casing_lines(builder, cells, front, envelope)
-    builder.spheroid(envelope.back, lines.foot_back, lines.seam_back)
-    builder.strip(lines.seam_rim, lines.seam_rim_back)
-    builder.strip(lines.foot_rim_top, lines.foot_rim)
+    edges = _edges(builder, cells, front, envelope)
+
+    def ring(face: str) -> Ints:
+        lines = outline(face, edges, lambda line: line[::-1])
+        return np.concatenate([line[:-1] for line in lines])
+
+    builder.spheroid(envelope.back, edges["foot_back"], edges["seam_back"])
+    builder.strip(edges["seam_rim"], edges["seam_rim_back"])
+    builder.strip(edges["foot_rim_top"], edges["foot_rim"])
     seam_near, seam_far = builder.holes(envelope.seam_holes, np.stack([Y, Z]))
     foot_near, foot_far = builder.holes(envelope.foot_holes, np.stack([X, Y]))
-    builder.plane(FROM_X, [lines.seam_back, lines.seam_rim_back[::-1]], seam_far)
-    builder.plane(FROM_Z, _foot_flange(lines), foot_far)
-    builder.plane(FROM_X, _seam_face(lines), seam_near, away=True)
-    builder.plane(FROM_Z, [lines.foot_rim, lines.foot_front[::-1]], foot_near, away=True)
+    builder.plane(FROM_X, ring("seam_flange"), seam_far)
+    builder.plane(FROM_Z, ring("foot_flange"), foot_far)
+    builder.plane(FROM_X, ring("seam"), seam_near, away=True)
+    builder.plane(FROM_Z, ring("foot"), foot_near, away=True)
 
 
-def _casing_lines(
+def _edges(
     builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope
-) -> _CasingLines:
+) -> dict[str, Ints]:
+    """Vertices along the edges of the casing, by the names of casing_edges."""
     backs = envelope.seam_back, envelope.foot_back
-    ends = builder.add(envelope.seam_back.at(np.array([0.0, 1.0])))
+    back_ends = builder.add(envelope.seam_back.at(np.array([0.0, 1.0])))
     segments = max(builder.arc_segments(arc) for arc in backs)
-    seam_back, foot_back = (builder.arc_between(ends, arc, segments) for arc in backs)
-    return _CasingLines(
-        seam_back,
-        foot_back,
-        *builder.arc_pair(envelope.seam_rim, envelope.seam_thickness),
-        *builder.arc_pair(envelope.foot_rim, envelope.foot_thickness),
-        *(
-            front.outlines.along(boundary_chain(cells, plane))
-            for plane in (cells.boundary.seam, cells.boundary.foot)
-        ),
-    )
-
-
-def _foot_flange(lines: _CasingLines) -> list[Ints]:
-    """Round the foot flange's top, on which the seam flange stands."""
-    return [
-        lines.foot_rim_top,
-        lines.seam_rim[HIGH],
-        lines.seam_rim_back[HIGH],
-        lines.foot_back[::-1],
-        lines.seam_rim_back[LOW],
-        lines.seam_rim[LOW],
-    ]
-
-
-def _seam_face(lines: _CasingLines) -> list[Ints]:
-    """Round the joining face x = 0."""
-    return [
-        lines.foot_rim[LOW],
-        lines.seam_front,
-        lines.foot_rim[HIGH],
-        lines.foot_rim_top[HIGH],
-        lines.seam_rim[::-1],
-        lines.foot_rim_top[LOW],
-    ]
+    seam_back, foot_back = (builder.arc_between(back_ends, arc, segments) for arc in backs)
+    seam_rim, seam_rim_back = builder.arc_pair(envelope.seam_rim, envelope.seam_thickness)
+    foot_rim, foot_rim_top = builder.arc_pair(envelope.foot_rim, envelope.foot_thickness)
+    curves = {
+        "seam_back": seam_back,
+        "foot_back": foot_back,
+        "seam_rim": seam_rim,
+        "seam_rim_back": seam_rim_back,
+        "foot_rim": foot_rim,
+        "foot_rim_top": foot_rim_top,
+        "seam_front": front.outlines.along(boundary_chain(cells, cells.boundary.seam)),
+        "foot_front": front.outlines.along(boundary_chain(cells, cells.boundary.foot)),
+    }
+    ends = {ARC_ENDS[name]: curves[name][[0, -1]] for name in ARC_ENDS}
+    ends["front"] = curves["seam_front"][[0, -1]]
+    return curves | casing_lines(lambda a, b, k: np.array([ends[a][k], ends[b][k]]))
 
 
 def _proper(triangles: Ints) -> Ints:
