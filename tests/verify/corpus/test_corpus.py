@@ -60,7 +60,7 @@ def test_names_tell_mutations_apart() -> None:
         (fails("nothing", "none", lambda _: (), "centre error"), "another exit status"),
         (fails("wrong reason", "STL", mesh(dented), "watertight"), "none of watertight says so"),
         (fails("wrong words", "STL", mesh(dented), "surface error", "b9999"), "does not say"),
-        (fails("no export", "folder", gone("design.json"), "record"), "refused instead"),
+        (fails("no export", "folder", gone("design.json"), "poses"), "refused instead"),
         (refused("other words", "folder", gone("design.json"), "mirrors.csv"), "does not say"),
     ],
     ids=lambda value: value.name if isinstance(value, Mutation) else "",

@@ -228,6 +228,11 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "target lowered": (edit(lambda d: d.update(target_mm=30.0)), "requirements", "target_mm"),
     "id twice": (mirrors(lambda rows: rows[3].update(id="a0010")), "ids", "a0010"),
     "odd id": (mirrors(lambda rows: rows[3].update(id="m 4")), "ids", "m 4"),
+    "polar angle off": (
+        mirrors(lambda rows: rows[3].update(polar_deg="90.0")),
+        "figures",
+        "a0004",
+    ),
     "apex off": (mirrors(lambda rows: rows[3].update(px="1.0")), "poses", "a0004"),
 }
 
@@ -326,7 +331,7 @@ def test_a_spec_without_its_keys_is_unknown(export_folder: Path) -> None:
     (export_folder / "design.json").write_text(json.dumps(design))
     report = verify(sign(export_folder, NAMES), options=IN_PROCESS)
     unknown = {check.name for check in report.checks if check.passed is None}
-    assert unknown == {"requirements", "poses", "directions"}
+    assert unknown == {"requirements", "poses", "figures", "directions"}
     assert not report.passed
 
 

@@ -28,7 +28,7 @@ from tbcad_verify.report.checks import (
     at_least,
     at_most,
     check_names,
-    guarded,
+    guarded_each,
     informative,
     short_list,
     worst_offenders,
@@ -90,11 +90,7 @@ RECORD = (
 def record_checks(export: Export) -> list[Check]:
     """Record and spec agree, and mirrors are where DESIGN.md section 2 puts them."""
     work = (_requirements, _ids, _poses, _figures, _directions)
-    return [_guard(name, job, export) for name, job in zip(RECORD, work, strict=True)]
-
-
-def _guard(name: CheckName, job: Callable[[CheckName, Export], Check], export: Export) -> Check:
-    return guarded([name], lambda: [job(name, export)])[0]
+    return guarded_each(RECORD, work, export)
 
 
 def mesh_checks(file: str, topology: Topology) -> list[Check]:
