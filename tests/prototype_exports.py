@@ -34,9 +34,9 @@ def plan_of(made: PrototypeLayout) -> Plan:
 def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
-    plan = plan_csv.rows(planned_pictures(made))
-    write_table(folder / "rotation_plan.csv", plan_csv.COLUMNS, plan)
-    write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.rows(made))
+    plan = plan_csv.picture_rows(planned_pictures(made))
+    write_table(folder / "rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan)
+    write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.ball_rows(made))
     axis, zero, third = made.half.ellipsoid.frame().tolist()
     document = {
         "schema": "tbcad-prototype/2",

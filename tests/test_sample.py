@@ -1,6 +1,5 @@
-"""The committed sample export: proved, and what the present code would write."""
+"""The committed sample export is verified, and is what the present code writes."""
 
-import csv
 import json
 import shutil
 from pathlib import Path
@@ -9,33 +8,47 @@ import numpy as np
 import pytest
 from tbcad_verify.run.verify import verify
 
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import COLUMNS, rows
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.record import COLUMNS, document, mirror_rows
 from tbcad.spec.load import load_spec
+from tests.csv_files import read_csv
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "docs" / "sample"
 
 
-def test_sample_is_proved(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def flat_design() -> MirrorDesign:
+    return design(load_spec(ROOT / "designs" / "mukaigawa-flat.toml"))
+
+
+def test_sample_is_verified(tmp_path: Path) -> None:
     copy = tmp_path / "sample"
     shutil.copytree(SAMPLE, copy)
     assert verify(copy).passed
-    found, kept = (json.loads((place / "verify.json").read_text()) for place in (copy, SAMPLE))
-    assert kept["pass"] is True
-    assert [row["id"] for row in found["mirrors"]] == [row["id"] for row in kept["mirrors"]]
+    report, committed = (
+        json.loads((folder / "verify.json").read_text()) for folder in (copy, SAMPLE)
+    )
+    assert committed["pass"] is True
+    assert [row["id"] for row in report["mirrors"]] == [row["id"] for row in committed["mirrors"]]
     for name in ("coverage_facet_mm", "coverage_fitted_mm"):
-        values = [row[name] for row in kept["mirrors"]]
-        assert [row[name] for row in found["mirrors"]] == pytest.approx(values, abs=1e-3)
+        values = [row[name] for row in committed["mirrors"]]
+        assert [row[name] for row in report["mirrors"]] == pytest.approx(values, abs=1e-3)
 
 
-def test_sample_is_of_this_design_and_code() -> None:
-    made = design(load_spec(ROOT / "designs" / "mukaigawa-flat.toml"))
-    expected = [row for half in made.halves for row in rows(half)]
-    with (SAMPLE / "mirrors.csv").open(newline="") as file:
-        found = list(csv.DictReader(file))
-    assert [row["id"] for row in found] == [row["id"] for row in expected]
+def test_sample_has_the_mirrors_of_this_design_and_code(flat_design: MirrorDesign) -> None:
+    expected = [row for half in flat_design.halves for row in mirror_rows(half)]
+    recorded = read_csv(SAMPLE / "mirrors.csv")
+    assert [row["id"] for row in recorded] == [row["id"] for row in expected]
     for name in COLUMNS[2:]:
-        numbers = [np.nan if row[name] == "" else float(row[name]) for row in found]
-        wanted = [np.nan if row[name] is None else row[name] for row in expected]
-        assert numbers == pytest.approx(wanted, abs=1e-9, nan_ok=True), name
+        numbers = [float(row[name] or "nan") for row in recorded]
+        values = [np.nan if row[name] is None else row[name] for row in expected]
+        assert numbers == pytest.approx(values, abs=1e-9, nan_ok=True), name
+
+
+def test_sample_has_the_record_of_this_design_and_code(flat_design: MirrorDesign) -> None:
+    recorded = json.loads((SAMPLE / "design.json").read_text())
+    expected = document(flat_design, shells=True)
+    assert recorded.keys() == expected.keys()
+    for key in ("schema", "spec", "parts", "mirrors"):
+        assert recorded[key] == expected[key], key

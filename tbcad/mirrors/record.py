@@ -20,7 +20,7 @@ COLUMNS = (
 )
 
 
-def rows(half: MirrorArray) -> list[Row]:
+def mirror_rows(half: MirrorArray) -> list[Row]:
     """One row for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
     mirrors = half.mirrors
     numbers = np.column_stack(
@@ -46,7 +46,7 @@ def rows(half: MirrorArray) -> list[Row]:
 def write_record(folder: Path, design: MirrorDesign, shells: bool) -> None:
     """Write mirrors.csv and design.json; `shells`: whether the shells' files are there too."""
     write_table(
-        folder / MIRRORS_FILE, COLUMNS, (row for half in design.halves for row in rows(half))
+        folder / MIRRORS_FILE, COLUMNS, (row for half in design.halves for row in mirror_rows(half))
     )
     text = json.dumps(document(design, shells), indent=1, allow_nan=False) + "\n"
     (folder / DESIGN_FILE).write_text(text, encoding="utf-8")
@@ -61,13 +61,13 @@ def document(design: MirrorDesign, shells: bool) -> dict[str, Any]:
         "target_mm": spec.optics.capture_diameter_mm,
         "coating_mm": spec.mirrors.coating_um / 1000,
         "foot_z_mm": design.halves[0].foot,
-        "cameras": [camera(half) for half in design.halves],
-        "parts": [part(half) for half in design.halves if shells],
+        "cameras": [camera_record(half) for half in design.halves],
+        "parts": [shell_record(half) for half in design.halves if shells],
         "mirrors": MIRRORS_FILE,
     }
 
 
-def camera(half: MirrorArray) -> dict[str, Any]:
+def camera_record(half: MirrorArray) -> dict[str, Any]:
     """Record of one camera."""
     view = half.camera
     return {
@@ -81,7 +81,7 @@ def camera(half: MirrorArray) -> dict[str, Any]:
     }
 
 
-def part(half: MirrorArray) -> dict[str, str]:
+def shell_record(half: MirrorArray) -> dict[str, str]:
     """Record of one part and its files."""
     name = f"shell_{half.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}

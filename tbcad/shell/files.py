@@ -8,7 +8,7 @@ from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.mirrors.record import part
+from tbcad.mirrors.record import shell_record
 from tbcad.shell.envelope import Envelope, closing_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.shell.solid import shell_solid
@@ -26,7 +26,7 @@ def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda
     progress("facets")
     mesh = camera_a_mesh(design, envelope)
     for half in design.halves:
-        files = part(half)
+        files = shell_record(half)
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, half, envelope)
         progress(f"{files['name']}: files")
@@ -55,7 +55,7 @@ def camera_solid(
         SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds the solid invalid.
     """
-    name, cells = part(half)["name"], design.halves[0].modelled_cells
+    name, cells = shell_record(half)["name"], design.halves[0].modelled_cells
     envelope = envelope or shell_envelope(design)
     return shell_solid(name, half.ids, cells, envelope, mirrored=half.camera_id == "b")
 

@@ -1,6 +1,5 @@
 """Programs that users open our files with. Each is skipped when it is not installed."""
 
-import csv
 import json
 import math
 import shutil
@@ -23,6 +22,7 @@ from tbcad_verify.report.checks import Check
 from tbcad_verify.run.child import Limits
 
 from tbcad.cli import run
+from tests.csv_files import read_csv
 
 pytestmark = pytest.mark.clients
 
@@ -73,8 +73,7 @@ def wanted(export: Path, relative: float) -> list[ExpectedPart]:
 
 def mirrors(export: Path, camera: str) -> int:
     """Number of a camera's curved mirrors."""
-    with (export / "mirrors.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(export / "mirrors.csv")
     return sum(row["camera"] == camera and row["radius_mm"] != "" for row in rows)
 
 

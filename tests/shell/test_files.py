@@ -1,4 +1,3 @@
-import csv
 import hashlib
 import json
 from pathlib import Path
@@ -12,6 +11,7 @@ from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 from tbcad.shell.files import camera_a_mesh, camera_solid
 from tbcad.spec.load import load_spec, spec_dict
+from tests.csv_files import read_csv
 from tests.helpers import area, read_mesh, read_step, volume
 
 
@@ -81,8 +81,7 @@ def test_mesh_round_trip(
 
 
 def test_record(exported: Path, small_design: MirrorDesign) -> None:
-    with (exported / "mirrors.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(exported / "mirrors.csv")
     assert tuple(rows[0]) == COLUMNS
     document = json.loads((exported / "design.json").read_text())
     assert document["spec"] == spec_dict(small_design.spec)
@@ -97,8 +96,7 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
 
 def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:
     write_export(design(load_spec(None, ["n=2", "radius_rule=flat"])), tmp_path, [SHELL])
-    with (tmp_path / "mirrors.csv").open(newline="") as file:
-        row = next(csv.DictReader(file))
+    row = read_csv(tmp_path / "mirrors.csv")[0]
     assert row["radius_mm"] == row["cx"] == ""
     assert float(row["coverage_mm"]) > 0
     assert read_step(tmp_path / "shell_a.step").kinds["StepGeom_Plane"] >= 15

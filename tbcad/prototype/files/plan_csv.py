@@ -10,7 +10,7 @@ from tbcad.formats.csv_table import Row
 from tbcad.prototype.balls.layout import PlannedPicture, PrototypeLayout
 from tbcad.prototype.frame.layout import FrameLayout
 
-COLUMNS = (
+PICTURE_COLUMNS = (
     *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),
     *("polar_error_deg", "azimuth_error_deg", "error_deg"),
 )
@@ -19,21 +19,21 @@ HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 
 
-def rows(photographs: list[PlannedPicture]) -> list[Row]:
+def picture_rows(pictures: list[PlannedPicture]) -> list[Row]:
     """One row for each mirror's picture, in order; stops and balls are numbered from 1.
 
     One photograph shows all mirrors of a stop with the object as it is turned. Errors of azimuth
     and polar angle are the ball's less the mirror's.
     """
-    return [_row(order, one) for order, one in enumerate(photographs, 1)]
+    return [_picture_row(order, picture) for order, picture in enumerate(pictures, 1)]
 
 
-def stop_rows(made: PrototypeLayout) -> list[Row]:
+def stop_rows(layout: PrototypeLayout) -> list[Row]:
     """One row for each stop: how many mirrors, which balls, and the worst errors, all >= 0.
 
     They hold for both turns of the object.
     """
-    return [_stop(made, stop) for stop in range(len(made.stops))]
+    return [_stop_row(layout, stop) for stop in range(len(layout.stops))]
 
 
 def hole_rows(frame: FrameLayout) -> list[Row]:
@@ -49,18 +49,23 @@ def hole_rows(frame: FrameLayout) -> list[Row]:
     ]
 
 
-def _row(order: int, one: PlannedPicture) -> Row:
+def _picture_row(order: int, picture: PlannedPicture) -> Row:
     values = (
-        *(order, round(float(np.degrees(one.object_angle))), one.stop + 1, _degrees(one.angle)),
-        *(one.ball + 1, one.mirror),
-        *(_degrees(one.polar_error), _degrees(one.azimuth_error), _degrees(one.error)),
+        *(
+            order,
+            round(float(np.degrees(picture.object_angle))),
+            picture.stop + 1,
+            _degrees(picture.angle),
+        ),
+        *(picture.ball + 1, picture.mirror),
+        *(_degrees(picture.polar_error), _degrees(picture.azimuth_error), _degrees(picture.error)),
     )
-    return dict(zip(COLUMNS, values, strict=True))
+    return dict(zip(PICTURE_COLUMNS, values, strict=True))
 
 
-def _stop(made: PrototypeLayout, stop: int) -> Row:
-    stops, mirrors = made.stops, made.stops.mirrors(stop)
-    balls = " ".join(str(ball + 1) for ball in np.unique(made.fit.ball[mirrors]).tolist())
+def _stop_row(layout: PrototypeLayout, stop: int) -> Row:
+    stops, mirrors = layout.stops, layout.stops.mirrors(stop)
+    balls = " ".join(str(ball + 1) for ball in np.unique(layout.fit.ball[mirrors]).tolist())
     worst = [float(np.abs(error[mirrors]).max()) for error in (stops.azimuth_error, stops.error)]
     values = (stop + 1, _degrees(float(stops.angle[stop])), len(mirrors), balls)
     return dict(zip(STOP_COLUMNS, (*values, *map(_degrees, worst)), strict=True))

@@ -49,54 +49,58 @@ def export_prototype(
 
 def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers."""
-    made, keys = built.layout, design.spec.prototype
-    axis, zero, third = (made.half.ellipsoid.frame() + 0.0).tolist()
+    layout, spec = built.layout, design.spec.prototype
+    axis, zero, third = (layout.half.ellipsoid.frame() + 0.0).tolist()
     return {
         "schema": SCHEMA,
-        "camera": made.half.camera_id,
+        "camera": layout.half.camera_id,
         "target_mm": design.spec.optics.capture_diameter_mm,
-        "picture": keys.picture,
+        "picture": spec.picture,
         "target_pad_um": PAD_UM,
         "frame": {"axis": axis, "zero": zero, "third": third},
-        "swing_deg": _swing(built, keys.motion),
+        "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
-        "choices": _choices(made, design.spec),
+        "alternatives": _alternatives(layout, design.spec),
         "seats": _seats(built),
         "parts": [part_record(part) for part in built.printed],
         "leds": [
-            {"name": name, "position_mm": (place + 0.0).tolist(), "direction": way.tolist()}
-            for name, place, way in led_poses(built.stage)
+            {
+                "name": name,
+                "position_mm": (position + 0.0).tolist(),
+                "direction": direction.tolist(),
+            }
+            for name, position, direction in led_poses(built.stage)
         ],
         "bought": [
             {"name": item.name, "what": item.what, "part": item.part, "turns": item.turns}
             for item in built.frame.purchased
         ],
-        "stand": {
+        "frame_stock": {
             "plate": built.frame.plate.name,
             "upright": built.frame.upright.name,
             "uprights_cut_to_mm": built.frame.length,
         },
         "assembly": {"step": STEP, "glb": GLB},
         "drive": bom_csv.drive_record(
-            built.balance, built.drive, keys.motion, built.swing, built.base.hub.disc
+            built.balance, built.drive, spec.motion, built.swing, built.base.hub.disc
         ),
     }
 
 
-def _choices(made: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
-    """What each way to choose the balls from the stock would cost, the one taken among them."""
-    found = ball_alternatives(spec, made.half, made.groups, made.balls.catalogue)
+def _alternatives(layout: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
+    """What each way to choose balls from the stock costs; the chosen one is among them."""
+    alternatives = ball_alternatives(spec, layout.half, layout.groups, layout.balls.catalogue)
     return [
         {
-            "way": one.name,
-            "pixels": one.pixels,
-            "pixels_kept": one.kept_share,
-            "coverage_mm": one.min_coverage,
-            "mirrors_short": one.below_target,
-            "balls_mass_g": one.mass_g,
-            "caps": one.caps,
+            "name": alternative.name,
+            "pixels": alternative.pixels,
+            "pixels_kept_share": alternative.kept_share,
+            "coverage_mm": alternative.min_coverage,
+            "mirrors_below_target": alternative.below_target,
+            "balls_mass_g": alternative.mass_g,
+            "caps": alternative.caps,
         }
-        for one in found
+        for alternative in alternatives
     ]
 
 
@@ -123,17 +127,19 @@ def _seats(built: PrototypeModel) -> list[dict[str, Any]]:
 
 
 def _write_tables(built: PrototypeModel, design: MirrorDesign, folder: Path) -> None:
-    made, motion = built.layout, design.spec.prototype.motion
-    bill = bom_csv.bom_rows(made, built.drive, _needed(built, design), built.parts)
+    layout, motion = built.layout, design.spec.prototype.motion
+    pictures = plan_csv.picture_rows(planned_pictures(layout))
+    bill = bom_csv.bom_rows(layout, built.drive, _needed(built, design), built.parts)
     for name, columns, rows in (
-        (BALLS_FILE, balls_csv.COLUMNS, balls_csv.rows(made)),
-        ("rotation_plan.csv", plan_csv.COLUMNS, plan_csv.rows(planned_pictures(made))),
-        ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(made)),
+        (BALLS_FILE, balls_csv.COLUMNS, balls_csv.ball_rows(layout)),
+        ("rotation_plan.csv", plan_csv.PICTURE_COLUMNS, pictures),
+        ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(layout)),
         ("plate_holes.csv", plan_csv.HOLE_COLUMNS, plan_csv.hole_rows(built.frame)),
         ("bom.csv", bom_csv.COLUMNS, bill),
     ):
         write_table(folder / name, columns, rows)
-    gcode.write_program(folder / "rotation_plan.nc", gcode.gcode_program(made, built.drive, motion))
+    program = gcode.gcode_program(layout, built.drive, motion)
+    gcode.write_program(folder / "rotation_plan.nc", program)
 
 
 def _needed(built: PrototypeModel, design: MirrorDesign) -> bom_csv.PartsNeeded:

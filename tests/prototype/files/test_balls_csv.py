@@ -1,4 +1,3 @@
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +7,13 @@ from numpy.typing import NDArray
 from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.files.balls_csv import COLUMNS, rows
+from tbcad.prototype.files.balls_csv import COLUMNS, ball_rows
 from tbcad.spec.load import load_spec
-
-Read = list[dict[str, str]]
+from tests.csv_files import Rows, read_csv
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
+def layout(small_design: MirrorDesign) -> PrototypeLayout:
     """Balls and caps, both."""
     return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
@@ -23,39 +21,38 @@ def made(small_design: MirrorDesign) -> PrototypeLayout:
 
 
 @pytest.fixture(scope="module")
-def read(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def read(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("balls") / "balls.csv"
-    write_table(path, COLUMNS, rows(made))
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    write_table(path, COLUMNS, ball_rows(layout))
+    return read_csv(path)
 
 
-def column(read: Read, *names: str) -> NDArray[np.float64]:
+def column(read: Rows, *names: str) -> NDArray[np.float64]:
     return np.array([[float(row[name]) for name in names] for row in read]).squeeze()
 
 
-def test_one_row_a_ball(made: PrototypeLayout, read: Read) -> None:
+def test_one_row_a_ball(layout: PrototypeLayout, read: Rows) -> None:
     assert tuple(read[0]) == COLUMNS
-    assert [int(row["number"]) for row in read] == list(range(1, len(made) + 1))
-    assert [row["size"] for row in read] == list(made.balls.size)
+    assert [int(row["number"]) for row in read] == list(range(1, len(layout) + 1))
+    assert [row["size"] for row in read] == list(layout.balls.size)
 
 
-def test_places_are_exact(made: PrototypeLayout, read: Read) -> None:
+def test_places_are_exact(layout: PrototypeLayout, read: Rows) -> None:
     for names, expected in {
-        ("px", "py", "pz"): made.apices(),
-        ("nx", "ny", "nz"): made.normals(),
-        ("cx", "cy", "cz"): made.centres(),
-        ("bx", "by", "bz"): made.body_centres(),
+        ("px", "py", "pz"): layout.apices(),
+        ("nx", "ny", "nz"): layout.normals(),
+        ("cx", "cy", "cz"): layout.centres(),
+        ("bx", "by", "bz"): layout.body_centres(),
     }.items():
         assert np.array_equal(column(read, *names), expected)
-    assert np.array_equal(column(read, "radius_mm"), made.balls.radius)
-    assert np.array_equal(column(read, "body_radius_mm"), made.balls.body_radius)
+    assert np.array_equal(column(read, "radius_mm"), layout.balls.radius)
+    assert np.array_equal(column(read, "body_radius_mm"), layout.balls.body_radius)
     assert np.radians(column(read, "azimuth_deg")) == pytest.approx(
-        made.placement.azimuth, abs=1e-15, rel=1e-15
+        layout.placement.azimuth, abs=1e-15, rel=1e-15
     )
 
 
-def test_the_table_alone_gives_the_spheres(read: Read) -> None:
+def test_the_table_alone_gives_the_spheres(read: Rows) -> None:
     apex, normal = column(read, "px", "py", "pz"), column(read, "nx", "ny", "nz")
     centre, radius = column(read, "cx", "cy", "cz"), column(read, "radius_mm")
     assert apex - radius[:, None] * normal == pytest.approx(centre)
@@ -64,10 +61,10 @@ def test_the_table_alone_gives_the_spheres(read: Read) -> None:
     assert away == pytest.approx(np.full(len(read), away[0]))
 
 
-def test_balls_have_grade_and_mass_caps_have_none(made: PrototypeLayout, read: Read) -> None:
+def test_balls_have_grade_and_mass_caps_have_none(layout: PrototypeLayout, read: Rows) -> None:
     kinds = [row["kind"] for row in read]
     assert set(kinds) == {"ball", "cap"}
-    for row, cap, mass in zip(read, made.balls.cap, made.balls.mass_g, strict=True):
+    for row, cap, mass in zip(read, layout.balls.cap, layout.balls.mass_g, strict=True):
         assert row["kind"] == ("cap" if cap else "ball")
         if cap:
             assert row["grade"] == row["standard"] == row["mass_g"] == ""
@@ -77,9 +74,9 @@ def test_balls_have_grade_and_mass_caps_have_none(made: PrototypeLayout, read: R
             assert float(row["diameter_mm"]) == 2 * float(row["radius_mm"])
 
 
-def test_what_they_show(made: PrototypeLayout, read: Read) -> None:
-    fit = made.fit
-    assert sum(int(row["mirrors"]) for row in read) == len(made.half)
+def test_what_they_show(layout: PrototypeLayout, read: Rows) -> None:
+    fit = layout.fit
+    assert sum(int(row["mirrors"]) for row in read) == len(layout.half)
     assert column(read, "pixels").sum() == pytest.approx(fit.pixels.sum())
     assert column(read, "pixels_shell").sum() == pytest.approx(fit.pixels_shell.sum())
     for j, row in enumerate(read):
@@ -87,13 +84,13 @@ def test_what_they_show(made: PrototypeLayout, read: Read) -> None:
         assert int(row["mirrors"]) == own.sum()
         assert float(row["coverage_mm"]) == fit.coverage[own].min()
         assert float(row["coverage_fixed_mm"]) == fit.coverage_fixed[own].min()
-        assert float(row["error_deg"]) == np.degrees(made.stops.error[own]).max()
+        assert float(row["error_deg"]) == np.degrees(layout.stops.error[own]).max()
 
 
-def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
+def test_same_bytes(layout: PrototypeLayout, tmp_path: Path) -> None:
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path in paths:
-        write_table(path, COLUMNS, rows(made))
+        write_table(path, COLUMNS, ball_rows(layout))
     data = [path.read_bytes() for path in paths]
     assert data[0] == data[1]
     assert b"\r" not in data[0]

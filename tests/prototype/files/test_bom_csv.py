@@ -1,4 +1,3 @@
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import MotionSpec
+from tests.csv_files import Rows, read_csv
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
@@ -32,11 +32,10 @@ NEEDED = PartsNeeded(
     },
     printed=(PrintedItem("base", "carrier", 5e5), PrintedItem("foot", "below the plate", 1e3, 4)),
 )
-Read = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
+def layout(small_design: MirrorDesign) -> PrototypeLayout:
     """Balls and caps, both."""
     return prototype_layout(
         load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
@@ -49,19 +48,18 @@ def drive() -> Drive:
 
 
 @pytest.fixture(scope="module")
-def read(made: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def read(layout: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
-    write_table(path, COLUMNS, bom_rows(made, drive, NEEDED, PARTS))
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    write_table(path, COLUMNS, bom_rows(layout, drive, NEEDED, PARTS))
+    return read_csv(path)
 
 
-def of(read: Read, part: str) -> dict[str, str]:
+def of(read: Rows, part: str) -> dict[str, str]:
     (row,) = (row for row in read if row["part"] == part)
     return row
 
 
-def test_rows(read: Read) -> None:
+def test_rows(read: Rows) -> None:
     assert tuple(read[0]) == COLUMNS
     assert [int(row["item"]) for row in read] == list(range(1, len(read) + 1))
     assert len({row["part"] for row in read}) == len(read)
@@ -72,8 +70,8 @@ def test_rows(read: Read) -> None:
         assert (row["print_volume_mm3"] != "") == (row["from"] == "printed")
 
 
-def test_totals_are_the_sum_of_the_parts(made: PrototypeLayout, drive: Drive, read: Read) -> None:
-    balls = made.mass_g + 1.27e-3 * cap_volume(made.balls).sum()
+def test_totals_are_the_sum_of_the_parts(layout: PrototypeLayout, drive: Drive, read: Rows) -> None:
+    balls = layout.mass_g + 1.27e-3 * cap_volume(layout.balls).sum()
     bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.purchased.items())
     electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
     printed = 1.27e-3 * (5e5 + 4e3)
@@ -82,27 +80,27 @@ def test_totals_are_the_sum_of_the_parts(made: PrototypeLayout, drive: Drive, re
     assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)
 
 
-def test_balls_by_size(made: PrototypeLayout, read: Read) -> None:
+def test_balls_by_size(layout: PrototypeLayout, read: Rows) -> None:
     balls = [row for row in read if row["part"].startswith("ball ")]
-    assert sum(int(row["quantity"]) for row in balls) == (~made.balls.cap).sum()
+    assert sum(int(row["quantity"]) for row in balls) == (~layout.balls.cap).sum()
     for row in balls:
         size = row["part"].removeprefix("ball ")
-        assert int(row["quantity"]) == made.balls.size.count(size)
+        assert int(row["quantity"]) == layout.balls.size.count(size)
         assert row["what"] == f"steel ball {size} ISO 3290-1 G40"
     caps = [row for row in read if row["part"].startswith("cap ")]
-    assert len(caps) == made.balls.cap.sum() > 0
+    assert len(caps) == layout.balls.cap.sum() > 0
 
 
-def test_equal_balls_share_a_row(made: PrototypeLayout, drive: Drive) -> None:
-    stock = made.balls.stock.copy()
+def test_equal_balls_share_a_row(layout: PrototypeLayout, drive: Drive) -> None:
+    stock = layout.balls.stock.copy()
     stock[:] = 10
-    alike = replace(made, balls=replace(made.balls, stock=stock))
+    alike = replace(layout, balls=replace(layout.balls, stock=stock))
     first, *others = bom_rows(alike, drive, PartsNeeded(), PARTS)
-    assert first["quantity"] == len(made)
+    assert first["quantity"] == len(layout)
     assert not any(str(row["part"]).startswith("ball ") for row in others)
 
 
-def test_counts_add_up(read: Read) -> None:
+def test_counts_add_up(read: Rows) -> None:
     assert of(read, "M3x10")["quantity"] == "8"
     assert "ISO 4762" in of(read, "M3x10")["what"]
     assert of(read, "LED-3")["quantity"] == "5"  # four on the stage, one asked for
@@ -112,40 +110,40 @@ def test_counts_add_up(read: Read) -> None:
     assert not [row for row in read if row["part"] == "DOWEL-4x20"]
 
 
-def test_magnets_weigh_what_the_list_says(read: Read) -> None:
+def test_magnets_weigh_what_the_list_says(read: Rows) -> None:
     for name in ("MAGNET-4x3", "MAGNET-8x3"):
         assert float(of(read, name)["mass_g"]) == pytest.approx(PARTS[name].mass_g, rel=1e-3)
         disc = np.pi / 4 * PARTS[name]["diameter_mm"] ** 2 * PARTS[name]["height_mm"]
         assert float(of(read, name)["mass_g"]) == pytest.approx(7.5e-3 * disc, rel=1e-3)
 
 
-def test_drive_is_in_it(drive: Drive, read: Read) -> None:
+def test_drive_is_in_it(drive: Drive, read: Rows) -> None:
     for part in drive.parts:
         assert of(read, part.name)["quantity"] == "1"
 
 
-def test_unknown_part(made: PrototypeLayout, drive: Drive) -> None:
+def test_unknown_part(layout: PrototypeLayout, drive: Drive) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
-        bom_rows(made, drive, PartsNeeded(purchased={"M3x11": 1}), PARTS)
+        bom_rows(layout, drive, PartsNeeded(purchased={"M3x11": 1}), PARTS)
 
 
-def test_same_bytes(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
+def test_same_bytes(layout: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        write_table(tmp_path / name, COLUMNS, bom_rows(made, drive, NEEDED, load_parts()))
+        write_table(tmp_path / name, COLUMNS, bom_rows(layout, drive, NEEDED, load_parts()))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_record_of_the_drive(made: PrototypeLayout) -> None:
-    summed = sum_masses(made.half.ellipsoid.frame(), ball_masses(made, 1.27))
-    low, high = (float(made.stops.angle[i]) for i in (0, -1))
+def test_record_of_the_drive(layout: PrototypeLayout) -> None:
+    summed = sum_masses(layout.half.ellipsoid.frame(), ball_masses(layout, 1.27))
+    low, high = (float(layout.stops.angle[i]) for i in (0, -1))
     motion = MotionSpec()
     needed = summed.required_torque(
         low, high, np.radians(motion.acceleration_deg_s2), motion.safety
     )
     drive = choose_drive("nema17-belt", needed, DRIVES)
     record = json.loads(json.dumps(drive_record(summed, drive, motion, (low, high), 120.0)))
-    assert record["needed_nmm"] <= record["holds_nmm"]
-    assert record["needed_nmm"] >= 2 * record["worst_torque_nmm"]
+    assert record["required_torque_nmm"] <= record["holding_torque_nmm"]
+    assert record["required_torque_nmm"] >= 2 * record["worst_torque_nmm"]
     assert record["mass_g"] == summed.mass_g
     assert record["counterweight_g"] * 120 == pytest.approx(record["moment_g_mm"])
     assert record["motor"] == drive.motor.name

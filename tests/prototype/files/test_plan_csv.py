@@ -1,4 +1,3 @@
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -7,51 +6,40 @@ import pytest
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
-from tbcad.prototype.files.plan_csv import (
-    COLUMNS,
-    STOP_COLUMNS,
-    rows,
-    stop_rows,
-)
+from tbcad.prototype.files.plan_csv import PICTURE_COLUMNS, STOP_COLUMNS, picture_rows, stop_rows
 from tbcad.spec.load import load_spec
-
-Read = list[dict[str, str]]
-
-
-def read_back(path: Path) -> Read:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+from tests.csv_files import Rows, read_csv
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
+def layout(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
 @pytest.fixture(scope="module")
-def plan(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def plan(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("plan") / "rotation_plan.csv"
-    write_table(path, COLUMNS, rows(planned_pictures(made)))
-    return read_back(path)
+    write_table(path, PICTURE_COLUMNS, picture_rows(planned_pictures(layout)))
+    return read_csv(path)
 
 
 @pytest.fixture(scope="module")
-def stops(made: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Read:
+def stops(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("stops") / "stops.csv"
-    write_table(path, STOP_COLUMNS, stop_rows(made))
-    return read_back(path)
+    write_table(path, STOP_COLUMNS, stop_rows(layout))
+    return read_csv(path)
 
 
-def test_every_mirror_of_both_cameras_once(made: PrototypeLayout, plan: Read) -> None:
-    assert tuple(plan[0]) == COLUMNS
-    assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(made.half) + 1))
+def test_every_mirror_of_both_cameras_once(layout: PrototypeLayout, plan: Rows) -> None:
+    assert tuple(plan[0]) == PICTURE_COLUMNS
+    assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(layout.half) + 1))
     for turn, camera in (("0", "a"), ("180", "b")):
         own = [row["mirror"] for row in plan if row["object_turn_deg"] == turn]
-        assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(made.half))]
+        assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(layout.half))]
 
 
-def test_round_trip(made: PrototypeLayout, plan: Read) -> None:
-    for row, one in zip(plan, planned_pictures(made), strict=True):
+def test_round_trip(layout: PrototypeLayout, plan: Rows) -> None:
+    for row, one in zip(plan, planned_pictures(layout), strict=True):
         assert int(row["stop"]) == one.stop + 1
         assert int(row["ball"]) == one.ball + 1
         for name, angle in {
@@ -63,15 +51,15 @@ def test_round_trip(made: PrototypeLayout, plan: Read) -> None:
             assert np.radians(float(row[name])) == pytest.approx(angle, rel=1e-15, abs=1e-15)
 
 
-def test_each_run_goes_upward(plan: Read) -> None:
+def test_each_run_goes_upward(plan: Rows) -> None:
     for turn in ("0", "180"):
         angle = [float(row["base_angle_deg"]) for row in plan if row["object_turn_deg"] == turn]
         assert angle == sorted(angle)
 
 
-def test_the_table_alone_gives_the_directions(made: PrototypeLayout, plan: Read) -> None:
+def test_the_table_alone_gives_the_directions(layout: PrototypeLayout, plan: Rows) -> None:
     """Ball's azimuth on the base and the base's angle, less the error: the mirror's azimuth."""
-    half, azimuth = made.half, np.degrees(made.placement.azimuth)
+    half, azimuth = layout.half, np.degrees(layout.placement.azimuth)
     for row in (row for row in plan if row["object_turn_deg"] == "0"):
         i = half.ids.index(row["mirror"])
         stands = azimuth[int(row["ball"]) - 1] + float(row["base_angle_deg"])
@@ -79,7 +67,7 @@ def test_the_table_alone_gives_the_directions(made: PrototypeLayout, plan: Read)
         assert found == pytest.approx(np.degrees(half.azimuth[i]), abs=1e-9)
 
 
-def test_stops_sum_up_the_plan(plan: Read, stops: Read) -> None:
+def test_stops_sum_up_the_plan(plan: Rows, stops: Rows) -> None:
     assert tuple(stops[0]) == STOP_COLUMNS
     for turn in ("0", "180"):
         for stop in stops:
@@ -92,9 +80,11 @@ def test_stops_sum_up_the_plan(plan: Read, stops: Read) -> None:
             assert worst == float(stop["azimuth_error_deg"])
 
 
-def test_same_bytes(made: PrototypeLayout, tmp_path: Path) -> None:
+def test_same_bytes(layout: PrototypeLayout, tmp_path: Path) -> None:
     def written(name: str, records: list[Row]) -> bytes:
-        write_table(tmp_path / name, COLUMNS, records)
+        write_table(tmp_path / name, PICTURE_COLUMNS, records)
         return (tmp_path / name).read_bytes()
 
-    assert written("a", rows(planned_pictures(made))) == written("b", rows(planned_pictures(made)))
+    assert written("a", picture_rows(planned_pictures(layout))) == written(
+        "b", picture_rows(planned_pictures(layout))
+    )

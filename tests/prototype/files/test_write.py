@@ -104,10 +104,10 @@ def test_pads_are_where_the_record_says(folder: Path, record: dict[str, Any], ba
 
 def test_the_choice_that_was_taken_is_recorded(record: dict[str, Any], balls: Rows) -> None:
     """Its pixels are those of the balls; the default is cover, with caps."""
-    (taken,) = [one for one in record["choices"] if one["way"] == "cover, with caps"]
-    assert len(record["choices"]) == 4
-    assert taken["pixels"] == pytest.approx(sum(float(ball["pixels"]) for ball in balls))
-    assert taken["caps"] == sum(ball["kind"] == "cap" for ball in balls)
+    (chosen,) = [one for one in record["alternatives"] if one["name"] == "cover, with caps"]
+    assert len(record["alternatives"]) == 4
+    assert chosen["pixels"] == pytest.approx(sum(float(ball["pixels"]) for ball in balls))
+    assert chosen["caps"] == sum(ball["kind"] == "cap" for ball in balls)
 
 
 def test_tables_and_record_agree(folder: Path, record: dict[str, Any], balls: Rows) -> None:

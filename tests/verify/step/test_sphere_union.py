@@ -24,7 +24,7 @@ from tbcad_verify.step.sphere_union import (
 from tbcad_verify.types import Floats
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import COLUMNS, rows
+from tbcad.mirrors.record import COLUMNS, mirror_rows
 from tbcad.optics.cells import cell_areas
 from tbcad.spec.load import load_spec
 
@@ -34,7 +34,7 @@ PI = np.pi
 
 
 def balls(*rows: tuple[float, float, float, float], walls: Floats = NO_WALLS) -> ClosedFormCells:
-    table = np.array(rows)
+    table = np.array(mirror_rows)
     return cells_of_balls(table[:, :3], table[:, 3], walls)
 
 
@@ -371,7 +371,7 @@ def made(name: str) -> MirrorDesign:
 def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
     sample = read_export(SAMPLE)
-    table = [row for half in it.halves for row in rows(half)]
+    table = [row for half in it.halves for row in mirror_rows(half)]
     views = {half.camera_id: half.camera.pinhole for half in it.halves}
     cameras: dict[str, Camera] = {
         key: sample.cameras[key].model_copy(update={"pinhole": pinhole})

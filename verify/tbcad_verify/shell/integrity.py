@@ -5,7 +5,7 @@ The files are those of the manifest, the record is the design's, and the meshes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import PurePosixPath
 
 import numpy as np
