@@ -92,3 +92,11 @@ def read_3mf(path: Path) -> tuple[np.ndarray, np.ndarray]:
     triangles = np.array([list(t.Indices) for t in part.GetTriangleIndices()])
     assert not objects.MoveNext()
     return vertices, triangles
+
+
+def segment_distances(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distances (s, k) of points (k, 3) from segments (s, 3)."""
+    along, to = (end - start)[:, None], points - start[:, None]
+    share = np.clip((to * along).sum(axis=-1) / (along**2).sum(axis=-1), 0, 1)
+    distances: np.ndarray = np.linalg.norm(to - share[..., None] * along, axis=-1)
+    return distances

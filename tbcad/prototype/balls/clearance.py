@@ -77,7 +77,7 @@ def obstacles(spec: PrototypeSpec, frame: Floats, view: Camera, length: float) -
     start = frame @ view.pinhole
     end = start - spec.camera_length_mm * (frame @ view.forward)
     camera = _capsule(start, end, spec.camera_diameter_mm / 2)
-    return [thing for thing in (post, camera) if thing.cone.start_radius[0] > 0]
+    return [obstacle for obstacle in (post, camera) if obstacle.cone.start_radius[0] > 0]
 
 
 def _capsule(start: Floats, end: Floats, radius: float) -> Obstacle:

@@ -92,7 +92,7 @@ class PrototypeLayout:
         return self.on_base(self.balls.centre, angle)
 
     def body_centres(self, angle: float = 0.0) -> Floats:
-        """Centres of the spheres that sit in the seats, mm, (k, 3); a ball's own, if no cap."""
+        """Centres of the spheres in the seats, mm, (k, 3); those of caps differ from centres."""
         return self.on_base(self.balls.body_centre, angle)
 
     @property

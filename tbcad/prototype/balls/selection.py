@@ -77,7 +77,7 @@ class Balls:
 
     @property
     def mass_g(self) -> Floats:
-        """Mass of the bought balls, grams, (k,); zero for caps, whose material is open here."""
+        """Mass of the bought balls, grams, (k,); zero for caps, which depend on the material."""
         return np.where(self.cap, 0.0, self.catalogue.mass_g[self.stock])
 
     @property

@@ -16,8 +16,9 @@ from tbcad.prototype.balls.clearance import (
 from tbcad.prototype.balls.groups import group_mirrors
 from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
 from tbcad.spec.load import load_spec
+from tests.helpers import segment_distances
 
-KEYS = load_spec(None).prototype
+LIMITS = load_spec(None).prototype
 K = 12
 
 
@@ -43,28 +44,21 @@ def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
     return np.tile(point, (2, 1)), np.concatenate([end, np.broadcast_to(camera, end.shape)])
 
 
-def gaps(start: np.ndarray, end: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Least distance (a,) of points (a, 3) from segments (s, 3)."""
-    way, to = (end - start)[:, None], centre - start[:, None]
-    share = np.clip((to * way).sum(axis=-1) / (way**2).sum(axis=-1), 0, 1)
-    result: np.ndarray = norm(to - share[..., None] * way).min(axis=0)
-    return result
-
-
 def test_light_passes_beyond_the_angle_and_hardly_within(
     paper_half: MirrorArray, balls: Balls
 ) -> None:
     """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
     pinhole = norm(paper_half.camera.pinhole)
-    _, dark = min_separations(balls, KEYS, pinhole, 30.0)
-    turn = np.radians(np.arange(0, 60, 0.5))
+    _, dark = min_separations(balls, LIMITS, pinhole, 30.0)
+    azimuth = np.radians(np.arange(0, 60, 0.5))
     nearest = np.full((K, K), np.inf)
     for j in range(K):
         start, end = rays(balls, j, pinhole)
         for i in set(range(K)) - {j}:
-            place = np.concatenate([[dark[i, j]], turn[turn > dark[i, j]]])
+            place = np.concatenate([[dark[i, j]], azimuth[azimuth > dark[i, j]]])
             centre = rotated_about_x(np.broadcast_to(balls.body_centre[i], (len(place), 3)), place)
-            gap = gaps(start, end, centre) - balls.body_radius[i] - KEYS.light_margin_mm
+            distance = segment_distances(start, end, centre).min(axis=0)
+            gap = distance - balls.body_radius[i] - LIMITS.light_margin_mm
             assert gap.min() > 0
             nearest[i, j] = gap[0]
     # The light of one of the two sets the angle.
@@ -74,28 +68,28 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
 
 
 def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> None:
-    touch, _ = min_separations(balls, KEYS, norm(paper_half.camera.pinhole), 30.0)
+    touch, _ = min_separations(balls, LIMITS, norm(paper_half.camera.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
         other = rotated_about_x(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
-        assert norm(other - balls.body_centre[j]) == pytest.approx(60 + KEYS.ball_wall_mm)
+        assert norm(other - balls.body_centre[j]) == pytest.approx(60 + LIMITS.ball_wall_mm)
 
 
 def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None:
     """Its half-plane is opposite to the mirrors; only the lowest polar angles come near it."""
     frame = paper_half.ellipsoid.frame()
-    post, camera = obstacles(KEYS, frame, paper_half.camera, 400.0)
+    post, camera = obstacles(LIMITS, frame, paper_half.camera, 400.0)
     assert post.azimuth == pytest.approx(np.pi)
     assert post.cone.end[0] == pytest.approx(400 * np.array([1, 1]) / np.sqrt(2))
     assert camera.cone.start[0] == pytest.approx([np.sqrt(2) * 100, 0])
-    floor, ceiling = allowed_azimuths(balls, KEYS, [post])
+    floor, ceiling = allowed_azimuths(balls, LIMITS, [post])
     assert floor == pytest.approx(-ceiling)
     near = ceiling < np.pi
     assert near[0]
     assert not near[-1]
     at = rotated_about_x(balls.body_centre[0], np.array(ceiling[0])) @ frame
-    away = np.hypot(at[0], at[1])
-    assert away == pytest.approx(30 + KEYS.post_diameter_mm / 2 + KEYS.ball_wall_mm)
+    distance = np.hypot(at[0], at[1])
+    assert distance == pytest.approx(30 + LIMITS.post_diameter_mm / 2 + LIMITS.ball_wall_mm)
 
 
 def test_edges_are_tangents_from_the_axis(balls: Balls) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign
@@ -22,6 +23,7 @@ from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_re
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
+from tests.helpers import segment_distances
 
 SPEC = load_spec(None)
 LIMITS = SPEC.prototype
@@ -91,9 +93,11 @@ class TestBalls:
         limits = LIMITS.model_copy(update={"snap": "nearest"})
         balls = choose_balls(candidates, limits, prototype.balls.catalogue)
         every = prototype.balls.catalogue.diameter / 2
-        away = np.abs(every - prototype.groups.radius[:, None]).min(axis=1)
+        distance = np.abs(every - prototype.groups.radius[:, None]).min(axis=1)
         bought = ~balls.cap
-        assert np.abs(balls.radius - prototype.groups.radius)[bought] == pytest.approx(away[bought])
+        assert np.abs(balls.radius - prototype.groups.radius)[bought] == pytest.approx(
+            distance[bought]
+        )
         assert ball_fit(candidates, balls, limits).coverage.min() < 60
 
     def test_pictures_left_in_place_need_tiny_balls(
@@ -101,23 +105,28 @@ class TestBalls:
     ) -> None:
         limits = LIMITS.model_copy(update={"picture": "fixed"})
         balls = choose_balls(candidates, limits, prototype.balls.catalogue)
-        found = ball_fit(candidates, balls, limits)
-        assert not found.coverable.all()
-        assert (found.coverage_fixed[found.coverable] >= 60 - COVERAGE_ROUNDING_MM).all()
-        assert found.kept_share < 0.05
+        fit = ball_fit(candidates, balls, limits)
+        assert not fit.coverable.all()
+        assert (fit.coverage_fixed[fit.coverable] >= 60 - COVERAGE_ROUNDING_MM).all()
+        assert fit.kept_share < 0.05
 
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)
-        found = {
+        alternatives = {
             c.name: c
             for c in ball_alternatives(
                 spec, prototype.half, prototype.groups, prototype.balls.catalogue
             )
         }
-        assert found["cover, with caps"].kept_share == pytest.approx(prototype.fit.kept_share)
-        assert found["cover, with caps"].below_target == 0
-        assert found["cover, balls only"].kept_share < found["cover, with caps"].kept_share
-        assert found["nearest, with caps"].below_target > 10
+        assert alternatives["cover, with caps"].kept_share == pytest.approx(
+            prototype.fit.kept_share
+        )
+        assert alternatives["cover, with caps"].below_target == 0
+        assert (
+            alternatives["cover, balls only"].kept_share
+            < alternatives["cover, with caps"].kept_share
+        )
+        assert alternatives["nearest, with caps"].below_target > 10
 
 
 class TestPlaces:
@@ -138,7 +147,7 @@ class TestPlaces:
         assert gap.min() > LIMITS.ball_wall_mm
         assert gap.min() < LIMITS.ball_wall_mm + 0.05  # and are no farther than they must
 
-    def test_no_ball_stands_in_anothers_light(self, prototype: PrototypeLayout) -> None:
+    def test_no_ball_blocks_anothers_light(self, prototype: PrototypeLayout) -> None:
         """Rays off every ball by brute force against every other ball."""
         outline, balls = prototype.balls.outline, prototype.balls
         camera, frame = prototype.half.camera.pinhole, prototype.half.ellipsoid.frame()
@@ -148,17 +157,14 @@ class TestPlaces:
             normal = unit(inner - centre)
             point = centre + balls.radius[:, None, None] * normal
             for j in range(len(prototype)):
-                turn = prototype.placement.azimuth[j]
-                rotation = np.array(
-                    [[1, 0, 0], [0, np.cos(turn), -np.sin(turn)], [0, np.sin(turn), np.cos(turn)]]
-                )
-                x, n = point[j] @ rotation.T @ frame, normal[j] @ rotation.T @ frame
+                rotation = Rotation.from_euler("x", prototype.placement.azimuth[j])
+                x, n = rotation.apply(point[j]) @ frame, rotation.apply(normal[j]) @ frame
                 out = reflected_rays(camera, x, n)
                 end = x - dot(x, out)[:, None] * out
                 assert norm(end).max() < 30 + 1e-6
                 others = np.arange(len(prototype)) != j
                 for target in (np.broadcast_to(camera, x.shape), end):
-                    gap = clear(x, target, prototype.body_centres()[others])
+                    gap = segment_distances(x, target, prototype.body_centres()[others])
                     assert (gap - balls.body_radius[others]).min() > LIMITS.light_margin_mm
 
     def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
@@ -166,12 +172,12 @@ class TestPlaces:
         back = view.pinhole - LIMITS.camera_length_mm * view.forward
         for angle in np.linspace(-1, 1, 41) * prototype.placement.swing / 2:
             centre = prototype.body_centres(angle)
-            post = clear(np.zeros((1, 3)), np.array([[0, 0, -400.0]]), centre)[0]
-            body = clear(view.pinhole[None], back[None], centre)[0]
+            post = segment_distances(np.zeros((1, 3)), np.array([[0, 0, -400.0]]), centre)[0]
+            body = segment_distances(view.pinhole[None], back[None], centre)[0]
             assert (post - prototype.balls.body_radius - 10).min() > LIMITS.ball_wall_mm - 1e-3
             assert (body - prototype.balls.body_radius - 30).min() > LIMITS.ball_wall_mm - 1e-3
 
-    def test_swing_is_proved_least_and_less_than_greedy(self, prototype: PrototypeLayout) -> None:
+    def test_swing_is_the_minimum_and_less_than_greedy(self, prototype: PrototypeLayout) -> None:
         assert prototype.placement.swing_bound == pytest.approx(prototype.placement.swing, abs=1e-3)
         assert prototype.placement.swing < prototype.greedy_placement.swing - DEGREE
         assert prototype.placement.swing / DEGREE < 205
@@ -187,14 +193,6 @@ class TestPlaces:
             )
             far = max(far, (np.abs(np.arctan2(across, out)) + half).max())
         assert prototype.placement.outermost == pytest.approx(far, abs=1e-6)
-
-
-def clear(start: np.ndarray, end: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Distances (s, k) of points (k, 3) from segments (s, 3)."""
-    way = (end - start)[:, None]
-    share = dot(centre - start[:, None], np.broadcast_to(way, (len(start), *centre.shape)))
-    share = np.clip(share / (way**2).sum(axis=-1), 0, 1)
-    return norm(start[:, None] + share[..., None] * way - centre)
 
 
 class TestStops:
@@ -221,14 +219,14 @@ class TestStops:
         assert np.abs(prototype.stops.angle).max() <= prototype.placement.swing / 2 + 1e-9
 
     def test_are_the_fewest_and_fewer_than_greedys(self, prototype: PrototypeLayout) -> None:
-        wanted = stop_requests(
+        requests = stop_requests(
             prototype.groups, prototype.half.azimuth, np.radians(LIMITS.stop_error_deg)
         )
-        angle = wanted.azimuth - prototype.placement.azimuth[wanted.ball]
-        points, _ = min_stabbing_points(angle - wanted.tolerance, angle + wanted.tolerance)
+        angle = requests.azimuth - prototype.placement.azimuth[requests.ball]
+        points, _ = min_stabbing_points(angle - requests.tolerance, angle + requests.tolerance)
         assert len(points) == len(prototype.stops)
         other = plan_stops(
-            prototype.groups, prototype.half.polar, wanted, prototype.greedy_placement.azimuth
+            prototype.groups, prototype.half.polar, requests, prototype.greedy_placement.azimuth
         )
         assert len(prototype.stops) <= len(other)
 
@@ -255,26 +253,26 @@ class TestAsked:
         assert again.stops.angle.tobytes() == prototype.stops.angle.tobytes()
         assert again.balls.size == prototype.balls.size
 
-    def test_auto_is_the_least_number_within_the_limits(self, small_design: MirrorDesign) -> None:
+    def test_auto_is_the_minimum_number_within_the_limits(self, small_design: MirrorDesign) -> None:
         auto = small(small_design, "prototype.k=auto")
         limits = load_spec(None).prototype
 
         def within(k: int) -> bool:
-            found = small(small_design, f"prototype.k={k}")
-            error = np.degrees(np.abs(found.fit.polar_error))
+            layout = small(small_design, f"prototype.k={k}")
+            error = np.degrees(np.abs(layout.fit.polar_error))
             return bool(
                 error.max() <= limits.auto_direction_max_deg
                 and np.median(error) <= limits.auto_direction_median_deg
-                and 100 * (1 - found.fit.kept_share) <= limits.auto_lost_percent
+                and 100 * (1 - layout.fit.kept_share) <= limits.auto_lost_percent
             )
 
         assert within(len(auto))
         assert not within(len(auto) - 1)
 
     def test_one_ball(self, small_design: MirrorDesign) -> None:
-        alone = small(small_design, "prototype.k=1")
-        assert len(alone) == 1
-        assert alone.placement.swing / DEGREE < 180
+        single = small(small_design, "prototype.k=1")
+        assert len(single) == 1
+        assert single.placement.swing / DEGREE < 180
 
     def test_smaller_balls_are_lighter(self, small_design: MirrorDesign) -> None:
         light, heavy = (

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -17,7 +18,7 @@ from tbcad.prototype.drive.balance import (
 
 # The paper's: w leans 45 degrees below the horizon.
 FRAME = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0).frame()
-TURN = np.pi / 2
+QUARTER_TURN = np.pi / 2
 
 
 def at(along: float, radius: float, azimuth: float, mass: float = 100.0) -> PointMasses:
@@ -25,25 +26,20 @@ def at(along: float, radius: float, azimuth: float, mass: float = 100.0) -> Poin
     return PointMasses(np.array([mass]), place @ FRAME)
 
 
-def turned(load: PointMasses, angle: float) -> PointMasses:
-    """Rodrigues' rotation about the axis, apart from the frame's own."""
-    w, r = FRAME[0], load.centre
-    across = np.cross(w, r)
-    along = (r @ w)[:, None] * w
-    return PointMasses(
-        load.mass_g, r * np.cos(angle) + across * np.sin(angle) + along * (1 - np.cos(angle))
-    )
+def turned(masses: PointMasses, angle: float) -> PointMasses:
+    rotation = Rotation.from_rotvec(angle * FRAME[0])
+    return PointMasses(masses.mass_g, rotation.apply(masses.centre))
 
 
 class TestTorque:
     def test_one_ball(self) -> None:
         """A ball 100 mm off the axis, beside it: its weight times 100 mm times cos 45 degrees."""
-        one = sum_masses(FRAME, at(20, 100, 0))
+        balance = sum_masses(FRAME, at(20, 100, 0))
         full = 0.1 * GRAVITY * 100 / np.sqrt(2)
-        assert one.torque(np.array([0, TURN, -TURN, 2 * TURN])) == pytest.approx(
-            [0, full, -full, 0]
-        )
-        assert one.torque_amplitude == pytest.approx(full)
+        assert balance.torque(
+            np.array([0, QUARTER_TURN, -QUARTER_TURN, 2 * QUARTER_TURN])
+        ) == pytest.approx([0, full, -full, 0])
+        assert balance.torque_amplitude == pytest.approx(full)
 
     def test_it_is_that_of_its_weight(self) -> None:
         """Against w . (r x F) of the turned masses, from their places alone."""
@@ -52,8 +48,10 @@ class TestTorque:
         for angle in np.linspace(-3, 3, 7):
             force = np.array([0, 0, -GRAVITY])
             expected = sum(
-                1e-3 * load.mass_g[0] * (FRAME[0] @ np.cross(turned(load, angle).centre[0], force))
-                for load in loads
+                1e-3
+                * masses.mass_g[0]
+                * (FRAME[0] @ np.cross(turned(masses, angle).centre[0], force))
+                for masses in loads
             )
             assert summed.torque(np.array([angle])) == pytest.approx(expected)
 
@@ -64,15 +62,15 @@ class TestTorque:
 
     def test_an_upright_axis_has_none(self) -> None:
         upright = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-        load = PointMasses(np.array([100.0]), np.array([[50.0, 20, 10]]))
-        assert sum_masses(upright, load).torque_amplitude == 0
+        masses = PointMasses(np.array([100.0]), np.array([[50.0, 20, 10]]))
+        assert sum_masses(upright, masses).torque_amplitude == 0
 
     def test_worst_at_an_end_or_beside_the_axis(self) -> None:
-        one = sum_masses(FRAME, at(0, 100, 0))
-        assert one.max_torque(-1, 0.5) == pytest.approx(one.torque_amplitude * np.sin(1))
-        assert one.max_torque(-0.5, 2) == one.torque_amplitude
-        assert one.max_torque(-2, 0.5) == one.torque_amplitude
-        assert one.max_torque(2, 4) == pytest.approx(one.torque_amplitude * np.sin(2))
+        balance = sum_masses(FRAME, at(0, 100, 0))
+        assert balance.max_torque(-1, 0.5) == pytest.approx(balance.torque_amplitude * np.sin(1))
+        assert balance.max_torque(-0.5, 2) == balance.torque_amplitude
+        assert balance.max_torque(-2, 0.5) == balance.torque_amplitude
+        assert balance.max_torque(2, 4) == pytest.approx(balance.torque_amplitude * np.sin(2))
 
     @given(
         azimuth=st.floats(-7, 7),
@@ -89,10 +87,10 @@ class TestTorque:
         assert summed.max_torque(low, low + width) == pytest.approx(tried, rel=1e-5)
 
     def test_holding_torque_wanted(self) -> None:
-        one = sum_masses(FRAME, at(0, 100, 0))
+        balance = sum_masses(FRAME, at(0, 100, 0))
         inertia = 0.1 * 0.1**2  # kg m^2
-        assert one.required_torque(-2, 2, 3.0, 2.0) == pytest.approx(
-            2 * (one.torque_amplitude + 1e3 * inertia * 3)
+        assert balance.required_torque(-2, 2, 3.0, 2.0) == pytest.approx(
+            2 * (balance.torque_amplitude + 1e3 * inertia * 3)
         )
 
 
@@ -110,29 +108,29 @@ def placed(weight: Counterweight, along: float) -> PointMasses:
 class TestCounterweight:
     @given(azimuth=st.floats(-3, 3), radius=st.floats(10, 300), mass=st.floats(1, 5000))
     def test_nothing_is_left(self, azimuth: float, radius: float, mass: float) -> None:
-        load = at(30, 90, azimuth, mass)
-        weight = sum_masses(FRAME, load).counterweight(radius)
+        masses = at(30, 90, azimuth, mass)
+        weight = sum_masses(FRAME, masses).counterweight(radius)
         assert weight.mass_g == pytest.approx(mass * 90 / radius)
-        left = sum_masses(FRAME, load, placed(weight, -80))
-        assert left.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
-        assert left.mass_g == pytest.approx(mass + weight.mass_g)
+        balanced = sum_masses(FRAME, masses, placed(weight, -80))
+        assert balanced.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
+        assert balanced.mass_g == pytest.approx(mass + weight.mass_g)
 
     def test_of_a_prototype(self, prototype: PrototypeLayout) -> None:
-        load = ball_masses(prototype, 1.27)
-        before = sum_masses(prototype.half.ellipsoid.frame(), load)
+        masses = ball_masses(prototype, 1.27)
+        before = sum_masses(prototype.half.ellipsoid.frame(), masses)
         weight = before.counterweight(100)
-        after = sum_masses(before.frame, load, placed(weight, -70))
+        after = sum_masses(before.frame, masses, placed(weight, -70))
         assert before.torque_amplitude > 100
         assert after.torque_amplitude < 1e-9 * before.torque_amplitude
 
 
 class TestBalls:
     def test_balls_weigh_where_they_sit(self, prototype: PrototypeLayout) -> None:
-        load = ball_masses(prototype, 1.27)
+        masses = ball_masses(prototype, 1.27)
         bought = ~prototype.balls.cap
-        assert len(load) == len(prototype)
-        assert load.mass_g[bought].sum() == pytest.approx(prototype.mass_g)
-        assert (load.centre == prototype.body_centres()).all()
+        assert len(masses) == len(prototype)
+        assert masses.mass_g[bought].sum() == pytest.approx(prototype.mass_g)
+        assert (masses.centre == prototype.body_centres()).all()
 
     def test_turning_the_base_turns_the_balls(self, prototype: PrototypeLayout) -> None:
         frame = prototype.half.ellipsoid.frame()
@@ -162,8 +160,8 @@ class TestBalls:
 
 
 def test_one_mass_is_its_own_sum() -> None:
-    one: BaseBalance = sum_masses(FRAME, at(10, 50, 0.2, 80.0))
-    assert FRAME @ one.centre == pytest.approx([10, 50 * np.cos(0.2), 50 * np.sin(0.2)])
-    assert one.moment == pytest.approx(4000)
-    assert one.azimuth == pytest.approx(0.2)
-    assert one.inertia == pytest.approx(80 * 50**2)
+    balance: BaseBalance = sum_masses(FRAME, at(10, 50, 0.2, 80.0))
+    assert FRAME @ balance.centre == pytest.approx([10, 50 * np.cos(0.2), 50 * np.sin(0.2)])
+    assert balance.moment == pytest.approx(4000)
+    assert balance.azimuth == pytest.approx(0.2)
+    assert balance.inertia == pytest.approx(80 * 50**2)
