@@ -77,7 +77,7 @@ def test_build_with_prototype_is_proved(tmp_path: Path, capsys: pytest.CaptureFi
     assert "prototype: 4 balls" in shown.out
     verdict = json.loads((out / "verify.json").read_text())
     names = {check["name"] for check in verdict["checks"] if check["pass"]}
-    assert names >= {"coverage, spheres", "coverage, balls", "light of the balls", "ball centres"}
+    assert names >= {"coverage, spheres", "coverage, balls", "light paths, balls", "ball centres"}
 
 
 def test_failed_proof_keeps_the_files_and_names_mirrors(

@@ -25,15 +25,15 @@ ON_STOPS = (
     "cells",
     "coverage, balls",
     "coverage, balls, deviation from record",
-    "light of the balls",
-    "rays of the balls",
-    "pixels kept by the balls",
+    "light paths, balls",
+    "rays, balls",
+    "pixels, balls",
 )
 ON_BALLS = (
     *ON_STOPS,
     "swing",
     "swing clearance",
-    "looks over the swing",
+    "swing angles",
     "parts apart",
     "balls apart",
 )
@@ -164,12 +164,12 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     ),
     "apex off": (
         ball(1, lambda row: moved(row, "p", 1e-6)),
-        ("ball places", "plan errors"),
+        ("ball positions", "plan errors"),
         "ball 1",
     ),
     "centre off the normal": (
         ball(2, lambda row: [moved(row, name, 1e-6) for name in "cb"]),
-        ("ball places",),
+        ("ball positions",),
         "ball 2",
     ),
     "ball larger than its stock": (
@@ -246,7 +246,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     ),
     "part out of its place": (
         in_record("parts", 0, "origin_mm", to=lambda v: [v[0], v[1] + 0.02, v[2]]),
-        ("ball centres", "balls clear", "pads", "light of the balls"),
+        ("ball centres", "balls clear", "pads", "light paths, balls"),
         "ball",
     ),
     "light outside": (
@@ -303,27 +303,27 @@ PROTOTYPES: dict[str, tuple[SyntheticPrototype, tuple[str, ...], str]] = {
     "cap's front 20 um too large": (SyntheticPrototype(grown=0.02), ("cap fronts",), "ball 4"),
     "cap shows too little": (
         SyntheticPrototype(target=40.0, front=400.0),
-        ("coverage, balls", "light of the balls"),
+        ("coverage, balls", "light paths, balls"),
         "a00",
     ),
     "wall in the light": (
         SyntheticPrototype(more={"wall": ("frame", [25, -8, 30], [27, 8, 60])}),
-        ("light of the balls", "swing"),
+        ("light paths, balls", "swing"),
         "blocked by wall",
     ),
     "stage in the light": (
         SyntheticPrototype(stage_mm=16.0),
-        ("light of the balls",),
+        ("light paths, balls",),
         "blocked by stage",
     ),
     "wall on the base": (
         SyntheticPrototype(more={"fin": ("base", FIN - 3, FIN + 3)}),
-        ("light of the balls", "swing"),
+        ("light paths, balls", "swing"),
         "blocked by",
     ),
     "frame where the base swings": (
         SyntheticPrototype(more={"bar": ("frame", [-150, -150, 60], [150, 150, 62])}),
-        ("swing", "light of the balls"),
+        ("swing", "light paths, balls"),
         "share",
     ),
     "motor where the base swings": (
@@ -348,7 +348,7 @@ PROTOTYPES: dict[str, tuple[SyntheticPrototype, tuple[str, ...], str]] = {
     ),
     "pictures left where they are": (
         SyntheticPrototype(moved=False),
-        ("coverage, balls", "light of the balls"),
+        ("coverage, balls", "light paths, balls"),
         "shows too little",
     ),
 }

@@ -43,9 +43,9 @@ CHECKS = {
     "cells": "directions",
     "coverage, balls": "mm",
     "coverage, balls, deviation from record": "mm",
-    "light of the balls": "blocked rays",
-    "rays of the balls": "rays",
-    "pixels kept by the balls": "% of the shell's",
+    "light paths, balls": "blocked rays",
+    "rays, balls": "rays",
+    "pixels, balls": "% of the shell's",
 }
 HALVINGS = 26
 RINGS = (0.25, 0.5, 0.75)  # of the angle to the rim, each with one direction in RING_STEP

@@ -18,7 +18,7 @@ CUBE_MM = 0.02  # edge of the cube that represents an LED
 CHECKS = {
     "leds inside": "outside the capture sphere",
     "leds free": "in the stage",
-    "leds held": "mm",
+    "leds to stage": "mm",
 }
 
 

@@ -24,7 +24,7 @@ from tbcad_verify.types import Bools, Floats
 TOLERANCE = 1e-9  # mm, radians, and of unit vectors
 CHECKS = (
     ("prototype requirements", RECORD, "unlike the design"),
-    ("ball places", BALLS, "mm off"),
+    ("ball positions", BALLS, "mm off"),
     ("ball sizes", BALLS, "balls"),
 )
 

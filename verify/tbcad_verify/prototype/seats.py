@@ -38,7 +38,7 @@ CHECKS = {
     "ball centres": "um",
     "pads": "mm",
     "balls clear": "mm",
-    "room round balls": "mm",
+    "ball clearance": "mm",
 }
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,6 @@ from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import (
-    Check,
-    CheckName,
     attempt,
     check_names,
     finite,
@@ -50,7 +49,6 @@ NO_SEATS = "the seats could not be measured"
 DIGITS = 9
 
 Row = dict[str, Any]
-Work = Callable[[list[CheckName]], Sequence[Check]]
 
 
 def verify_prototype(
@@ -83,17 +81,21 @@ def verify_prototype(
     measured, reason = attempt(
         lambda: measure_prototype(context, require(held, NO_SEATS), fitted, parts)
     )
-    views = _light(context, parts, sink, lambda: require(measured, reason))
+    views, no_views = attempt(lambda: ball_views.ball_views(require(measured, reason)))
+    placed_files = stl_names(parts, *PLACED)
+    _add(sink, ball_views, placed_files, lambda: (context, require(views, no_views)))
     sink(Results(stages=[SWING]))
     _swing(context, parts, sink, lambda: require(measured, reason))
     sink(Results(prototype=json_rows(context, held, views)))
     return parts
 
 
-def _add(sink: ResultSink, units: Mapping[str, str], files: str, work: Work) -> None:
-    """Hand over what checks find; all of them are unknown if they break."""
-    names = check_names(units, files)
-    sink(Results(checks=guarded(names, lambda: work(names))))
+def _add(
+    sink: ResultSink, module: ModuleType, files: str, arguments: Callable[[], Sequence[object]]
+) -> None:
+    """Hand over a module's checks; all of them are unknown if they or their arguments break."""
+    names = check_names(module.CHECKS, files)
+    sink(Results(checks=guarded(names, lambda: module.checks(names, *arguments()))))
 
 
 def _seats(
@@ -101,10 +103,7 @@ def _seats(
 ) -> list[MeasuredSeat] | None:
     base, no_base = attempt(lambda: joined_meshes(of_roles(parts, "base"))[0])
     held, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
-    files = stl_names(parts, "base")
-    _add(
-        sink, seats.CHECKS, files, lambda names: seats.checks(names, context, require(held, reason))
-    )
+    _add(sink, seats, stl_names(parts, "base"), lambda: (context, require(held, reason)))
     return held
 
 
@@ -113,28 +112,8 @@ def _caps(
 ) -> list[MeasuredCap]:
     of_caps = of_roles(parts, "cap")
     fitted, reason = attempt(lambda: [caps.measure_cap(context, part) for part in of_caps])
-    files = stl_names(parts, "cap")
-    _add(
-        sink, caps.CHECKS, files, lambda names: caps.checks(names, context, require(fitted, reason))
-    )
+    _add(sink, caps, stl_names(parts, "cap"), lambda: (context, require(fitted, reason)))
     return fitted or []
-
-
-def _light(
-    context: PrototypeContext,
-    parts: list[MeasuredPart],
-    sink: ResultSink,
-    measured: Callable[[], MeasuredPrototype],
-) -> BallViews | None:
-    views, reason = attempt(lambda: ball_views.ball_views(measured()))
-    files = stl_names(parts, *PLACED)
-    _add(
-        sink,
-        ball_views.CHECKS,
-        files,
-        lambda names: ball_views.checks(names, context, require(views, reason)),
-    )
-    return views
 
 
 def _swing(
@@ -146,21 +125,9 @@ def _swing(
     drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
     bought, reason = attempt(lambda: assembly.fixed_solids(context, require(drawn, no_drawing)))
     files, file = stl_names(parts, *PLACED), context.prototype.assembly.glb
-    _add(
-        sink,
-        swing.CHECKS,
-        files,
-        lambda names: swing.checks(names, measured(), parts, require(bought, reason)),
-    )
-    _add(
-        sink,
-        assembly.CHECKS,
-        file,
-        lambda names: assembly.checks(names, context, parts, require(drawn, no_drawing)),
-    )
-    stage = of_roles(parts, "stage")
-    files = stl_names(parts, "stage")
-    _add(sink, leds.CHECKS, files, lambda names: leds.checks(names, context, stage))
+    _add(sink, swing, files, lambda: (measured(), parts, require(bought, reason)))
+    _add(sink, assembly, file, lambda: (context, parts, require(drawn, no_drawing)))
+    _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
 
 
 def json_rows(

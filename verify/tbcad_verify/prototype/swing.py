@@ -36,7 +36,7 @@ NAMED = 3  # pairs of parts
 CHECKS = {
     "swing": "mm^3",
     "swing clearance": "mm",
-    "looks over the swing": "looks",
+    "swing angles": "angles",
     "parts apart": "mm^3",
     "balls apart": "mm",
 }

@@ -211,7 +211,7 @@ CHECKS: Checks = {
     "step surfaces": ("mm", _surfaces),
     "step outward": ("turned faces", _outward),
     "step cells": ("of the area", _areas),
-    "step middles": ("mm", _centroids),
-    "step front": ("of the volume", _front_volume),
+    "step cell centroids": ("mm", _centroids),
+    "step front volume": ("of the volume", _front_volume),
     **MASS_CHECKS,
 }
