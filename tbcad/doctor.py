@@ -1,7 +1,7 @@
-"""What may be wrong with an environment, each fault with the command that repairs it.
+"""Checks of the environment, with the command that repairs each fault.
 
 Native libraries are tried in child processes: two kernels that clash, or VTK without a display,
-can end a process without a word.
+can end a process without a message.
 """
 
 import os
@@ -12,9 +12,10 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, distributions, metadata, requires
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,16 +24,16 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 _TIMEOUT_S = 180  # the first import on a cold disk reads 1 GB
-_LEAST_MEMORY_GB = 2.0
-_LEAST_DISK_GB = 1.0
-_QUIET = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
+_MIN_MEMORY_GB = 2.0
+_MIN_DISK_GB = 1.0
+_NO_CORE_DUMP = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
 
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 _VTKS = ("vtk", "cadquery-vtk")
-_LIBRARIES = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
+_INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
 
 _KERNEL = "import OCP; print(OCP.__version__)"
-_BOTH = """
+_SHARED_KERNEL = """
 import build123d, cadquery
 box = cadquery.Shape.cast(build123d.Box(1, 2, 3).wrapped)
 assert abs(box.Volume() - 6) < 1e-9, box.Volume()
@@ -80,9 +81,21 @@ print("drawn")
 """
 
 
+# Name, program and distributions; the first of these is installed again if the program fails.
+_LIBRARIES = (
+    ("OCP", _KERNEL, _KERNELS),
+    ("build123d with cadquery", _SHARED_KERNEL, _KERNELS),
+    ("embreex", _EMBREE, ("embreex",)),
+    ("manifold3d", _MANIFOLD, ("manifold3d",)),
+    ("lib3mf", _LIB3MF, ("lib3mf",)),
+    ("numba", _NUMBA, ("numba", "llvmlite")),
+    ("h5py", _H5PY, ("h5py",)),
+)
+
+
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: whether it is in order, what was seen, what would repair it."""
+    """Result of one check: whether it passed, what was found, and the command that repairs it."""
 
     name: str
     ok: bool
@@ -91,37 +104,32 @@ class Finding:
 
 
 def diagnose(folder: Path = Path()) -> list[Finding]:
-    """Look at everything a build needs.
+    """Check everything that a build needs.
 
     Args:
-        folder: where exports are to go, for the free space.
+        folder: of the exports, for the free space.
     """
     needs = _requirements()
+    attempts = [partial(_attempt_library, *library, needs) for library in _LIBRARIES]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        tried = list(pool.map(lambda attempt: attempt(), _attempts(needs)))
+        findings = list(pool.map(lambda check: check(), [*attempts, pictures]))
     return [
         python_version(platform.python_version()),
         one_of("CAD kernel", _KERNELS, _installed(), needs),
         one_of("VTK", _VTKS, _installed(), needs),
         versions(needs, _installed()),
-        *tried,
+        *findings,
         memory(_available_memory_gb()),
         disk(folder),
     ]
 
 
-def _attempts(needs: Sequence[Requirement]) -> list[Callable[[], Finding]]:
-    repair = _reinstall(_KERNELS, _KERNELS[0], needs)
-    return [
-        lambda: attempt("OCP", _KERNEL, f"{_LIBRARIES}; if that is not it: {repair}"),
-        lambda: attempt("build123d with cadquery", _BOTH, repair),
-        lambda: attempt("embreex", _EMBREE, _reinstall(["embreex"], "embreex", needs)),
-        lambda: attempt("manifold3d", _MANIFOLD, _reinstall(["manifold3d"], "manifold3d", needs)),
-        lambda: attempt("lib3mf", _LIB3MF, _reinstall(["lib3mf"], "lib3mf", needs)),
-        lambda: attempt("numba", _NUMBA, _reinstall(["numba", "llvmlite"], "numba", needs)),
-        lambda: attempt("h5py", _H5PY, _reinstall(["h5py"], "h5py", needs)),
-        pictures,
-    ]
+def _attempt_library(
+    name: str, program: str, distributions: Sequence[str], needs: Sequence[Requirement]
+) -> Finding:
+    reinstall = _reinstall(distributions, distributions[0], needs)
+    first = f"{_INSTALL_X11}; if that is not it: " if program is _KERNEL else ""
+    return attempt(name, program, first + reinstall)
 
 
 def python_version(version: str) -> Finding:
@@ -142,25 +150,25 @@ def one_of(
     installed: Iterable[tuple[str, str]],
     needs: Sequence[Requirement] = (),
 ) -> Finding:
-    """Tell whether exactly one of some distributions that own the same files is installed.
+    """Check that exactly one of some distributions that own the same files is installed.
 
     Args:
-        name: what they are called together.
-        rivals: their names.
+        name: of the check.
+        rivals: the distributions.
         installed: (name, version) of everything installed.
         needs: tbcad's requirements, for the version in the remedy.
     """
-    found = [f"{which} {version}" for which, version in installed if which in rivals]
-    detail = " and ".join(found) or "none installed"
-    if len(found) > 1:
+    present = [f"{which} {version}" for which, version in installed if which in rivals]
+    detail = " and ".join(present) or "none installed"
+    if len(present) > 1:
         detail += " overwrite each other"
-    ok = len(found) == 1
+    ok = len(present) == 1
     # The kernel brings the VTK it was built with.
     return Finding(name, ok, detail, "" if ok else _reinstall(rivals, _KERNELS[0], needs))
 
 
 def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]]) -> Finding:
-    """Tell whether all that tbcad requires is installed in a version it allows."""
+    """Check that all that tbcad requires is installed in a version it allows."""
     present = dict(installed)
     wrong = [need for need in needs if not _is_met(need, present)]
     if not needs:
@@ -185,7 +193,7 @@ def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) ->
         remedy: what to do then.
         before: a command in front of the interpreter.
     """
-    command = [*before, sys.executable, "-P", "-c", _QUIET + program]
+    command = [*before, sys.executable, "-P", "-c", _NO_CORE_DUMP + program]
     try:
         run = subprocess.run(
             command,
@@ -200,10 +208,10 @@ def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) ->
         return Finding(name, False, f"no answer after {_TIMEOUT_S} s", remedy)
     if run.returncode == 0:
         return Finding(name, True, _last_line(run.stdout))
-    return Finding(name, False, _why(run.returncode, run.stderr), remedy)
+    return Finding(name, False, _failure(run.returncode, run.stderr), remedy)
 
 
-def _why(code: int, stderr: str) -> str:
+def _failure(code: int, stderr: str) -> str:
     crash = f"crashed ({signal.Signals(-code).name})" if code < 0 else ""
     return ": ".join(filter(None, [crash, _last_line(stderr)])) or f"ended with {code}"
 
@@ -214,7 +222,7 @@ def _last_line(text: str) -> str:
 
 
 def pictures() -> Finding:
-    """Tell whether VTK can draw without a window, by itself or under xvfb-run."""
+    """Check that VTK can draw without a window, by itself or under xvfb-run."""
     remedy = (
         "apt-get install xvfb libgl1-mesa-dri, then run under xvfb-run -a; only pictures need it"
     )
@@ -229,18 +237,19 @@ def memory(available_gb: float | None) -> Finding:
     """Compare the free memory with what the largest build takes."""
     if available_gb is None:
         return Finding("memory", True, "unknown on this system")
-    ok = available_gb >= _LEAST_MEMORY_GB
-    remedy = "" if ok else f"close other programs: {_LEAST_MEMORY_GB:g} GB are needed"
+    ok = available_gb >= _MIN_MEMORY_GB
+    remedy = "" if ok else f"close other programs: {_MIN_MEMORY_GB:g} GB are needed"
     return Finding("memory", ok, f"{available_gb:.1f} GB free", remedy)
 
 
 def disk(folder: Path) -> Finding:
     """Compare the free space where a folder is or would be with what exports take."""
-    there = next(path for path in [folder.absolute(), *folder.absolute().parents] if path.exists())
-    free = shutil.disk_usage(there).free / 1e9
-    ok = free >= _LEAST_DISK_GB
-    remedy = "" if ok else f"free some space: {_LEAST_DISK_GB:g} GB are needed"
-    return Finding("disk", ok, f"{free:.1f} GB free at {there}", remedy)
+    absolute = folder.absolute()
+    existing = next(path for path in (absolute, *absolute.parents) if path.exists())
+    free = shutil.disk_usage(existing).free / 1e9
+    ok = free >= _MIN_DISK_GB
+    remedy = "" if ok else f"free some space: {_MIN_DISK_GB:g} GB are needed"
+    return Finding("disk", ok, f"{free:.1f} GB free at {existing}", remedy)
 
 
 def _available_memory_gb() -> float | None:
@@ -248,8 +257,8 @@ def _available_memory_gb() -> float | None:
         text = Path("/proc/meminfo").read_text(encoding="ascii")
     except OSError:
         return None
-    found = re.search(r"^MemAvailable:\s+(\d+) kB", text, re.MULTILINE)
-    return int(found[1]) * 1024 / 1e9 if found else None
+    match = re.search(r"^MemAvailable:\s+(\d+) kB", text, re.MULTILINE)
+    return int(match[1]) * 1024 / 1e9 if match else None
 
 
 def _installed() -> list[tuple[str, str]]:

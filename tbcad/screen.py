@@ -1,4 +1,4 @@
-"""What a long command shows: a bar on a terminal, plain lines elsewhere."""
+"""Progress of a long command: a bar on a terminal, plain lines elsewhere."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,10 +8,10 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 
 class Stages:
-    """Stages of one command, told on stderr."""
+    """Stages of one command, shown on stderr."""
 
     def __init__(self, bar: Progress | None, total: int) -> None:
-        """Tell stages on a bar, or in plain lines when there is none."""
+        """Show stages on a bar, or in plain lines when there is none."""
         self._bar = bar
         self._task = bar.add_task("", total=total) if bar else None
         self._plain = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -26,14 +26,14 @@ class Stages:
         self._stage = text
 
     def detail(self, text: str) -> None:
-        """Say how far the stage has come, on a terminal only."""
+        """Show a step of the stage, on a terminal only."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, description=f"{self._stage}: {text}")
 
 
 @contextmanager
 def stages(total: int) -> Iterator[Stages]:
-    """Show about this many stages while the block runs."""
+    """Show stages while the block runs; `total` is about their number."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield Stages(None, total)

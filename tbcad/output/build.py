@@ -27,7 +27,7 @@ def write_export(
         design: the mirrors.
         folder: to write into.
         parts: some of PARTS.
-        progress: told of each stage.
+        progress: called with each stage.
 
     Raises:
         SpecError: when something does not fit; it says what to change.

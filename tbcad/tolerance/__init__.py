@@ -1,1 +1,1 @@
-"""How exactly the machine must be made: random machines, each with what it sees."""
+"""Tolerances: simulated builds with random errors, and the coverage of each."""

@@ -166,8 +166,8 @@ def analyse(
         process: how it is made.
         scene_object: photographed for the sharpness.
         options: number of builds, wanted yield, seed ...
-        progress: told of each stage.
-        detail: told of the steps of a stage.
+        progress: called with each stage.
+        detail: called with the steps of a stage.
 
     Raises:
         InputError: mirrors are planar, or the scheduler cannot be reached.

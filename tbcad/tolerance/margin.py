@@ -59,7 +59,7 @@ def margin(
         errors: of the process.
         wanted_yield: share of good builds.
         worst: simulates builds.
-        progress: told of each margin.
+        progress: called with each margin.
 
     The loss of the worst camera hardly depends on the margin, so each try starts from the loss of
     the last one; smaller mirrors lose a little more, hence several tries.

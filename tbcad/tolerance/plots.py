@@ -46,7 +46,7 @@ def _coverage_map(analysis: Analysis) -> Panel:
 
 def directions(analysis: Analysis) -> Floats:
     """Directions of the virtual cameras, (v, 3)."""
-    number = virtual_camera_numbers(analysis.edge_models)
+    number = virtual_camera_numbers(analysis.edge_models[1].halved)
     of_mirrors = np.concatenate([camera.u for camera in analysis.cameras])
     result = np.zeros((int(number.max()) + 1, 3))
     result[number[::-1]] = of_mirrors[::-1]  # the first mirror of a camera counts

@@ -26,7 +26,7 @@ def spec_for_process(
         spec: the design.
         process: how it is made.
         wanted_yield: share of the builds that are to be good.
-        progress: told of each margin that is tried.
+        progress: called with each margin that is tried.
 
     Raises:
         InputError: no margin is enough, or the radii do not follow a target.

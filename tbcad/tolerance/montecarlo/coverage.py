@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, surface_tables, view_tables
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,18 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws) -> MirrorCoverage:
     return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
 
 
-def virtual_camera_numbers(edge_models: EdgeModels) -> Ints:
+def virtual_camera_numbers(halved: Bools) -> Ints:
     """Number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
 
     The two halves of a mirror on the seam share one virtual camera; mirror i of camera b is
     mirror i of camera a reflected in the plane x = 0.
+
+    Args:
+        halved: mirrors of one camera that the seam halves, (m,).
     """
-    a, b = edge_models
-    separate = len(a) + np.cumsum(~b.halved) - 1
-    return np.concatenate([np.arange(len(a)), np.where(b.halved, np.arange(len(b)), separate)])
+    of_a = np.arange(len(halved))
+    separate = len(halved) + np.cumsum(~halved) - 1
+    return np.concatenate([of_a, np.where(halved, of_a, separate)])
 
 
 def coverage(
@@ -61,7 +64,7 @@ def coverage(
     without a cell, or whose image does not surround the object's centre, covers nothing.
     """
     halves = [mirror_coverage(half, drawn) for half, drawn in zip(edge_models, draws, strict=True)]
-    camera = virtual_camera_numbers(edge_models)
+    camera = virtual_camera_numbers(edge_models[1].halved)
     shape = (len(draws[0]), int(camera.max()) + 1)
     diameter, crossings, pixels = np.full(shape, np.inf), np.zeros(shape, int), np.zeros(shape)
     losses = [drawn.facets[:, None] for drawn in draws]

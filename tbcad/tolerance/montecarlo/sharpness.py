@@ -76,7 +76,7 @@ def sharpness(
         residual: of a mirror's direction after calibration, per axis, radians.
         seed: of the residuals.
         method: how views are made.
-        progress: told of each build.
+        progress: called with each build.
     """
     designed = _light_field(cameras, scene, reference.capture_mm)
     rows = [_ssim(designed, scene, reference, method)]

@@ -20,6 +20,7 @@ from tbcad.optics.windows import cell_windows
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
+from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
@@ -84,7 +85,7 @@ def prototype_model(reflectors: tuple[Reflector, Reflector], plan: Plan) -> Prot
     view = reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
-    return PrototypeModel(view.pinhole, axes, plan, both, _virtual_cameras(*both))
+    return PrototypeModel(view.pinhole, axes, plan, both, virtual_camera_numbers(both[1].halved))
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
@@ -101,13 +102,6 @@ def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
     outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
     outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
     return RunWindows(run.ball, run.stop, side, first, middle, outward, halved)
-
-
-def _virtual_cameras(a: RunWindows, b: RunWindows) -> Ints:
-    """Both halves of a mirror on the seam have the number of camera a's (tbcad.optics.trace)."""
-    of_a = np.arange(len(a.ball))
-    separate = len(of_a) - 1 + np.cumsum(~b.halved)
-    return np.concatenate([of_a, np.where(b.halved, of_a, separate)])
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def none(halves: EdgeModels, builds: int = 1) -> tuple[ShellDraws, ShellDraws]:
 
 
 def test_virtual_cameras_share_halved_mirrors(halves: EdgeModels) -> None:
-    which, m = virtual_camera_numbers(halves), len(halves[0])
+    which, m = virtual_camera_numbers(halves[1].halved), len(halves[0])
     halved = halves[0].halved
     assert len(np.unique(which)) == which.max() + 1 == 2 * m - halved.sum() == 193
     assert np.array_equal(which[:m], np.arange(m))

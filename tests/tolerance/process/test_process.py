@@ -69,7 +69,7 @@ class TestBuiltIn:
         assert process.name == name
         outside = re.compile(
             r"judgement|vendors|Formlabs|Apollo|ISO \d|Allied|Data sheets|Minebea|\.com"
-            r"|proof|STEP|The (same|shift)|Aluminium 0\.023|As sphere",
+            r"|verification|STEP|The (same|shift)|Aluminium 0\.023|As sphere",
             re.IGNORECASE,
         )
         for kind in KINDS:
