@@ -14,8 +14,8 @@ class ColouredSolid:
     """One solid.
 
     Attributes:
-        name: unique in the rig.
-        shape: with the base at angle zero.
+        name: unique in the assembly.
+        shape: in its place, the base at angle zero.
         colour: red, green, blue (sRGB) and opacity, from 0 to 1.
     """
 

@@ -12,7 +12,7 @@ from trimesh.visual.material import PBRMaterial
 from tbcad.cad.assembly import ColouredSolid, SolidGroup
 from tbcad.cad.solids import meshed
 
-# Only to look at: parts are meshed finely in their own files.
+# For viewing only: parts are meshed finely in their own files.
 COARSE_MM, COARSE_ANGLE = 0.1, 0.25
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
@@ -20,7 +20,7 @@ METAL, ROUGH = 0.1, 0.6
 
 
 def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
-    """Write groups of bodies as a binary glTF 2.0 file, a node for each group and each body."""
+    """Write groups of solids as a binary glTF 2.0 file, a node for each group and each solid."""
     scene = trimesh.Scene(base_frame="world")
     scene.graph.update(name, "world", matrix=UPRIGHT)
     for group in groups:
@@ -43,7 +43,7 @@ def _drawn(body: ColouredSolid) -> trimesh.Trimesh:
     drawn.visual = TextureVisuals(
         material=PBRMaterial(
             name=body.name,
-            baseColorFactor=[*body.colour[:3], body.colour[3]],
+            baseColorFactor=[*body.colour],
             metallicFactor=METAL,
             roughnessFactor=ROUGH,
             alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",

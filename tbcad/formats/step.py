@@ -38,11 +38,8 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
     Raises:
         StepError: when the kernel fails.
     """
-    quiet()
     STEPControl_Controller.Init_s()
-    Interface_Static.SetCVal_s("write.step.unit", "MM")
-    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
-    Interface_Static.SetIVal_s("write.surfacecurve.mode", int(pcurves))
+    configure(pcurves)
     writer = STEPControl_Writer()
     if writer.Transfer(solid.shape, STEPControl_AsIs) != IFSelect_RetDone:
         raise StepError(f"{path.name}: the kernel cannot translate the solid")
@@ -51,15 +48,18 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
         _name(finder, face, name)
     _validation_properties(writer, solid.shape)
     _name_product(writer, solid.name)
-    write_head(writer, solid.name)
+    write_header(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
         raise StepError(f"{path.name}: the kernel cannot write the file")
 
 
-def quiet() -> None:
-    """Keep the kernel's statistics off the screen; its failures are raised here."""
+def configure(pcurves: bool) -> None:
+    """Write AP214 in millimetres; keep statistics off the screen, failures are raised here."""
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Fail)
+    Interface_Static.SetCVal_s("write.step.unit", "MM")
+    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
+    Interface_Static.SetIVal_s("write.surfacecurve.mode", int(pcurves))
 
 
 def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:
@@ -98,7 +98,7 @@ def _name_product(writer: STEPControl_Writer, name: str) -> None:
             entity.SetName(TCollection_HAsciiString(name))
 
 
-def write_head(writer: STEPControl_Writer, name: str) -> None:
+def write_header(writer: STEPControl_Writer, name: str) -> None:
     """Name the file; its time stamp is fixed."""
     header = APIHeaderSection_MakeHeader(writer.Model())
     header.SetName(TCollection_HAsciiString(name))

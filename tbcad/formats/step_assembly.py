@@ -6,7 +6,6 @@ from pathlib import Path
 import cadquery
 from cadquery.occ_impl.assembly import toCAF
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
@@ -15,37 +14,34 @@ from OCP.TCollection import TCollection_HAsciiString
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
-from tbcad.formats.step import StepError, quiet, write_head
+from tbcad.formats.step import StepError, configure, write_header
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 
 
 def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
-    """Write groups of bodies as one AP214 assembly in millimetres, everything where it stands.
+    """Write groups of bodies as one AP214 assembly in millimetres, all solids in their places.
 
-    The kernel's own order of colours is that of addresses in memory, so they are written here.
+    The kernel writes colours in the order of addresses in memory, so they are written here.
 
     Raises:
         StepError: when the kernel fails.
     """
-    quiet()
     _, document = toCAF(_tree(name, groups), True)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetColorMode(False)
     writer.SetNameMode(True)
-    Interface_Static.SetCVal_s("write.step.unit", "MM")
-    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
-    Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
+    configure(pcurves=False)
     if not writer.Transfer(document, STEPControl_AsIs):
         raise StepError(f"{path.name}: the kernel cannot translate the assembly")
-    plain = writer.ChangeWriter()
-    _count_anew(plain)
-    write_head(plain, name)
-    colours = _colours(plain, [body for group in groups for body in group.bodies])
+    step_writer = writer.ChangeWriter()
+    _number_occurrences(step_writer)
+    write_header(step_writer, name)
+    colours = _colours(step_writer, [body for group in groups for body in group.bodies])
     if writer.Write(str(path)) != IFSelect_RetDone:
         raise StepError(f"{path.name}: the kernel cannot write the file")
-    text, found, rest = path.read_text(encoding="ascii").rpartition(END)
-    path.write_text(text + colours + found + rest, encoding="ascii")
+    text, end, rest = path.read_text(encoding="ascii").rpartition(END)
+    path.write_text(text + colours + end + rest, encoding="ascii")
 
 
 def _tree(name: str, groups: Sequence[SolidGroup]) -> cadquery.Assembly:
@@ -58,8 +54,8 @@ def _tree(name: str, groups: Sequence[SolidGroup]) -> cadquery.Assembly:
     return tree
 
 
-def _count_anew(writer: STEPControl_Writer) -> None:
-    """Number and name the places in the assembly; the kernel counts on from file to file."""
+def _number_occurrences(writer: STEPControl_Writer) -> None:
+    """Number and name the occurrences; the kernel counts on from file to file."""
     model, count = writer.Model(), 0
     for k in range(1, model.NbEntities() + 1):
         entity = model.Value(k)

@@ -10,10 +10,10 @@ from pathlib import Path
 from tbcad.errors import InputError
 
 SHELL = "shell"
-RIG = ("rig", "base", "seat", "exploded")
-SUBJECTS = (SHELL, *RIG)
-NEEDED = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
-NEEDED_FOR_RIG = ("prototype.json", "balls.csv")
+PROTOTYPE = ("rig", "base", "seat", "exploded")
+SUBJECTS = (SHELL, *PROTOTYPE)
+SHELL_FILES = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
+PROTOTYPE_FILES = ("prototype.json", "balls.csv")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL) -> None:
@@ -29,8 +29,8 @@ def picture(folder: Path, file: Path, subject: str = SHELL) -> None:
     """
     if subject not in SUBJECTS:
         raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
-    needed = NEEDED if subject == SHELL else NEEDED_FOR_RIG
-    missing = [name for name in needed if not (folder / name).is_file()]
+    required = SHELL_FILES if subject == SHELL else PROTOTYPE_FILES
+    missing = [name for name in required if not (folder / name).is_file()]
     if missing:
         raise InputError(
             f"{folder}: {missing[0]} is missing: name a folder that tbcad build wrote with its "

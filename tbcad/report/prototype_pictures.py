@@ -69,7 +69,7 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
     plotter.close()
 
 
-def _rig(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _whole(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     """Everything, bought parts too, from two sides."""
     bodies = _assembly(folder, record)
     for column, eye in enumerate(((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0))):
@@ -125,7 +125,7 @@ def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
 
 
 SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Record], None]] = {
-    "rig": _rig,
+    "rig": _whole,
     "base": _base,
     "seat": _seat,
     "exploded": _exploded,
@@ -148,7 +148,7 @@ def _parts(
 
 
 def _mesh(folder: Path, part: Record) -> pyvista.PolyData:
-    """A part from the printer's bed back to where it stands in the rig."""
+    """A part from the printer's bed back to its place in the prototype."""
     mesh = pyvista.read(folder / part["stl"])
     axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
     mesh.points = (np.asarray(mesh.points, dtype=np.float64) - origin) @ axes.T

@@ -33,7 +33,7 @@ GROUPS = {
 
 @dataclass
 class Grbl:
-    """What the machine did.
+    """What the controller did.
 
     Attributes:
         axis: letter of its rotary axis.
@@ -102,15 +102,15 @@ class Grbl:
 
 
 def sent(lines: list[str], axis: str = "X") -> Grbl:
-    machine = Grbl(axis)
+    controller = Grbl(axis)
     for line in lines:
-        machine.send(line)
-    assert machine.ended
-    return machine
+        controller.send(line)
+    assert controller.ended
+    return controller
 
 
 @pytest.fixture(scope="module")
-def made(small_design: MirrorDesign) -> PrototypeLayout:
+def prototype(small_design: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
@@ -119,79 +119,91 @@ def drive() -> Drive:
     return choose_drive("nema17-belt", 1000, load_drives(load_parts()))
 
 
-def test_every_stop_twice_in_order_within_a_step(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(gcode_program(made, drive, MOTION))
-    angle = np.degrees(made.stops.angle)
+@pytest.fixture(scope="module")
+def program(prototype: PrototypeLayout, drive: Drive) -> list[str]:
+    return gcode_program(prototype, drive, MOTION)
+
+
+@pytest.fixture(scope="module")
+def controller(program: list[str]) -> Grbl:
+    """After the default program."""
+    return sent(program)
+
+
+def test_every_stop_twice_in_order_within_a_step(
+    prototype: PrototypeLayout, drive: Drive, controller: Grbl
+) -> None:
+    angle = np.degrees(prototype.stops.angle)
     step = 1 / drive.steps_per_deg(MOTION.microsteps)
-    off = np.abs(np.array(machine.shots) - np.tile(angle, 2))
+    off = np.abs(np.array(controller.shots) - np.tile(angle, 2))
     assert off.max() < 10**-DECIMALS < step / 10
 
 
-def test_it_stays_in_the_swing_but_for_the_approach(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(gcode_program(made, drive, MOTION))
-    ends = np.degrees(made.stops.angle[[0, -1]])
-    half = np.degrees(made.placement.swing) / 2
+def test_it_stays_in_the_swing_but_for_the_approach(
+    prototype: PrototypeLayout, controller: Grbl
+) -> None:
+    ends = np.degrees(prototype.stops.angle[[0, -1]])
+    half = np.degrees(prototype.placement.swing) / 2
     assert ends.min() >= -half - 1e-9
     start = ends[0] - MOTION.approach_deg
-    assert max(machine.moves) <= ends[1]
-    assert min(machine.moves) >= start
-    within = [place for place in machine.moves if place != pytest.approx(start, abs=1e-3)]
-    assert len(within) == len(machine.moves) - 3  # before each run, and while the object is turned
+    assert max(controller.moves) <= ends[1]
+    assert min(controller.moves) >= start
+    within = [place for place in controller.moves if place != pytest.approx(start, abs=1e-3)]
+    assert (
+        len(within) == len(controller.moves) - 3
+    )  # before each run, and while the object is turned
     assert min(within) >= ends[0]
 
 
-def test_every_stop_is_reached_from_below(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(gcode_program(made, drive, MOTION))
-    steps = list(zip(machine.moves, machine.moves[1:], strict=False))
-    for shot in set(machine.shots):
+def test_every_stop_is_reached_from_below(controller: Grbl) -> None:
+    steps = list(zip(controller.moves, controller.moves[1:], strict=False))
+    for shot in set(controller.shots):
         came = [old for old, new in steps if new == shot]
         assert len(came) == 2
         assert max(came) < shot
 
 
-def test_pauses_for_people(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(gcode_program(made, drive, MOTION))
-    (before, first), (between, second) = machine.pauses
+def test_pauses_for_people(prototype: PrototypeLayout, controller: Grbl) -> None:
+    (before, first), (between, second) = controller.pauses
     assert before is None
     assert "base at 0 degrees" in first
     assert "turn the object by 180 degrees" in second
-    assert between == pytest.approx(stop_sequence(made, MOTION).start, abs=1e-3)
+    assert between == pytest.approx(stop_sequence(prototype, MOTION).start, abs=1e-3)
 
 
-def test_it_ends_where_it_began(made: PrototypeLayout, drive: Drive) -> None:
+def test_it_ends_where_it_began(prototype: PrototypeLayout, drive: Drive) -> None:
     motion = MotionSpec(home_deg=-12.5)
-    assert sent(gcode_program(made, drive, motion)).at == -12.5
+    assert sent(gcode_program(prototype, drive, motion)).at == -12.5
 
 
-def test_other_axis(made: PrototypeLayout, drive: Drive) -> None:
-    plain, other = (gcode_program(made, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
+def test_other_axis(prototype: PrototypeLayout, drive: Drive) -> None:
+    plain, other = (gcode_program(prototype, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
     assert sent(other, "A").shots == sent(plain).shots
     assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
     assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
 
 
-def test_a_person_as_trigger(made: PrototypeLayout, drive: Drive) -> None:
-    lines = gcode_program(made, drive, MotionSpec(trigger="pause"))
-    machine = sent(lines)
-    assert not machine.shots
-    assert len(machine.pauses) == 2 + 2 * len(made.stops)
+def test_a_person_as_trigger(prototype: PrototypeLayout, drive: Drive) -> None:
+    lines = gcode_program(prototype, drive, MotionSpec(trigger="pause"))
+    controller = sent(lines)
+    assert not controller.shots
+    assert len(controller.pauses) == 2 + 2 * len(prototype.stops)
     assert not {"M8", "M9"} & set(lines)
 
 
-def test_comments_count_the_mirrors(made: PrototypeLayout, drive: Drive) -> None:
-    lines = gcode_program(made, drive, MOTION)
-    counts = [int(c) for line in lines for c in re.findall(r"of \d+: (\d+) mirrors", line)]
-    assert sum(counts) == 2 * len(made.half)
-    assert f"(stop 1 of {len(made.stops)}: {len(made.stops.mirrors(0))} mirrors)" in lines
-
-
-def test_time(made: PrototypeLayout, drive: Drive) -> None:
-    machine = sent(gcode_program(made, drive, MOTION))
-    todo = stop_sequence(made, MOTION)
-    way = 2 * 2 * (todo.angle[-1] - todo.start)
-    assert duration_minutes(todo, MOTION) == pytest.approx(
-        machine.rest / 60 + way / MOTION.feed_deg_min
+def test_comments_count_the_mirrors(prototype: PrototypeLayout, program: list[str]) -> None:
+    counts = re.findall(r"of \d+: (\d+) mirrors", "\n".join(program))
+    assert sum(map(int, counts)) == 2 * len(prototype.half)
+    assert (
+        f"(stop 1 of {len(prototype.stops)}: {len(prototype.stops.mirrors(0))} mirrors)" in program
     )
+
+
+def test_time(prototype: PrototypeLayout, controller: Grbl) -> None:
+    sequence = stop_sequence(prototype, MOTION)
+    travel = 2 * 2 * (sequence.angle[-1] - sequence.start)
+    minutes = controller.rest / 60 + travel / MOTION.feed_deg_min
+    assert duration_minutes(sequence, MOTION) == pytest.approx(minutes)
 
 
 @pytest.mark.parametrize(
@@ -202,12 +214,12 @@ def test_time(made: PrototypeLayout, drive: Drive) -> None:
         MotionSpec(approach_deg=30),
     ],
 )
-def test_other_motions(made: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
-    machine = sent(gcode_program(made, drive, motion))
-    low, high = np.degrees(free_base_angles(made))
-    assert low <= min(machine.moves)
-    assert max(machine.moves) <= high
-    assert len(machine.shots) == 2 * len(made.stops)
+def test_other_motions(prototype: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
+    controller = sent(gcode_program(prototype, drive, motion))
+    low, high = np.degrees(free_base_angles(prototype))
+    assert low <= min(controller.moves)
+    assert max(controller.moves) <= high
+    assert len(controller.shots) == 2 * len(prototype.stops)
 
 
 def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:
@@ -218,18 +230,17 @@ def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) ->
     assert start == pytest.approx(-90)
 
 
-def test_a_start_out_of_reach(made: PrototypeLayout) -> None:
+def test_a_start_out_of_reach(prototype: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
-        stop_sequence(made, MotionSpec(home_deg=170))
+        stop_sequence(prototype, MotionSpec(home_deg=170))
 
 
-def test_written(made: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
-    lines = gcode_program(made, drive, MOTION)
+def test_written(program: list[str], tmp_path: Path) -> None:
     for name in ("a.nc", "b.nc"):
-        write_program(tmp_path / name, lines)
+        write_program(tmp_path / name, program)
     data = (tmp_path / "a.nc").read_bytes()
     assert data == (tmp_path / "b.nc").read_bytes()
-    assert data.decode("ascii").splitlines() == lines
+    assert data.decode("ascii").splitlines() == program
     assert b"\r" not in data
 
 
