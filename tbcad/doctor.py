@@ -82,7 +82,7 @@ print("drawn")
 
 
 # Name, program and distributions; the first of these is installed again if the program fails.
-_LIBRARIES = (
+_LIBRARIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("OCP", _KERNEL, _KERNELS),
     ("build123d with cadquery", _SHARED_KERNEL, _KERNELS),
     ("embreex", _EMBREE, ("embreex",)),
@@ -110,7 +110,7 @@ def diagnose(folder: Path = Path()) -> list[Finding]:
         folder: of the exports, for the free space.
     """
     needs = _requirements()
-    attempts = [partial(_attempt_library, *library, needs) for library in _LIBRARIES]
+    attempts = [partial(_attempt_library, needs, *library) for library in _LIBRARIES]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         findings = list(pool.map(lambda check: check(), [*attempts, pictures]))
     return [
@@ -125,7 +125,7 @@ def diagnose(folder: Path = Path()) -> list[Finding]:
 
 
 def _attempt_library(
-    name: str, program: str, distributions: Sequence[str], needs: Sequence[Requirement]
+    needs: Sequence[Requirement], name: str, program: str, distributions: Sequence[str]
 ) -> Finding:
     reinstall = _reinstall(distributions, distributions[0], needs)
     first = f"{_INSTALL_X11}; if that is not it: " if program is _KERNEL else ""
