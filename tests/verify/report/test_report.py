@@ -15,7 +15,14 @@ import tbcad_verify
 from tbcad_verify import main, verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.record.poses import geodesic
-from tbcad_verify.report.checks import Check, at_least, at_most, informative, worst_offenders
+from tbcad_verify.report.checks import (
+    Check,
+    at_least,
+    at_most,
+    each_at_most,
+    informative,
+    worst_offenders,
+)
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
@@ -354,9 +361,12 @@ def test_checks_hold_their_limits() -> None:
     assert at_least(name, 1, 1).passed is True
     assert at_least(name, np.nan, 1).passed is False
     assert informative(name, 3).limit is None
-    assert worst_offenders(["a", "b", "c"], np.array([1.0, 2, 3]), "mm", np.array([2, 0])) == (
-        "c 3.00 mm, a 1.00 mm"
-    )
+    names, values = ["a", "b", "c"], np.array([1.0, 2, 3])
+    bad = np.array([True, False, True])
+    assert worst_offenders(names, values, "mm", bad) == "c 3.00 mm, a 1.00 mm"
+    assert worst_offenders(names, values, "mm", bad, badness=-values) == "a 1.00 mm, c 3.00 mm"
+    assert each_at_most(name, names, values, 1.5, "mm", "off: ").detail == "off: c 3 mm, b 2 mm"
+    assert each_at_most(name, names, values * np.nan, 9, "mm").passed is False
 
 
 def test_the_proof_shares_no_code_with_what_it_proves() -> None:

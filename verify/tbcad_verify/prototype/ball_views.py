@@ -101,10 +101,9 @@ def checks(names: list[CheckName], context: PrototypeContext, views: BallViews) 
     cells, covers, off_record, light, rays, pixels = names
     ids, target = context.mirror_ids, context.export.target_mm
     hidden, blocked = views.hidden.astype(float), views.blocked.astype(float)
-    worst = np.argsort(views.coverage, kind="stable")
-    short = worst[views.coverage[worst] < target]
+    coverage = views.coverage
     balls, moved = context.prototype.balls, context.prototype.moved
-    minimum = ball_coverage(context, views.coverage)
+    minimum = ball_coverage(context, coverage)
     recorded = balls.coverage_mm if moved else balls.coverage_fixed_mm
     error = np.where(np.isfinite(minimum), np.abs(minimum - recorded), 0)
     k = int(error.argmax())
@@ -112,9 +111,10 @@ def checks(names: list[CheckName], context: PrototypeContext, views: BallViews) 
         at_most(cells, hidden.sum(), 0, f"another mirror covers {_ray_counts(ids, hidden)}"),
         at_least(
             covers,
-            float(views.coverage.min()),
+            float(coverage.min()),
             target,
-            "shows too little: " + worst_offenders(ids, views.coverage, "mm", short),
+            "shows too little: "
+            + worst_offenders(ids, coverage, "mm", coverage < target, badness=-coverage),
         ),
         informative(off_record, float(error[k]), f"ball {k + 1} shows {minimum[k]:.3f}"),
         at_most(
@@ -140,8 +140,7 @@ def ball_coverage(context: PrototypeContext, coverage: Floats) -> Floats:
 
 
 def _ray_counts(ids: list[str], counts: Floats) -> str:
-    worst = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
-    return worst_offenders(ids, counts, "rays", worst, ".0f")
+    return worst_offenders(ids, counts, "rays", counts > 0, ".0f")
 
 
 def _ended_on_balls(transfer: RayTransfer, cells: CellOutlines) -> tuple[CellOutlines, Floats]:

@@ -16,9 +16,9 @@ from tbcad_verify.report.checks import (
     CheckName,
     Unknown,
     at_most,
+    each_at_most,
     guarded_each,
     short_list,
-    worst_offenders,
 )
 from tbcad_verify.types import Floats, Ints
 
@@ -114,13 +114,8 @@ def direction_errors(context: PrototypeContext) -> Floats:
 def _errors(name: CheckName, context: PrototypeContext) -> Check:
     recorded = context.prototype.plan.errors[context.plan_rows]
     error = np.abs(np.degrees(direction_errors(context)) - recorded).max(axis=1)
-    worst = np.argsort(-error, kind="stable")
-    worst = worst[~(error[worst] <= ERROR_DEG)]
-    ids = context.mirror_ids
-    detail = "recorded otherwise than poses make them: " + worst_offenders(
-        ids, error, "deg", worst, ".3g"
-    )
-    return at_most(name, float(error.max()), ERROR_DEG, detail)
+    reason = "recorded otherwise than poses make them: "
+    return each_at_most(name, context.mirror_ids, error, ERROR_DEG, "deg", reason)
 
 
 def _stops(name: CheckName, context: PrototypeContext) -> Check:

@@ -15,9 +15,9 @@ from tbcad_verify.report.checks import (
     Check,
     CheckName,
     at_most,
+    each_at_most,
     guarded_each,
     short_list,
-    worst_offenders,
 )
 from tbcad_verify.types import Bools, Floats
 
@@ -56,17 +56,9 @@ def _off_unit(vectors: Floats) -> float:
 
 def _positions(name: CheckName, context: PrototypeContext) -> Check:
     errors = position_errors(context)
-    worst = np.argsort(-errors, kind="stable")
-    worst = worst[~(errors[worst] <= POSE_MM)]
-    return at_most(
-        name,
-        float(errors.max()),
-        POSE_MM,
-        "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
-        + worst_offenders(
-            context.prototype.balls.names(np.arange(errors.size)), errors, "mm", worst, ".3g"
-        ),
-    )
+    names = context.prototype.balls.names(np.arange(errors.size))
+    reason = "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
+    return each_at_most(name, names, errors, POSE_MM, "mm", reason)
 
 
 def position_errors(context: PrototypeContext) -> Floats:

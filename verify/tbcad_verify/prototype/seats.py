@@ -90,9 +90,8 @@ def checks(
     gap = np.array([seat.clear for seat in seats])
 
     def worst(values: Floats, bad: Bools, unit: str = "mm") -> str:
-        order = np.argsort(-values, kind="stable")
         ids = context.prototype.balls.names(np.arange(values.size))
-        return worst_offenders(ids, values, unit, order[bad[order]], ".3g")
+        return worst_offenders(ids, values, unit, bad, ".3g")
 
     return [
         at_most(

@@ -1,4 +1,4 @@
-"""One line of the proof, and what a whole proof says."""
+"""One line of the verification: a measured figure against its limit."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Bools, Floats
 
 CheckName = tuple[str, str, str]  # of a check: name, file, unit
 T = TypeVar("T")
-NAMED = 5  # how many offenders a line names
+MAX_NAMED = 5  # how many offenders a line names
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing measured.
+    """One figure and its limit.
 
     Attributes:
-        name: what.
-        file: where, inside the export.
-        passed: None is "unknown", and no pass.
-        measured: number, None where there is none.
-        limit: what it was held against; None for figures that inform only.
+        name: what was measured.
+        file: in which file of the export.
+        passed: None is "unknown", which is not a pass.
+        measured: the figure, or None.
+        limit: of the figure; None if it informs only.
         unit: of both.
-        detail: who offends, by how much, or why it is unknown.
+        detail: what exceeds the limit, and by how much; or why it is unknown.
     """
 
     name: str
@@ -42,7 +41,7 @@ class Check:
 
 
 def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
-    """A check that a figure does not exceed its limit; one that is not finite fails.
+    """A check that a figure does not exceed its limit; NaN fails.
 
     Args:
         check: name, file, unit.
@@ -50,21 +49,21 @@ def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -
         limit: largest allowed.
         detail: kept when it fails.
     """
-    return _held(check, measured, limit, measured <= limit, detail)
+    return _limited(check, measured, limit, measured <= limit, detail)
 
 
 def at_least(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
-    """A check that a figure reaches its limit; one that is not finite fails."""
-    return _held(check, measured, limit, measured >= limit, detail)
+    """A check that a figure reaches its limit; NaN fails."""
+    return _limited(check, measured, limit, measured >= limit, detail)
 
 
 def informative(check: CheckName, measured: float, detail: str = "") -> Check:
-    """A figure without a limit: it informs, and passes."""
+    """A figure without a limit: it passes."""
     return Check(check[0], check[1], True, finite(measured), None, check[2], detail)
 
 
 def unknown(check: CheckName, reason: str) -> Check:
-    """What could not be found out."""
+    """A check that could not be made."""
     return Check(check[0], check[1], None, None, None, check[2], reason)
 
 
@@ -79,11 +78,11 @@ def check_names(units: Mapping[str, str], file: str) -> list[CheckName]:
 
 
 class Unknown(Exception):
-    """Something cannot be found out because something before it was not; the message says why."""
+    """A figure cannot be measured, because what it needs is missing; the message says why."""
 
 
 def guarded(checks: Sequence[CheckName], work: Callable[[], Sequence[Check]]) -> list[Check]:
-    """Run one stage; if it breaks, everything it should have measured is unknown."""
+    """The checks that `work` makes; all are unknown if it breaks."""
     try:
         return list(work())
     except Exception as error:
@@ -104,7 +103,7 @@ def guarded_each(
 
 
 def reason_of(error: Exception) -> str:
-    """One line that says what broke."""
+    """One line that names the error."""
     kind = "" if isinstance(error, Unknown) else f"{type(error).__name__}: "
     return f"{kind}{error}".strip(": ").partition("\n")[0]
 
@@ -118,25 +117,50 @@ def worst_offenders(
     names: Sequence[str],
     values: Floats,
     unit: str,
-    worst_first: NDArray[np.intp],
+    bad: Bools,
     form: str = ".2f",
+    badness: Floats | None = None,
 ) -> str:
-    """The worst few by name and figure, and how many more there are."""
-    shown = [f"{names[k]} {values[k]:{form}} {unit}" for k in worst_first[:NAMED].tolist()]
-    return _listed(shown, len(worst_first))
+    """The worst few of what is bad, by name and figure, and how many more there are.
+
+    Args:
+        names: N.
+        values: (N,) figures.
+        unit: of the figures.
+        bad: (N,) true for what is to be named.
+        form: format of a figure.
+        badness: (N,) largest for the worst; None: the values.
+    """
+    order = np.argsort(-(values if badness is None else badness), kind="stable")
+    worst = order[bad[order]]
+    shown = [f"{names[k]} {values[k]:{form}} {unit}" for k in worst[:MAX_NAMED].tolist()]
+    return _listed(shown, worst.size)
+
+
+def each_at_most(
+    check: CheckName,
+    names: Sequence[str],
+    errors: Floats,
+    limit: float,
+    unit: str,
+    reason: str = "",
+) -> Check:
+    """A check that none of (N,) errors exceeds a limit; the detail names the worst."""
+    who = worst_offenders(names, errors, unit, ~(errors <= limit), ".3g")
+    return at_most(check, float(errors.max(initial=0)), limit, reason + who)
 
 
 def short_list(names: Sequence[str]) -> str:
     """The first few names, and how many more there are."""
-    return _listed(list(names[:NAMED]), len(names))
+    return _listed(list(names[:MAX_NAMED]), len(names))
 
 
 def all_passed(checks: Sequence[Check]) -> bool:
-    """True if every check passes; unknown is no pass."""
+    """True if every check passes; unknown is not a pass."""
     return all(check.passed is True for check in checks)
 
 
-def _held(check: CheckName, measured: float, limit: float, good: bool, detail: str) -> Check:
+def _limited(check: CheckName, measured: float, limit: float, good: bool, detail: str) -> Check:
     name, file, unit = check
     return Check(name, file, bool(good), finite(measured), limit, unit, "" if good else detail)
 
@@ -147,7 +171,7 @@ def _listed(shown: list[str], count: int) -> str:
 
 
 def attempt(work: Callable[[], T]) -> tuple[T | None, str]:
-    """What work gives and nothing to say, or nothing and why."""
+    """The value of `work` and "", or None and the reason why it broke."""
     try:
         return work(), ""
     except Exception as error:
@@ -158,7 +182,7 @@ def require(value: T | None, reason: str) -> T:
     """A value that may be missing.
 
     Raises:
-        Unknown: it is, for this reason.
+        Unknown: it is missing, for this reason.
     """
     if value is None:
         raise Unknown(reason)

@@ -1,4 +1,4 @@
-"""What a proof found: as JSON in the export, as a table and one verdict line on screen."""
+"""The result of a verification: JSON in the export, a table and a verdict on screen."""
 
 from __future__ import annotations
 
@@ -17,70 +17,60 @@ from rich.console import Console
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
-from tbcad_verify.report.checks import NAMED, Check, all_passed, finite
+from tbcad_verify.report.checks import MAX_NAMED, Check, all_passed, finite
 from tbcad_verify.report.table import table
 from tbcad_verify.run.results import PER_MIRROR
 from tbcad_verify.types import Floats
 
 DIGITS = 9
 NAME = "verify.json"
+NO_SHELL = "no shell in this export"
 
 
 @dataclass(frozen=True)
-class Findings:
-    """One row a recorded mirror, M of them; NaN is unknown. Halves of one mirror share coverage.
+class MirrorFigures:
+    """What was measured of each recorded mirror, M of them.
 
     Attributes:
         ids: names.
-        virtual: (M,) virtual camera of each mirror.
-        coverage_facet: (M,) mm.
-        coverage_fitted: (M,) mm.
-        centre_error: (M,) mm.
-        radius_error: (M,) mm.
-        pixels: (M,) of the real camera that see the object in this mirror.
+        virtual: (M,) virtual camera of each mirror; halves of one mirror share it.
+        columns: (M,) each, by the name it has in verify.json; NaN is unknown.
     """
 
     ids: tuple[str, ...]
     virtual: NDArray[np.intp]
-    coverage_facet: Floats
-    coverage_fitted: Floats
-    centre_error: Floats
-    radius_error: Floats
-    pixels: Floats
+    columns: Mapping[str, Floats]
 
 
-def findings(mirrors: Mirrors, columns: Mapping[str, Floats]) -> Findings:
-    """Findings from the columns that the stages could make; the others are unknown.
+def mirror_figures(mirrors: Mirrors, columns: Mapping[str, Floats]) -> MirrorFigures:
+    """Figures from the columns that the stages could make; the others are unknown.
 
     Args:
         mirrors: as recorded.
         columns: of `PER_MIRROR`, (M,) each.
     """
     blank = np.full(len(mirrors), np.nan)
-    return Findings(
-        mirrors.ids,
-        virtual_cameras(mirrors).index,
-        *(columns.get(name, blank) for name in PER_MIRROR),
-    )
+    every = {name: columns.get(name, blank) for name in PER_MIRROR}
+    return MirrorFigures(mirrors.ids, virtual_cameras(mirrors).index, every)
 
 
 @dataclass(frozen=True)
 class Report:
-    """The proof of one export.
+    """The verification of one export.
 
     Attributes:
         target_mm: diameter that every virtual camera must see.
         checks: in the order they were made.
-        findings: mirror by mirror.
-        programs: what other programs on this machine said; empty unless they were asked.
-        printing: what making each part on each machine comes to.
-        shell: whether there is a shell; without, the mirrors are only wanted.
-        prototype: what is found of the machine with balls; None where there is none.
+        mirrors: figures of each recorded mirror.
+        programs: answers of other programs on this computer; empty unless they were asked.
+        printing: a row for each part on each printer.
+        shell: whether there is a shell; without one, the mirrors are requirements only.
+        prototype: what is known of each ball and stop; None without a prototype.
     """
 
     target_mm: float
     checks: tuple[Check, ...]
-    findings: Findings
+    mirrors: MirrorFigures
     programs: tuple[Check, ...] = ()
     printing: tuple[dict[str, Any], ...] = ()
     shell: bool = True
@@ -97,20 +87,20 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """One line: PASS or FAIL, and what decides it."""
+        """One line: PASS or FAIL, and the figures that decide it."""
         return _pass_line(self) if self.passed else _fail_line(self)
 
     def to_json(self) -> str:
         """The text of verify.json.
 
-        The same for the same export, but for what other programs said, if they were asked.
+        The same export gives the same text, but for the answers of other programs.
         """
         document = {
             "pass": self.passed,
             "target_mm": self.target_mm,
             "checks": [_check_row(check) for check in self.checks],
             "printing": list(self.printing),
-            "mirrors": _mirror_rows(self.findings),
+            "mirrors": _mirror_rows(self.mirrors),
         }
         if self.prototype is not None:
             document["prototype"] = self.prototype
@@ -148,26 +138,19 @@ def _check_row(check: Check) -> dict[str, Any]:
         "limit": check.limit,
         "unit": check.unit,
     }
-    return row | {"detail": check.detail} if check.detail and not _held(check) else row
+    return row | {"detail": check.detail} if check.detail and not _needs_no_detail(check) else row
 
 
-def _held(check: Check) -> bool:
+def _needs_no_detail(check: Check) -> bool:
     """Whether a check passed against a limit, and so needs no words."""
     return check.passed is True and check.limit is not None
 
 
-def _mirror_rows(found: Findings) -> list[dict[str, Any]]:
-    values = (
-        found.coverage_facet,
-        found.coverage_fitted,
-        found.centre_error,
-        found.radius_error,
-        found.pixels,
-    )
-    columns = dict(zip(PER_MIRROR, values, strict=True))
-    order = sorted(range(len(found.ids)), key=found.ids.__getitem__)
+def _mirror_rows(mirrors: MirrorFigures) -> list[dict[str, Any]]:
+    order = sorted(range(len(mirrors.ids)), key=mirrors.ids.__getitem__)
     return [
-        {"id": found.ids[k]} | {key: _rounded(finite(column[k])) for key, column in columns.items()}
+        {"id": mirrors.ids[k]}
+        | {name: _rounded(finite(column[k])) for name, column in mirrors.columns.items()}
         for k in order
     ]
 
@@ -179,65 +162,63 @@ def _rounded(value: float | None) -> float | int | None:
 
 
 def _pass_line(report: Report) -> str:
-    left = sum(map(is_skipped, report.programs))
-    skipped = f"; {left} questions to other programs skipped" if left else ""
-    said = [_shell_line(report)] if report.shell else ["no shell in this export"]
-    said += [_machine_line(report)] if report.prototype is not None else []
-    return f"PASS: {'; '.join(said)}{skipped}"
+    skipped = sum(map(is_skipped, report.programs))
+    parts = [_shell_line(report)] if report.shell else [NO_SHELL]
+    if report.prototype is not None:
+        parts.append(_prototype_line(report.target_mm, report.prototype))
+    if skipped:
+        parts.append(f"{skipped} questions to other programs skipped")
+    return f"PASS: {'; '.join(parts)}"
 
 
 def _shell_line(report: Report) -> str:
-    found = report.findings
+    mirrors, columns = report.mirrors, report.mirrors.columns
     return (
-        f"{len(found.ids)} mirrors, {_cameras(found)} virtual cameras see "
-        f"{report.target_mm:g} mm or more (facets {np.min(found.coverage_facet):.2f}, spheres "
-        f"{np.min(found.coverage_fitted):.2f}); nothing blocked; centres within "
-        f"{np.max(found.centre_error) * 1e3:.2f} and radii within "
-        f"{np.max(found.radius_error) * 1e3:.2f} micrometres of the record"
+        f"{len(mirrors.ids)} mirrors, {_virtual_cameras(mirrors)} virtual cameras see "
+        f"{report.target_mm:g} mm or more (facets {np.min(columns['coverage_facet_mm']):.2f}, "
+        f"spheres {np.min(columns['coverage_fitted_mm']):.2f}); nothing blocked; centres within "
+        f"{np.max(columns['centre_error_mm']) * 1e3:.2f} and radii within "
+        f"{np.max(columns['radius_error_mm']) * 1e3:.2f} micrometres of the record"
     )
 
 
-def _machine_line(report: Report) -> str:
-    made = report.prototype or {}
-    balls, stops = made["balls"], made["stops"]
-    least = min(ball["coverage_mm"] for ball in balls)
+def _prototype_line(target_mm: float, prototype: Mapping[str, Any]) -> str:
+    balls, stops = prototype["balls"], prototype["stops"]
+    minimum = min(ball["coverage_mm"] for ball in balls)
     worst = max(ball["centre_error_um"] for ball in balls)
     return (
-        f"prototype: {len(balls)} balls at {len(stops)} stops show {report.target_mm:g} mm or "
-        f"more for every mirror ({least:.2f}); nothing blocked; pads hold the balls within "
+        f"prototype: {len(balls)} balls at {len(stops)} stops show {target_mm:g} mm or "
+        f"more for every mirror ({minimum:.2f}); nothing blocked; pads hold the balls within "
         f"{worst:.2f} micrometres of the record"
     )
 
 
 def _fail_line(report: Report) -> str:
-    wrong = [check.name for check in (*report.checks, *report.programs) if check.passed is False]
-    unsure = [check.name for check in (*report.checks, *report.programs) if check.passed is None]
-    said = [
-        f"{word}: {', '.join(dict.fromkeys(names))}"
-        for word, names in (("failed", wrong), ("unknown", unsure))
-        if names
-    ]
-    said = said if report.shell else ["no shell in this export", *said]
-    return f"FAIL: {'; '.join([*_short_mirrors(report), *said])}"
+    parts = [] if report.shell else [NO_SHELL]
+    for word, verdict in (("failed", False), ("unknown", None)):
+        checks = (*report.checks, *report.programs)
+        names = dict.fromkeys(check.name for check in checks if check.passed is verdict)
+        parts += [f"{word}: {', '.join(names)}"] if names else []
+    return f"FAIL: {'; '.join([*_short_of_target(report), *parts])}"
 
 
-def _short_mirrors(report: Report) -> list[str]:
-    found = report.findings
-    least = np.fmin(found.coverage_facet, found.coverage_fitted)
-    _, first = np.unique(found.virtual, return_index=True)  # a halved mirror is named once
-    short = first[least[first] < report.target_mm]
+def _short_of_target(report: Report) -> list[str]:
+    """How many virtual cameras see too little, and the worst of them."""
+    mirrors, target = report.mirrors, report.target_mm
+    coverage = np.fmin(mirrors.columns["coverage_facet_mm"], mirrors.columns["coverage_fitted_mm"])
+    _, first = np.unique(mirrors.virtual, return_index=True)  # a halved mirror is named once
+    short = first[coverage[first] < target]
     if not short.size:
         return []
-    worst = short[np.argsort(least[short], kind="stable")]
-    named = [
-        f"{found.ids[k]} sees {least[k]:.2f} mm, {report.target_mm - least[k]:.2f} short"
-        for k in worst[:NAMED].tolist()
-    ]
+    worst = short[np.argsort(coverage[short], kind="stable")][:MAX_NAMED].tolist()
     return [
-        f"{short.size} of {_cameras(found)} virtual cameras fall short of {report.target_mm:g} mm",
-        *named,
+        f"{short.size} of {_virtual_cameras(mirrors)} virtual cameras fall short of {target:g} mm",
+        *(
+            f"{mirrors.ids[k]} sees {coverage[k]:.2f} mm, {target - coverage[k]:.2f} short"
+            for k in worst
+        ),
     ]
 
 
-def _cameras(found: Findings) -> int:
-    return np.unique(found.virtual).size
+def _virtual_cameras(mirrors: MirrorFigures) -> int:
+    return np.unique(mirrors.virtual).size

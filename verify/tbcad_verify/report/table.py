@@ -12,8 +12,8 @@ from tbcad_verify.report.checks import Check
 
 
 def table(checks: Sequence[Check]) -> Table:
-    """One row a check; files of which the same is true share one."""
-    made = Table(title=None, box=None, pad_edge=False)
+    """One row for each check; files with the same result share one."""
+    rows = Table(title=None, box=None, pad_edge=False)
     for name, side in (
         ("check", "left"),
         ("file", "left"),
@@ -23,32 +23,32 @@ def table(checks: Sequence[Check]) -> Table:
         ("unit", "left"),
         ("", "left"),
     ):
-        made.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
-    for alike in _alike(checks):
-        first = alike[0]
-        made.add_row(
+        rows.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
+    for group in _groups(checks):
+        first = group[0]
+        rows.add_row(
             first.name,
-            escape(first.file) if len(alike) == 1 else f"{len(alike)} files",
+            escape(first.file) if len(group) == 1 else f"{len(group)} files",
             _mark(first),
-            _span([check.measured for check in alike]),
-            _span([check.limit for check in alike]),
+            _span([check.measured for check in group]),
+            _span([check.limit for check in group]),
             first.unit,
             escape(first.detail),
         )
-    return made
+    return rows
 
 
-def _alike(checks: Sequence[Check]) -> list[list[Check]]:
-    """Checks that say the same of several files and pass, in one row; all others alone."""
+def _groups(checks: Sequence[Check]) -> list[list[Check]]:
+    """Checks that pass with the same detail for several files together; all others alone."""
     groups: dict[tuple[object, ...], list[Check]] = {}
     for k, check in enumerate(checks):
-        said = (check.name, check.unit, check.limit is None, check.detail)
-        groups.setdefault(said if check.passed else (k,), []).append(check)
+        key = (check.name, check.unit, check.limit is None, check.detail)
+        groups.setdefault(key if check.passed else (k,), []).append(check)
     return list(groups.values())
 
 
 def _span(values: Sequence[float | None]) -> str:
-    """A figure, or the least and the greatest."""
+    """A figure, or the smallest and the largest."""
     figures = [_figure(value) for value in sorted(value for value in values if value is not None)]
     return " ... ".join(dict.fromkeys([*figures[:1], *figures[-1:]]))
 

@@ -15,7 +15,7 @@ from tbcad_verify.record.export import TEXTS, Export, Part, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.prototype import Printed
 from tbcad_verify.report.checks import Check, Unknown, short_list
-from tbcad_verify.report.report import Report, findings
+from tbcad_verify.report.report import Report, mirror_figures
 from tbcad_verify.run.results import CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
@@ -80,7 +80,7 @@ def verify(
     report = Report(
         export.target_mm,
         tuple(results.checks),
-        findings(export.mirrors, results.mirrors),
+        mirror_figures(export.mirrors, results.mirrors),
         tuple(programs),
         tuple(results.printing),
         shell=bool(export.parts),

@@ -88,13 +88,13 @@ def measure(setup: OpticalSetup) -> Coverage:
 def checks(setup: OpticalSetup, found: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
     facets, spheres, seen, gap, off = ((name, files, unit) for name, unit in CHECKS.items())
-    worst = np.argsort(-found.hidden, kind="stable")[: np.count_nonzero(found.hidden)]
-    who = worst_offenders(setup.export.mirrors.ids, found.hidden, "points", worst, ".0f")
+    ids, hidden = setup.export.mirrors.ids, found.hidden
+    who = worst_offenders(ids, hidden, "points", hidden > 0, ".0f")
     widest = setup.virtual_ids[int(np.argmax(found.gap))]
     return [
         _covers(setup, facets, found.facet),
         _covers(setup, spheres, found.fitted),
-        at_most(seen, int(found.hidden.sum()), 0, f"{who}; behind {short_list(found.blockers)}"),
+        at_most(seen, int(hidden.sum()), 0, f"{who}; behind {short_list(found.blockers)}"),
         informative(gap, float(found.gap.max()), f"widest at {widest}"),
         informative(off, _off_the_record(setup, found)),
     ]
@@ -123,9 +123,9 @@ def _diameters(
 def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
     target, lost = setup.export.target_mm, np.isnan(diameter)
     known = np.where(lost, np.inf, diameter)
-    worst = np.argsort(known, kind="stable")
-    worst = worst[known[worst] < target]
-    said = ["sees too little: " + worst_offenders(setup.virtual_ids, diameter, "mm", worst)]
+    ids = setup.virtual_ids
+    short = worst_offenders(ids, diameter, "mm", known < target, badness=-known)
+    said = [f"sees too little: {short}"]
     unseen = [setup.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
     said += [f"unknown, for want of a mirror: {short_list(unseen)}"] if unseen else []
     measured = -np.inf if lost.all() else float(known.min())

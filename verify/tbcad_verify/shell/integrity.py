@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
-import numpy as np
-
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mesh import Topology
 from tbcad_verify.record.export import Export
@@ -28,13 +26,12 @@ from tbcad_verify.report.checks import (
     at_least,
     at_most,
     check_names,
+    each_at_most,
     guarded_each,
     informative,
     short_list,
-    worst_offenders,
 )
 from tbcad_verify.report.report import NAME
-from tbcad_verify.types import Floats
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
@@ -89,8 +86,7 @@ RECORD = (
 
 def record_checks(export: Export) -> list[Check]:
     """Record and spec agree, and mirrors are where DESIGN.md section 2 puts them."""
-    work = (_requirements, _ids, _poses, _figures, _directions)
-    return guarded_each(RECORD, work, export)
+    return guarded_each(RECORD, (_requirements, _ids, _poses, _figures, _directions), export)
 
 
 def mesh_checks(file: str, topology: Topology) -> list[Check]:
@@ -152,29 +148,13 @@ def _ids(name: CheckName, export: Export) -> Check:
 
 
 def _poses(name: CheckName, export: Export) -> Check:
-    return _within(
-        name,
-        export,
-        pose_errors(export),
-        "off the ellipsoid, not bisecting, or centre off the normal: ",
-    )
+    reason = "off the ellipsoid, not bisecting, or centre off the normal: "
+    return each_at_most(name, export.mirrors.ids, pose_errors(export), POSE_MM, "mm", reason)
 
 
 def _figures(name: CheckName, export: Export) -> Check:
-    return _within(
-        name,
-        export,
-        figure_errors(export),
-        "polar angle, azimuth, theta_0, half width or theta_1 is another: ",
-    )
-
-
-def _within(name: CheckName, export: Export, errors: Floats, reason: str) -> Check:
-    """Errors of the mirrors, mm, against the limit for poses."""
-    worst = np.argsort(-errors, kind="stable")
-    worst = worst[errors[worst] > POSE_MM]
-    detail = reason + worst_offenders(export.mirrors.ids, errors, "mm", worst, ".3g")
-    return at_most(name, float(errors.max()), POSE_MM, detail)
+    reason = "polar angle, azimuth, theta_0, half width or theta_1 is another: "
+    return each_at_most(name, export.mirrors.ids, figure_errors(export), POSE_MM, "mm", reason)
 
 
 def _directions(name: CheckName, export: Export) -> Check:

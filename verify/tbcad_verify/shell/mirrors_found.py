@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.report.checks import Check, CheckName, at_most, short_list, worst_offenders
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_most,
+    check_names,
+    each_at_most,
+    short_list,
+    worst_offenders,
+)
 from tbcad_verify.shell.match import nearest_mirrors
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import FORM_MM
 from tbcad_verify.types import Floats
 
 POSITION_MM = 5e-3
+MAX_EXCHANGED = 100  # mirrors for which the record is searched
 CHECKS = {
     "mirrors found": "missing or extra",
     "form error": "mm",
@@ -23,21 +34,21 @@ CHECKS = {
 
 
 def checks(setup: OpticalSetup, files: str) -> list[Check]:
-    """Compare what was recovered with the record."""
-    found, form, centre, radius, surface = ((name, files, unit) for name, unit in CHECKS.items())
+    """The recovered mirrors against the record."""
+    found, form, centre, radius, surface = check_names(CHECKS, files)
     match, ids = setup.match, setup.export.mirrors.ids
-    lost = [ids[k] for k in np.flatnonzero(match.segment < 0).tolist()]
-    shape = _forms(setup)
-    rough = np.argsort(-shape, kind="stable")
-    rough = rough[shape[rough] > FORM_MM]
+    missing = [ids[k] for k in np.flatnonzero(match.segment < 0).tolist()]
+    number = len(missing) + match.extra.size
+    # Of a nearly flat mirror, float32 leaves the centre in doubt, though not the surface.
+    sphere_limit = np.maximum(POSITION_MM, match.blur)
+    surface_limit = np.full(len(ids), POSITION_MM)
+    hint = _exchanged(setup) + _scale(setup)
     return [
-        at_most(found, len(lost) + match.extra.size, 0, _who(setup, lost)),
-        at_most(
-            form, float(shape.max()), FORM_MM, worst_offenders(ids, shape, "mm RMS", rough, ".4f")
-        ),
-        _errors(setup, centre, match.centre_error, _swaps(setup) + _scale(setup)),
-        _errors(setup, radius, match.radius_error, ""),
-        _worst(setup, surface, match.surface_error, np.full(len(ids), POSITION_MM), ""),
+        at_most(found, number, 0, _missing_and_extra(setup, missing) + _scale(setup)),
+        each_at_most(form, ids, _form_errors(setup), FORM_MM, "mm RMS"),
+        _within_limits(centre, ids, match.centre_error, sphere_limit, hint),
+        _within_limits(radius, ids, match.radius_error, sphere_limit),
+        _within_limits(surface, ids, match.surface_error, surface_limit),
     ]
 
 
@@ -49,58 +60,54 @@ def columns(setup: OpticalSetup) -> dict[str, Floats]:
     }
 
 
-def _forms(setup: OpticalSetup) -> Floats:
+def _form_errors(setup: OpticalSetup) -> Floats:
     """(M,) form error of each mirror's patch, mm; of the nearest patch for missing mirrors."""
     fits, segment = setup.recovery.fits, setup.match.segment.copy()
-    lost = np.flatnonzero(segment < 0)
-    if lost.size:
-        apex = setup.export.mirrors.columns("px", 3)[:, lost]
-        segment[lost] = cKDTree(fits.middle.T).query(apex.T)[1]
+    missing = np.flatnonzero(segment < 0)
+    if missing.size:
+        apex = setup.export.mirrors.columns("px", 3)[:, missing]
+        segment[missing] = cKDTree(fits.middle.T).query(apex.T)[1]
     return fits.form[segment]
 
 
-def _who(setup: OpticalSetup, lost: list[str]) -> str:
-    extra, ids = setup.match.extra, setup.export.mirrors.ids
-    near = nearest_mirrors(setup.export.mirrors, setup.recovery.fits.middle[:, extra])
-    said = [f"missing: {short_list(lost)}"] if lost else []
+def _missing_and_extra(setup: OpticalSetup, missing: list[str]) -> str:
+    extra, mirrors = setup.match.extra, setup.export.mirrors
+    parts = [f"missing: {short_list(missing)}"] if missing else []
     if extra.size:
-        said.append(f"{extra.size} not in the record, near {short_list([ids[k] for k in near])}")
-    return "; ".join(said) + _scale(setup)
+        near = nearest_mirrors(mirrors, setup.recovery.fits.middle[:, extra])
+        names = short_list([mirrors.ids[k] for k in near])
+        parts.append(f"{extra.size} not in the record, near {names}")
+    return "; ".join(parts)
 
 
-def _errors(setup: OpticalSetup, name: CheckName, errors: Floats, more: str) -> Check:
-    # Of a nearly flat mirror, float32 leaves the centre in doubt, though not the surface.
-    return _worst(setup, name, errors, np.maximum(POSITION_MM, setup.match.blur), more)
-
-
-def _worst(
-    setup: OpticalSetup, name: CheckName, errors: Floats, limits: Floats, more: str
+def _within_limits(
+    name: CheckName, ids: Sequence[str], errors: Floats, limits: Floats, hint: str = ""
 ) -> Check:
-    """Hold every mirror to its own limit, and show the one that uses most of it."""
-    with np.errstate(invalid="ignore"):  # infinitely wrong, of something infinitely in doubt
-        used = np.nan_to_num(errors / limits, nan=-1.0, posinf=1e300)
-    order = np.argsort(-used, kind="stable")
-    over = order[used[order] > 1]
-    if used[order[0]] < 0:
+    """Every mirror against a limit of its own; the figure is that of the worst."""
+    with np.errstate(invalid="ignore"):  # infinite errors of what is infinitely in doubt
+        share = np.nan_to_num(errors / limits, nan=-1.0, posinf=1e300)
+    worst = int(share.argmax())
+    if share[worst] < 0:
         return at_most(name, np.nan, POSITION_MM, "no mirror found")
-    who = worst_offenders(setup.export.mirrors.ids, errors, "mm", over, ".4f")
-    return at_most(name, float(errors[order[0]]), float(limits[order[0]]), who + more)
+    who = worst_offenders(ids, errors, "mm", share > 1, ".4f", share)
+    return at_most(name, float(errors[worst]), float(limits[worst]), who + hint)
 
 
-def _swaps(setup: OpticalSetup) -> str:
-    """Mirrors whose recovered centre is the recorded one of another."""
+def _exchanged(setup: OpticalSetup) -> str:
+    """Mirrors whose recovered centre is the recorded centre of another."""
     match, mirrors = setup.match, setup.export.mirrors
-    moved = np.flatnonzero(match.centre_error > POSITION_MM)[:100]
-    recorded = mirrors.columns("cx", 3)
-    centre = setup.mirrors.take(moved).centre()
-    far = [np.nan_to_num(np.linalg.norm(recorded.T - c, axis=1), nan=np.inf) for c in centre.T]
+    moved = np.flatnonzero(match.centre_error > POSITION_MM)[:MAX_EXCHANGED]
+    centres = setup.mirrors.take(moved).centre()
+    known = np.isfinite(centres).all(axis=0)
+    spheres = np.flatnonzero(~mirrors.flat)
+    recorded = cKDTree(mirrors.columns("cx", 3)[:, spheres].T)
+    distance, other = (np.atleast_1d(x) for x in recorded.query(centres[:, known].T))
     pairs = [
-        (k, int(np.argmin(d)))
-        for k, d in zip(moved.tolist(), far, strict=True)
-        if d.min() <= POSITION_MM
+        f"{mirrors.ids[k]} has the place of {mirrors.ids[spheres[j]]}"
+        for k, j, d in zip(moved[known], other, distance, strict=True)
+        if d <= POSITION_MM
     ]
-    said = [f"{mirrors.ids[k]} has the place of {mirrors.ids[other]}" for k, other in pairs]
-    return f"; {short_list(said)}" if said else ""
+    return f"; {short_list(pairs)}" if pairs else ""
 
 
 def _scale(setup: OpticalSetup) -> str:

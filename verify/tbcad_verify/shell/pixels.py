@@ -86,8 +86,7 @@ def _reach(setup: OpticalSetup, seen: Coverage | None) -> Floats:
 
 def _path(setup: OpticalSetup, name: CheckName, tally: light.PixelTally) -> Check:
     blocked = tally.blocked.astype(np.float64)
-    worst = np.argsort(-blocked, kind="stable")[: np.count_nonzero(blocked)]
-    who = worst_offenders(setup.export.mirrors.ids, blocked, "px", worst, ".0f")
+    who = worst_offenders(setup.export.mirrors.ids, blocked, "px", blocked > 0, ".0f")
     by = short_list(setup.names(tally.blockers))
     return at_most(name, int(blocked.sum()), 0, f"{who}; blocked by {by}")
 

@@ -19,9 +19,9 @@ from tbcad_verify.report.checks import (
     Check,
     CheckName,
     at_most,
+    each_at_most,
     guarded,
     short_list,
-    worst_offenders,
 )
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
@@ -199,10 +199,7 @@ def _of(shell: ShellComparison, column: NDArray[Any]) -> NDArray[Any]:
 def _worst_of(name: CheckName, ids: Sequence[str], error: Floats, limit: float, unit: str) -> Check:
     """The worst mirror; one without a face counts as infinitely wrong."""
     error = np.where(np.isnan(error), np.inf, error)
-    order = np.argsort(-error, kind="stable")
-    order = order[error[order] > limit]
-    detail = worst_offenders(ids, error, unit, order, ".3g")
-    return at_most(name, float(error.max(initial=0)), limit, detail)
+    return each_at_most(name, ids, error, limit, unit)
 
 
 CHECKS: Checks = {
