@@ -50,11 +50,11 @@ def read_step(path: Path) -> StepContent:
 
 
 def count(shape: TopoDS_Shape, kind: object) -> int:
-    explorer, found = TopExp_Explorer(shape, kind), 0
+    explorer, total = TopExp_Explorer(shape, kind), 0
     while explorer.More():
-        found += 1
+        total += 1
         explorer.Next()
-    return found
+    return total
 
 
 def volume(shape: TopoDS_Shape) -> float:

@@ -26,16 +26,16 @@ def dotted(table: dict[str, object], prefix: str = "") -> set[str]:
 
 def comments(text: str) -> dict[str, str]:
     """The comment block that each dotted key of a design stands under."""
-    found, section, block, before = {}, "", "", ""
+    comments_by_key, section, block, before = {}, "", "", ""
     for line in text.splitlines():
         if line.startswith("#"):
             block = (block if before.startswith("#") else "") + line[1:]
         elif match := re.fullmatch(r"\[(.+)\]", line):
             section, block = match[1] + ".", ""
         elif match := re.match(r"(\w+) = ", line):
-            found[section + match[1]] = block
+            comments_by_key[section + match[1]] = block
         before = line
-    return found
+    return comments_by_key
 
 
 def test_the_papers_design_is_the_default() -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from tbcad.geometry.conics import Spheroid, enclosing_offset, wall_offset
 from tbcad.geometry.ellipsoid import Ellipsoid
@@ -11,7 +12,7 @@ ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)
 
 
 def on_spheroid(spheroid: Spheroid, points: np.ndarray) -> np.ndarray:
-    """Zero on the spheroid: sum of the distances to its own foci less its length."""
+    """Zero on the spheroid: sum of the distances to its foci less its length."""
     major, minor = spheroid.semi_axes
     focus = np.sqrt(major**2 - minor**2) * spheroid.ellipsoid.axis
     total = norm(points - spheroid.centre - focus) + norm(points - spheroid.centre + focus)
@@ -55,15 +56,12 @@ def test_wall_between_spheroids(wall: float, inner: float) -> None:
         Spheroid(ELLIPSOID, offset).from_sphere @ unit(rng.normal(size=(4000, 3))).T
         for offset in (inner, outer)
     )
-    from scipy.spatial import cKDTree
-
-    least = cKDTree(b.T).query(a.T)[0].min()
-    assert least >= wall - 1e-9
+    assert cKDTree(b.T).query(a.T)[0].min() >= wall - 1e-9
     # and no thicker than the elongation of the ellipsoid makes it anyway
     assert outer - inner <= 1.1 * wall
 
 
-def test_least_spheroid_that_holds_points() -> None:
+def test_smallest_spheroid_that_encloses_points() -> None:
     spheroid = Spheroid(ELLIPSOID, 7.5)
     rng = np.random.default_rng(2)
     points = spheroid.centre + unit(rng.normal(size=(50, 3))) @ spheroid.from_sphere

@@ -10,17 +10,12 @@ def at(along: float, out: float) -> np.ndarray:
     return np.array([[along, out]])
 
 
-def test_two_balls_of_one_height_touch_at_the_chord() -> None:
-    """Closed form: 2 * 80 * sin(angle / 2) = 15 + 9."""
-    balls = spheres(at(-20, 80), np.array([15.0]))
-    found = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
-    assert found == pytest.approx(2 * np.arcsin(24 / 160), rel=1e-12)
-
-
-def test_margin_is_added_to_the_radii() -> None:
-    balls = spheres(at(-20, 80), np.array([15.0])).grown(4)
-    found = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
-    assert found == pytest.approx(2 * np.arcsin(28 / 160), rel=1e-12)
+@pytest.mark.parametrize("margin", [0.0, 4.0])
+def test_two_balls_of_one_height_touch_at_the_chord(margin: float) -> None:
+    """Closed form: 2 * 80 * sin(angle / 2) = 15 + 9 and the margin."""
+    balls = spheres(at(-20, 80), np.array([15.0])).grown(margin)
+    angle = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
+    assert angle == pytest.approx(2 * np.arcsin((24 + margin) / 160), rel=1e-12)
 
 
 def test_balls_far_apart_along_the_axis_never_meet() -> None:
@@ -40,10 +35,10 @@ def test_rod_on_the_axis_is_met_between_its_ends() -> None:
 
 
 def test_capsule_across_the_orbit_is_met_at_the_tangent() -> None:
-    """A ray out from the axis at the ball's height: sin(angle) * out = radii."""
+    """A ray out from the axis at the ball's height: sin(angle) * out = sum of radii."""
     cone = RoundCones(at(0, 0), at(0, 1000), np.array([3.0]), np.array([3.0]))
-    found = contact_angle(at(0, 100), np.array([7.0]), cone)[0, 0]
-    assert found == pytest.approx(np.arcsin(10 / 100), rel=1e-9)
+    angle = contact_angle(at(0, 100), np.array([7.0]), cone)[0, 0]
+    assert angle == pytest.approx(np.arcsin(10 / 100), rel=1e-9)
 
 
 LENGTHS = st.floats(-100, 100)
@@ -60,12 +55,12 @@ def test_against_many_spheres(
     """The hull as a row of 1001 spheres, the ball at 361 angles."""
     ends = (np.array([point[:2]]) for point in (start, end))
     cone = RoundCones(*ends, np.array([start[2]]), np.array([end[2]]))
-    height, way, size = ball
-    found = contact_angle(at(height, way), np.array([size]), cone)[0, 0]
+    height, distance, size = ball
+    angle = contact_angle(at(height, distance), np.array([size]), cone)[0, 0]
     share = np.linspace(0, 1, 1001)[:, None]
     along, out, radius = (p + share * (q - p) for p, q in zip(start, end, strict=True))
-    turn = np.linspace(0, np.pi, 361)
-    away = (along - height) ** 2 + out**2 + way**2 - 2 * out * way * np.cos(turn)
-    gap = (np.sqrt(np.maximum(away, 0)) - radius - size).min(axis=0)
-    assert (gap[turn < found - 1e-6] < 2e-2).all()
-    assert (gap[turn > found + 1e-6] > -1e-6).all()
+    rotation = np.linspace(0, np.pi, 361)
+    squared = (along - height) ** 2 + out**2 + distance**2 - 2 * out * distance * np.cos(rotation)
+    gap = (np.sqrt(np.maximum(squared, 0)) - radius - size).min(axis=0)
+    assert (gap[rotation < angle - 1e-6] < 2e-2).all()
+    assert (gap[rotation > angle + 1e-6] > -1e-6).all()

@@ -5,26 +5,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import MirrorArray, design, numbered_directions
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 
 
-def half_of(*settings: str) -> MirrorArray:
+def mirrors_of(*settings: str) -> MirrorArray:
     return design(load_spec(None, settings)).halves[0]
 
 
 def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
-    """The half, or what the refusal says."""
+    """Camera a's mirrors, or the message of the error."""
     try:
-        return half_of(*settings), ""
+        return mirrors_of(*settings), ""
     except SpecError as error:
         return None, str(error)
 
 
 @pytest.mark.parametrize("n", [*range(1, 13), 17, 24, 36])
 def test_traced_mirrors_all_see_the_target(n: int) -> None:
-    half = half_of(f"n={n}")
+    half = mirrors_of(f"n={n}")
     curved = half.mirrors.radius < 29.9999 * half.half_width
     assert half.coverage.min() > 60.6 - 0.01
     assert half.coverage[curved].max(initial=0) < 60.6 + 0.01
@@ -34,24 +34,24 @@ def test_traced_mirrors_all_see_the_target(n: int) -> None:
 
 def test_mirrors_that_see_enough_are_nearly_flat() -> None:
     """n = 4 and below: the radius stops at a stated multiple of the half width."""
-    half = half_of("n=4")
+    half = mirrors_of("n=4")
     nearly_flat = np.isclose(half.mirrors.radius, 30 * half.half_width)
     assert nearly_flat.sum() > 5
     assert (half.coverage[nearly_flat] >= 60.6 - 0.01).all()
 
 
 def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
-    half = half_of("n=4", "radius_rule=paper")
+    half = mirrors_of("n=4", "radius_rule=paper")
     assert (half.mirrors.radius > 0).all()
     assert half.mirrors.radius.max() == pytest.approx((30 * half.half_width).max(), rel=0.5)
 
 
 def test_margin_is_added_to_the_target() -> None:
-    assert half_of("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
+    assert mirrors_of("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
 
 
 def test_coat_is_an_offset_of_the_radius() -> None:
-    bare, coated = half_of("n=8"), half_of("n=8", "coating_um=40")
+    bare, coated = mirrors_of("n=8"), mirrors_of("n=8", "coating_um=40")
     assert coated.mirrors.radius == pytest.approx(bare.mirrors.radius, rel=1e-12)
     m = len(coated)
     body = coated.modelled_cells.surfaces
@@ -61,7 +61,7 @@ def test_coat_is_an_offset_of_the_radius() -> None:
 
 def test_coat_thicker_than_a_mirror_is_refused() -> None:
     with pytest.raises(SpecError, match="coating_um"):
-        half_of(
+        mirrors_of(
             "n=18",
             "coating_um=500",
             "optics.camera_mm=[5,0,-5]",
@@ -70,8 +70,8 @@ def test_coat_thicker_than_a_mirror_is_refused() -> None:
         )
 
 
-def test_other_half_is_the_mirror_image(small_design: object) -> None:
-    a, b = small_design.halves  # type: ignore[attr-defined]
+def test_other_half_is_the_mirror_image(small_design: MirrorDesign) -> None:
+    a, b = small_design.halves
     flip = [-1, 1, 1]
     assert np.array_equal(a.u * flip, b.u)
     assert np.array_equal(a.mirrors.centre * flip, b.mirrors.centre)
@@ -84,17 +84,16 @@ def test_other_half_is_the_mirror_image(small_design: object) -> None:
 
 def test_numbers_run_from_the_zenith_down() -> None:
     every, faces = numbered_directions(6)
-    mine = every[(every[:, 0] >= 0) & (every[:, 2] >= 0)]
-    assert mine[0] == pytest.approx([0, 0, 1])
-    assert (np.diff(mine[:, 2]) < 1e-8).all()
-    triple = np.linalg.det(every[faces])
-    assert triple.min() > 0
+    half_a = every[(every[:, 0] >= 0) & (every[:, 2] >= 0)]
+    assert half_a[0] == pytest.approx([0, 0, 1])
+    assert (np.diff(half_a[:, 2]) < 1e-8).all()
+    assert np.linalg.det(every[faces]).min() > 0
 
 
 def test_hopeless_targets_name_the_mirrors() -> None:
     """So long an ellipsoid leaves its outer spheres no radius at which they still meet."""
     with pytest.raises(SpecError, match=r"a\d{4} \(\d+\.\d+ mm\)") as caught:
-        half_of("n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+        mirrors_of("n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
     assert "\n" not in str(caught.value)
     assert "change optics.n" in str(caught.value)
 
@@ -117,10 +116,10 @@ def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
         f"semi_minor_mm={b}",
         f"capture_diameter_mm={capture}",
     ]
-    half, told = attempt(*options)
+    half, message = attempt(*options)
     if half is None:
-        assert "\n" not in told
-        assert re.search("change|make|bring", told)
+        assert "\n" not in message
+        assert re.search("change|make|bring", message)
         return
     assert half.coverage.min() > capture + 0.6 - 0.01
     assert (half.area > 0).all()

@@ -12,15 +12,15 @@ CAPTURE = 30.0
 
 
 @pytest.fixture(scope="module")
-def some(paper_half: MirrorArray) -> np.ndarray:
+def sampled(paper_half: MirrorArray) -> np.ndarray:
     return np.arange(0, len(paper_half), 60)
 
 
 @pytest.fixture(scope="module")
-def outline(paper_half: MirrorArray, some: np.ndarray) -> np.ndarray:
-    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
+def outline(paper_half: MirrorArray, sampled: np.ndarray) -> np.ndarray:
+    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[sampled])
     pinhole = norm(paper_half.camera.pinhole)
-    return ball_light.used_outlines(at, paper_half.mirrors.radius[some], pinhole, CAPTURE)
+    return ball_light.used_outlines(at, paper_half.mirrors.radius[sampled], pinhole, CAPTURE)
 
 
 def test_poses_turned_are_the_mirrors(paper_half: MirrorArray) -> None:
@@ -32,24 +32,24 @@ def test_poses_turned_are_the_mirrors(paper_half: MirrorArray) -> None:
 
 
 def test_rays_off_the_outline_touch_the_capture_sphere(
-    paper_half: MirrorArray, some: np.ndarray, outline: np.ndarray
+    paper_half: MirrorArray, sampled: np.ndarray, outline: np.ndarray
 ) -> None:
-    mirrors, azimuth = paper_half.mirrors, paper_half.azimuth[some]
+    mirrors, azimuth = paper_half.mirrors, paper_half.azimuth[sampled]
     point = rotated_about_x(outline, azimuth[:, None]) @ paper_half.ellipsoid.frame()
-    centre, radius = mirrors.centre[some][:, None], mirrors.radius[some][:, None]
+    centre, radius = mirrors.centre[sampled][:, None], mirrors.radius[sampled][:, None]
     assert norm(point - centre) == pytest.approx(np.broadcast_to(radius, point.shape[:2]))
     miss = miss_distances(paper_half.camera.pinhole, point, unit(point - centre))
     assert miss == pytest.approx(CAPTURE, abs=1e-6)
 
 
 def test_light_lies_in_its_hulls(
-    paper_half: MirrorArray, some: np.ndarray, outline: np.ndarray
+    paper_half: MirrorArray, sampled: np.ndarray, outline: np.ndarray
 ) -> None:
     """Rays over all of the part in use, by points along them."""
     pinhole = norm(paper_half.camera.pinhole)
     camera = np.array([pinhole, 0.0, 0.0])
-    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[some])
-    radius = paper_half.mirrors.radius[some][:, None, None]
+    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[sampled])
+    radius = paper_half.mirrors.radius[sampled][:, None, None]
     centre = (at.apex - radius[:, 0] * at.normal)[:, None]
     to_object, to_camera = ball_light.light_hulls(outline, pinhole, CAPTURE)
     for share in (0.0, 0.4, 0.8, 1.0):
@@ -67,11 +67,11 @@ def outside(cones: RoundCones, point: np.ndarray) -> float:
     flat = np.concatenate([cones.start, cones.end], axis=1)
     share = np.linspace(0, 1, 2001)[:, None]
     worst = -np.inf
-    for (a, b, c, d), r, s, own in zip(
+    for (a, b, c, d), r, s, points in zip(
         flat, cones.start_radius, cones.end_radius, point, strict=True
     ):
         spine = np.concatenate([a + share * (c - a), b + share * (d - b), 0 * share], axis=1)
-        gap = norm(own[:, None] - spine) - (r + share * (s - r))[:, 0]
+        gap = norm(points[:, None] - spine) - (r + share * (s - r))[:, 0]
         worst = max(worst, float(gap.min(axis=1).max()))
     return worst
 
@@ -85,19 +85,20 @@ def test_area_of_an_ellipse(a: float, b: float) -> None:
 
 def test_pixels_against_counting(paper_half: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
-    view, mirrors, i = paper_half.camera, paper_half.mirrors, 400
+    camera, mirrors, i = paper_half.camera, paper_half.mirrors, 400
     at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[[i]])
-    shape = ball_light.used_outlines(at, mirrors.radius[[i]], norm(view.pinhole), CAPTURE)
+    outline = ball_light.used_outlines(at, mirrors.radius[[i]], norm(camera.pinhole), CAPTURE)
     frame = paper_half.ellipsoid.frame()
-    found = ball_light.pixel_counts(view, frame, shape, paper_half.azimuth[[i]])[0]
-    size = 2 * view.half_sizes[0] / view.width_px / 4  # sixteen rays a pixel
-    way = mirrors.apex[i] - view.pinhole
-    down = np.cross(view.forward, view.right)
-    place = np.array([way @ view.right, way @ down]) / (way @ view.forward)
-    x, y = np.meshgrid(*(p + size * np.arange(-400, 401) for p in place))
-    ray = unit(view.forward + x[..., None] * view.right + y[..., None] * down)
-    miss = sphere_miss_distances(view.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i]))
-    assert found == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
+    pixels = ball_light.pixel_counts(camera, frame, outline, paper_half.azimuth[[i]])[0]
+    size = 2 * camera.half_sizes[0] / camera.width_px / 4  # sixteen rays a pixel
+    axes = np.stack([camera.right, np.cross(camera.forward, camera.right)])
+    apex_ray = mirrors.apex[i] - camera.pinhole
+    apex_image = axes @ apex_ray / (apex_ray @ camera.forward)
+    x, y = np.meshgrid(*(centre + size * np.arange(-400, 401) for centre in apex_image))
+    ray = unit(camera.forward + np.stack([x, y], axis=-1) @ axes)
+    sphere = mirrors.centre[i], np.array(mirrors.radius[i])
+    miss = sphere_miss_distances(camera.pinhole, ray, *sphere)
+    assert pixels == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
 
 
 def test_field_angles_against_the_scalar_product_with_the_axis(paper_half: MirrorArray) -> None:

@@ -62,8 +62,8 @@ def test_every_ray_meets_the_cell_that_contains_it(n: int, rule: str) -> None:
     rng = np.random.default_rng(n)
     mirror, point = within(cells, unit(rng.normal(size=(600, 3))))
     assert len(mirror) > 100
-    found = [contains(cells, i, x) for i, x in zip(mirror, point, strict=True)]
-    assert np.mean(found) > 0.995  # outlines are sampled: a ray beside an arc may miss its cell
+    in_cell = [contains(cells, i, x) for i, x in zip(mirror, point, strict=True)]
+    assert np.mean(in_cell) > 0.995  # outlines are sampled: a ray beside an arc may miss its cell
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 18])

@@ -25,7 +25,7 @@ def test_rounds_of_samples_close_in_on_the_minimum() -> None:
 
 
 def brute_force_coverage(cells: Cells, pinhole: np.ndarray, i: int, reach: float) -> float:
-    """Twice the least miss of rays over points of sphere i that another surface covers.
+    """Twice the smallest miss distance of rays over points of sphere i that another one covers.
 
     It looks at a grid of points and at every other surface, and knows nothing of arcs. A mirror
     halved by the seam must not be asked for.
@@ -52,9 +52,9 @@ def test_coverage_against_brute_force(rule: str) -> None:
     whole = np.flatnonzero(half.u[:, 0] > 0)
     extremes = whole[np.argsort(half.coverage[whole])[[0, 1, -1]]]
     for i in [*extremes, *whole[:: len(whole) // 6]]:
-        found = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.half_width[i])
+        brute_force = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.half_width[i])
         # The grid's step is a third of a percent of its reach, and so is its error.
-        assert found == pytest.approx(half.coverage[i], rel=4e-3)
+        assert brute_force == pytest.approx(half.coverage[i], rel=4e-3)
 
 
 def test_the_seam_does_not_limit_halved_mirrors(paper_half: MirrorArray) -> None:

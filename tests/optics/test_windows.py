@@ -14,44 +14,44 @@ def seen(paper_half: MirrorArray) -> Windows:
     return cell_windows(paper_half.cells, paper_half.camera.pinhole)
 
 
-def own(half: MirrorArray, turn: float = 0.0) -> tuple[np.ndarray, ...]:
-    """Every mirror's own sphere, its window turned a little about the upright."""
+def own_spheres(half: MirrorArray, angle: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Every mirror's own sphere, its window rotated about the vertical."""
     axis = np.broadcast_to([0.0, 0.0, 1.0], half.u.shape)
     mirrors = half.mirrors
-    return mirrors.centre, mirrors.radius, axis, np.full(len(half), turn)
+    return mirrors.centre, mirrors.radius, axis, np.full(len(half), angle)
 
 
 def test_own_spheres_cover_what_the_shell_covers(paper_half: MirrorArray, seen: Windows) -> None:
     expected = coverage_diameters(paper_half.cells, paper_half.camera.pinhole)
-    assert seen.coverage(*own(paper_half)) == pytest.approx(expected, abs=2e-4)
+    assert seen.coverage(*own_spheres(paper_half)) == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.parametrize("i", [0, 7, 300, 846])
 def test_turned_windows_against_brute_force(paper_half: MirrorArray, seen: Windows, i: int) -> None:
     """2001 points on every side, turned by another library."""
-    turn = 0.004
-    found = seen.coverage(*own(paper_half, turn))[i]
+    angle = 0.004
+    coverage = seen.coverage(*own_spheres(paper_half, angle))[i]
     arcs = seen.arc[seen.mirror == i]
     t = np.linspace(0, 1, 2001)
     points = [seen.cells.arcs.at(np.full(len(t), arc), t) for arc in arcs]
     ray = unit(np.concatenate(points) - seen.pinhole)
-    ray = Rotation.from_rotvec([0, 0, turn]).apply(ray)
+    ray = Rotation.from_rotvec([0, 0, angle]).apply(ray)
     mirrors = paper_half.mirrors
     miss = sphere_miss_distances(seen.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i]))
-    assert found == pytest.approx(2 * miss.min(), abs=1e-3)
+    assert coverage == pytest.approx(2 * miss.min(), abs=1e-3)
 
 
 def test_windows_hold_their_own_apex_and_not_the_next(
     paper_half: MirrorArray, seen: Windows
 ) -> None:
-    way = unit(paper_half.mirrors.apex - seen.pinhole)
-    none = np.zeros(len(way))
-    assert seen.contains(way, way, none).all()
-    assert not seen.contains(np.roll(way, 60, axis=0), way, none).any()
+    direction = unit(paper_half.mirrors.apex - seen.pinhole)
+    no_rotation = np.zeros(len(direction))
+    assert seen.contains(direction, direction, no_rotation).all()
+    assert not seen.contains(np.roll(direction, 60, axis=0), direction, no_rotation).any()
 
 
 def test_only_some(paper_half: MirrorArray, seen: Windows) -> None:
     kept = np.arange(len(paper_half)) % 7 == 0
-    found = seen.only(kept).coverage(*own(paper_half))
-    assert np.isinf(found[~kept]).all()
-    assert (found[kept] == seen.coverage(*own(paper_half))[kept]).all()
+    coverage = seen.only(kept).coverage(*own_spheres(paper_half))
+    assert np.isinf(coverage[~kept]).all()
+    assert (coverage[kept] == seen.coverage(*own_spheres(paper_half))[kept]).all()

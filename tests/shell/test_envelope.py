@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
@@ -10,7 +11,7 @@ from tbcad.spec.load import load_spec
 
 
 def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_envelope: Envelope) -> None:
-    """Least distance from any corner or arc to the back is the wall, within the samples."""
+    """The smallest distance from any corner or arc to the back is the wall, within the samples."""
     arcs = small_half.modelled_cells.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, 9))
     valley = arcs.at(arc, t).reshape(-1, 3)
@@ -18,10 +19,7 @@ def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_envelope:
     unit = rng.normal(size=(400_000, 3))
     unit /= norm(unit)[:, None]
     back = small_envelope.back.centre + unit @ small_envelope.back.from_sphere
-    from scipy.spatial import cKDTree
-
-    least = cKDTree(back).query(valley)[0].min()
-    assert 3.0 - 1e-6 < least < 3.3
+    assert 3.0 - 1e-6 < cKDTree(back).query(valley)[0].min() < 3.3
 
 
 def test_ends_meet(small_envelope: Envelope) -> None:

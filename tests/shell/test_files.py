@@ -53,7 +53,7 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Mir
 
     file = p21.readfile(str(exported / "shell_a.step"))
     half = small_design.halves[0]
-    found = {}
+    spheres = {}
     for instance in file.data[0].instances.values():
         if not hasattr(instance, "entity") or instance.entity.name != "ADVANCED_FACE":
             continue
@@ -62,10 +62,10 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Mir
         if sphere.name == "SPHERICAL_SURFACE":
             placement = file[sphere.params[1]].entity
             point = file[placement.params[1]].entity.params[1]
-            found[name] = (*point, sphere.params[2])
-    assert list(found) == half.ids
+            spheres[name] = (*point, sphere.params[2])
+    assert list(spheres) == half.ids
     expected = np.column_stack([half.mirrors.centre, half.mirrors.radius])
-    assert np.array(list(found.values())) == pytest.approx(expected, abs=1e-9)
+    assert np.array(list(spheres.values())) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["stl", "3mf"])
@@ -88,10 +88,10 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
     assert document["mirrors"] == "mirrors.csv"
     assert [row["id"] for row in rows] == [*small_design.halves[0].ids, *small_design.halves[1].ids]
     for half in small_design.halves:
-        own = [row for row in rows if row["camera"] == half.camera_id]
-        apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own])
+        own_rows = [row for row in rows if row["camera"] == half.camera_id]
+        apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own_rows])
         assert np.array_equal(apex, half.mirrors.apex)  # full double precision
-        assert np.array_equal([float(row["coverage_mm"]) for row in own], half.coverage)
+        assert np.array_equal([float(row["coverage_mm"]) for row in own_rows], half.coverage)
 
 
 def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:
@@ -120,11 +120,11 @@ def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
 
 def test_pcurves_on_request(tmp_path: Path) -> None:
     sizes = []
-    for wanted in ("false", "true"):
-        folder = tmp_path / wanted
+    for pcurves in ("false", "true"):
+        folder = tmp_path / pcurves
         folder.mkdir()
-        write_export(design(load_spec(None, ["n=2", f"step.pcurves={wanted}"])), folder, [SHELL])
+        write_export(design(load_spec(None, ["n=2", f"step.pcurves={pcurves}"])), folder, [SHELL])
         text = (folder / "shell_a.step").read_text()
-        assert ("PCURVE" in text) == (wanted == "true")
+        assert ("PCURVE" in text) == (pcurves == "true")
         sizes.append(len(text))
     assert sizes[1] > 1.5 * sizes[0]

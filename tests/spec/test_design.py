@@ -39,11 +39,11 @@ def refusal(path: Path | None, *options: str) -> str:
 
 
 def refused(file: Path, text: str | bytes) -> str:
-    """What is said about a file, which is always named."""
+    """The error about a file, which is always named."""
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    said = refusal(file)
-    assert said.startswith(f"{file}: ")
-    return said.removeprefix(f"{file}: ")
+    message = refusal(file)
+    assert message.startswith(f"{file}: ")
+    return message.removeprefix(f"{file}: ")
 
 
 class TestDefaults:
@@ -107,10 +107,10 @@ class TestFile:
     def test_unreadable(self, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         file.touch()
 
-        def shut(*_: object) -> None:
+        def refuse(*_: object) -> None:
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr(Path, "open", shut)
+        monkeypatch.setattr(Path, "open", refuse)
         assert "Permission denied" in refusal(file)
 
     def test_not_utf8(self, file: Path) -> None:
@@ -121,9 +121,9 @@ class TestFile:
 
     @pytest.mark.parametrize("text", ["[optics\n", "\n\nn = \n", "n = 1\nn = 2\n", "a = 1 b = 2"])
     def test_not_toml(self, file: Path, text: str) -> None:
-        said = refused(file, text)
-        assert said.startswith("not valid TOML")
-        assert " line " in said
+        message = refused(file, text)
+        assert message.startswith("not valid TOML")
+        assert " line " in message
 
     def test_nested_too_deeply(self, file: Path) -> None:
         assert refused(file, "a = " + "[" * 50_000).startswith("tables nested too deeply")
@@ -188,10 +188,10 @@ class TestValue:
             value = next(end for end in ends.values() if end is not None)
             outward = 1 if ends["le"] is not None or ends["lt"] is not None else -1
             step = 1 if field.annotation is int else abs(value) * 1e-9 or 1e-9
-            said = refusal(None, f"{key}={value + outward * step!r}")
-            assert said.startswith(f"option: {key} is ")
-            assert allowed_text(field.annotation, field.metadata) in said
-            assert f"{value:g}" in said
+            message = refusal(None, f"{key}={value + outward * step!r}")
+            assert message.startswith(f"option: {key} is ")
+            assert allowed_text(field.annotation, field.metadata) in message
+            assert f"{value:g}" in message
 
     @pytest.mark.parametrize("key", NUMBERS)
     @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "true", "'1'", "[1]", "{a = 1}", "x"])
@@ -214,8 +214,8 @@ class TestValue:
         assert "set schema to 2" in text
 
     def test_names_the_choices(self) -> None:
-        said = refusal(None, "radius_rule=exact")
-        assert "mirrors.radius_rule is 'exact', allowed is traced or paper or flat" in said
+        message = refusal(None, "radius_rule=exact")
+        assert "mirrors.radius_rule is 'exact', allowed is traced or paper or flat" in message
 
     @pytest.mark.parametrize("value", ["''", "'a\\nb'", "'../x'", "7", "'" + "a" * 81 + "'"])
     def test_names_are_plain(self, value: str) -> None:
@@ -234,17 +234,17 @@ class TestValue:
         ],
     )
     def test_camera_below_on_its_side(self, value: str, place: str) -> None:
-        said = refusal(None, f"camera_mm={value}")
-        assert f"optics.camera_mm{place} is " in said
-        assert "a number above 0 to 10000" in said
+        message = refusal(None, f"camera_mm={value}")
+        assert f"optics.camera_mm{place} is " in message
+        assert "a number above 0 to 10000" in message
 
     def test_long_values_are_cut(self) -> None:
         assert len(refusal(None, f"optics.n='{'a' * 5000}'")) < 200
 
     def test_several_faults_are_counted(self, file: Path) -> None:
-        said = refused(file, "[optics]\nn = 99\nsemi_minor_mm = 0\n[mesh]\nx = 1\n")
-        assert said.startswith("optics.n is 99")
-        assert said.endswith("(and 2 more)")
+        message = refused(file, "[optics]\nn = 99\nsemi_minor_mm = 0\n[mesh]\nx = 1\n")
+        assert message.startswith("optics.n is 99")
+        assert message.endswith("(and 2 more)")
 
     def test_what_must_be_a_section(self, file: Path) -> None:
         assert "optics is 3, allowed is a table" in refused(file, "optics = 3")
@@ -256,12 +256,12 @@ class TestTogether:
     def test_holes_fit_their_flange(self, flange: str, hole: str) -> None:
         key = f"shell.{flange}.{hole}"
         load_spec(None, [f"{key}=10"])
-        said = refusal(None, f"{key}=10.01")
-        assert f"shell.{flange}: {hole} 10.01 does not fit in width_mm 12" in said
+        message = refusal(None, f"{key}=10.01")
+        assert f"shell.{flange}: {hole} 10.01 does not fit in width_mm 12" in message
 
     def test_capture_sphere_fits_the_ellipsoid(self) -> None:
-        said = refusal(None, "semi_minor_mm=71")
-        least = float(said.split("semi_minor_mm more than ")[1].split()[0])
+        message = refusal(None, "semi_minor_mm=71")
+        least = float(message.split("semi_minor_mm more than ")[1].split()[0])
         assert least == pytest.approx(math.sqrt(30**2 + 30 * math.sqrt(2) * 100), rel=1e-3)
         load_spec(None, [f"semi_minor_mm={least * 1.001}"])
         refusal(None, f"semi_minor_mm={least * 0.999}")
@@ -274,8 +274,8 @@ class TestTogether:
 
     def test_options_are_blamed_with_the_file(self, file: Path) -> None:
         file.write_text("[optics]\nsemi_minor_mm = 100\n")
-        said = refusal(file, "capture_diameter_mm=200")
-        assert said.startswith(f"{file} with options: ")
+        message = refusal(file, "capture_diameter_mm=200")
+        assert message.startswith(f"{file} with options: ")
 
     @given(
         st.floats(1, 5000),
@@ -328,8 +328,8 @@ class TestOptions:
 
     def test_end_of_a_key_must_be_the_only_one(self) -> None:
         assert load_spec(None, ["seam_flange.bolts=3"]).shell.seam_flange.bolts == 3
-        said = refusal(None, "bolts=3")
-        assert "shell.foot_flange.bolts or shell.seam_flange.bolts" in said
+        message = refusal(None, "bolts=3")
+        assert "shell.foot_flange.bolts or shell.seam_flange.bolts" in message
 
     @pytest.mark.parametrize("key", KEYS)
     def test_every_whole_key_is_known(self, key: str) -> None:
@@ -362,8 +362,8 @@ class TestOptions:
 class TestPrototype:
     @pytest.mark.parametrize("value", ["0", "1001", "true", "1.0", "many", "[]", "-1"])
     def test_number_of_balls(self, value: str) -> None:
-        said = refusal(None, f"prototype.k={value}")
-        assert "give a whole number from 1 to 1000, or auto" in said
+        message = refusal(None, f"prototype.k={value}")
+        assert "give a whole number from 1 to 1000, or auto" in message
 
     def test_number_of_balls_may_be_found(self) -> None:
         assert load_spec(None, ["prototype.k=auto"]).prototype.k == "auto"

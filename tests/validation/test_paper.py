@@ -21,23 +21,23 @@ def camera_a(n: int) -> tuple[np.ndarray, np.ndarray]:
     return every[(every[:, 0] >= 0) & (every[:, 2] >= 0)], every
 
 
-def half_of(*settings: str) -> MirrorArray:
+def mirrors_of(*settings: str) -> MirrorArray:
     return design(load_spec(None, settings)).halves[0]
 
 
 def test_numbers_of_virtual_cameras() -> None:
     """1657 (Table I); 847 a camera, the 37 on the seam counted for both."""
-    mine, every = camera_a(18)
+    half_a, every = camera_a(18)
     assert (every[:, 2] >= 0).sum() == 1657
-    assert len(mine) == 847
-    assert (mine[:, 0] == 0).sum() == 37
+    assert len(half_a) == 847
+    assert (half_a[:, 0] == 0).sum() == 37
 
 
 @pytest.mark.parametrize(("n", "paper_mm"), [(4, 21.2), (18, 4.8)])
 def test_flat_capture_diameter(n: int, paper_mm: float) -> None:
     """2 d sin(min theta_0): 21.0 and 4.6 mm measured; the paper has 21.2 and 4.8."""
-    mine, every = camera_a(n)
-    theta0 = flat.half_angles(ELLIPSOID, mine, every)
+    half_a, every = camera_a(n)
+    theta0 = flat.half_angles(ELLIPSOID, half_a, every)
     diameter = 2 * ELLIPSOID.camera_distance * np.sin(theta0.min())
     assert diameter == pytest.approx(paper_mm, rel=0.05)
 
@@ -47,7 +47,7 @@ def test_traced_coverage_of_flat_mirrors_agrees_with_their_cones() -> None:
 
     Measured on cells the shell's own borders count, seam and foot, not the neighbours beyond.
     """
-    half = half_of("n=4", "radius_rule=flat")
+    half = mirrors_of("n=4", "radius_rule=flat")
     inner = (half.u[:, 0] > 0.4) & (half.u[:, 2] > 0.4)
     cone = 2 * ELLIPSOID.camera_distance * np.sin(half.theta0)
     assert half.coverage[inner] == pytest.approx(cone[inner], rel=1e-6)
@@ -56,24 +56,24 @@ def test_traced_coverage_of_flat_mirrors_agrees_with_their_cones() -> None:
 
 def test_largest_object_that_does_not_block() -> None:
     """62.0 mm at the zenith mirror; the paper: the limit is 60 mm."""
-    mine, _ = camera_a(18)
-    apex = ELLIPSOID.apices(mine)
+    half_a, _ = camera_a(18)
+    apex = ELLIPSOID.apices(half_a)
     toward = unit(ELLIPSOID.pinhole - apex)
     passing = norm(np.cross(apex, toward))
     assert dot(-apex, toward).min() > 0  # every ray comes nearest on its way
     assert 2 * passing.min() == pytest.approx(62.0, abs=0.05)
-    assert mine[passing.argmin()] == pytest.approx([0, 0, 1])
+    assert half_a[passing.argmin()] == pytest.approx([0, 0, 1])
 
 
 def test_angle_of_incidence() -> None:
-    mine, _ = camera_a(18)
-    angle = np.degrees(np.arccos(dot(ELLIPSOID.normals(mine), -mine)))
+    half_a, _ = camera_a(18)
+    angle = np.degrees(np.arccos(dot(ELLIPSOID.normals(half_a), -half_a)))
     assert (round(angle.min()), round(angle.max())) == (16, 35)
 
 
 def test_radii_by_equation_2() -> None:
     """8.00 ... 65.4 mm, strongly tied to the polar angle of 45 ... 135 degrees."""
-    half = half_of("radius_rule=paper")
+    half = mirrors_of("radius_rule=paper")
     radius = half.mirrors.radius
     assert radius.min() == pytest.approx(8.00, abs=0.005)
     assert radius.max() == pytest.approx(65.4, abs=0.06)
@@ -89,7 +89,7 @@ def test_equation_2_falls_short() -> None:
     the one per cent looks like the first measurement's sampling of the cells' edges. The largest
     is the mirror (1, 0, 0), whose coverage the foot plane's place decides.
     """
-    coverage = half_of("radius_rule=paper").coverage
+    coverage = mirrors_of("radius_rule=paper").coverage
     assert (coverage < 60).sum() == 845
     assert coverage.min() == pytest.approx(50.34, abs=0.005)
     assert coverage.min() == pytest.approx(50.8, rel=0.01)
@@ -100,12 +100,12 @@ def test_equation_2_falls_short() -> None:
 
 def test_radii_that_reach_60_mm() -> None:
     """Before: 6.98 ... 68.4 mm, 0.88 of eq. 2. Exact here: 6.84 ... 67.11, 0.863."""
-    half = half_of("margin_mm=0")
+    half = mirrors_of("margin_mm=0")
     assert half.coverage == pytest.approx(np.full(847, 60.0), abs=0.01)
     radius = half.mirrors.radius
     assert radius.min() == pytest.approx(6.98, rel=0.021)
     assert radius.max() == pytest.approx(68.4, rel=0.021)
-    ratio = radius * half_of("radius_rule=paper").mirrors.curvature
+    ratio = radius * mirrors_of("radius_rule=paper").mirrors.curvature
     assert np.median(ratio) == pytest.approx(0.88, rel=0.021)
 
 
