@@ -78,13 +78,13 @@ class BaseSpec(Section):
     rib_mm: float = Field(5.0, ge=1.2, le=30)
     """Thickness of the ribs."""
     rib_height_mm: float = Field(8.0, ge=1, le=50)
-    """How far ribs stand out of the wall; next to the hub they are higher."""
+    """Height of the ribs above the wall; next to the hub they are higher."""
     light_clearance_mm: float = Field(0.5, ge=0, le=20)
-    """Least room between all light and the carrier."""
+    """Minimum distance of the carrier from all light."""
     clearance_mm: float = Field(0.5, ge=0.1, le=5)
-    """Room between a ball and its cup everywhere but at the pads."""
+    """Gap between a ball and its cup everywhere but at the pads."""
     pad_mm: float = Field(3.0, ge=0.5, le=20)
-    """Diameter of the three pads on which a ball rests; less for balls of less than 4.5 pads."""
+    """Diameter of the three pads that carry a ball; smaller for balls of less than 4.5 pads."""
     pad_angle_deg: float = Field(50.0, ge=20, le=70)
     """Angle between a pad's normal and the axis of its seat."""
     cup_wall_mm: float = Field(2.5, ge=0.8, le=20)
@@ -92,7 +92,7 @@ class BaseSpec(Section):
     floor_mm: float = Field(2.0, ge=0.6, le=20)
     """Wall below a cup's pocket."""
     hold: Hold = "magnet"
-    """What holds a ball on its pads: a magnet below it, or glue in a well."""
+    """How a ball is held on its pads: by a magnet below it, or by glue in a well."""
     magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
     """Diameters of the disc magnets on sale; each ball gets the largest that fits."""
     magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
@@ -100,17 +100,17 @@ class BaseSpec(Section):
     magnet_gap_mm: float = Field(0.5, ge=0.1, le=5)
     """Gap between ball and magnet, or depth of the glue well below the ball."""
     magnet_play_mm: float = Field(0.2, ge=0, le=1)
-    """How much wider than the magnet its pocket is."""
+    """Play of the magnet in its pocket, on the diameter."""
     digit_mm: float = Field(6.0, ge=3, le=30)
     """Height of the digits in relief."""
     relief_mm: float = Field(0.6, ge=0.2, le=3)
-    """How far the digits stand out."""
+    """Height of the digits above the surface."""
     drive: Drive = "nema17-belt"
-    """What turns the base: decides the holes in its hub."""
+    """Drive of the base, which decides the holes in its hub."""
     shaft_mm: float = Field(8.0, ge=3, le=25)
     """Diameter of the shaft's bore."""
     lock: Lock = "set-screws"
-    """What holds the shaft."""
+    """How the shaft is locked in the hub."""
     insert_hole_mm: float = Field(4.0, ge=2, le=10)
     """Diameter of the holes for M3 heat-set inserts."""
     insert_depth_mm: float = Field(6.2, ge=2, le=20)
@@ -118,41 +118,42 @@ class BaseSpec(Section):
     joint_mm: float = Field(8.0, ge=4, le=30)
     """Thickness of the flanges where the base is cut to fit the bed; for inserts and dowels."""
     joint_height_mm: float = Field(12.0, ge=8, le=50)
-    """How far these flanges stand out of the wall."""
+    """Height of these flanges above the wall."""
     screw_pitch_mm: float = Field(45.0, ge=12, le=500)
-    """Distance of the screws along a joint, about."""
+    """Approximate distance of the screws along a joint."""
     dowel_mm: float = Field(3.0, ge=1, le=10)
     """Diameter of the dowel pins in the joints (ISO 8734), two to each."""
     dowel_press_mm: float = Field(0.1, ge=-0.5, le=1)
-    """How much wider than its dowel a hole is that holds it; prints come out tighter."""
+    """Play on the diameter of a dowel in the hole that holds it; printed holes come out smaller."""
     dowel_slip_mm: float = Field(0.2, ge=0, le=1)
-    """How much wider than its dowel the hole on the other side is."""
+    """Play on the diameter of a dowel in the hole on the other side."""
     coupon_offsets_mm: Offsets = (-0.1, 0.0, 0.1)
-    """How far the coupon's pads are moved away from the ball."""
+    """Distances by which the coupon's pads are moved away from the ball."""
 
 
 class MotionSpec(Section):
-    """How the base is driven from stop to stop, and what the controller is told."""
+    """How the base is driven from stop to stop: motion, trigger and controller."""
 
     axis: Literal["X", "A"] = "X"
     """Axis of the controller: X with a degree for a millimetre (GRBL 1.1 has X, Y and Z only),
     or A in degrees (grblHAL and others)."""
     trigger: Literal["coolant", "pause"] = "coolant"
-    """What takes a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
+    """What triggers a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
     home_deg: float = Field(0.0, ge=-180, le=180)
-    """Base angle at which the program is started: at the base's mark, or after homing."""
+    """Base angle at which the program starts: at the base's mark, or after homing."""
     approach_deg: float = Field(1.0, ge=0, le=30)
-    """How far below its first stop the base starts, so that all are reached from one side."""
+    """Angle below the first stop at which the base starts, so that all stops are reached from one
+    side."""
     feed_deg_min: float = Field(900.0, ge=1, le=100000)
     """Speed of the base."""
     acceleration_deg_s2: float = Field(50.0, gt=0, le=10000)
     """Acceleration of the base; the motor is chosen for it."""
     settle_s: float = Field(0.5, ge=0, le=60)
-    """Rest at a stop before a photograph."""
+    """Pause at a stop before a photograph."""
     trigger_s: float = Field(0.2, gt=0, le=60)
-    """How long the relay is on."""
+    """Time for which the relay is on."""
     exposure_s: float = Field(1.0, ge=0, le=600)
-    """Rest after the relay, while the camera exposes and saves."""
+    """Pause after the relay, while the camera exposes and saves."""
     microsteps: int = Field(16, ge=1, le=256)
     """Microsteps of the motor's driver to a full step."""
     safety: float = Field(2.0, ge=1, le=10)
@@ -161,10 +162,10 @@ class MotionSpec(Section):
 
 
 class StageSpec(Section):
-    """What the object stands on, with LEDs at known places to calibrate with."""
+    """The stage that carries the object, with LEDs at known places for calibration."""
 
     top_mm: float = Field(-20.0, ge=-1000, le=1000)
-    """Height of the disc that the object stands on; it must be inside the capture sphere."""
+    """Height of the disc that carries the object; it must be inside the capture sphere."""
     disc_mm: float = Field(17.0, ge=4, le=500)
     """Diameter of that disc, which is turned by 180 degrees for the other half."""
     led: Led = "LED-3"
@@ -175,7 +176,7 @@ class StageSpec(Section):
         (-3.4, 12.6, -13.5),
         (-10.6, -7.5, -7.0),
     )
-    """Middles of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
+    """Centres of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
     led_wall_mm: float = Field(2.0, ge=0.8, le=20)
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)
@@ -191,32 +192,32 @@ class FrameSpec(Section):
     floor_mm: float = Field(-230.0, ge=-3000, le=-10)
     """Height of the base plate's upper face."""
     clearance_mm: float = Field(3.0, ge=0.5, le=50)
-    """Least room of all that stands still to the light and to what the base sweeps."""
+    """Minimum distance of all static parts from the light and from what the base sweeps."""
     flange_mm: float = Field(8.0, ge=3, le=30)
     """Thickness of the brackets' flanges."""
     web_mm: float = Field(6.0, ge=3, le=30)
     """Thickness of the brackets' webs."""
     uprights_mm: float = Field(80.0, ge=70, le=300)
-    """Distance of the two uprights' middles."""
+    """Distance between the middles of the two uprights."""
     bearing_fit_mm: float = Field(-0.05, ge=-0.5, le=0.5)
-    """How much wider than the bearings their seats are; less than 0: a press fit."""
+    """Play on the diameter of the bearings in their seats; below 0: a press fit."""
     belt_travel_mm: float = Field(6.0, ge=0, le=40)
     """Length by which the motor can be moved to tighten the belt, half to either side."""
     camera_screw_mm: float = Field(50.0, ge=10, le=1000)
-    """How far behind the pinhole the camera's tripod thread is."""
+    """Distance of the camera's tripod thread behind the pinhole."""
     camera_travel_mm: float = Field(20.0, ge=0, le=200)
     """Length by which the camera can be moved along its axis, half to either side."""
     post_play_mm: float = Field(0.2, ge=0, le=2)
-    """How much wider than the post its clamp is."""
+    """Play on the diameter of the post in its clamp."""
 
 
 class PrototypeSpec(Section):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
     k: Annotated[int | Literal["auto"], BeforeValidator(_count)] = 16
-    """Number of balls, or auto: the least that keeps the limits below."""
+    """Number of balls, or auto: the smallest number that keeps the limits below."""
     radius_weight_deg: float = Field(0.25, ge=0, le=100)
-    """What one millimetre of radius counts, in degrees of polar angle, when mirrors are grouped."""
+    """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm."""
     auto_direction_max_deg: float = Field(3.5, gt=0, le=90)
     """With k auto: largest error of direction of any mirror."""
     auto_direction_median_deg: float = Field(1.5, gt=0, le=90)
@@ -238,9 +239,9 @@ class PrototypeSpec(Section):
     cap_rim_mm: float = Field(2.0, ge=0, le=50)
     """Width of the rim round the part of a cap in use."""
     ball_wall_mm: float = Field(3.0, ge=0, le=50)
-    """Least distance between two balls, and between a ball and the post or the camera."""
+    """Minimum distance between two balls, and between a ball and the post or the camera."""
     light_margin_mm: float = Field(0.5, ge=0, le=20)
-    """Least distance of a ball from the light of another."""
+    """Minimum distance of a ball from the light of another."""
     post_diameter_mm: float = Field(20.0, ge=0, le=200)
     """Post straight below the object, which no ball may reach; 0: none, the hub is hollow."""
     camera_diameter_mm: float = Field(60.0, ge=0, le=500)
@@ -254,8 +255,8 @@ class PrototypeSpec(Section):
     base: BaseSpec = BaseSpec()
     """The printed carrier of the balls."""
     motion: MotionSpec = MotionSpec()
-    """How it is driven from stop to stop."""
+    """How the base is driven from stop to stop."""
     stage: StageSpec = StageSpec()
-    """What the object stands on."""
+    """Stage for the object."""
     frame: FrameSpec = FrameSpec()
-    """What holds stage, base and camera."""
+    """Frame for stage, base and camera."""
