@@ -1,9 +1,12 @@
 """Pictures out of the light field against what a real camera sees."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tbcad.errors import InputError
+from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
@@ -13,7 +16,8 @@ from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import Focus, lens_pinholes, lens_rays, refocus, refocus_sweep
-from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.synthesis import horizon_search_radius, synthesise
+from tbcad.simulate.views.two_plane import two_plane_along
 
 SIZE = (160, 120)
 
@@ -60,6 +64,39 @@ def test_what_no_mirror_saw_is_not_seen(light_field: LightField) -> None:
     middle = picture.seen[50:70, 70:90]
     assert not middle.any()
     assert not picture.colour[50:70, 70:90].any()
+
+
+def test_without_captured_rays_only_what_misses_the_capture_sphere_is_complete(
+    light_field: LightField,
+) -> None:
+    """The boundary is the sphere's own radius, to a pixel."""
+    frame = light_field.frames["b"]
+    nothing = {**frame.planes, "mirror": np.zeros_like(frame.planes["mirror"])}
+    empty = LightField({"b": replace(frame, planes=nothing)}, 60.0, {})
+    view = view_from(70, 40)
+    miss = np.linalg.norm(np.cross(view.pinhole, view_directions(view)), axis=2)
+    for picture in (
+        synthesise(MirrorTiles(empty), view),
+        refocus(MirrorTiles(empty), view, Focus(1e-6, 0)),
+    ):
+        assert np.array_equal(picture.seen, miss > 30.0)
+        assert not picture.colour.any()
+
+
+def test_horizon_search_radius_is_the_distance_of_a_ray_below_the_nearest_mirror(
+    tiles: MirrorTiles,
+) -> None:
+    """By search over the rays through the apex, at a capture radius from the target there."""
+    depth = np.linalg.norm(tiles.apex, axis=1).min()
+    two_plane = two_plane_along(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 60.0)
+    down = two_plane.axes[1]
+    slopes = np.linspace(0, 0.5, 100_001)
+    through_apex = unit(two_plane.axes[2] + slopes[:, None] * down)
+    apex = -depth * two_plane.axes[2]
+    captured = two_plane.coordinates(np.broadcast_to(apex, through_apex.shape), through_apex)
+    target = two_plane.coordinates((apex + 30.0 * down)[None], two_plane.axes[2:])
+    nearest = np.linalg.norm(captured - target, axis=1).min()
+    assert horizon_search_radius(tiles) == pytest.approx(nearest, rel=1e-6)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 90.0])
