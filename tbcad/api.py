@@ -287,7 +287,7 @@ def capture(
         write_photographs(taken, Path(out), force, progress)
         return LightField.read(Path(out))
     progress("photographs and light field")
-    bands = {at.camera_id: (at, bands()) for at, bands in taken.cameras}
+    bands = ((reflector, bands()) for reflector, bands in taken.cameras)
     return light_field_in_memory(bands, taken.capture_mm, taken.facts)
 
 

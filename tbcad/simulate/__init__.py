@@ -1,4 +1,4 @@
-"""What the machine would photograph: capture, light field, views, refocusing, studies."""
+"""Simulated photographs, their light field, views, refocusing, and studies of the paper."""
 
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,7 @@ __all__ = ["LightField"]
 
 
 def __getattr__(name: str) -> object:
-    """Give the reader of light fields, whose libraries take a second to load, when it is wanted."""
+    """Import the reader of light fields, whose libraries take a second to load, on first use."""
     if name == "LightField":
         from tbcad.simulate.capture.light_field import LightField
 

@@ -24,7 +24,7 @@ def compiled(function: Function) -> Function:
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Results in the items' order, whatever the threads do."""
+    """Results in the items' order."""
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(work, items))
 

@@ -51,10 +51,8 @@ def knot() -> Scene:
 
 @pytest.fixture(scope="session")
 def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField:
-    return light_field_in_memory(
-        {at.camera_id: (at, photograph(at.camera, exact_tracer(at), knot)) for at in cameras},
-        CAPTURE_MM,
-    )
+    photographs = [(at, photograph(at.camera, exact_tracer(at), knot)) for at in cameras]
+    return light_field_in_memory(photographs, CAPTURE_MM)
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate import image_files
-from tbcad.simulate.capture import light_field
 from tbcad.simulate.capture.geometry import CameraPhotographs
+from tbcad.simulate.capture.light_field import NAME
+from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
+from tbcad.simulate.image_files import write_images
 from tbcad.simulate.scene.object import SceneObject
 
 OBJECT, RECORD = "object.npz", "capture.json"
@@ -21,7 +22,7 @@ MAX_OBJECT_BYTES = 4 << 30  # bytes, unpacked
 
 def write_capture(
     folder: Path,
-    captured: CameraPhotographs,
+    photographs: CameraPhotographs,
     subject: SceneObject,
     capture_mm: float,
     facts: dict[str, Any],
@@ -30,18 +31,18 @@ def write_capture(
 
     Args:
         folder: exists, and is the caller's to replace.
-        captured: each camera with what gives its bands.
+        photographs: each camera with a function that gives the bands of its picture.
         subject: the object before the cameras.
         capture_mm: diameter of the capture sphere.
         facts: how the capture is made.
     """
     record: dict[str, Any] = {"schema": SCHEMA, "object": subject.name, **facts, "cameras": {}}
-    with light_field.create_light_field(folder / light_field.NAME, capture_mm, record) as store:
-        for at, bands in captured:
-            picture, counts = light_field.write_camera(store, at, bands())
-            file = folder / f"camera_{at.camera_id}.png"
-            image_files.write_images({file: picture})
-            record["cameras"][at.camera_id] = {"picture": file.name, **counts}
+    with create_light_field(folder / NAME, capture_mm, record) as store:
+        for reflector, bands in photographs:
+            picture, counts = write_camera(store, reflector, bands())
+            file = folder / f"camera_{reflector.camera_id}.png"
+            write_images({file: picture})
+            record["cameras"][reflector.camera_id] = {"picture": file.name, **counts}
     write_object(folder / OBJECT, subject)
     text = json.dumps(record, indent=1) + "\n"
     (folder / RECORD).write_text(text, encoding="utf-8")
@@ -75,24 +76,18 @@ def read_object(folder: Path) -> SceneObject:
 
 
 def _subject(arrays: dict[str, Any]) -> SceneObject:
-    made = SceneObject(
-        name=str(arrays["name"]),
-        points=arrays["points"].astype(np.float64),
-        faces=arrays["faces"].astype(np.int64),
-        normals=arrays["normals"].astype(np.float64),
-        albedo=arrays["albedo"].astype(np.float64),
-        uv=arrays.get("uv"),
-        texture=arrays.get("texture"),
-        patterned=bool(arrays["patterned"]),
+    faces = arrays["faces"].astype(np.int64)
+    points, normals, albedo = (
+        arrays[name].astype(np.float64) for name in ("points", "normals", "albedo")
     )
-    v, f = len(made.points), len(made.faces)
-    shapes = (made.points.shape, made.faces.shape, made.normals.shape, made.albedo.shape)
+    uv, texture = arrays.get("uv"), arrays.get("texture")
+    v, f = len(points), len(faces)
+    shapes = (points.shape, faces.shape, normals.shape, albedo.shape)
     if shapes != ((v, 3), (f, 3), (v, 3), (f, 3, 3)) or f == 0:
         raise ValueError("arrays do not belong together")
-    if made.faces.min() < 0 or made.faces.max() >= v or not np.isfinite(made.points).all():
+    if faces.min() < 0 or faces.max() >= v or not np.isfinite(points).all():
         raise ValueError("facets have corners that do not exist")
-    if (made.uv is None) != (made.texture is None):
-        raise ValueError("a texture without its places")
-    if made.uv is not None and made.uv.shape != (f, 3, 2):
-        raise ValueError("a texture without its places")
-    return made
+    if (uv is None) != (texture is None) or (uv is not None and uv.shape != (f, 3, 2)):
+        raise ValueError("a texture without its coordinates")
+    name, patterned = str(arrays["name"]), bool(arrays["patterned"])
+    return SceneObject(name, points, faces, normals, albedo, uv, texture, patterned)

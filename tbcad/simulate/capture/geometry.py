@@ -1,10 +1,10 @@
-"""What the cameras photograph through: the recorded spheres, the meshes, or the prototype."""
+"""What the cameras see the object in: the recorded spheres, the meshes, or the prototype."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Literal
 
-from tbcad.simulate.capture.photograph import Band, Tracer, photograph
+from tbcad.simulate.capture.photograph import Band, photograph
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
@@ -30,7 +30,7 @@ def camera_photographs(
         geometry: spheres of the record, meshes of the shells, or the prototype's balls, stop by
             stop.
         samples: a pixel is the mean of samples x samples rays.
-        progress: told how far it has come.
+        progress: called with each step.
 
     Raises:
         InputError: files of that geometry are missing or broken.
@@ -43,10 +43,8 @@ def camera_photographs(
         ]
     shells = read_shell_meshes(export) if geometry == "mesh" else None
 
-    def tracer(at: Reflector) -> Tracer:
-        return mesh_tracer(shells, at) if shells else exact_tracer(at)
+    def photograph_of(reflector: Reflector) -> Iterable[Band]:
+        trace = mesh_tracer(shells, reflector) if shells else exact_tracer(reflector)
+        return photograph(reflector.camera, trace, scene, samples, progress)
 
-    return [
-        (at, partial(photograph, at.camera, tracer(at), scene, samples, progress))
-        for at in export.reflectors
-    ]
+    return [(reflector, partial(photograph_of, reflector)) for reflector in export.reflectors]

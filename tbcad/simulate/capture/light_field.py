@@ -1,7 +1,7 @@
-"""The light field as a file: for every pixel the ray it sees along, its colour and its mirror.
+"""The light field, in memory or as a file: ray, colour and mirror of every pixel.
 
-One HDF5 file (docs/light-field.md): every tool that matters to this field reads it, parts of it
-can be read without the rest, and it is one file to copy. A group for each camera holds arrays of
+One HDF5 file (docs/light-field.md): most tools read it, parts of it can be
+read without the rest, and it is one file to copy. A group for each camera holds arrays of
 the picture's size, in chunks, compressed:
 
     colour     (h, w, 3)  uint8    red, green, blue
@@ -16,7 +16,6 @@ columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixel
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -31,15 +30,12 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.capture.photograph import BAND_ROWS, Band
-from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.capture.photograph import Band
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
-CHUNK = (BAND_ROWS, 256)
-COMPRESSION_LEVEL = 1  # of compression: higher ones save 2 % at most
 PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "colour": ((3,), "u1"),
     "mirror": ((), "u2"),
@@ -54,14 +50,14 @@ class Frame:
     """One camera's share of a light field; its arrays may lie in a file and are read by slices.
 
     Attributes:
-        view: the camera.
+        camera: its pinhole, axes and sensor.
         u: directions of the virtual cameras, (m, 3).
         mirrors: surfaces, (m,).
         boxes: columns x0, x1 and rows y0, y1, ends excluded, that hold each mirror, (m, 4).
         planes: arrays `colour`, `mirror`, `origin`, `direction` as above.
     """
 
-    view: Camera
+    camera: Camera
     u: Floats
     mirrors: Surfaces
     boxes: NDArray[np.int64]
@@ -124,82 +120,11 @@ class LightField:
     def __repr__(self) -> str:
         """Return object, cameras and numbers of mirrors and pixels."""
         sizes = ", ".join(
-            f"camera {name}: {len(frame.u)} mirrors, {frame.view.width_px} x {frame.view.height_px}"
+            f"camera {name}: {len(frame.u)} mirrors, {camera.width_px} x {camera.height_px}"
             for name, frame in self.frames.items()
+            for camera in [frame.camera]
         )
         return f"<LightField of {self.facts.get('object', 'an object')}: {sizes}>"
-
-
-@contextmanager
-def create_light_field(
-    path: Path, capture_mm: float, facts: Mapping[str, Any]
-) -> Iterator[h5py.File]:
-    """Make a file; `write` fills it camera by camera."""
-    with h5py.File(path, "w", libver=("v110", "v110")) as store:
-        store.attrs["schema"] = SCHEMA
-        store.attrs["capture_mm"] = capture_mm
-        store.attrs["facts"] = json.dumps(dict(facts), sort_keys=True)
-        yield store
-
-
-def write_camera(
-    store: h5py.File, at: Reflector, bands: Iterable[Band]
-) -> tuple[NDArray[np.uint8], dict[str, int]]:
-    """Write one camera's bands as they come, each a row of chunks.
-
-    Returns:
-        Its picture (h, w, 3), and how many of its pixels are on mirrors, and of those how many
-        rays meet the capture sphere.
-    """
-    view, group = at.camera, store.create_group(at.camera_id)
-    _write_view(group, view)
-    _write_mirrors(group.create_group("mirrors"), at)
-    shape = (view.height_px, view.width_px)
-    chunk = (min(CHUNK[0], shape[0]), min(CHUNK[1], shape[1]))
-    planes = {
-        name: group.create_dataset(
-            name,
-            shape + last,
-            kind,
-            chunks=chunk + last,
-            shuffle=True,
-            compression=COMPRESSION_LEVEL,
-        )
-        for name, (last, kind) in PIXEL_ARRAYS.items()
-    }
-    picture = np.zeros((*shape, 3), dtype=np.uint8)
-    counts = {"pixels_on_mirrors": 0, "pixels_that_see_the_capture_sphere": 0}
-    radius = float(store.attrs["capture_mm"]) / 2
-    for band in bands:
-        counts["pixels_on_mirrors"] += int((band.rays.mirror > 0).sum())
-        counts["pixels_that_see_the_capture_sphere"] += int(band.rays.meeting(radius).sum())
-        rows = slice(band.rows.start, band.rows.stop)
-        picture[rows] = band.colour
-        _write_chunks(planes, band)
-    return picture, counts
-
-
-def _write_chunks(planes: Mapping[str, h5py.Dataset], band: Band) -> None:
-    """Write a band, a row of chunks, as HDF5 would, but compress in threads: it does in one."""
-    arrays = band_arrays(band)
-    width, step = band.colour.shape[1], planes["colour"].chunks[1]
-    places = [(name, first) for name in PIXEL_ARRAYS for first in range(0, width, step)]
-
-    def packed(place: tuple[str, int]) -> bytes:
-        name, first = place
-        return _packed(arrays[name][:, first : first + step], planes[name].chunks)
-
-    for (name, first), data in zip(places, in_threads(packed, places), strict=True):
-        offset = (band.rows.start, first, 0)[: arrays[name].ndim]
-        planes[name].id.write_direct_chunk(offset, data)
-
-
-def _packed(part: NDArray[Any], shape: tuple[int, ...]) -> bytes:
-    """A chunk after HDF5's filters: filled up, bytes of equal weight side by side, deflated."""
-    whole = np.zeros(shape, dtype=part.dtype)
-    whole[: part.shape[0], : part.shape[1]] = part
-    shuffled = whole.reshape(-1, 1).view(np.uint8).T
-    return zlib.compress(shuffled.tobytes(), COMPRESSION_LEVEL)
 
 
 def band_arrays(band: Band) -> dict[str, NDArray[Any]]:
@@ -213,31 +138,25 @@ def band_arrays(band: Band) -> dict[str, NDArray[Any]]:
 
 
 def light_field_in_memory(
-    captured: Mapping[str, tuple[Reflector, Iterable[Band]]],
+    photographs: Iterable[tuple[Reflector, Iterable[Band]]],
     capture_mm: float,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> LightField:
-    """A light field that is in no file."""
+    """A light field that is in no file.
+
+    Args:
+        photographs: each camera with the bands of its picture.
+        capture_mm: diameter of the capture sphere.
+        facts: how it was made.
+    """
     frames = {}
-    for camera, (at, bands) in captured.items():
+    for reflector, bands in photographs:
         parts = [band_arrays(band) for band in bands]
         planes = {name: np.concatenate([part[name] for part in parts]) for name in PIXEL_ARRAYS}
-        frames[camera] = Frame(at.camera, at.u, at.mirrors, at.boxes(), planes)
+        frames[reflector.camera_id] = Frame(
+            reflector.camera, reflector.u, reflector.mirrors, reflector.boxes(), planes
+        )
     return LightField(frames, capture_mm, dict(facts))
-
-
-def _write_view(group: h5py.Group, view: Camera) -> None:
-    group.attrs["pinhole_mm"] = view.pinhole
-    group.attrs["forward"] = view.forward
-    group.attrs["right"] = view.right
-    group.attrs["hfov_rad"] = view.hfov
-
-
-def _write_mirrors(group: h5py.Group, at: Reflector) -> None:
-    mirrors = at.mirrors
-    columns = (at.u, mirrors.apex, mirrors.normal, mirrors.curvature, at.boxes())
-    for name, values in zip(MIRROR_ARRAYS, columns, strict=True):
-        group.create_dataset(name, data=values)
 
 
 @contextmanager
@@ -253,13 +172,13 @@ def _opened(file: Path) -> Iterator[h5py.File]:
 
 
 def _read(file: Path, store: h5py.File) -> LightField:
-    found = store.attrs.get("schema")
-    if found != SCHEMA:
+    schema = store.attrs.get("schema")
+    if schema != SCHEMA:
         raise InputError(
-            f"{file} has schema {found!r}, allowed is {SCHEMA!r}: capture again with this tbcad"
+            f"{file} has schema {schema!r}, allowed is {SCHEMA!r}: capture again with this tbcad"
         )
     try:
-        frames = {name: _frame(_group(store, name)) for name in ("a", "b") if name in store}
+        frames = {name: _frame(_member(store, name)) for name in ("a", "b") if name in store}
         capture_mm = float(store.attrs["capture_mm"])
         facts = json.loads(store.attrs["facts"])
     except (KeyError, ValueError, TypeError, AttributeError) as error:
@@ -269,25 +188,18 @@ def _read(file: Path, store: h5py.File) -> LightField:
     return LightField(frames, capture_mm, facts)
 
 
-def _group(store: h5py.Group, name: str) -> h5py.Group:
-    if not isinstance(store.get(name, getlink=True), h5py.HardLink):
-        raise ValueError(f"group {name} is missing or lies elsewhere")
-    return store[name]
-
-
-def _inside(group: h5py.Group, name: str) -> h5py.Dataset:
-    """An array that lies in this very file: a link could name any other."""
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink):
-        raise ValueError(f"array {name} of {group.name} is missing or lies elsewhere")
-    found = group[name]
-    if not isinstance(found, h5py.Dataset) or found.external or found.is_virtual:
+def _member(group: h5py.Group, name: str) -> Any:
+    """A group or array that lies in this very file: a link could name any other."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"{name} of {group.name} is missing or lies elsewhere")
+    member = group[name]
+    if isinstance(member, h5py.Dataset) and (member.external or member.is_virtual):
         raise ValueError(f"array {name} of {group.name} lies elsewhere")
-    return found
+    return member
 
 
 def _frame(group: h5py.Group) -> Frame:
-    planes = {name: _inside(group, name) for name in PIXEL_ARRAYS}
+    planes = {name: _member(group, name) for name in PIXEL_ARRAYS}
     height, width = planes["mirror"].shape
     for name, (last, kind) in PIXEL_ARRAYS.items():
         if planes[name].shape != (height, width, *last) or planes[name].dtype != np.dtype(kind):
@@ -297,8 +209,8 @@ def _frame(group: h5py.Group) -> Frame:
         _numbers(attributes[name], (3,)) for name in ("pinhole_mm", "forward", "right")
     )
     hfov = float(_numbers(attributes["hfov_rad"], ()))
-    table = _group(group, "mirrors")
-    columns = {name: _inside(table, name)[:] for name in MIRROR_ARRAYS}
+    table = _member(group, "mirrors")
+    columns = {name: _member(table, name)[:] for name in MIRROR_ARRAYS}
     m = len(columns["curvature"])
     u, apex, normal = (_numbers(columns[name], (m, 3)) for name in ("u", "apex", "normal"))
     mirrors = Surfaces(apex, normal, _numbers(columns["curvature"], (m,)))

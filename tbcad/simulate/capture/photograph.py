@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, in_batches
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
@@ -27,7 +28,7 @@ class Band:
 
     Attributes:
         rows: which, from the top.
-        rays: through the pixels' centres; none where the object itself stands in front.
+        rays: through the pixels' centres; none where the object itself is in front.
         colour: red, green, blue, (h, w, 3).
     """
 
@@ -46,7 +47,7 @@ def photograph(
         trace: gives the rays of rows after the mirrors.
         scene: the object.
         samples: a pixel is the mean of samples x samples rays.
-        progress: told how far it has come.
+        progress: called with each step.
     """
     height = view.height_px
     work = partial(_band, view, trace, scene, samples)
@@ -85,23 +86,21 @@ def _through(
 ) -> tuple[ReflectedRays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
-    seen = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
-    colour = seen.colour.reshape(*rays.mirror.shape, 3)
+    hits = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
+    colour = hits.colour.reshape(*rays.mirror.shape, 3)
     return _hidden(view, rays, colour, scene, rows, shift), colour
 
 
 def _hidden(
     view: Camera, rays: ReflectedRays, colour: Colours, scene: Scene, rows: range, shift: Shift
 ) -> ReflectedRays:
-    """Paint the object where the camera sees it directly, and take the rays away there."""
-    way = unit_directions(view, rows, shift).reshape(-1, 3)
-    direct = cast_rays(scene, np.broadcast_to(view.pinhole, way.shape), way)
-    met = np.flatnonzero(np.isfinite(direct.depth))
-    if len(met) == 0:
-        return rays
-    to_mirror = np.linalg.norm(rays.origin.reshape(-1, 3)[met] - view.pinhole, axis=1)
-    front = met[(rays.mirror.ravel()[met] == 0) | (direct.depth[met] < to_mirror)]
+    """Paint the object where the camera sees it directly, and remove the rays there."""
+    direction = unit_directions(view, rows, shift).reshape(-1, 3)
+    direct = cast_rays(scene, np.broadcast_to(view.pinhole, direction.shape), direction)
+    hit = np.flatnonzero(np.isfinite(direct.depth))
+    to_mirror = norm(rays.origin.reshape(-1, 3)[hit] - view.pinhole)
+    front = hit[(rays.mirror.ravel()[hit] == 0) | (direct.depth[hit] < to_mirror)]
     colour.reshape(-1, 3)[front] = direct.colour[front]
-    gone = np.zeros(rays.mirror.shape, dtype=bool)
-    gone.ravel()[front] = True
-    return rays.without(gone)
+    removed = np.zeros(rays.mirror.shape, dtype=bool)
+    removed.ravel()[front] = True
+    return rays.without(removed)

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import (
     CENTRE,
     Band,
@@ -35,7 +34,7 @@ from tbcad.simulate.prototype.ball_rays import (
     reflected_colours,
     trace_balls,
 )
-from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector
+from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.prototype.stop_photograph import resampled_photograph
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
@@ -92,28 +91,6 @@ class MergedPixels:
     hits: BallHits
     front: Bools
     direct: Colours
-
-
-def merged_light_field(
-    runs: tuple[PrototypeRun, PrototypeRun],
-    scene: Scene,
-    capture_mm: float,
-    resample: Resample = "photograph",
-    samples: int = 1,
-    progress: Progress = lambda _: None,
-) -> LightField:
-    """Both runs merged, in memory; capture_mm is the diameter of the capture sphere.
-
-    The other arguments are those of `merge_run`.
-    """
-    captured = {
-        run.reflector.camera_id: (
-            ball_reflector(run),
-            merge_run(run, scene, resample, samples, progress),
-        )
-        for run in runs
-    }
-    return light_field_in_memory(captured, capture_mm)
 
 
 def merge_run(

@@ -1,9 +1,8 @@
 """One run of the base through its stops, seen from the object.
 
-The second half is photographed with the object turned by 180 degrees about z. Seen from the object
-the machine is turned instead: its camera then stands where the shell's camera b stands, and each
-ball in the place of one of camera b's mirrors. So both runs are alike, and differ in where the
-machine stands.
+The second half is photographed with the object turned by 180 degrees about z. In the frame of the
+object the prototype is turned instead: its camera is then where the shell's camera b is, and each
+ball in the place of one of camera b's mirrors. Both runs differ only in where the prototype is.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from tbcad.types import Floats, Ints
 
 @dataclass(frozen=True)
 class PrototypeRun:
-    """A run of s stops that stands in for the m mirrors of one of the shell's cameras.
+    """A run of s stops, whose balls replace the m mirrors of one of the shell's cameras.
 
     All in the frame of the object.
 
@@ -69,17 +68,17 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, turn: Floats) -> PrototypeRun:
-    ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * turn
+def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, flip: Floats) -> PrototypeRun:
+    ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * flip
     angle = plan.angle[stop]
     apex, normal = (
-        rotated(vectors[ball] * turn, frame[0], angle) for vectors in (plan.apex, plan.normal)
+        rotated(vectors[ball] * flip, frame[0], angle) for vectors in (plan.apex, plan.normal)
     )
     turned = replace(
         camera,
-        pinhole=camera.pinhole * turn,
-        forward=camera.forward * turn,
-        right=camera.right * turn,
+        pinhole=camera.pinhole * flip,
+        forward=camera.forward * flip,
+        right=camera.right * flip,
     )
     rotations = _window_rotations(reflector.mirrors.apex, apex, frame, turned.pinhole)
     if not plan.moved:
@@ -87,7 +86,7 @@ def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, turn: Floa
     return PrototypeRun(
         reflector=reflector,
         camera=turned,
-        balls=_balls_at_stops(plan, frame[0], turn),
+        balls=_balls_at_stops(plan, frame[0], flip),
         stop=stop,
         ball=ball,
         ball_surfaces=Surfaces(apex, normal, 1 / plan.radius[ball]),
@@ -95,11 +94,11 @@ def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, turn: Floa
     )
 
 
-def _balls_at_stops(plan: Plan, axis: Floats, turn: Floats) -> Floats:
+def _balls_at_stops(plan: Plan, axis: Floats, flip: Floats) -> Floats:
     """All balls at all stops, (s, k, 8)."""
     shape = (len(plan.angle), len(plan))
     centre, body_centre = (
-        rotated(np.broadcast_to(points * turn, (*shape, 3)), axis, plan.angle[:, None])
+        rotated(np.broadcast_to(points * flip, (*shape, 3)), axis, plan.angle[:, None])
         for points in (plan.centre, plan.body_centre)
     )
     radius, body_radius = (
@@ -116,7 +115,7 @@ def _window_rotations(mirror: Floats, ball: Floats, frame: Floats, pinhole: Floa
 
     Args:
         mirror: apices of the mirrors, mm, (m, 3).
-        ball: apices of the balls where they stand in, mm, (m, 3).
+        ball: apices of the balls in their places, mm, (m, 3).
         frame: rows: axis, azimuth zero and third, (3, 3).
         pinhole: mm, (3,).
     """

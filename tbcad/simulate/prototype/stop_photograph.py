@@ -1,6 +1,6 @@
 """The photograph that the prototype's camera takes at a stop: balls and object, no printed part.
 
-All of it, or only the pixels between which something is wanted.
+All of it, or only the pixels that are interpolated.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import subpixel_shifts
-from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.refocus import Focus, lens_rays
@@ -21,8 +21,8 @@ def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
     """The picture (h, w, 3), 0 to 255, of a pinhole camera, samples x samples rays a pixel."""
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     for shift in subpixel_shifts(samples):
-        way = view_directions(view, shift)
-        total += _seen(scene, np.broadcast_to(view.pinhole, way.shape), way)
+        direction = view_directions(view, shift)
+        total += _colours(scene, np.broadcast_to(view.pinhole, direction.shape), direction)
     return total / np.float32(samples**2)
 
 
@@ -40,20 +40,20 @@ def lens_picture(
         view: the middle of the lens, and the picture.
         focus: diameter of the lens, and the plane that it makes sharp.
         samples: rays a pixel, each through another point of the lens and of the pixel.
-        progress: told how far it has come.
+        progress: called with each step.
     """
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     for k, (point, shift) in enumerate(zip(_disc(samples), _square(samples), strict=True)):
         progress(f"ray {k + 1} of {samples}")
-        total += _seen(scene, *lens_rays(view, focus, point * focus.aperture_mm / 2, shift))
+        total += _colours(scene, *lens_rays(view, focus, point * focus.aperture_mm / 2, shift))
     return total / np.float32(samples)
 
 
 def _disc(count: int) -> Floats:
     """Points (n, 2) spread evenly over the unit disc, on Vogel's spiral."""
     k = np.arange(count)
-    radius, turn = np.sqrt((k + 0.5) / count), GOLDEN_ANGLE * k
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    radius, angle = np.sqrt((k + 0.5) / count), GOLDEN_ANGLE * k
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def _square(count: int) -> list[tuple[float, float]]:
@@ -64,9 +64,9 @@ def _square(count: int) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in places]
 
 
-def _seen(scene: Scene, origin: Floats, way: Floats) -> Colours:
+def _colours(scene: Scene, origin: Floats, direction: Floats) -> Colours:
     """Colours (h, w, 3) along rays (h, w, 3)."""
-    flat, start = way.reshape(-1, 3), origin.reshape(-1, 3)
-    pieces = [slice(k, k + RAYS_PER_CHUNK) for k in range(0, len(flat), RAYS_PER_CHUNK)]
-    found = in_threads(lambda part: cast_rays(scene, start[part], flat[part]).colour, pieces)
-    return np.concatenate(found).reshape(way.shape)
+    flat, start = direction.reshape(-1, 3), origin.reshape(-1, 3)
+    parts = chunks(len(flat), RAYS_PER_CHUNK)
+    colours = in_threads(lambda part: cast_rays(scene, start[part], flat[part]).colour, parts)
+    return np.concatenate(colours).reshape(direction.shape)

@@ -1,6 +1,6 @@
 """The object before the cameras: its shape and its colours, from a file or built in."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,7 +27,7 @@ class SceneObject:
 
     Attributes:
         name: what it is, for records.
-        points: corners, mm, (v, 3), z up, in the frame of the machine.
+        points: corners, mm, (v, 3), z up, in the frame of the design.
         faces: corners of the facets, (f, 3).
         normals: unit normals at the corners, for shading, (v, 3).
         albedo: red, green, blue at each facet's corners, 0 to 1, (f, 3, 3).
@@ -57,7 +57,7 @@ def load_object(
     """Read a triangle mesh in millimetres, z up, about the origin.
 
     Args:
-        path: any file that trimesh reads; its textures must lie beside it.
+        path: any file that trimesh reads; its textures must be in the same folder.
         capture_mm: diameter of the capture sphere.
         fit: move and scale it so that it just fits that sphere.
         paint: its own colours, or the built-in pattern where the file has none; the pattern in any
@@ -75,10 +75,10 @@ def load_object(
     patterned = not colours and paint != "plain"
     normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
     plain = np.full((len(faces), 3, 3), GREY)
-    made = SceneObject(path.name, points, faces, normals, plain, patterned=patterned)
-    made = replace(made, **colours)
-    _check_size(path, made, capture_mm)
-    return made
+    fields = {"albedo": plain, "patterned": patterned, **colours}
+    subject = SceneObject(path.name, points, faces, normals, **fields)
+    _check_size(path, subject, capture_mm)
+    return subject
 
 
 def load_or_built_in(
@@ -113,9 +113,9 @@ def pattern(points: Floats) -> Floats:
     """Colours (..., 3) of the built-in pattern: cubes in space, each of its own hue and weight."""
     cube = np.floor(points / CELL_MM).astype(np.int64)
     mixed = (cube * np.array([73_856_093, 19_349_663, 83_492_791])).sum(axis=-1)
-    turn = (mixed % 17) / 17
+    hue = (mixed % 17) / 17
     weight = 0.55 + 0.45 * (cube.sum(axis=-1) % 2)
-    result: Floats = rainbow(turn) * weight[..., None]
+    result: Floats = rainbow(hue) * weight[..., None]
     return result
 
 
@@ -126,7 +126,7 @@ def _knot(t: Floats) -> Floats:
 
 
 def _ring(t: Floats, s: Floats) -> Floats:
-    """Unit vectors (k, j, 3) across the knot at t (k,), all round it at s (j,)."""
+    """Unit vectors (k, j, 3) across the knot at t (k,), around it at s (j,)."""
     step = 1e-4
     along = _knot(t + step) - _knot(t - step)
     along /= np.linalg.norm(along, axis=1)[:, None]
@@ -170,8 +170,8 @@ def _check(path: Path, points: Floats, faces: Ints) -> None:
         raise InputError(f"{path} has points that are not finite: repair the mesh")
 
 
-def _check_size(path: Path, made: SceneObject, capture_mm: float) -> None:
-    used = made.points[np.unique(made.faces)]
+def _check_size(path: Path, subject: SceneObject, capture_mm: float) -> None:
+    used = subject.points[np.unique(subject.faces)]
     size, reach = np.ptp(used, axis=0), 2 * float(np.linalg.norm(used, axis=1).max())
     if size.max() == 0:
         raise InputError(f"{path} has no extent: all its points are one: name another")

@@ -13,7 +13,7 @@ from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bytes, Floats, Ints
 
 # Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
-# the same in all directions, as light-field rendering presumes. No cast shadows.
+# the same in all directions, as light-field rendering assumes. No cast shadows.
 LAMPS = np.array([[0.48, 0.36, 0.8], [-0.6, 0.64, 0.48]])
 LAMP_LIGHT = np.array([0.55, 0.2])
 SKY_LIGHT = 0.35
@@ -106,9 +106,9 @@ def _texels(picture: Bytes, uv: Floats) -> Floats:
     """Colours (n, 3) of a picture that repeats, between its four nearest texels."""
     height, width = picture.shape[:2]
     x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
-    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    across, down = (x - left)[:, None], (y - top)[:, None]
-    rows, columns = (top % height, (top + 1) % height), (left % width, (left + 1) % width)
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    across, down = (x - column)[:, None], (y - row)[:, None]
+    rows, columns = (row % height, (row + 1) % height), (column % width, (column + 1) % width)
     upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
     lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
     result: Floats = (upper * (1 - down) + lower * down) / 255

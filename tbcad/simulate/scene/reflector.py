@@ -10,7 +10,7 @@ from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
-# Boxes about cells in the picture are widened by so many pixels: an arc may bulge beyond samples.
+# Boxes around cells in the picture are widened by this: an arc may bulge beyond its samples.
 MARGIN_PX = 2
 ARC_SAMPLES = np.linspace(0, 1, 9)
 

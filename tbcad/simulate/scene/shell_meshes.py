@@ -1,8 +1,8 @@
-"""The exported mesh: which mirror each pixel's ray meets, on spheres recovered from its vertices.
+"""The exported meshes: facets say which mirror a ray meets, spheres fitted to them where it goes.
 
-A facet reflects like a flat mirror, which turns rays by some 2 mm at the object
-(docs/decisions/0003). Its vertices lie on the sphere, though: so facets say what stands where, and
-the spheres through the vertices of each mirror's facets say where light goes.
+A facet reflects like a flat mirror, which deflects rays by some 2 mm at the object
+(docs/decisions/0003). Its vertices lie on the sphere, though, so the ray is reflected by the
+sphere through the vertices of the mirror's facets.
 """
 
 from __future__ import annotations
@@ -58,51 +58,53 @@ def read_shell_meshes(export: Exported) -> ShellMeshes:
     """
     coat = export.spec.mirrors.coating_um / 1000
     corners, owners, surfaces = [], [], []
-    for at, sign in zip(export.reflectors, (1, -1), strict=True):
-        path = export.folder / f"shell_{at.camera_id}.stl"
+    for reflector, sign in zip(export.reflectors, (1, -1), strict=True):
+        path = export.folder / f"shell_{reflector.camera_id}.stl"
         facets = _facets(path)
-        owner = _owners(at.mirrors.offset(-coat), facets)
-        if len(lost := np.setdiff1d(np.arange(len(at)), owner)):
-            raise InputError(f"{path} has no facets of {len(lost)} recorded mirrors: {REBUILD}")
+        owner = _owners(reflector.mirrors.offset(-coat), facets)
+        if len(missing := np.setdiff1d(np.arange(len(reflector)), owner)):
+            raise InputError(f"{path} has no facets of {len(missing)} recorded mirrors: {REBUILD}")
         corners.append(facets)
         owners.append(sign * (owner + 1))
-        surfaces.append(fitted_surfaces(at.mirrors, facets, owner).offset(coat))
+        surfaces.append(fitted_surfaces(reflector.mirrors, facets, owner).offset(coat))
     mirror = np.concatenate(owners).astype(np.int32)
     return ShellMeshes(mirror, embree_scene(np.concatenate(corners)), (surfaces[0], surfaces[1]))
 
 
 def mesh_tracer(
-    shells: ShellMeshes, at: Reflector
+    shells: ShellMeshes, reflector: Reflector
 ) -> Callable[[range, tuple[float, float]], ReflectedRays]:
-    """What gives the rays of rows of a camera's picture off the mirrors of the mesh."""
-    sign, surfaces = (1, shells.surfaces[0]) if at.camera_id == "a" else (-1, shells.surfaces[1])
+    """A function that traces rows of a camera's pixels off the mirrors of the mesh."""
+    sign, surfaces = (
+        (1, shells.surfaces[0]) if reflector.camera_id == "a" else (-1, shells.surfaces[1])
+    )
 
     def trace(rows: range, shift: tuple[float, float]) -> ReflectedRays:
-        way = pixel_directions(at.camera, rows, shift)
-        start = np.empty((way.shape[0] * way.shape[1], 3), dtype=np.float32)
-        start[:] = at.camera.pinhole
-        facet = np.asarray(shells.embree.run(start, way.reshape(-1, 3).astype(np.float32)))
+        direction = pixel_directions(reflector.camera, rows, shift)
+        start = np.empty((direction.shape[0] * direction.shape[1], 3), dtype=np.float32)
+        start[:] = reflector.camera.pinhole
+        facet = np.asarray(shells.embree.run(start, direction.reshape(-1, 3).astype(np.float32)))
         mirror = np.where(facet >= 0, np.maximum(sign * shells.mirror[facet], 0), 0)
-        numbers = mirror.reshape(way.shape[:2]).astype(np.int32)
-        return reflect_pixels(at.camera.pinhole, way, surfaces, numbers)
+        numbers = mirror.reshape(direction.shape[:2]).astype(np.int32)
+        return reflect_pixels(reflector.camera.pinhole, direction, surfaces, numbers)
 
     return trace
 
 
-def fitted_surfaces(meant: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
+def fitted_surfaces(nominal: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
     """The surfaces (m,) that fit the corners (f, 3, 3) of facets of owners (f,) best; -1: none.
 
-    In a frame with z along the meant normal, at the meant apex, a surface is
+    In a frame with z along the nominal normal, at the nominal apex, a surface is
     z = h + a x + b y - k/2 (x^2 + y^2 + z^2): least squares in (h, a, b, k), spheres and planes
     alike. Each facet's corners count, so vertices count by the facets about them.
     """
-    mine = owner >= 0
-    i = np.repeat(owner[mine], 3)
-    frames = _frames(meant.normal)
-    local = np.einsum("nkx,nx->nk", frames[i], corners[mine].reshape(-1, 3) - meant.apex[i])
+    owned = owner >= 0
+    i = np.repeat(owner[owned], 3)
+    frames = _frames(nominal.normal)
+    local = np.einsum("nkx,nx->nk", frames[i], corners[owned].reshape(-1, 3) - nominal.apex[i])
     terms = np.column_stack([np.ones(len(i)), local[:, :2], -(local**2).sum(axis=1) / 2])
     products = np.einsum("nj,nk->njk", terms, np.column_stack([terms, local[:, 2]]))
-    sums = np.zeros((len(meant), 4, 5))
+    sums = np.zeros((len(nominal), 4, 5))
     np.add.at(sums, i, products)
     h, a, b, k = np.linalg.solve(sums[:, :, :4], sums[:, :, 4:])[..., 0].T
     slope = np.stack([-a, -b, np.ones_like(a)], axis=1)
@@ -111,14 +113,14 @@ def fitted_surfaces(meant: Surfaces, corners: Floats, owner: Ints) -> Surfaces:
     foot = (2 * h / (steep + np.sqrt(steep) * size))[:, None] * slope
     normal = (slope + k[:, None] * foot) / size[:, None]
     back = np.swapaxes(frames, 1, 2)
-    apex = meant.apex + np.einsum("mxk,mk->mx", back, foot)
+    apex = nominal.apex + np.einsum("mxk,mk->mx", back, foot)
     return Surfaces(apex, np.einsum("mxk,mk->mx", back, normal), k / size)
 
 
 def _frames(normal: Floats) -> Floats:
     """Rows (m, 3, 3): two unit vectors across each normal (m, 3), and the normal."""
-    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    across = np.cross(normal, least)
+    shortest = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    across = np.cross(normal, shortest)
     across /= np.linalg.norm(across, axis=1)[:, None]
     return np.stack([across, np.cross(normal, across), normal], axis=1)
 
@@ -146,10 +148,10 @@ def _owners(bare: Surfaces, corners: Floats) -> Ints:
     )
     owner = np.full(len(corners), -1)
     for likely in near.reshape(len(corners), -1).T:
-        left = np.flatnonzero(owner < 0)
-        i = np.repeat(likely[left, None], 3, axis=1)
-        on = np.abs(bare.value(i, corners[left])).max(axis=1) < ON_MIRROR_MM
-        owner[left[on]] = likely[left[on]]
+        unassigned = np.flatnonzero(owner < 0)
+        i = np.repeat(likely[unassigned, None], 3, axis=1)
+        on = np.abs(bare.value(i, corners[unassigned])).max(axis=1) < ON_MIRROR_MM
+        owner[unassigned[on]] = likely[unassigned[on]]
     owner[~_along(bare, corners, owner)] = -1
     return owner
 

@@ -1,4 +1,4 @@
-"""Where a picture is wanted from: a pinhole that looks at the middle of the object."""
+"""Viewpoints of synthesised pictures: pinhole cameras that look at the middle of the object."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.types import Floats
 
-# Room about the capture sphere in a picture.
+# Size of a picture in diameters of the capture sphere.
 FRAME_MARGIN = 1.05
 
 
@@ -28,7 +28,7 @@ def camera_around_object(
         capture_mm: diameter of the capture sphere.
         size: columns and rows.
         hfov: angle of view across the columns, radians; without, the capture sphere fills the
-            shorter side but for a little room.
+            shorter side but for a small margin.
 
     Raises:
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
@@ -46,17 +46,17 @@ def camera_around_object(
     if not np.isfinite(azimuth):
         raise InputError("--azimuth is not a number: give degrees")
     forward, right = _axes(azimuth, elevation)
-    wide = hfov if hfov is not None else _fitting(capture_mm / 2 / distance, size)
-    return Camera(-distance * forward, forward, right, *size, wide)
+    fov = hfov if hfov is not None else _fitted_fov(capture_mm / 2 / distance, size)
+    return Camera(-distance * forward, forward, right, *size, fov)
 
 
 def _axes(azimuth: float, elevation: float) -> tuple[Floats, Floats]:
-    flat = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    toward = np.cos(elevation) * flat + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
-    return -toward, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    horizontal = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    outward = np.cos(elevation) * horizontal + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
+    return -outward, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
 
 
-def _fitting(sine: float, size: tuple[int, int]) -> float:
+def _fitted_fov(sine: float, size: tuple[int, int]) -> float:
     half = FRAME_MARGIN * np.tan(np.arcsin(sine)) * size[0] / min(size)
     return float(2 * np.arctan(half))
 

@@ -50,7 +50,7 @@ class ApertureStop:
         f_number: focal length / pupil.
         blur_px: diameter of the blur circle at both ends of the range.
         airy_px: diameter of the Airy disc on the lens's axis.
-        light: left, relative to the lens wide open.
+        light: relative to the lens wide open.
     """
 
     pupil: float
@@ -83,7 +83,7 @@ def focal_length(lens: Lens, over: DepthRange) -> float:
 
 
 def blur_limited(lens: Lens, over: DepthRange, blur_px: float) -> float:
-    """Largest pupil whose blur circle is so many pixels at most, mm.
+    """Largest pupil whose blur circle is at most this many pixels, mm.
 
     A point at depth s before a lens in focus at D has a blur circle of pupil * image *
     |1/s - 1/D|, wherever it is in the picture; at both ends of the range that is half the spread.
@@ -92,7 +92,7 @@ def blur_limited(lens: Lens, over: DepthRange, blur_px: float) -> float:
 
 
 def sharpest(lens: Lens, over: DepthRange) -> float:
-    """Pupil with which blur circle and Airy disc together are least: there they are equal, mm.
+    """Pupil with which blur circle and Airy disc together are smallest: there they are equal, mm.
 
     The blur is pupil * image * spread / 2, the disc 2.44 wavelength * image / pupil.
     """

@@ -83,15 +83,15 @@ def count_pixels(
             sensors of one shape may share their rays.
     """
     traced: dict[tuple[int, int, float], PixelCounts] = {}
-    found = []
+    counts = []
     for sensor in sensors:
         width, height = _sampled(sensor, most_rays)
         key = width, height, sensor.height_px / sensor.width_px
         if key not in traced:
             traced[key] = _counted(half, sensor, (width, height), radius)
         one, scale = traced[key], (sensor.width_px / width) ** 2
-        found.append(PixelCounts(one.on * scale, one.seen * scale, one.fill, one.rays))
-    return found
+        counts.append(PixelCounts(one.on * scale, one.seen * scale, one.fill, one.rays))
+    return counts
 
 
 def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
@@ -102,7 +102,7 @@ def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
 def _counted(
     half: MirrorArray, sensor: Sensor, sampled: tuple[int, int], radius: float
 ) -> PixelCounts:
-    """Counts of the rays themselves, through the middles of so many columns and rows."""
+    """Counts of the rays themselves, through the centres of the sampled columns and rows."""
     corners = half.cells.corners
     full = fitted_camera(
         half.camera.pinhole, corners, sensor.width_px, sensor.height_px, half.camera.hfov
@@ -112,11 +112,11 @@ def _counted(
     return PixelCounts(on, seen, full.fill(corners), sampled[0] * sampled[1])
 
 
-def _traced(at: Reflector, radius: float) -> tuple[Floats, Floats]:
+def _traced(reflector: Reflector, radius: float) -> tuple[Floats, Floats]:
     """Rays on each mirror and those that go on to the capture sphere, each (m,)."""
-    trace, m = exact_tracer(at), len(at)
+    trace, m = exact_tracer(reflector), len(reflector)
     on, seen = np.zeros(m + 1), np.zeros(m + 1)
-    for rows in row_bands(at.camera.height_px):
+    for rows in row_bands(reflector.camera.height_px):
         rays = trace(rows, CENTRE)
         on += np.bincount(rays.mirror.ravel(), minlength=m + 1)
         seen += np.bincount(rays.mirror[rays.meeting(radius)], minlength=m + 1)

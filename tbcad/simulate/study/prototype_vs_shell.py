@@ -82,11 +82,9 @@ def prototype_vs_shell(
 def _tiles(
     export: Exported, scene: Scene, kind: Geometry, samples: int, progress: Progress
 ) -> MirrorTiles:
-    captured = {
-        at.camera_id: (at, bands())
-        for at, bands in camera_photographs(export, scene, kind, samples, progress)
-    }
-    return MirrorTiles(light_field_in_memory(captured, export.capture_mm))
+    cameras = camera_photographs(export, scene, kind, samples, progress)
+    photographs = ((reflector, bands()) for reflector, bands in cameras)
+    return MirrorTiles(light_field_in_memory(photographs, export.capture_mm))
 
 
 def _figures(table: Table) -> tuple[Figure, ...]:

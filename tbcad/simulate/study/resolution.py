@@ -107,7 +107,7 @@ def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> Balance
         n: subdivisions in ascending order, (k,).
         cameras: number of virtual cameras, (k,); NaN where there was no design.
         pixels: average pixels of one, (k,).
-        ratio: wanted.
+        ratio: of cameras to pixels that is asked for.
 
     Cameras grow and pixels shrink with n^2, so the logarithm of their ratio is nearly a straight
     line over log n: linear between two neighbours it errs by less than 0.01 in n.
@@ -182,14 +182,14 @@ def _of_sensor(table: Table, sensor: Sensor) -> Table:
 def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
     counted = _of_sensor(counts, sensor)
     cameras, pixels = counted.numbers("virtual_cameras"), counted.numbers(KINDS[kind])
-    found = balance(counted.numbers("n"), cameras, pixels, ratio)
-    inside = not np.isnan(found.n)
-    nearest = counted.records()[found.nearest]
+    balanced = balance(counted.numbers("n"), cameras, pixels, ratio)
+    inside = not np.isnan(balanced.n)
+    nearest = counted.records()[balanced.nearest]
     return {
         **asdict(sensor),
         "ratio": str(ratio),
         "pixels_counted": kind,
-        "balanced_n": found.n if inside else None,
+        "balanced_n": balanced.n if inside else None,
         "nearest_n": nearest["n"] if inside else None,
         "virtual_cameras": nearest["virtual_cameras"] if inside else None,
         "average_px": nearest[KINDS[kind]] if inside else None,

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.stats import linregress
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.simulate.capture.light_field import NAME, LightField, create_light_field, write_camera
+from tbcad.simulate.capture.light_field import NAME, LightField
+from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene

@@ -1,4 +1,4 @@
-"""Views all round the object, and how like the truth a light field's are."""
+"""Viewpoints around the object, and the quality of a light field's views from there."""
 
 from dataclasses import dataclass
 
@@ -45,14 +45,14 @@ class Viewpoints:
 def viewpoints_around(
     elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float
 ) -> Viewpoints:
-    """Viewpoints at some elevations, and at each so many azimuths evenly around the object.
+    """Viewpoints at some elevations, and at each a number of azimuths evenly around the object.
 
     Raises:
         InputError: there are none or too many.
     """
     if not 1 <= azimuths <= MAX_AZIMUTHS:
         raise InputError(
-            f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints all round"
+            f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints around the object"
         )
     around = np.arange(azimuths) * 360.0 / azimuths
     elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, around, indexing="ij"))

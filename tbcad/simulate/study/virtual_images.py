@@ -57,10 +57,10 @@ def virtual_images(half: MirrorArray, radius: float) -> VirtualImages:
     """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
     mirrors, pinhole = half.mirrors, half.camera.pinhole
     toward = mirrors.apex - pinhole
-    to_mirror, way = norm(toward), unit(toward)
-    incidence = np.arccos(np.clip(-dot(way, mirrors.normal), -1, 1))
+    to_mirror, ray = norm(toward), unit(toward)
+    incidence = np.arccos(np.clip(-dot(ray, mirrors.normal), -1, 1))
     objects = norm(mirrors.apex)[:, None] + radius * np.array([-1.0, 0.0, 1.0])
     image = image_distances(mirrors.curvature[:, None], incidence[:, None], objects)
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
-    along = way @ half.camera.forward
+    along = ray @ half.camera.forward
     return VirtualImages(to_mirror, incidence, distance, distance * along[:, None, None])

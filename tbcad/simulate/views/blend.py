@@ -1,7 +1,7 @@
 """A target ray from several virtual cameras: each shows the point where the ray meets a surface.
 
-Of the virtual cameras those are taken that look at the point most nearly along the target ray;
-their weights fall to nothing at the first that is left out, so that pictures are continuous (C.
+Those virtual cameras are used that look at the point most nearly along the target ray; their
+weights fall to zero at the first one that is not used, so that pictures are continuous (C.
 Buehler and others, Unstructured Lumigraph Rendering, 2001, section 3). Each adds the pixels
 about the point, weighted by a bell curve much narrower than they are: the pixels of several
 cameras lie between each other, and together they are finer than one of them.
@@ -139,7 +139,7 @@ def _squared_pitch(points: Floats, tile: Ints, pixel: int, depth: float) -> floa
     """Mean squared distance of the rays of a pixel's four neighbours from its own, at a depth."""
     first, height, width = tile[0], tile[1], tile[2]
     row, column = divmod(pixel - first, width)
-    own = points[pixel]
+    centre = points[pixel]
     total, count = 0.0, 0
     for step, there in (
         (-1, column > 0),
@@ -148,6 +148,6 @@ def _squared_pitch(points: Floats, tile: Ints, pixel: int, depth: float) -> floa
         (width, row + 1 < height),
     ):
         if there and not np.isnan(points[pixel + step, 0]):
-            total += squared_distance(points, pixel + step, own, depth, 0.0)
+            total += squared_distance(points, pixel + step, centre, depth, 0.0)
             count += 1
     return total / count if count > 0 else 1.0

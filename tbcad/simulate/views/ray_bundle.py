@@ -18,7 +18,7 @@ from tbcad.types import Bytes, Floats, Ints
 
 # Target rays that go through the loops together: neighbours, so that few mirrors are near.
 RAYS_PER_CHUNK = 1 << 11
-# One target ray of so many tells which mirrors are near a chunk of them.
+# Every 31st target ray is looked at to find the mirrors near a chunk of them.
 SAMPLED_RAY_STEP = 31
 
 
@@ -76,7 +76,7 @@ def candidate_mirrors(pinholes: Floats, targets: Floats, limit: float, step: int
         pinholes: as in `RayBundle`, (k, 4).
         targets: two-plane coordinates, (n, 4).
         limit: mm.
-        step: one target of so many is looked at, and the last.
+        step: between the targets that are looked at; the last one always is.
     """
     kept = np.empty(len(pinholes), dtype=np.int64)
     count = 0

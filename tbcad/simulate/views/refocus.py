@@ -22,7 +22,8 @@ from tbcad.simulate.views.synthesis import (
 from tbcad.simulate.views.two_plane import two_plane_along
 from tbcad.types import Bools, Floats, Progress
 
-# The paper's 69 pinholes: so many points of a square lattice lie within this radius in its steps.
+# 69 points of a square lattice, the paper's number of pinholes, are within this squared radius
+# in steps of the lattice.
 LATTICE_RADIUS2 = 20
 
 

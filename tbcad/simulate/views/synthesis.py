@@ -24,7 +24,7 @@ Rays = tuple[Floats, Floats]
 DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
 
-# One target ray of so many tells which mirrors are near.
+# Every 601st target ray is looked at to find the mirrors near a view.
 VIEW_RAY_STEP = 601
 
 
@@ -66,13 +66,13 @@ def synthesise(
     meets, rays = rays_to_capture_sphere(tiles, (origin, direction))
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
-    found, seen = ray_colours(bundle, rays, method, depth)
+    colours, seen = ray_colours(bundle, rays, method, depth)
     if not seen.all():
         rest = (rays[0][~seen], rays[1][~seen])
         bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
-        found[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
+        colours[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
     colour = np.zeros(direction.shape, dtype=np.float32)
-    colour[meets] = found
+    colour[meets] = colours
     complete = ~meets
     complete[meets] = seen
     return SynthesisedView(colour, complete)
@@ -121,7 +121,9 @@ def search_radius(tiles: MirrorTiles) -> float:
     """
     capture = tiles.source.capture_mm
     angle = np.sqrt(2 * np.pi / len(tiles.u) * 2 / np.sqrt(3))
-    size = sum(frame.view.width_px * frame.view.height_px for frame in tiles.source.frames.values())
+    size = sum(
+        frame.camera.width_px * frame.camera.height_px for frame in tiles.source.frames.values()
+    )
     pixel = capture / np.sqrt(size / len(tiles.u))
     return float(angle * capture / 2 / np.sqrt(3) + pixel)
 

@@ -136,8 +136,8 @@ def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:
 def _light_field(
     cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float
 ) -> LightField:
-    both = {at.camera_id: (at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras}
-    return light_field_in_memory(both, capture_mm)
+    photographs = ((at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras)
+    return light_field_in_memory(photographs, capture_mm)
 
 
 def _with_rays_of(rays: LightField, pictures: LightField) -> LightField:

@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.simulate.capture.light_field import (
-    PIXEL_ARRAYS,
-    SCHEMA,
-    LightField,
-    create_light_field,
-    write_camera,
-)
+from tbcad.simulate.capture.light_field import PIXEL_ARRAYS, SCHEMA, LightField
+from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
@@ -45,8 +40,8 @@ def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: Light
                 assert np.array_equal(frame.planes[name][:], memory.planes[name])
             assert np.array_equal(frame.u, at.u)
             assert np.array_equal(frame.boxes, at.boxes())
-            assert np.array_equal(frame.view.pinhole, at.camera.pinhole)
-            assert frame.view.hfov == at.camera.hfov
+            assert np.array_equal(frame.camera.pinhole, at.camera.pinhole)
+            assert frame.camera.hfov == at.camera.hfov
             assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
 
 

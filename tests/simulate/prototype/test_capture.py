@@ -13,11 +13,12 @@ import tbcad.simulate.parallel
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.simulate.capture.light_field import LightField, create_light_field, write_camera
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import CENTRE, Band
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
 from tbcad.simulate.prototype.ball_rays import image_points, pixel_rays, trace_balls
-from tbcad.simulate.prototype.merge import merge_run, merged_light_field
+from tbcad.simulate.prototype.merge import Resample, merge_run
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector, prototype_runs
 from tbcad.simulate.prototype.stop_photograph import resampled_photograph, stop_photograph
@@ -48,7 +49,12 @@ def scene(knot: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def merged(both: Both, scene: Scene) -> LightField:
-    return merged_light_field(both, scene, CAPTURE_MM)
+    return merged_light_field(both, scene)
+
+
+def merged_light_field(both: Both, scene: Scene, resample: Resample = "photograph") -> LightField:
+    photographs = ((ball_reflector(run), merge_run(run, scene, resample)) for run in both)
+    return light_field_in_memory(photographs, CAPTURE_MM)
 
 
 def ideal(made: PrototypeLayout, angle: float) -> Plan:
@@ -199,9 +205,7 @@ class TestMerged:
     ) -> None:
         """Also where the object, if it is too large, hides mirrors."""
         scene = prepared_scene(built_in_object(size_mm))
-        found = merged_light_field(
-            prototype_runs(cameras, ideal(made, 0.7)), scene, CAPTURE_MM, resample
-        )  # type: ignore[arg-type]
+        found = merged_light_field(prototype_runs(cameras, ideal(made, 0.7)), scene, resample)  # type: ignore[arg-type]
         for at in cameras:
             shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
@@ -254,7 +258,7 @@ class TestMerged:
     def test_photographs_are_close_to_exact_rays(
         self, merged: LightField, both: Both, scene: Scene
     ) -> None:
-        sharp = merged_light_field(both, scene, CAPTURE_MM, "exact")
+        sharp = merged_light_field(both, scene, "exact")
         for camera, frame in merged.frames.items():
             other = sharp.frames[camera]
             for name in RAYS:
@@ -292,7 +296,7 @@ class TestMerged:
         self, merged: LightField, both: Both, scene: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(tbcad.simulate.parallel, "THREADS", 1)
-        again = merged_light_field(both, scene, CAPTURE_MM)
+        again = merged_light_field(both, scene)
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
                 assert (plane == again.frames[camera].planes[name]).all()
