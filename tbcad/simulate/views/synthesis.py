@@ -121,10 +121,9 @@ def search_radius(tiles: MirrorTiles) -> float:
     """
     capture = tiles.source.capture_mm
     angle = np.sqrt(2 * np.pi / len(tiles.u) * 2 / np.sqrt(3))
-    size = sum(
-        frame.camera.width_px * frame.camera.height_px for frame in tiles.source.frames.values()
-    )
-    pixel = capture / np.sqrt(size / len(tiles.u))
+    cameras = [frame.camera for frame in tiles.source.frames.values()]
+    pixels = sum(camera.width_px * camera.height_px for camera in cameras)
+    pixel = capture / np.sqrt(pixels / len(tiles.u))
     return float(angle * capture / 2 / np.sqrt(3) + pixel)
 
 

@@ -200,12 +200,13 @@ class TestMerged:
         self,
         made: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
-        resample: str,
+        resample: Resample,
         size_mm: float,
     ) -> None:
         """Also where the object, if it is too large, hides mirrors."""
         scene = prepared_scene(built_in_object(size_mm))
-        found = merged_light_field(prototype_runs(cameras, ideal(made, 0.7)), scene, resample)  # type: ignore[arg-type]
+        runs = prototype_runs(cameras, ideal(made, 0.7))
+        found = merged_light_field(runs, scene, resample)
         for at in cameras:
             shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
