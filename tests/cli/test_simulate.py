@@ -10,7 +10,19 @@ import trimesh
 from PIL import Image
 
 from tbcad.cli import run
+from tbcad.mirrors.array import design
+from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.spec.load import load_spec
+from tests.simulate.conftest import OPTIONS
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the record only, as `tbcad build` writes it."""
+    folder = tmp_path_factory.mktemp("record")
+    write_record(folder, design(load_spec(None, OPTIONS)), shells=False)
+    return folder
 
 
 @pytest.fixture(scope="module")

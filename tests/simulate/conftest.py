@@ -22,15 +22,15 @@ CAPTURE_MM = 60.0
 
 
 @pytest.fixture(scope="session")
-def little() -> MirrorDesign:
+def low_resolution_design() -> MirrorDesign:
     return design(load_spec(None, OPTIONS))
 
 
 @pytest.fixture(scope="session")
-def record(little: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the record only, as `tbcad build` writes it."""
     folder = tmp_path_factory.mktemp("record")
-    write_record(folder, little, shells=False)
+    write_record(folder, low_resolution_design, shells=False)
     return folder
 
 
@@ -40,8 +40,8 @@ def exported(record: Path) -> Exported:
 
 
 @pytest.fixture(scope="session")
-def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
-    return reflectors(little)
+def cameras(low_resolution_design: MirrorDesign) -> tuple[Reflector, Reflector]:
+    return reflectors(low_resolution_design)
 
 
 @pytest.fixture(scope="session")
@@ -56,12 +56,14 @@ def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField
 
 
 @pytest.fixture(scope="session")
-def made(little: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(little.spec, little)
+def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
+    return prototype_layout(low_resolution_design.spec, low_resolution_design)
 
 
 @pytest.fixture(scope="session")
-def written(
-    made: PrototypeLayout, little: MirrorDesign, tmp_path_factory: pytest.TempPathFactory
+def export_folder(
+    layout: PrototypeLayout,
+    low_resolution_design: MirrorDesign,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
-    return write_export(tmp_path_factory.mktemp("export"), little, made)
+    return write_export(tmp_path_factory.mktemp("export"), low_resolution_design, layout)

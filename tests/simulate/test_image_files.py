@@ -30,7 +30,7 @@ def test_stills_are_read_back_and_repeat(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ANIMATED_SUFFIXES)
-def test_films_go_there_and_back(tmp_path: Path, suffix: str) -> None:
+def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
     frames = [np.full((24, 32, 3), level, dtype=np.uint8) for level in (0, 80, 160, 240)]
     file = tmp_path / f"film{suffix}"
     write_animation(file, frames)
@@ -39,7 +39,7 @@ def test_films_go_there_and_back(tmp_path: Path, suffix: str) -> None:
     assert levels == [0, 80, 160, 240, 160, 80]
 
 
-def test_pictures_beside_each_other() -> None:
+def test_images_side_by_side() -> None:
     sheet = side_by_side({"red": RED, "blue": BLUE})
     assert (sheet[-1, 0] == [255, 0, 0]).all()
     assert (sheet[-1, -1] == [0, 0, 255]).all()
@@ -52,13 +52,13 @@ def test_difference_has_no_sign() -> None:
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "folder.png"])
-def test_places_that_cannot_be(tmp_path: Path, name: str) -> None:
+def test_image_paths_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(InputError, match=name):
         check_image_path(tmp_path / name)
 
 
-def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
+def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
     old = tmp_path / "b.png"
     write_images({old: RED})
     before = old.read_bytes()
@@ -68,7 +68,7 @@ def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
 
 
-def test_equal_pictures_are_alike() -> None:
+def test_quality_of_equal_images() -> None:
     same = image_quality(RED, RED)
     assert same.ssim == pytest.approx(1)
     assert same.psnr_db == float("inf")

@@ -17,7 +17,7 @@ from tbcad.simulate.scene.reflector import Reflector
 Cameras = tuple[Reflector, Reflector]
 
 
-def written(path: Path, cameras: Cameras, scene: Scene) -> Path:
+def write_light_field(path: Path, cameras: Cameras, scene: Scene) -> Path:
     with create_light_field(path, 60.0, {"object": "knot"}) as store:
         for at in cameras:
             write_camera(store, at, photograph(at.camera, exact_tracer(at), scene))
@@ -26,10 +26,10 @@ def written(path: Path, cameras: Cameras, scene: Scene) -> Path:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, cameras: Cameras, knot: Scene) -> Path:
-    return written(tmp_path_factory.mktemp("field") / "lightfield.h5", cameras, knot)
+    return write_light_field(tmp_path_factory.mktemp("field") / "lightfield.h5", cameras, knot)
 
 
-def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: LightField) -> None:
+def test_round_trip(file: Path, cameras: Cameras, light_field: LightField) -> None:
     with LightField.open(file) as source:
         assert source.facts == {"object": "knot"}
         assert source.capture_mm == 60.0
@@ -45,7 +45,7 @@ def test_reads_what_was_written(file: Path, cameras: Cameras, light_field: Light
             assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
 
 
-def test_a_part_is_a_part(file: Path, light_field: LightField) -> None:
+def test_reads_parts(file: Path, light_field: LightField) -> None:
     with LightField.open(file.parent) as source:  # the folder will do
         part = source.frames["b"].read(slice(50, 90), slice(100, 333))
     for name, values in part.items():
@@ -74,7 +74,7 @@ def test_rays_are_unit_and_leave_their_mirror(light_field: LightField) -> None:
 def test_compressed_and_the_same_each_time(
     file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
 ) -> None:
-    again = written(tmp_path / "again.h5", cameras, knot)
+    again = write_light_field(tmp_path / "again.h5", cameras, knot)
     assert again.read_bytes() == file.read_bytes()
     raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PIXEL_ARRAYS.values())
     assert file.stat().st_size < 0.8 * 2 * 416 * 310 * raw
@@ -98,7 +98,7 @@ def test_compressed_and_the_same_each_time(
         ("text", "no light field"),
     ],
 )
-def test_other_files_are_refused(file: Path, tmp_path: Path, change: str, wrong: str) -> None:
+def test_damaged_files_are_refused(file: Path, tmp_path: Path, change: str, wrong: str) -> None:
     path = tmp_path / "changed.h5"
     path.write_bytes(file.read_bytes())
     if change in ("cut", "text"):
@@ -141,7 +141,7 @@ def _changed(store: h5py.File, change: str) -> None:
         )
 
 
-def test_no_file(tmp_path: Path) -> None:
+def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no file"), LightField.open(tmp_path):
         pass
 

@@ -76,7 +76,7 @@ def _shifted(at: Reflector, shift: tuple[float, float]) -> Tracer:
     return lambda rows, _: trace(rows, shift)
 
 
-def test_places_in_a_pixel_are_even() -> None:
+def test_subpixel_shifts_are_even() -> None:
     assert subpixel_shifts(1) == [(0.0, 0.0)]
     assert sorted(subpixel_shifts(2)) == [
         (-0.25, -0.25),
@@ -87,21 +87,24 @@ def test_places_in_a_pixel_are_even() -> None:
     assert np.mean(subpixel_shifts(5), axis=0) == pytest.approx([0, 0])
 
 
-def test_progress_is_told(cameras: Cameras, knot: Scene) -> None:
-    said: list[str] = []
-    list(photograph(cameras[0].camera, exact_tracer(cameras[0]), knot, 1, said.append))
-    assert said[0] == "row 0 of 310"
-    assert len(said) > 1
+def test_progress(cameras: Cameras, knot: Scene) -> None:
+    messages: list[str] = []
+    list(photograph(cameras[0].camera, exact_tracer(cameras[0]), knot, 1, messages.append))
+    assert messages[0] == "row 0 of 310"
+    assert len(messages) > 1
 
 
 @pytest.fixture(scope="module")
 def with_meshes(
-    little: MirrorDesign, record: Path, exported: Exported, tmp_path_factory: pytest.TempPathFactory
+    low_resolution_design: MirrorDesign,
+    record: Path,
+    exported: Exported,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Exported:
     """The record with shells beside it, as STL."""
-    folder, made = tmp_path_factory.mktemp("meshes"), camera_a_mesh(little)
-    write_stl(folder / "shell_a.stl", made)
-    write_stl(folder / "shell_b.stl", made.mirrored())
+    folder, mesh = tmp_path_factory.mktemp("meshes"), camera_a_mesh(low_resolution_design)
+    write_stl(folder / "shell_a.stl", mesh)
+    write_stl(folder / "shell_b.stl", mesh.mirrored())
     return exported.model_copy(update={"folder": folder})
 
 
@@ -109,13 +112,13 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
     shells = read_shell_meshes(with_meshes)
     for at in with_meshes.reflectors:
         rows = range(at.camera.height_px)
-        one, other = exact_tracer(at)(rows, (0.0, 0.0)), mesh_tracer(shells, at)(rows, (0.0, 0.0))
-        same = one.mirror == other.mirror
+        exact, mesh = exact_tracer(at)(rows, (0.0, 0.0)), mesh_tracer(shells, at)(rows, (0.0, 0.0))
+        same = exact.mirror == mesh.mirror
         assert same.mean() > 0.999  # but for pixel centres on an edge
-        both = same & (one.mirror > 0)
-        apart = other.origin[both] - one.origin[both]
+        both = same & (exact.mirror > 0)
+        apart = mesh.origin[both] - exact.origin[both]
         assert np.abs(apart).max() < 1e-4
-        turned = np.cross(one.direction[both], other.direction[both])
+        turned = np.cross(exact.direction[both], mesh.direction[both])
         assert 200 * np.linalg.norm(turned, axis=1).max() < 2e-3  # mm at the object
         pictures = [
             np.concatenate([band.colour for band in photograph(at.camera, trace, knot)]).astype(int)
@@ -124,7 +127,9 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
 
 
-def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: MirrorDesign) -> None:
+def test_facets_of_a_mirror_have_its_area(
+    with_meshes: Exported, low_resolution_design: MirrorDesign
+) -> None:
     """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
     corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
     shells = read_shell_meshes(with_meshes)
@@ -132,8 +137,8 @@ def test_facets_of_a_mirror_have_its_area(with_meshes: Exported, little: MirrorD
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.bincount(
         np.maximum(owner, 0), weights=np.linalg.norm(sides, axis=1) / 2, minlength=len(owner)
-    )[1 : len(little.halves[0]) + 1]
-    assert area == pytest.approx(little.halves[0].area, rel=2e-3)
+    )[1 : len(low_resolution_design.halves[0]) + 1]
+    assert area == pytest.approx(low_resolution_design.halves[0].area, rel=2e-3)
 
 
 def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:

@@ -33,13 +33,13 @@ from tests.prototype_exports import plan_of
 from tests.simulate.conftest import CAPTURE_MM, OPTIONS
 
 SPEC = load_spec(None, OPTIONS)
-Both = tuple[PrototypeRun, PrototypeRun]
+Runs = tuple[PrototypeRun, PrototypeRun]
 Rows = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def both(made: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Both:
-    return prototype_runs(cameras, plan_of(made))
+def runs(layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Runs:
+    return prototype_runs(cameras, plan_of(layout))
 
 
 @pytest.fixture(scope="module")
@@ -48,73 +48,73 @@ def scene(knot: Scene) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def merged(both: Both, scene: Scene) -> LightField:
-    return merged_light_field(both, scene)
+def merged(runs: Runs, scene: Scene) -> LightField:
+    return merged_light_field(runs, scene)
 
 
-def merged_light_field(both: Both, scene: Scene, resample: Resample = "photograph") -> LightField:
-    photographs = ((ball_reflector(run), merge_run(run, scene, resample)) for run in both)
+def merged_light_field(runs: Runs, scene: Scene, resample: Resample = "photograph") -> LightField:
+    photographs = ((ball_reflector(run), merge_run(run, scene, resample)) for run in runs)
     return light_field_in_memory(photographs, CAPTURE_MM)
 
 
-def ideal(made: PrototypeLayout, angle: float) -> Plan:
-    """A ball for every mirror, its like, on a base that brings them there at one angle."""
-    half, m = made.half, np.arange(len(made.half))
+def ideal(layout: PrototypeLayout, angle: float) -> Plan:
+    """A ball like each mirror, on a base that brings all of them there at one angle."""
+    half, m = layout.half, np.arange(len(layout.half))
     back = Rotation.from_rotvec(-angle * half.ellipsoid.axis)
     apex, normal = back.apply(half.mirrors.apex), back.apply(half.mirrors.normal)
     radius = half.mirrors.radius
     centre = apex - radius[:, None] * normal
-    ball, stop = np.stack([m, np.argsort(made.twin)]), np.zeros((2, len(m)), dtype=np.int64)
+    ball, stop = np.stack([m, np.argsort(layout.twin)]), np.zeros((2, len(m)), dtype=np.int64)
     frame = half.ellipsoid.frame()
     return Plan(frame, apex, normal, radius, centre, radius, True, np.array([angle]), ball, stop)
 
 
-def misses(run: PrototypeRun, mirror: np.ndarray, way: np.ndarray) -> np.ndarray:
+def misses(run: PrototypeRun, mirror: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Distances from the origin of rays of mirrors' windows after their balls, caps whole.
 
     Infinite where a ray meets something else.
     """
     whole = np.concatenate([run.balls[..., :4], run.balls[..., :4]], axis=2)
-    turned = np.einsum("nx,nxy->ny", way, run.window_rotation[mirror])
+    turned = np.einsum("nx,nxy->ny", direction, run.window_rotation[mirror])
     seen = trace_balls(replace(run, balls=whole), turned, run.stop[mirror])
     away = norm(np.cross(seen.origin, seen.direction))
     return np.where(seen.ball == run.ball[mirror] + 1, away, np.inf)
 
 
 class TestGeometry:
-    def test_a_mirrors_apex_is_shown_the_middle_of_the_object_by_its_balls(
-        self, both: Both
+    def test_the_apex_of_a_mirror_shows_the_middle_of_the_object_by_its_ball(
+        self, runs: Runs
     ) -> None:
         """Origin and pinhole are foci of the ellipsoid that both apices lie on."""
-        for run in both:
-            way = unit(run.reflector.mirrors.apex - run.camera.pinhole)
-            turned = np.einsum("nx,nxy->ny", way, run.window_rotation)
+        for run in runs:
+            direction = unit(run.reflector.mirrors.apex - run.camera.pinhole)
+            turned = np.einsum("nx,nxy->ny", direction, run.window_rotation)
             seen = trace_balls(run, turned, run.stop)
             assert (seen.ball == run.ball + 1).all()
             assert np.abs(seen.origin - run.ball_surfaces.apex).max() < 1e-9
             assert np.abs(seen.direction + unit(run.ball_surfaces.apex)).max() < 1e-9
 
-    def test_balls_stand_as_far_off_as_the_plan_says(
-        self, both: Both, made: PrototypeLayout
+    def test_direction_errors_of_balls_are_those_of_the_plan(
+        self, runs: Runs, layout: PrototypeLayout
     ) -> None:
         a, b = (
-            2 * np.arcsin(norm(unit(run.ball_surfaces.apex) - run.reflector.u) / 2) for run in both
+            2 * np.arcsin(norm(unit(run.ball_surfaces.apex) - run.reflector.u) / 2) for run in runs
         )
-        assert a == pytest.approx(made.stops.error, abs=1e-9)
-        assert b[made.twin] == pytest.approx(made.stops.error, abs=1e-9)
+        assert a == pytest.approx(layout.stops.error, abs=1e-9)
+        assert b[layout.twin] == pytest.approx(layout.stops.error, abs=1e-9)
         assert a.max() > np.radians(1)
 
-    def test_windows_are_turned_not_tilted(self, both: Both) -> None:
-        for run in both:
+    def test_window_rotations_are_rotations(self, runs: Runs) -> None:
+        for run in runs:
             eye = np.einsum("mxy,mzy->mxz", run.window_rotation, run.window_rotation)
             assert np.abs(eye - np.eye(3)).max() < 1e-12
             assert np.linalg.det(run.window_rotation) == pytest.approx(1)
 
     def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
-        self, both: Both, made: PrototypeLayout
+        self, runs: Runs, layout: PrototypeLayout
     ) -> None:
         """The record is computed at the mirror's own azimuth, these rays at the stop."""
-        for run, order in zip(both, (np.arange(len(made.half)), made.twin), strict=True):
+        for run, order in zip(runs, (np.arange(len(layout.half)), layout.twin), strict=True):
             arcs, m = run.reflector.cells.arcs, len(run.reflector)
             wall, t = run.reflector.cells.boundary.seam, np.linspace(0, 1, 201)
             least = np.full(m, np.inf)
@@ -127,27 +127,27 @@ class TestGeometry:
                     np.repeat(counted[:, None], len(t), 1),
                     np.broadcast_to(t, (len(counted), len(t))),
                 )
-                way = unit(point - run.camera.pinhole).reshape(-1, 3)
+                direction = unit(point - run.camera.pinhole).reshape(-1, 3)
                 mirror = np.repeat(mine[counted], len(t))
-                np.minimum.at(least, mirror, misses(run, mirror, way))
-            assert 2 * least[order] == pytest.approx(made.fit.coverage, abs=2e-3)
+                np.minimum.at(least, mirror, misses(run, mirror, direction))
+            assert 2 * least[order] == pytest.approx(layout.fit.coverage, abs=2e-3)
 
-    def test_left_where_they_are(
-        self, made: PrototypeLayout, cameras: tuple[Reflector, ...]
+    def test_windows_stay_where_the_plan_does_not_move_them(
+        self, layout: PrototypeLayout, cameras: tuple[Reflector, ...]
     ) -> None:
-        still = prototype_runs(cameras, replace(plan_of(made), moved=False))
+        still = prototype_runs(cameras, replace(plan_of(layout), moved=False))
         assert (still[0].window_rotation == np.eye(3)).all()
 
-    def test_a_caps_body_hides_and_shows_nothing(self, both: Both) -> None:
+    def test_a_caps_body_hides_and_shows_nothing(self, runs: Runs) -> None:
         """Body about (0, 0, 10) of radius 3, its front cut off by a ball of 10 whose apex is 8."""
         cap = np.array([[[0.0, 0.0, 18.0, 10.0, 0.0, 0.0, 10.0, 3.0]]])
-        view = replace(both[0].camera, pinhole=np.zeros(3))
-        run = replace(both[0], camera=view, balls=cap)
-        # Both spheres meet at z = 8.6875, 2.697 from the axis.
+        view = replace(runs[0].camera, pinhole=np.zeros(3))
+        run = replace(runs[0], camera=view, balls=cap)
+        # Runs spheres meet at z = 8.6875, 2.697 from the axis.
         edge, rim = np.arctan2(2.697, 8.6875), np.arcsin(3 / 10)
         angle = np.array([0, 0.9 * edge, 0.99 * rim, 1.01 * rim])
-        way = np.column_stack([np.sin(angle), np.zeros(4), np.cos(angle)])
-        seen = trace_balls(run, way, np.zeros(4, dtype=np.int64))
+        direction = np.column_stack([np.sin(angle), np.zeros(4), np.cos(angle)])
+        seen = trace_balls(run, direction, np.zeros(4, dtype=np.int64))
         assert edge < 0.99 * rim
         assert seen.ball.tolist() == [1, 1, 0, 0]
         assert np.isfinite(seen.distance).tolist() == [True, True, True, False]
@@ -155,8 +155,8 @@ class TestGeometry:
         assert norm(seen.origin[1] - [0, 0, 18]) == pytest.approx(10)
         assert seen.direction[0] == pytest.approx([0, 0, -1])
 
-    def test_places(self, both: Both) -> None:
-        view = both[1].camera
+    def test_image_points_undo_pixel_rays(self, runs: Runs) -> None:
+        view = runs[1].camera
         places = np.array([[0.0, 0.0], [415.0, 309.0], [12.25, 200.5]])
         assert image_points(view, pixel_rays(view, places)) == pytest.approx(places, abs=1e-9)
         outside = pixel_rays(view, np.array([[-0.1, 5.0], [5.0, 309.1]]))
@@ -164,33 +164,33 @@ class TestGeometry:
 
 
 class TestPhotographs:
-    def test_the_second_run_sees_the_object_turned(self, both: Both, scene: Scene) -> None:
+    def test_the_second_run_sees_the_object_turned(self, runs: Runs, scene: Scene) -> None:
         """Camera a before an object that was really turned takes the same photograph."""
         subject = replace(scene.subject, points=scene.subject.points * HALF_TURN)
         turned = replace(prepared_scene(subject), shade=scene.shade)
-        second, first = stop_photograph(both[1], scene, 3), stop_photograph(both[0], turned, 3)
+        second, first = stop_photograph(runs[1], scene, 3), stop_photograph(runs[0], turned, 3)
         assert second.any()
         assert (np.abs(second.astype(int) - first) > 1).any(axis=2).mean() < 1e-3
-        straight = stop_photograph(both[0], scene, 3)
+        straight = stop_photograph(runs[0], scene, 3)
         assert (np.abs(second.astype(int) - straight) > 1).any(axis=2).mean() > 1e-2
 
-    def test_between_pixels(self, both: Both, scene: Scene) -> None:
-        whole = stop_photograph(both[0], scene, 2, samples=2).astype(float)
+    def test_resampling_is_bilinear(self, runs: Runs, scene: Scene) -> None:
+        whole = stop_photograph(runs[0], scene, 2, samples=2).astype(float)
         row, column = np.argwhere(whole.sum(axis=2) > 0)[::7].T
         row, column = np.minimum(row, 308), np.minimum(column, 414)
         places = np.column_stack([column, row]).astype(float)
-        assert (resampled_photograph(both[0], scene, 2, 2, places) == whole[row, column]).all()
+        assert (resampled_photograph(runs[0], scene, 2, 2, places) == whole[row, column]).all()
         right, under = whole[row, column + 1], whole[row + 1, column]
         middle = 0.75 * whole[row, column] + 0.25 * right
-        found = resampled_photograph(both[0], scene, 2, 2, places + np.array([0.25, 0]))
+        found = resampled_photograph(runs[0], scene, 2, 2, places + np.array([0.25, 0]))
         assert np.abs(found - middle).max() <= 0.5
-        found = resampled_photograph(both[0], scene, 2, 2, places + np.array([0, 0.5]))
+        found = resampled_photograph(runs[0], scene, 2, 2, places + np.array([0, 0.5]))
         assert np.abs(found - (whole[row, column] + under) / 2).max() <= 0.5
 
-    def test_the_last_pixel(self, both: Both, scene: Scene) -> None:
+    def test_resampling_at_the_last_pixel(self, runs: Runs, scene: Scene) -> None:
         last = np.array([[415.0, 309.0]])
-        whole = stop_photograph(both[0], scene, 0)
-        assert (resampled_photograph(both[0], scene, 0, 1, last) == whole[-1, -1]).all()
+        whole = stop_photograph(runs[0], scene, 0)
+        assert (resampled_photograph(runs[0], scene, 0, 1, last) == whole[-1, -1]).all()
 
 
 class TestMerged:
@@ -198,15 +198,15 @@ class TestMerged:
     @pytest.mark.parametrize("resample", ["exact", "photograph"])
     def test_balls_like_the_mirrors_give_the_shells_picture(
         self,
-        made: PrototypeLayout,
+        layout: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
         resample: Resample,
         size_mm: float,
     ) -> None:
         """Also where the object, if it is too large, hides mirrors."""
         scene = prepared_scene(built_in_object(size_mm))
-        runs = prototype_runs(cameras, ideal(made, 0.7))
-        found = merged_light_field(runs, scene, resample)
+        ideal_runs = prototype_runs(cameras, ideal(layout, 0.7))
+        found = merged_light_field(ideal_runs, scene, resample)
         for at in cameras:
             shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
@@ -222,8 +222,8 @@ class TestMerged:
             off = np.abs(planes["colour"].astype(int) - picture).max(axis=2)
             assert (off > 1).mean() < 5e-4
 
-    def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, both: Both) -> None:
-        for run in both:
+    def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, runs: Runs) -> None:
+        for run in runs:
             frame = merged.frames[run.reflector.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
@@ -233,9 +233,9 @@ class TestMerged:
             assert norm(frame.planes["direction"][on]) == pytest.approx(1, abs=1e-6)
             assert not frame.planes["origin"][~on].any()
 
-    def test_light_obeys_the_law_of_reflection(self, merged: LightField, both: Both) -> None:
-        """Way in and way out have the ball's normal for their bisector."""
-        for run in both:
+    def test_light_obeys_the_law_of_reflection(self, merged: LightField, runs: Runs) -> None:
+        """The ray in and the ray out have the ball's normal for their bisector."""
+        for run in runs:
             frame = merged.frames[run.reflector.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
@@ -244,8 +244,8 @@ class TestMerged:
             both_ways = unit(run.camera.pinhole - origin) + frame.planes["direction"][on]
             assert np.abs(unit(both_ways) - unit(origin - centre)).max() < 1e-4
 
-    def test_pixels_kept(
-        self, merged: LightField, made: PrototypeLayout, cameras: tuple[Reflector, Reflector]
+    def test_share_of_rays_kept_is_that_of_the_layout(
+        self, merged: LightField, layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]
     ) -> None:
         """As many rays into the capture sphere as the design's areas promise, within rounding."""
         kept = sum(capture_rays(frame.planes).sum() for frame in merged.frames.values())
@@ -253,13 +253,13 @@ class TestMerged:
             capture_rays({k: getattr(exact_tracer(at)(range(310), (0, 0)), k) for k in RAYS}).sum()
             for at in cameras
         )
-        assert shell == pytest.approx(2 * made.fit.pixels_shell.sum(), rel=0.01)
-        assert kept / shell == pytest.approx(made.fit.kept_share, abs=0.01)
+        assert shell == pytest.approx(2 * layout.fit.pixels_shell.sum(), rel=0.01)
+        assert kept / shell == pytest.approx(layout.fit.kept_share, abs=0.01)
 
     def test_photographs_are_close_to_exact_rays(
-        self, merged: LightField, both: Both, scene: Scene
+        self, merged: LightField, runs: Runs, scene: Scene
     ) -> None:
-        sharp = merged_light_field(both, scene, "exact")
+        sharp = merged_light_field(runs, scene, "exact")
         for camera, frame in merged.frames.items():
             other = sharp.frames[camera]
             for name in RAYS:
@@ -269,47 +269,49 @@ class TestMerged:
             moved = np.roll(other.image(), 1, axis=1).astype(float) - other.image()
             assert psnr > 10 * np.log10(255**2 / (moved**2).mean()) + 2
 
-    def test_windows_that_leave_the_photograph(self, both: Both, scene: Scene) -> None:
+    def test_windows_that_leave_the_photograph(self, runs: Runs, scene: Scene) -> None:
         """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
-        wide = both[0].camera
-        narrow = replace(both[0], camera=replace(wide, hfov=0.8 * wide.hfov))
+        wide = runs[0].camera
+        narrow = replace(runs[0], camera=replace(wide, hfov=0.8 * wide.hfov))
         for resample in ("exact", "photograph"):
             bands = list(merge_run(narrow, scene, resample))  # type: ignore[arg-type]
             mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
             place = narrow.camera.project(origin[mirror > 0])
             assert (place >= -1e-6).all()
             assert (place <= np.array([415, 309]) + 1e-6).all()
-            free = exact_tracer(both[0].reflector)(range(310), CENTRE).mirror
+            free = exact_tracer(runs[0].reflector)(range(310), CENTRE).mirror
             lost = (mirror == 0) & (free > 0)
             assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
             assert not np.concatenate([band.colour for band in bands])[lost].any()
 
-    def test_samples_smooth(self, both: Both, scene: Scene) -> None:
+    def test_more_samples_smooth(self, runs: Runs, scene: Scene) -> None:
         for resample in ("exact", "photograph"):
             one, many = (
-                np.concatenate([b.colour for b in merge_run(both[0], scene, resample, n)])
+                np.concatenate([b.colour for b in merge_run(runs[0], scene, resample, n)])
                 for n in (1, 3)
             )
             rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
             assert rough[1] < 0.95 * rough[0]
 
     def test_same_bytes_on_one_thread(
-        self, merged: LightField, both: Both, scene: Scene, monkeypatch: pytest.MonkeyPatch
+        self, merged: LightField, runs: Runs, scene: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(tbcad.simulate.parallel, "THREADS", 1)
-        again = merged_light_field(both, scene)
+        again = merged_light_field(runs, scene)
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
                 assert (plane == again.frames[camera].planes[name]).all()
 
-    def test_as_a_file(self, merged: LightField, both: Both, scene: Scene, tmp_path: Path) -> None:
+    def test_written_as_a_file(
+        self, merged: LightField, runs: Runs, scene: Scene, tmp_path: Path
+    ) -> None:
         with create_light_field(
             tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}
         ) as store:
-            for run in both:
+            for run in runs:
                 write_camera(store, ball_reflector(run), merge_run(run, scene))
         with LightField.open(tmp_path / "field.h5") as found:
-            for run in both:
+            for run in runs:
                 frame, other = (
                     found.frames[run.reflector.camera_id],
                     merged.frames[run.reflector.camera_id],
@@ -319,11 +321,11 @@ class TestMerged:
                 assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
                 assert frame.u == pytest.approx(unit(run.ball_surfaces.apex))
 
-    def test_progress(self, both: Both, scene: Scene) -> None:
-        told: list[str] = []
-        list(merge_run(both[0], scene, progress=told.append))
-        assert told[0] == f"stop 1 of {len(both[0])}"
-        assert any(one.startswith("row ") for one in told)
+    def test_progress(self, runs: Runs, scene: Scene) -> None:
+        messages: list[str] = []
+        list(merge_run(runs[0], scene, progress=messages.append))
+        assert messages[0] == f"stop 1 of {len(runs[0])}"
+        assert any(one.startswith("row ") for one in messages)
 
 
 RAYS = ("mirror", "origin", "direction")
@@ -335,20 +337,20 @@ def joined(bands: list[Band], name: str) -> np.ndarray:
 
 def capture_rays(planes: dict[str, np.ndarray]) -> np.ndarray:
     """Pixels whose ray meets the capture sphere."""
-    origin, way = planes["origin"].astype(float), planes["direction"].astype(float)
-    near = norm(np.cross(origin, way)) <= CAPTURE_MM / 2
-    return near & (planes["mirror"] > 0) & ((origin * way).sum(axis=2) < 0)
+    origin, direction = planes["origin"].astype(float), planes["direction"].astype(float)
+    near = norm(np.cross(origin, direction)) <= CAPTURE_MM / 2
+    return near & (planes["mirror"] > 0) & ((origin * direction).sum(axis=2) < 0)
 
 
 class TestReading:
-    def test_what_was_written(self, written: Path, made: PrototypeLayout) -> None:
-        found, wanted = read_plan(read_export(written)), plan_of(made)
+    def test_plan_round_trip(self, export_folder: Path, layout: PrototypeLayout) -> None:
+        found, wanted = read_plan(read_export(export_folder)), plan_of(layout)
         for name in ("frame", "apex", "normal", "radius", "body_centre", "body_radius", "angle"):
             assert getattr(found, name) == pytest.approx(getattr(wanted, name), abs=1e-12)
         assert (found.ball == wanted.ball).all()
         assert (found.stop == wanted.stop).all()
         assert found.moved
-        assert found.centre == pytest.approx(made.centres())
+        assert found.centre == pytest.approx(layout.centres())
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -374,9 +376,9 @@ class TestReading:
         ],
     )
     def test_refused_plans(
-        self, written: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+        self, export_folder: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
     ) -> None:
-        folder = copied(written, tmp_path)
+        folder = copied(export_folder, tmp_path)
         edit_csv(folder / "rotation_plan.csv", change)
         with pytest.raises(InputError, match=message) as caught:
             read_plan(read_export(folder))
@@ -394,9 +396,9 @@ class TestReading:
         ],
     )
     def test_refused_records(
-        self, written: Path, tmp_path: Path, change: Callable[[dict], object], message: str
+        self, export_folder: Path, tmp_path: Path, change: Callable[[dict], object], message: str
     ) -> None:
-        folder = copied(written, tmp_path)
+        folder = copied(export_folder, tmp_path)
         path = folder / "prototype.json"
         record = json.loads(path.read_text())
         change(record)
@@ -419,9 +421,9 @@ class TestReading:
         ],
     )
     def test_refused_balls(
-        self, written: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+        self, export_folder: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
     ) -> None:
-        folder = copied(written, tmp_path)
+        folder = copied(export_folder, tmp_path)
         edit_csv(folder / "balls.csv", change)
         with pytest.raises(InputError, match=message) as caught:
             read_plan(read_export(folder))
@@ -429,9 +431,9 @@ class TestReading:
 
     @pytest.mark.parametrize("name", ["prototype.json", "balls.csv", "rotation_plan.csv"])
     def test_files_that_are_not_there_or_no_text(
-        self, written: Path, tmp_path: Path, name: str
+        self, export_folder: Path, tmp_path: Path, name: str
     ) -> None:
-        folder = copied(written, tmp_path)
+        folder = copied(export_folder, tmp_path)
         (folder / name).write_bytes(b"\xff\xfe\x00")
         with pytest.raises(InputError, match=f"{name} cannot be read"):
             read_plan(read_export(folder))
@@ -439,8 +441,8 @@ class TestReading:
         with pytest.raises(InputError, match=f"{name} is not there"):
             read_plan(read_export(folder))
 
-    def test_one_camera_that_cannot_take_both_halves(self, written: Path) -> None:
-        exported = read_export(written)
+    def test_one_camera_that_cannot_take_both_halves(self, export_folder: Path) -> None:
+        exported = read_export(export_folder)
         a, b = exported.reflectors
         askew = replace(b, camera=replace(b.camera, pinhole=b.camera.pinhole + np.array([0, 1, 0])))
         with pytest.raises(InputError, match="one camera cannot take both halves"):

@@ -56,7 +56,7 @@ def cell(key: str, value: str) -> Callable[[Rows], object]:
         (lambda d: d["spec"]["optics"].update(n=99), r"spec\.optics\.n"),
     ],
 )
-def test_records_that_cannot_be(
+def test_records_refused(
     record: Path, tmp_path: Path, change: Callable[[Document], object], wrong: str
 ) -> None:
     with pytest.raises(InputError, match=wrong) as error:
@@ -78,7 +78,7 @@ def test_records_that_cannot_be(
         (cell("px", "1000.0"), "bound no cells"),
     ],
 )
-def test_mirrors_that_cannot_be(
+def test_mirrors_refused(
     record: Path, tmp_path: Path, change: Callable[[Rows], object], wrong: str
 ) -> None:
     folder = changed(record, tmp_path, lambda _: None)
@@ -98,7 +98,7 @@ def test_a_record_that_is_not_there(record: Path, tmp_path: Path, name: str) -> 
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", "null", '{"schema": 5}', "[" * 100_000])
-def test_other_files(tmp_path: Path, text: str) -> None:
+def test_files_of_other_kinds_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "design.json").write_text(text)
     with pytest.raises(InputError, match=r"design\.json"):
         read_export(tmp_path)

@@ -37,7 +37,7 @@ def light_on_top(normal: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("kind", ["ply", "stl", "obj", "glb", "off"])
-def test_kinds_of_files(tmp_path: Path, kind: str) -> None:
+def test_file_formats(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"box.{kind}"
     box().export(path)
     subject = load_object(path, CAPTURE_MM)
@@ -95,7 +95,7 @@ def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
     assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
 
 
-def test_pattern_can_be_asked_for(tmp_path: Path) -> None:
+def test_paint_pattern(tmp_path: Path) -> None:
     mesh = box()
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
     mesh.export(tmp_path / "box.ply")
@@ -107,7 +107,7 @@ def test_pattern_can_be_asked_for(tmp_path: Path) -> None:
     assert colour / colour.max() == pytest.approx(shown / shown.max(), abs=0.01)
 
 
-def test_plain_grey_can_be_asked_for(tmp_path: Path) -> None:
+def test_paint_plain(tmp_path: Path) -> None:
     box().export(tmp_path / "box.stl")
     subject = load_object(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
     colours = from_above(subject, 1, 2).colour[0]
@@ -174,7 +174,7 @@ def test_built_in_object_is_a_closed_body_of_many_colours() -> None:
     assert len(np.unique(np.round(subject.albedo[:, 0], 2), axis=0)) > 50
 
 
-def test_an_object_is_kept_with_a_capture(tmp_path: Path) -> None:
+def test_object_file_round_trip(tmp_path: Path) -> None:
     subject = built_in_object(CAPTURE_MM)
     write_object(tmp_path / "object.npz", subject)
     first = (tmp_path / "object.npz").read_bytes()

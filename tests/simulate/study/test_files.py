@@ -181,7 +181,7 @@ def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
     assert not list(tmp_path.glob(".tbcad-*"))
 
 
-def test_folder_that_cannot_be(tmp_path: Path) -> None:
+def test_study_folders_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="is a file"):
         check_study_folder(tmp_path / "file" / "studies")
@@ -190,13 +190,13 @@ def test_folder_that_cannot_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 5), (5, 4), (2, 61)])
-def test_sweeps_that_cannot_be(first: int, last: int) -> None:
+def test_sweeps_refused(first: int, last: int) -> None:
     with pytest.raises(InputError, match="--from or --to"):
         n_range(first, last)
     assert list(n_range(2, 4)) == [2, 3, 4]
 
 
-def test_claims_say_where_they_stand() -> None:
+def test_claims_say_where_in_the_paper() -> None:
     assert all(claim.where and claim.text for claim in claims().values())
     assert claims()["virtual_cameras"].value == 1657
 

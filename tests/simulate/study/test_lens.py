@@ -62,7 +62,7 @@ def test_airy_disc_of_a_known_stop() -> None:
     assert found.airy_px == pytest.approx(10.736, rel=1e-6)
 
 
-def test_sharpest_stop_is_least_of_all() -> None:
+def test_sharpest_stop_has_the_smallest_blur() -> None:
     best = aperture_stop(LENS, RANGE, sharpest(LENS, RANGE))
     pupils = np.linspace(0.1, 1.2, 2000)
     least = min(aperture_stop(LENS, RANGE, pupil).total_px for pupil in pupils)
@@ -90,6 +90,6 @@ def test_no_stop_is_wider_than_wide_open() -> None:
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 @pytest.mark.parametrize("name", ["blur_px", "pixel_um", "wide_open"])
-def test_options_of_no_sense_are_refused(name: str, value: float) -> None:
+def test_options_refused(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"--{name.replace('_', '-')}"):
         LensOptions(**{name: value}).checked()

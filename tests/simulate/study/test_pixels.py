@@ -121,18 +121,18 @@ def test_balance_passes_over_designs_that_were_refused() -> None:
     assert balance(n, cameras, pixels, Ratio(1, 1)).n == pytest.approx(1e5**0.25, rel=1e-12)
 
 
-def test_texts() -> None:
+def test_sensors_and_ratios_from_text() -> None:
     assert parse_sensor("8320x6208") == Sensor(8320, 6208)
     assert parse_ratio("1:4") == Ratio(1, 4)
 
 
 @pytest.mark.parametrize("text", ["", "2080", "2080x", "15x1552", "2080x99999", "-1x20", "ax20"])
-def test_no_sensors(text: str) -> None:
+def test_sensor_texts_refused(text: str) -> None:
     with pytest.raises(InputError, match="2080x1552"):
         parse_sensor(text)
 
 
 @pytest.mark.parametrize("text", ["", "1", "1:0", "-1:1", "nan:1", "1:inf", "a:b", "1:2:3"])
-def test_no_ratios(text: str) -> None:
+def test_ratio_texts_refused(text: str) -> None:
     with pytest.raises(InputError, match="1:4"):
         parse_ratio(text)

@@ -27,7 +27,7 @@ def quiet(_: str) -> None:
     pass
 
 
-def test_every_sensor_has_its_own_n() -> None:
+def test_n_proportionate_to_the_sensor() -> None:
     """Four times the sides: sixteen times the pixels, twice the n (designs/sensor-10mp.toml)."""
     sensors = (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
     assert [proportionate_n(load_spec(None), sensor) for sensor in sensors] == [18, 36, 24]
@@ -36,8 +36,10 @@ def test_every_sensor_has_its_own_n() -> None:
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    places = viewpoints_around((15.0, 60.0), 2, 640.0)
-    return ssim(load_spec(None, SMALL), built_in_object(60.0), SENSORS, places, "nearest", quiet)
+    viewpoints = viewpoints_around((15.0, 60.0), 2, 640.0)
+    return ssim(
+        load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest", quiet
+    )
 
 
 def test_more_pixels_make_better_views(study: Study) -> None:
@@ -47,7 +49,7 @@ def test_more_pixels_make_better_views(study: Study) -> None:
     assert every[0] < every[1] < every[2] < 1
 
 
-def test_means_are_those_of_the_views(study: Study) -> None:
+def test_means(study: Study) -> None:
     views, means = study.tables[:2]
     assert len(views.rows) == 3 * 4
     mine = views.where(width_px=416, elevation_deg=60.0).numbers("ssim")
@@ -56,7 +58,7 @@ def test_means_are_those_of_the_views(study: Study) -> None:
     assert mean["ssim"] == pytest.approx(np.mean(mine))
 
 
-def test_fit_is_that_of_the_means(study: Study) -> None:
+def test_fit(study: Study) -> None:
     means, fits = study.tables[1:]
     rows = means.where(elevation_deg="all")
     x, y = np.log10(rows.numbers("width_px") * rows.numbers("height_px")), rows.numbers("ssim")
@@ -76,15 +78,15 @@ def test_the_same_study_gives_the_same_files(study: Study) -> None:
 def test_a_sensor_whose_mirrors_cannot_be_made_has_a_reason() -> None:
     hopeless = ["camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36"]
     spec = load_spec(None, [*SMALL, "n=9", *hopeless])
-    places = viewpoints_around((30.0,), 1, 640.0)
+    viewpoints = viewpoints_around((30.0,), 1, 640.0)
     with pytest.raises(SpecError) as refusal:
         design(spec)
-    found = ssim(spec, built_in_object(36.0), SENSORS[:1], places, "nearest", quiet)
+    found = ssim(spec, built_in_object(36.0), SENSORS[:1], viewpoints, "nearest", quiet)
     assert found.tables[0].column("reason") == [str(refusal.value)]
     assert found.figures == ()
 
 
-def test_paired_interval_is_students() -> None:
+def test_interval_of_the_mean_difference() -> None:
     rng = np.random.default_rng(3)
     one = rng.normal(0.9, 0.05, 20)
     other = one + rng.normal(0.01, 0.01, 20)
@@ -97,11 +99,11 @@ def test_paired_interval_is_students() -> None:
     assert mean_difference_interval(one[:1], other[:1]) == (-np.inf, np.inf)
 
 
-def test_prototype_against_the_shell(written: Path) -> None:
-    """Fewer pixels and other virtual cameras: views that are a little worse, not other ones."""
-    export = read_export(written)
-    places = viewpoints_around((20.0, 60.0), 2, 640.0)
-    found = prototype_vs_shell(export, built_in_object(60.0), places, "nearest", 2)
+def test_prototype_against_the_shell(export_folder: Path) -> None:
+    """Fewer pixels and other virtual cameras: views that are slightly worse."""
+    export = read_export(export_folder)
+    viewpoints = viewpoints_around((20.0, 60.0), 2, 640.0)
+    found = prototype_vs_shell(export, built_in_object(60.0), viewpoints, "nearest", 2)
     rows = {figure.quantity: figure.value for figure in found.figures}
     shell, balls = (rows[f"mean SSIM of the {name}'s views"] for name in ("shell", "prototype"))
     assert 0.5 < balls < shell < 1
@@ -117,10 +119,10 @@ def test_prototype_against_the_shell(written: Path) -> None:
     assert rows["at 95 % the difference is"] == verdict
 
 
-def test_viewpoints_all_round() -> None:
-    places = viewpoints_around((0.0, 45.0), 4, 500.0)
-    assert places.azimuth_deg.tolist() == [0, 90, 180, 270] * 2
-    at = np.array([view.pinhole for view in places.cameras(60.0)])
+def test_viewpoints_around_the_object() -> None:
+    viewpoints = viewpoints_around((0.0, 45.0), 4, 500.0)
+    assert viewpoints.azimuth_deg.tolist() == [0, 90, 180, 270] * 2
+    at = np.array([view.pinhole for view in viewpoints.cameras(60.0)])
     assert np.linalg.norm(at, axis=1) == pytest.approx(np.full(8, 500.0))
     assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
     with pytest.raises(InputError, match="--azimuths 0"):

@@ -32,7 +32,7 @@ def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return origin, direction, colour
 
 
-def wanted_by(view: Camera) -> tuple[TwoPlane, Rays]:
+def targets_of(view: Camera) -> tuple[TwoPlane, Rays]:
     two_plane = two_plane_along(view.forward, view.right, CAPTURE_MM)
     way = view_directions(view).reshape(-1, 3)
     meets = np.linalg.norm(np.cross(view.pinhole, way), axis=1) < CAPTURE_MM / 2
@@ -46,27 +46,27 @@ def wanted_by(view: Camera) -> tuple[TwoPlane, Rays]:
     distance=st.floats(60, 2000),
 )
 @settings(max_examples=12, deadline=None)
-def test_equals_the_tree(
+def test_equals_a_k_d_tree_over_all_rays(
     light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
 ) -> None:
     view = camera_around_object(
         np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120)
     )
-    two_plane, rays = wanted_by(view)
-    wanted = two_plane.coordinates(*rays)
+    two_plane, rays = targets_of(view)
+    targets = two_plane.coordinates(*rays)
     origin, direction, _ = every_ray(light_field)
     points = two_plane.coordinates(origin, direction)
-    away, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(wanted)
-    near = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
-    assert near is not None
-    found = nearest_rays(near, wanted)
-    # At the limit itself a mirror may be left out: one wanted ray in a few says which are near.
+    distance, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(targets)
+    bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
+    assert bundle is not None
+    found = nearest_rays(bundle, targets)
+    # At the limit itself a mirror may be left out: one target in a few says which are near.
     within = found >= 0
-    assert (away[within] <= near.limit).all()
-    assert within[away < 0.9 * near.limit].all()
-    mine = np.linalg.norm(near.points[found[within]] - wanted[within], axis=1)
+    assert (distance[within] <= bundle.limit).all()
+    assert within[distance < 0.9 * bundle.limit].all()
+    found_distance = np.linalg.norm(bundle.points[found[within]] - targets[within], axis=1)
     # Walking may end beside the nearest where a mirror's pixels have a notch; it is rare.
-    assert (mine <= away[within] * (1 + 1e-9)).mean() > 0.9995
+    assert (found_distance <= distance[within] * (1 + 1e-9)).mean() > 0.9995
 
 
 def test_distance_in_two_plane_coordinates_is_that_of_the_rays_in_the_capture_sphere() -> None:
@@ -82,13 +82,13 @@ def test_distance_in_two_plane_coordinates_is_that_of_the_rays_in_the_capture_sp
     assert np.linalg.norm(a - b) == pytest.approx(np.sqrt(np.trapezoid(apart, z) / 60), rel=1e-6)
 
 
-def test_rays_that_are_too_oblique_have_no_place() -> None:
+def test_rays_that_are_too_oblique_have_no_coordinates() -> None:
     two_plane = two_plane_along(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), CAPTURE_MM)
     points = two_plane.coordinates(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     assert np.isnan(points).all()
 
 
-def test_meeting_point_of_rays() -> None:
+def test_convergence_point_of_rays() -> None:
     """Rays through one point meet there; parallel ones anywhere along, at their spread."""
     rng = np.random.default_rng(1)
     way = rng.normal(size=(50, 3))
@@ -113,8 +113,8 @@ def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: Mirro
     two_plane = two_plane_along(
         -frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM
     )
-    wanted = two_plane.coordinates(origin, direction)
-    near = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
-    assert near is not None
-    found = nearest_rays(near, wanted)
-    assert np.array_equal(near.colour[found], colour)
+    targets = two_plane.coordinates(origin, direction)
+    bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
+    assert bundle is not None
+    found = nearest_rays(bundle, targets)
+    assert np.array_equal(bundle.colour[found], colour)

@@ -47,7 +47,9 @@ def test_views_resemble_the_truth_and_blends_more_so(
     assert blended.psnr_db > plain.psnr_db
 
 
-def test_the_same_whatever_the_workers(tiles: MirrorTiles, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_threads_does_not_matter(
+    tiles: MirrorTiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
     view = view_from(50, 30)
     before = synthesise(tiles, view, "blend").colour
     focus = Focus(200, 0)
@@ -57,7 +59,7 @@ def test_the_same_whatever_the_workers(tiles: MirrorTiles, monkeypatch: pytest.M
     assert np.array_equal(refocus(tiles, view, focus).colour, mean)
 
 
-def test_what_no_mirror_saw_is_not_seen(light_field: LightField) -> None:
+def test_what_no_mirror_captured_is_not_seen(light_field: LightField) -> None:
     """With camera b's half alone, camera a's side is dark."""
     half = LightField({"b": light_field.frames["b"]}, 60.0, {})
     picture = synthesise(MirrorTiles(half), view_from(0, 10))
@@ -145,9 +147,9 @@ def test_rays_through_the_lens_meet_on_the_sharp_plane() -> None:
 
 def test_a_sweep_goes_through_the_object(tiles: MirrorTiles) -> None:
     view = view_from(30, 45)
-    said: list[str] = []
-    frames = refocus_sweep(tiles, view, 250, 3, said.append)
-    assert len(said) == len(frames) == 3
+    messages: list[str] = []
+    frames = refocus_sweep(tiles, view, 250, 3, messages.append)
+    assert len(messages) == len(frames) == 3
     assert np.array_equal(frames[1], refocus(tiles, view, Focus(250, 0)).image)
     assert not np.array_equal(frames[0], frames[2])
 
@@ -157,7 +159,7 @@ def test_a_sweep_goes_through_the_object(tiles: MirrorTiles) -> None:
     [(-1, 640, "--elevation"), (91, 640, "--elevation"), (float("nan"), 640, "--elevation"),
      (10, 29, "--distance"), (10, float("inf"), "--distance"), (10, float("nan"), "--distance")],
 )  # fmt: skip
-def test_viewpoints_that_cannot_be(elevation: float, distance: float, wrong: str) -> None:
+def test_viewpoints_refused(elevation: float, distance: float, wrong: str) -> None:
     with pytest.raises(InputError, match=wrong):
         view_from(0, elevation, distance)
 
@@ -167,7 +169,7 @@ def test_viewpoints_that_cannot_be(elevation: float, distance: float, wrong: str
     [(0, 0, "--aperture"), (float("inf"), 0, "--aperture"), (300, 100, "--focus"),
      (300, float("nan"), "--focus")],
 )  # fmt: skip
-def test_lenses_that_cannot_be(aperture: float, plane: float, wrong: str) -> None:
+def test_lenses_refused(aperture: float, plane: float, wrong: str) -> None:
     with pytest.raises(InputError, match=wrong):
         Focus(aperture, plane).check(view_from(0, 0), 60.0)
 
