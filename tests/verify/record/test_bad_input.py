@@ -112,7 +112,7 @@ BROKEN = {
     ),
     "no cameras": (
         edit("design.json", lambda d: d.update(cameras=[])),
-        "cameras is [], allowed is a list of 1 or more",
+        "cameras is [], allowed is a list of 1 to 1000",
     ),
     "no parts": (edit("design.json", lambda d: d.update(parts=[])), "parts"),
     "odd parts": (
@@ -136,6 +136,10 @@ BROKEN = {
         "at most",
     ),
     "half a pixel": (edit("design.json", first("width_px", 260.5)), "allowed is a whole number"),
+    "absurdly many cameras": (
+        edit("design.json", lambda d: d.update(cameras=[1] * 10**6)),
+        "cameras is [1, 1, 1, 1,",
+    ),
     "cameras alike": (
         edit("design.json", lambda d: d["cameras"].append(d["cameras"][0])),
         "differ",
@@ -151,6 +155,10 @@ BROKEN = {
     "manifest odd": (
         edit("manifest.json", lambda m: m["files"].update(x=3)),
         "files.x is 3, allowed is",
+    ),
+    "absurdly many files": (
+        edit("manifest.json", lambda m: m.update(files=dict.fromkeys(map(str, range(10**6)), 1))),
+        "files lists 1000000; at most 10000 are read",
     ),
     "manifest size": (
         edit("manifest.json", lambda m: m["files"]["mirrors.csv"].update(size="1")),

@@ -32,6 +32,8 @@ from tbcad_verify.types import Floats
 SCHEMA = "tbcad-design/2"
 DESIGN, MIRRORS, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
 TEXTS = (DESIGN, MIRRORS, MANIFEST)
+MOST = 1000  # cameras or parts
+MOST_FILES = 10_000
 MAX_SIDE_PX = 65536
 MAX_PIXELS = 500_000_000
 SQUARE = 1e-6  # by which axes of a camera may be off unit length or a right angle
@@ -112,8 +114,8 @@ class Design(Strict):
     target_mm: float = Field(ge=1e-3, le=1e6)
     coating_mm: float = Field(ge=0, le=1e3)
     foot_z_mm: float = Field(ge=-1e6, le=1e6)
-    cameras: list[Camera] = Field(min_length=1)
-    parts: list[Part]
+    cameras: list[Camera] = Field(min_length=1, max_length=MOST)
+    parts: list[Part] = Field(max_length=MOST)
     mirrors: Literal["mirrors.csv"]
 
     @model_validator(mode="after")
@@ -135,10 +137,13 @@ class Manifest(Strict):
 
     files: dict[str, Entry] = Field(min_length=1)
 
-    @field_validator("files")
+    @field_validator("files", mode="before")
     @classmethod
-    def _inside(cls, files: dict[str, Entry]) -> dict[str, Entry]:
-        for name in files:
+    def _few_and_inside(cls, files: object) -> object:
+        names = list(files) if isinstance(files, dict) else []
+        if len(names) > MOST_FILES:
+            raise ValueError(f"lists {len(names)}; at most {MOST_FILES} are read")
+        for name in names:
             refuse_unsafe(name)
         return files
 

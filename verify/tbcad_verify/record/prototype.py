@@ -147,7 +147,7 @@ class Prototype(Strict):
     frame: Frame
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
     pad_um: float = Field(alias="target_pad_um", ge=1e-3, le=1e4)
-    seats: list[Seat]
+    seats: list[Seat] = Field(max_length=MOST)
     parts: list[Printed] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     bought: list[Bought] = Field(max_length=MOST)
