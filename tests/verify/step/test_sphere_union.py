@@ -33,8 +33,8 @@ NO_WALLS = np.zeros((0, 4))
 PI = np.pi
 
 
-def balls(*rows: tuple[float, float, float, float], walls: Floats = NO_WALLS) -> ClosedFormCells:
-    table = np.array(mirror_rows)
+def balls(*spheres: tuple[float, float, float, float], walls: Floats = NO_WALLS) -> ClosedFormCells:
+    table = np.array(spheres)
     return cells_of_balls(table[:, :3], table[:, 3], walls)
 
 

@@ -15,7 +15,7 @@ def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floa
 
     Args:
         points: (2, N).
-        group: (N,) 0 ... G - 1, each with one point at least.
+        group: (N,) 0 ... G - 1, each with at least one point.
         count: G.
 
     Returns:

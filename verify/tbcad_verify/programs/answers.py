@@ -39,7 +39,7 @@ SHOWN = 160  # characters of a program's own message
 
 
 def skipped(check: CheckName, reason: str) -> Check:
-    """A check that was not made because nobody could: no failure, and no figure either."""
+    """A check that could not be made: no failure, and no figure either."""
     return informative(check, math.nan, SKIPPED + reason)
 
 

@@ -192,7 +192,7 @@ def _coverage(transfer: RayTransfer, outlines: CellOutlines, nearest: Floats) ->
     both = outlines.is_edge & np.roll(outlines.is_edge, -1, axis=1)
     ends = [x.reshape(3, -1) for x in (nearest, np.roll(nearest, -1, axis=2))]
     distance = distances_to_segments(np.zeros_like(ends[0]), *ends).reshape(both.shape)
-    # A ray that misses the ball shows nothing, so it takes nothing away.
+    # A ray that misses the ball shows nothing of the object, and does not count.
     diameter = 2 * np.where(both & np.isfinite(distance), distance, np.inf).min(axis=1)
     apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
     middle = np.repeat(unit(apex - context.pinhole[:, None]), both.shape[1], axis=1)

@@ -74,7 +74,7 @@ class PrototypeContext:
 
     @cached_property
     def plan_rows(self) -> Ints:
-        """(m,) row of the plan that shows each of this camera's mirrors, the object not turned.
+        """(m,) row of the plan that shows each of this camera's mirrors, the object at 0 degrees.
 
         Raises:
             Unknown: a mirror has none, or a row names a ball that does not exist.

@@ -37,8 +37,8 @@ class ProgramRun:
 def run_program(text: str) -> ProgramRun:
     """Run a program from its first line to its last.
 
-    A photograph is taken by M8; in a program without M8 by every M0 after the first move, but for
-    the middle one, at which the object is turned.
+    A photograph is taken by M8; in a program without M8 by every M0 after the first move, except
+    for the middle one, at which the object is rotated.
     """
     moves: list[float] = []
     coolant: list[float] = []

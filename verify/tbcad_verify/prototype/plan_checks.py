@@ -41,7 +41,7 @@ def checks(context: PrototypeContext) -> list[Check]:
 
 
 def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
-    """Each of this camera's mirrors once with the object straight, all others once with it turned.
+    """Each of this camera's mirrors once with the object at 0 degrees, all others once at 180.
 
     Rows are numbered, and name balls that exist.
     """
@@ -53,7 +53,9 @@ def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
         count = Counter(plan.mirror[k] for k in np.flatnonzero(plan.turn == turn).tolist())
         faults += [name for name in expected if count[name] != 1]
         faults += sorted(set(count) - set(expected))
-    faults += [f"row {k + 1} turned oddly" for k in np.flatnonzero(~np.isin(plan.turn, TURNS))]
+    faults += [
+        f"row {k + 1} at another object angle" for k in np.flatnonzero(~np.isin(plan.turn, TURNS))
+    ]
     foreign = (plan.ball < 1) | (plan.ball > len(context.prototype.balls))
     faults += [f"row {k + 1} of no ball" for k in np.flatnonzero(foreign).tolist()]
     unordered = np.flatnonzero(plan.order != np.arange(1, len(plan) + 1))
@@ -65,9 +67,9 @@ def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
 
 
 def twins(context: PrototypeContext) -> Ints:
-    """(m,) row of mirrors.csv of the mirror that each one shows when the object is turned.
+    """(m,) row of mirrors.csv of the mirror that each one shows with the object at 180 degrees.
 
-    Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
+    Rotated by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
 
     Raises:
         Unknown: there is no mirror in that direction.
@@ -81,16 +83,16 @@ def twins(context: PrototypeContext) -> Ints:
     distance, nearest = map(np.asarray, cKDTree(u[:, others].T).query(rotated.T))
     if not distance.max() <= SAME_DIRECTION:
         missing = context.mirror_ids[int(distance.argmax())]
-        raise Unknown(f"no mirror of the other camera is {missing} turned by 180 degrees")
+        raise Unknown(f"no mirror of the other camera is {missing} rotated by 180 degrees")
     return np.asarray(others[nearest])
 
 
 def _twins(name: CheckName, context: PrototypeContext) -> Check:
-    """The turned half uses the same balls and stops as the mirrors it is the image of."""
+    """With the object at 180 degrees, each mirror uses the ball and stop of its twin."""
     plan, rows = context.prototype.plan, context.export.mirrors
-    turned = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
+    at_180 = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
     ids = [rows.ids[k] for k in twins(context).tolist()]
-    row = np.array([turned.get(name, -1) for name in ids])
+    row = np.array([at_180.get(name, -1) for name in ids])
     first = context.plan_rows
     same = (
         (row >= 0) & (plan.ball[row] == plan.ball[first]) & (plan.angle[row] == plan.angle[first])

@@ -39,7 +39,7 @@ STAGES = (
     "prototype's record",
     "printed parts",
     "seats",
-    "light by way of the balls",
+    "light paths of the balls",
     "swing",
     "printability of the prototype",
 )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Export
@@ -40,19 +38,19 @@ def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unkn
 
 
 def part_step_checks(
-    export: Export, masses: dict[str, MassProperties], found: dict[str, StepFile | Unknown]
+    export: Export, masses: dict[str, MassProperties], files: dict[str, StepFile | Unknown]
 ) -> list[Check]:
     """All checks of the STEP files of a prototype's parts.
 
     Args:
         export: the record.
         masses: figures of the meshes moved back to their places, by part.
-        found: the files as read.
+        files: as read, by part.
     """
     return [
         check
         for part in _parts(export)
-        for check in _part(export, part, found[part.name], masses.get(part.name))
+        for check in _part(export, part, files[part.name], masses.get(part.name))
     ]
 
 
@@ -61,15 +59,12 @@ def _parts(export: Export) -> list[Printed]:
 
 
 def _part(
-    export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
+    export: Export, part: Printed, file: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
-    return guarded(names_of(CHECKS, part.step), partial(_compared, export, part, found, mass))
+    def compared() -> list[Check]:
+        if isinstance(file, Unknown):
+            raise file
+        comparison = PartComparison(part.name, file, mass, export.mesh_error_mm, CLAIM_SHARE)
+        return run_checks(CHECKS, part.step, comparison)
 
-
-def _compared(
-    export: Export, part: Printed, found: StepFile | Unknown, mass: MassProperties | None
-) -> list[Check]:
-    if isinstance(found, Unknown):
-        raise found
-    comparison = PartComparison(part.name, found, mass, export.mesh_error_mm, CLAIM_SHARE)
-    return run_checks(CHECKS, part.step, comparison)
+    return guarded(names_of(CHECKS, part.step), compared)

@@ -17,11 +17,11 @@ from tbcad_verify.step.text import read_text
 def main(file: Path, answer: Path) -> None:
     """Read one file; the answer appears whole or not at all."""
     try:
-        found: dict[str, Any] = {"text": read_text(file), "solid": read_solid(file)}
+        content: dict[str, Any] = {"text": read_text(file), "solid": read_solid(file)}
     except ValueError as error:
-        found = {"refused": str(error)}
+        content = {"refused": str(error)}
     draft = answer.with_suffix(".draft")
-    draft.write_text(json.dumps(found), encoding="utf-8")
+    draft.write_text(json.dumps(content), encoding="utf-8")
     draft.replace(answer)
 
 

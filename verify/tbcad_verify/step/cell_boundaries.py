@@ -8,7 +8,7 @@ This is exact, whatever the mirrors' sizes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -73,32 +73,29 @@ def cell_boundaries(mirrors: Surfaces, walls: Surfaces, front: bool) -> CellBoun
     spread, others = _spread(mirrors, walls), joined_surfaces(mirrors, walls)
     maps = surface_maps(mirrors if front else with_apex_uncovered(mirrors, others), front, spread)
     whole = np.zeros(len(maps.reach), dtype=np.bool_)
-    found: list[MapArcs] = []
+    arcs: list[MapArcs] = []
     for batch in _batches(maps, others, spread):
         whole[batch.index] = ~(batch.circles.covers | batch.circles.real).any(axis=1)
         for row, some in _solved(batch, np.arange(len(batch.index)), FIRST):
-            found.append(replace(some, mirror=batch.index[row][some.mirror]))
-    every = joined_arcs(found)
+            arcs.append(replace(some, mirror=batch.index[row][some.mirror]))
+    every = joined_arcs(arcs)
     return CellBoundaries(maps, every.take(np.argsort(every.mirror, kind="stable")), whole, spread)
 
 
 def joined_surfaces(one: Surfaces, other: Surfaces) -> Surfaces:
     """Surfaces of both, in this order."""
-    return Surfaces(
-        np.concatenate([one.point, other.point], axis=1),
-        np.concatenate([one.normal, other.normal], axis=1),
-        np.concatenate([one.curvature, other.curvature]),
-    )
+    pairs = zip(astuple(one), astuple(other), strict=True)
+    return Surfaces(*(np.concatenate(pair, axis=-1) for pair in pairs))
 
 
 def _spread(mirrors: Surfaces, walls: Surfaces) -> float:
     """Extent of all surfaces, mm: the unit in which sizes are compared."""
     offset = (walls.normal * walls.point).sum(axis=0)
-    away = np.abs(np.einsum("iw,im->wm", walls.normal, mirrors.point) - offset[:, None])
+    distance = np.abs(np.einsum("iw,im->wm", walls.normal, mirrors.point) - offset[:, None])
     curved = mirrors.curvature[mirrors.curvature > 0]
     if not len(mirrors.curvature):
         return 1.0
-    size = float(np.hypot.reduce([*np.ptp(mirrors.point, axis=1), away.max(initial=0.0)]))
+    size = float(np.hypot.reduce([*np.ptp(mirrors.point, axis=1), distance.max(initial=0.0)]))
     return size or (1 / float(curved.max()) if len(curved) else 1.0)
 
 
@@ -127,7 +124,7 @@ def _solved(batch: MapBatch, row: Ints, width: int) -> Iterator[tuple[Ints, MapA
 
 
 def _nearest(near: Floats, width: int) -> Ints:
-    """(M, width) numbers of the least of (M, K), in ascending order of number."""
+    """(M, width) numbers of the smallest of (M, K), in ascending order of number."""
     if width == near.shape[1]:
         return np.broadcast_to(np.arange(width), near.shape)
     return np.sort(np.argpartition(near, width, axis=1)[:, :width], axis=1)

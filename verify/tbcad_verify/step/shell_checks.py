@@ -97,7 +97,7 @@ def _recorded_areas(export: Export) -> Check:
     for camera in export.cameras:
         area[mirrors.camera == camera] = cells_of_export(export, camera, coated=True).area
     error = np.abs(mirrors.cell_area_mm2 / area - 1)
-    return _worst_of(AREAS, mirrors.ids, error, CELL_SHARE, "of its area away")
+    return _worst_of(AREAS, mirrors.ids, error, CELL_SHARE, "of its area off")
 
 
 def _comparison(
@@ -153,15 +153,15 @@ def _surfaces(name: CheckName, shell: ShellComparison) -> Check:
 def _outward(name: CheckName, shell: ShellComparison) -> Check:
     """Mirrors are convex seen from outside the solid; `_surfaces` tests where planes face."""
     outward = _of(shell, shell.file.faces.outward)
-    turned = [shell.mirrors.ids[k] for k in np.flatnonzero(~outward).tolist()]
-    detail = f"the solid lies on the wrong side: {short_list(turned)}"
-    return at_most(name, len(turned), 0, detail)
+    inward = [shell.mirrors.ids[k] for k in np.flatnonzero(~outward).tolist()]
+    detail = f"the solid lies on the wrong side: {short_list(inward)}"
+    return at_most(name, len(inward), 0, detail)
 
 
 def _areas(name: CheckName, shell: ShellComparison) -> Check:
     """Each mirror's area is its cell's, so that no face is the rest of its sphere."""
     error = np.abs(_of(shell, shell.file.faces.area) / shell.cells.area - 1)
-    return _worst_of(name, shell.mirrors.ids, error, CELL_SHARE, "of its cell's area away")
+    return _worst_of(name, shell.mirrors.ids, error, CELL_SHARE, "of its cell's area off")
 
 
 def _centroids(name: CheckName, shell: ShellComparison) -> Check:

@@ -39,7 +39,7 @@ class StepFaces:
         radius: (F,) of spheres, mm.
         normal: (F, 3) of planes, out of the solid.
         outward: (F,) true where a sphere is convex seen from outside the solid, and a plane faces
-            the way the kernel says, in the text too: kernels mend a face that is turned about,
+            the direction that the kernel gives, in the text too: kernels repair reversed faces,
             other readers may not.
         area: (F,) mm^2.
         middle: (F, 3) of the area, mm.

@@ -124,9 +124,9 @@ def _forms(maps: SurfaceMaps, others: Surfaces) -> tuple[Floats, Floats, Floats]
     """Alpha (M, T), beta (2, M, T) and gamma (M, T), not yet scaled."""
     mine = maps.surfaces
     shape = (3, len(mine.curvature), len(others.curvature))
-    away = mine.point[:, :, None] - others.point[:, None]
-    slope = others.normal[:, None] + others.curvature * away
-    flat = away.reshape(3, -1)
+    offset = mine.point[:, :, None] - others.point[:, None]
+    slope = others.normal[:, None] + others.curvature * offset
+    flat = offset.reshape(3, -1)
     height = np.broadcast_to(others.normal[:, None], shape).reshape(3, -1)
     gamma = (dot(height, flat)).reshape(shape[1:])
     gamma = gamma + others.curvature / 2 * dot(flat, flat).reshape(shape[1:])
@@ -177,10 +177,10 @@ def _opposite(surfaces: Surfaces, others: Surfaces, part: slice) -> Floats:
     mine = surfaces.take(np.arange(len(surfaces.curvature))[part])
     k = mine.curvature
     centre = mine.point - np.divide(mine.normal, k, out=np.zeros((3, len(k))), where=k > 0)
-    away = centre[:, :, None] - others.point[:, None]
-    slope = others.normal[:, None] + others.curvature * away
-    value = np.einsum("it,imt->mt", others.normal, away)
-    value = value + others.curvature / 2 * np.einsum("imt,imt->mt", away, away)
+    offset = centre[:, :, None] - others.point[:, None]
+    slope = others.normal[:, None] + others.curvature * offset
+    value = np.einsum("it,imt->mt", others.normal, offset)
+    value = value + others.curvature / 2 * np.einsum("imt,imt->mt", offset, offset)
     steep = np.sqrt(np.einsum("imt,imt->mt", slope, slope))
     # On the sphere C + r s, k times the other's function is level + slope . s.
     level = value * k[:, None] + others.curvature / 2 / np.where(k > 0, k, 1)[:, None]
