@@ -261,15 +261,10 @@ def _rings(spec: BaseSpec, inner: Floats) -> tuple[Floats, ...]:
     place[:-1] += along[:-1] * spec.rib_mm / 2
     foot = RING_FOOT * spec.thickness_mm
     top = spec.thickness_mm + spec.rib_height_mm - RING_LOWER_MM
+    lengths = np.array([[0.0, -spec.rib_mm, -spec.rib_mm, 0.0]]).T
+    heights = np.array([[foot, foot, top, top]]).T
     return tuple(
-        np.array(
-            [
-                end + foot * out,
-                end - spec.rib_mm * forward + foot * out,
-                end - spec.rib_mm * forward + top * out,
-                end + top * out,
-            ]
-        )
+        end + lengths * forward + heights * out
         for end, forward, out in zip(place, along, outward(inner)[part], strict=True)
     )
 
