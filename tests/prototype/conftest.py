@@ -30,7 +30,7 @@ def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
 
 
 @pytest.fixture(scope="session")
-def prototype(small_design: MirrorDesign) -> PrototypeLayout:
+def small_prototype(small_design: MirrorDesign) -> PrototypeLayout:
     """A quick one: four balls for the mirrors of n = 6."""
     return prototype_layout(SMALL, small_design)
 

@@ -70,8 +70,8 @@ class TestSeats:
         pads = seats.radius * np.sin(seats.tilt) - seats.pad * np.cos(seats.tilt)
         assert (seats.pocket < pads).all()
 
-    def test_glue_needs_no_magnet(self, prototype: PrototypeLayout) -> None:
-        seats = seat_layout(changed_spec(hold="glue"), prototype)
+    def test_glue_needs_no_magnet(self, small_prototype: PrototypeLayout) -> None:
+        seats = seat_layout(changed_spec(hold="glue"), small_prototype)
         assert (seats.magnet == 0).all()
         assert seats.bottom == pytest.approx(seats.radius + SPEC.magnet_gap_mm)
 
@@ -81,8 +81,8 @@ class TestSeats:
     def test_a_ball_that_cannot_go_in_straight_goes_in_at_a_slant(
         self, paper_design: MirrorDesign
     ) -> None:
-        prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
-        seats = seat_layout(SPEC, prototype)
+        small_prototype = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
+        seats = seat_layout(SPEC, small_prototype)
         slant = np.degrees(
             np.arccos(np.clip(-dot(seats.insertion, seats.axis) / norm(seats.insertion), -1, 1))
         )
@@ -117,9 +117,9 @@ class TestLight:
         inside = region.excess(weights @ facets).min(axis=1)
         assert (region.min_excess(facets) <= inside + 1e-9).all()
 
-    def test_a_boss_in_the_light_is_refused(self, prototype: PrototypeLayout) -> None:
+    def test_a_boss_in_the_light_is_refused(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"into the light: make prototype\.base\.pad_angle_deg"):
-            base_layout(changed_spec(light_clearance_mm=12.0), prototype)
+            base_layout(changed_spec(light_clearance_mm=12.0), small_prototype)
 
 
 class TestProfile:
@@ -196,28 +196,34 @@ class TestRefused:
             ({"magnets_mm": [40.0]}, "no magnet fits between the pads of ball 1: add one of"),
         ],
     )
-    def test_seats(self, prototype: PrototypeLayout, changed: dict[str, object], text: str) -> None:
+    def test_seats(
+        self, small_prototype: PrototypeLayout, changed: dict[str, object], text: str
+    ) -> None:
         with pytest.raises(SpecError, match=text):
-            base_layout(changed_spec(**changed), prototype)
+            base_layout(changed_spec(**changed), small_prototype)
 
-    def test_pads_in_the_way_of_other_balls(self, prototype: PrototypeLayout) -> None:
-        close = replace(prototype.placement, azimuth=prototype.placement.azimuth * 0)
+    def test_pads_in_the_way_of_other_balls(self, small_prototype: PrototypeLayout) -> None:
+        close = replace(small_prototype.placement, azimuth=small_prototype.placement.azimuth * 0)
         small = replace(
-            prototype.balls.poses,
-            apex=prototype.balls.poses.apex * 0 + prototype.balls.poses.apex[:1],
+            small_prototype.balls.poses,
+            apex=small_prototype.balls.poses.apex * 0 + small_prototype.balls.poses.apex[:1],
         )
-        crowded = replace(prototype, placement=close, balls=replace(prototype.balls, poses=small))
+        crowded = replace(
+            small_prototype, placement=close, balls=replace(small_prototype.balls, poses=small)
+        )
         with pytest.raises(SpecError, match="is where another ball is inserted"):
             seat_layout(SPEC, crowded)
 
-    def test_a_ball_next_to_the_axis(self, prototype: PrototypeLayout) -> None:
-        seats = seat_layout(SPEC, prototype)
-        frame = prototype.half.ellipsoid.frame()
+    def test_a_ball_next_to_the_axis(self, small_prototype: PrototypeLayout) -> None:
+        seats = seat_layout(SPEC, small_prototype)
+        frame = small_prototype.half.ellipsoid.frame()
         near = replace(seats, centre=seats.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
         with pytest.raises(SpecError, match="is too near to the axis for its seat"):
-            sector(SPEC, near, prototype)
+            sector(SPEC, near, small_prototype)
 
-    def test_balls_all_round_the_axis(self, prototype: PrototypeLayout) -> None:
-        spread = replace(prototype.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0]))
+    def test_balls_all_round_the_axis(self, small_prototype: PrototypeLayout) -> None:
+        spread = replace(
+            small_prototype.placement, azimuth=np.radians([-170.0, -60.0, 60.0, 170.0])
+        )
         with pytest.raises(SpecError, match=r"would go 3\d\d degrees round its axis"):
-            base_layout(SPEC, replace(prototype, placement=spread))
+            base_layout(SPEC, replace(small_prototype, placement=spread))

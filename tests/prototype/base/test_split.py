@@ -34,10 +34,12 @@ def cube(size: float) -> PrinterSpec:
 
 @pytest.fixture(scope="module", params=["small", "paper in two", "paper in three"])
 def cut(
-    request: pytest.FixtureRequest, prototype: PrototypeLayout, paper_prototype: PrototypeLayout
+    request: pytest.FixtureRequest,
+    small_prototype: PrototypeLayout,
+    paper_prototype: PrototypeLayout,
 ) -> tuple[BaseLayout, BaseSplit]:
     at = {
-        "small": (prototype, 150.0),
+        "small": (small_prototype, 150.0),
         "paper in two": (paper_prototype, 180.0),
         "paper in three": (paper_prototype, 160.0),
     }
@@ -59,9 +61,9 @@ def rims(base: BaseLayout) -> np.ndarray:
 
 class TestPlanes:
     def test_a_base_that_fits_stays_whole(
-        self, prototype: PrototypeLayout, paper_prototype: PrototypeLayout
+        self, small_prototype: PrototypeLayout, paper_prototype: PrototypeLayout
     ) -> None:
-        for one in (prototype, paper_prototype):
+        for one in (small_prototype, paper_prototype):
             plan = split_base(base_layout(SPEC, one), PrinterSpec())
             assert not plan.joints
             assert [len(piece) for piece in plan.pieces] == [0]
@@ -89,19 +91,19 @@ class TestPlanes:
         assert (np.sum(inside, axis=0) == 1).all()
         assert all(one.any() for one in inside)
 
-    def test_the_same_again(self, prototype: PrototypeLayout) -> None:
-        one, two = (split_base(base_layout(SPEC, prototype), cube(150.0)) for _ in range(2))
+    def test_the_same_again(self, small_prototype: PrototypeLayout) -> None:
+        one, two = (split_base(base_layout(SPEC, small_prototype), cube(150.0)) for _ in range(2))
         for first, second in zip(one.joints, two.joints, strict=True):
             assert (first.screws == second.screws).all()
             assert (first.plane.normal == second.plane.normal).all()
 
-    def test_a_bed_too_small_names_one_that_does(self, prototype: PrototypeLayout) -> None:
+    def test_a_bed_too_small_names_one_that_does(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as caught:
-            split_base(base_layout(SPEC, prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
+            split_base(base_layout(SPEC, small_prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))
         (bed,) = re.findall(r"least (\d+) x (\d+) x (\d+)", str(caught.value))
         width, depth, height = map(float, bed)
         larger = PrinterSpec(bed_mm=(width, depth, height))
-        assert len(split_base(base_layout(SPEC, prototype), larger).pieces) == 2
+        assert len(split_base(base_layout(SPEC, small_prototype), larger).pieces) == 2
 
 
 class TestJoints:
@@ -173,10 +175,10 @@ class TestJoints:
         ],
     )
     def test_refused(
-        self, prototype: PrototypeLayout, changed: dict[str, object], text: str
+        self, small_prototype: PrototypeLayout, changed: dict[str, object], text: str
     ) -> None:
         with pytest.raises(SpecError, match=text):
-            split_base(base_layout(changed_spec(**changed), prototype), cube(150.0))
+            split_base(base_layout(changed_spec(**changed), small_prototype), cube(150.0))
 
 
 class TestBed:
@@ -215,20 +217,22 @@ class TestBought:
         assert found["M3x12"] == screws
         assert found["INSERT-M3"] == 6 + screws
 
-    def test_other_hubs(self, prototype: PrototypeLayout) -> None:
-        whole = split_base(base_layout(SPEC, prototype), PrinterSpec())
-        clamp = base_purchased_parts(base_layout(changed_spec(lock="clamp"), prototype), whole)
+    def test_other_hubs(self, small_prototype: PrototypeLayout) -> None:
+        whole = split_base(base_layout(SPEC, small_prototype), PrinterSpec())
+        clamp = base_purchased_parts(
+            base_layout(changed_spec(lock="clamp"), small_prototype), whole
+        )
         assert clamp["INSERT-M3"] == 5
         assert sum(count for name, count in clamp.items() if name.startswith("M3x")) == 1
         stage = base_purchased_parts(
-            base_layout(changed_spec(drive="stage-60", hold="glue"), prototype), whole
+            base_layout(changed_spec(drive="stage-60", hold="glue"), small_prototype), whole
         )
         assert stage == {}
 
-    def test_not_in_a_list(self, prototype: PrototypeLayout) -> None:
+    def test_not_in_a_list(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):
-            magnets(base_layout(changed_spec(magnet_height_mm=4.0), prototype))
-        base = base_layout(changed_spec(insert_hole_mm=4.4), prototype)
+            magnets(base_layout(changed_spec(magnet_height_mm=4.0), small_prototype))
+        base = base_layout(changed_spec(insert_hole_mm=4.4), small_prototype)
         whole = split_base(base, PrinterSpec())
         with pytest.raises(SpecError, match=r"no M3 insert for holes of 4\.4 mm"):
             fasteners(base, whole)

@@ -42,8 +42,8 @@ def cut_up(base: BaseLayout, printer: PrinterSpec) -> Cut:
 
 
 @pytest.fixture(scope="module")
-def small(prototype: PrototypeLayout) -> Cut:
-    return cut_up(base_layout(BaseSpec(), prototype), PRINTER)
+def small(small_prototype: PrototypeLayout) -> Cut:
+    return cut_up(base_layout(BaseSpec(), small_prototype), PRINTER)
 
 
 @pytest.fixture(scope="module")

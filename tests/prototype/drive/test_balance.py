@@ -115,9 +115,9 @@ class TestCounterweight:
         assert balanced.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
         assert balanced.mass_g == pytest.approx(mass + weight.mass_g)
 
-    def test_of_a_prototype(self, prototype: PrototypeLayout) -> None:
-        masses = ball_masses(prototype, 1.27)
-        before = sum_masses(prototype.half.ellipsoid.frame(), masses)
+    def test_of_a_prototype(self, small_prototype: PrototypeLayout) -> None:
+        masses = ball_masses(small_prototype, 1.27)
+        before = sum_masses(small_prototype.half.ellipsoid.frame(), masses)
         weight = before.counterweight(100)
         after = sum_masses(before.frame, masses, placed(weight, -70))
         assert before.torque_amplitude > 100
@@ -125,25 +125,28 @@ class TestCounterweight:
 
 
 class TestBalls:
-    def test_balls_weigh_where_they_sit(self, prototype: PrototypeLayout) -> None:
-        masses = ball_masses(prototype, 1.27)
-        bought = ~prototype.balls.cap
-        assert len(masses) == len(prototype)
-        assert masses.mass_g[bought].sum() == pytest.approx(prototype.mass_g)
-        assert (masses.centre == prototype.body_centres()).all()
+    def test_balls_weigh_where_they_sit(self, small_prototype: PrototypeLayout) -> None:
+        masses = ball_masses(small_prototype, 1.27)
+        bought = ~small_prototype.balls.cap
+        assert len(masses) == len(small_prototype)
+        assert masses.mass_g[bought].sum() == pytest.approx(small_prototype.mass_g)
+        assert (masses.centre == small_prototype.body_centres()).all()
 
-    def test_turning_the_base_turns_the_balls(self, prototype: PrototypeLayout) -> None:
-        frame = prototype.half.ellipsoid.frame()
-        still = sum_masses(frame, ball_masses(prototype, 1.27))
+    def test_turning_the_base_turns_the_balls(self, small_prototype: PrototypeLayout) -> None:
+        frame = small_prototype.half.ellipsoid.frame()
+        still = sum_masses(frame, ball_masses(small_prototype, 1.27))
         moved = sum_masses(
-            frame, PointMasses(ball_masses(prototype, 1.27).mass_g, prototype.body_centres(0.4))
+            frame,
+            PointMasses(
+                ball_masses(small_prototype, 1.27).mass_g, small_prototype.body_centres(0.4)
+            ),
         )
         assert still.torque(np.array([0.4])) == pytest.approx(moved.torque(np.array([0.0])))
         assert still.inertia == pytest.approx(moved.inertia)
 
-    def test_caps_by_slices(self, prototype: PrototypeLayout) -> None:
+    def test_caps_by_slices(self, small_prototype: PrototypeLayout) -> None:
         """Their volume as the sum of thin discs: within both spheres."""
-        balls = prototype.balls
+        balls = small_prototype.balls
         assert balls.cap.any()
         for j in np.flatnonzero(balls.cap):
             body, radius, depth = balls.body_radius[j], balls.radius[j], balls.body_depth[j]
@@ -155,8 +158,8 @@ class TestBalls:
             area = np.pi * np.where(x < drop, front, np.maximum(back, 0))
             assert cap_volume(balls)[j] == pytest.approx(np.trapezoid(area, x), rel=1e-5)
 
-    def test_balls_have_no_cap(self, prototype: PrototypeLayout) -> None:
-        assert (cap_volume(prototype.balls)[~prototype.balls.cap] == 0).all()
+    def test_balls_have_no_cap(self, small_prototype: PrototypeLayout) -> None:
+        assert (cap_volume(small_prototype.balls)[~small_prototype.balls.cap] == 0).all()
 
 
 def test_one_mass_is_its_own_sum() -> None:
