@@ -1,4 +1,4 @@
-"""A small machine as the fast model sees it."""
+"""A small build as the fast model sees it."""
 
 import pytest
 

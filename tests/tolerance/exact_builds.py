@@ -1,4 +1,4 @@
-"""Made machines by slow and independent means: cells of known topology, meshes, brute force."""
+"""Builds by slow and independent means: cells of known topology, meshes, brute force."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 
 
 def made(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
-    """Cells of machine k before its shell is scaled and moved."""
+    """Cells of build k before its shell is scaled and moved."""
     every, m = half.cells.surfaces, len(half)
     radius = 1 / every.curvature[:m] + draws.radius[k]
     centre = half.mirrors.centre + draws.centre[k]
@@ -48,8 +48,8 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
     return replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
 
 
-def slowly(half: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
-    """Coverage of each mirror of machine k by tbcad.optics.trace, mm; of even scale only."""
+def traced_coverage(half: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
+    """Coverage of each mirror of build k by tbcad.optics.trace, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
     back = Rotation.from_rotvec(draws.shell_tilt[k]).inv()
@@ -72,10 +72,10 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mirror[counted], arc[counted]
 
 
-def meshed(
+def write_meshes(
     design: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path
 ) -> None:
-    """Write both shells of machine k as STL files, as the exporter would."""
+    """Write both shells of build k as STL files, as the exporter would."""
     first, body = design.halves[0], shell_envelope(design)
     for half, drawn in zip(design.halves, draws, strict=True):
         own = made(half, drawn, k)
@@ -88,8 +88,8 @@ def meshed(
         write_stl(folder / f"shell_{half.camera_id}.stl", Mesh(points, facets.triangles))
 
 
-def proved(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Coverage of every virtual camera by the proof's own reading of STL files, mm, (v,)."""
+def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Coverage of every virtual camera by the verification's own reading of STL files, mm, (v,)."""
     cameras = {
         name: camera.model_copy(update={"pinhole": camera.pinhole + shifts[name]})
         for name, camera in record.cameras.items()
@@ -117,8 +117,10 @@ def _least(bench: OpticalSetup) -> np.ndarray:
     return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 
 
-def brutally(half: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000) -> float:
-    """Coverage of a mirror of machine k by bisection of where each way from its apex ends, mm.
+def bisected_coverage(
+    half: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000
+) -> float:
+    """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
 
     Every sphere and plane is looked at, scaled as it is, without any circle or corner.
     """

@@ -42,7 +42,7 @@ def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def losing(loss: Loss) -> Callable[[MirrorDesign, Errors], np.ndarray]:
-    """Coverage of machines that see the target and the margin but for what they lose."""
+    """Coverage of builds that see the target and the margin but for what they lose."""
     return lambda made, _: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
 
 
@@ -82,7 +82,7 @@ class TestMadeUpLosses:
     @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.95, 0.975, 0.985, 0.99, 0.995, 0.999])
     @pytest.mark.parametrize("seed", range(4))
     def test_random_losses_against_brute_force(self, spec: Spec, seed: int, wanted: float) -> None:
-        """Also with shares between those that 100 machines can have."""
+        """Also with shares between those that 100 builds can have."""
         lost = np.random.default_rng(seed).normal(1.5, 0.4, 100).clip(0.05)
         found = margin(spec, Errors(), wanted, losing(steady(lost)))
         assert found.mm == pytest.approx(brute(lost, wanted), abs=1e-9)
@@ -151,7 +151,7 @@ def test_spec_with_another_margin() -> None:
 
 
 class TestRealDesigns:
-    """Made anew with the margin that was found, and with machines of the same numbers."""
+    """Made anew with the margin that was found, and with builds of the same numbers."""
 
     @staticmethod
     def worst(made: MirrorDesign, errors: Errors) -> np.ndarray:

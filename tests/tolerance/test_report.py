@@ -54,7 +54,7 @@ def little() -> MirrorDesign:
 
 @pytest.fixture(scope="module")
 def analysis(little: MirrorDesign) -> Analysis:
-    """Real machines, some good and some not; all else made up."""
+    """Real builds, some good and some not; all else made up."""
     cameras = reflectors(little)
     models = edge_models(cameras)
     errors = Errors(sphere_centre=Error(0.012))
@@ -265,7 +265,7 @@ class TestTables:
             times = one["tolerable_factor"]
             assert row["tolerable_factor"] == ("" if times is None else str(times))
         assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
-        # Facets of sla: 0.36 mm in every machine and no spread; 1.5 times that is no zero.
+        # Facets of sla: 0.36 mm in every build and no spread; 1.5 times that is no zero.
         may = [(row["tolerable_magnitude"], row["tolerable_mean"]) for row in rows]
         assert may == [(str(0.375 * 25), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
 

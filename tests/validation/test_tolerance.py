@@ -1,4 +1,4 @@
-"""The fast model of made machines against closed forms, slow tracing, brute force and the proof."""
+"""The fast model of simulated builds against closed forms, slow tracing and the verification."""
 
 from __future__ import annotations
 
@@ -20,7 +20,12 @@ from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.pointing import pointing
-from tests.tolerance.exact_builds import brutally, meshed, proved, slowly
+from tests.tolerance.exact_builds import (
+    bisected_coverage,
+    traced_coverage,
+    verified_coverage,
+    write_meshes,
+)
 
 # What a careless maker might leave; even scale only, as the slow means know no other.
 COARSE = Errors(
@@ -76,7 +81,7 @@ def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> No
     draws = tuple(perfect(fast) for fast in halves)
     for half, fast, drawn in zip(paper_design.halves, halves, draws, strict=True):
         found = mirror_coverage(fast, drawn).diameter[0]
-        assert np.abs(found - slowly(half, drawn, 0)).max() < 1e-6
+        assert np.abs(found - traced_coverage(half, drawn, 0)).max() < 1e-6
         assert np.abs(found - half.coverage).max() < 1e-5
     every, _ = coverage(halves, draws)
     assert every.shape == (1, 1657)
@@ -118,7 +123,7 @@ def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
 
 
 @pytest.mark.parametrize("size", [0.98, 1.03])
-def test_larger_machine_covers_more_in_proportion(halves: EdgeModels, size: float) -> None:
+def test_larger_build_covers_more_in_proportion(halves: EdgeModels, size: float) -> None:
     still = perfect(halves[0])
     pinhole = halves[0].view.pinhole
     larger = replace(still, scale=row(size, size, size), camera_shift=(size - 1) * pinhole[None])
@@ -196,7 +201,7 @@ def test_radius_of_one_mirror_alone(halves: EdgeModels, small_design: MirrorDesi
     radius[0, alone] = 0.1
     drawn = replace(perfect(halves[0]), radius=radius)
     found = mirror_coverage(halves[0], drawn).diameter[0]
-    assert found[alone] == pytest.approx(brutally(half, drawn, 0, alone), abs=1e-4)
+    assert found[alone] == pytest.approx(bisected_coverage(half, drawn, 0, alone), abs=1e-4)
     before = mirror_coverage(halves[0], perfect(halves[0])).diameter[0]
     faces = half.cells.arcs.faces
     touched = np.unique(faces[(faces == alone).any(axis=1)])
@@ -214,29 +219,29 @@ def test_coat_too_thick_is_radii_too_large(halves: EdgeModels) -> None:
     assert (both[0] != mirror_coverage(halves[0], perfect(halves[0])).diameter).all()
 
 
-# Random machines
+# Random builds
 
 
 @pytest.mark.parametrize("share", [0.1, 1.0, 4.0])
-def test_random_machines_against_slow_tracing(
+def test_random_builds_against_slow_tracing(
     halves: EdgeModels, small_design: MirrorDesign, share: float
 ) -> None:
-    """20 machines of 2 x 103 mirrors, within 1e-6 mm (asked for: 1e-4)."""
+    """20 builds of 2 x 103 mirrors, within 1e-6 mm (asked for: 1e-4)."""
     errors = scaled(POSED, share)
     for half, fast, drawn in zip(
         small_design.halves, halves, draw(errors, 7, range(20), len(halves[0])), strict=True
     ):
         found = mirror_coverage(fast, drawn).diameter
-        slow = np.stack([slowly(half, drawn, k) for k in range(20)])
+        slow = np.stack([traced_coverage(half, drawn, k) for k in range(20)])
         assert np.abs(found - slow).max() < 1e-6
         assert np.abs(found - half.coverage).max() > 5 * share  # it is no small thing
 
 
-def test_random_paper_machines_against_slow_tracing(paper_design: MirrorDesign) -> None:
+def test_random_paper_builds_against_slow_tracing(paper_design: MirrorDesign) -> None:
     halves = halves_of(paper_design)
     drawn, _ = draw(POSED, 7, range(3), len(halves[0]))
     found = mirror_coverage(halves[0], drawn).diameter
-    slow = np.stack([slowly(paper_design.halves[0], drawn, k) for k in range(3)])
+    slow = np.stack([traced_coverage(paper_design.halves[0], drawn, k) for k in range(3)])
     assert np.abs(found - slow).max() < 1e-6
 
 
@@ -256,35 +261,37 @@ def test_uneven_scale_against_brute_force(
     _, drawn = draw(errors, 3, range(1), len(halves[0]))
     assert np.ptp(drawn.scale) > 0.005
     found = mirror_coverage(halves[1], drawn).diameter[0, mirror]
-    assert found == pytest.approx(brutally(small_design.halves[1], drawn, 0, mirror), abs=1e-4)
+    assert found == pytest.approx(
+        bisected_coverage(small_design.halves[1], drawn, 0, mirror), abs=1e-4
+    )
 
 
-# The proof of made files
+# Verification of the files of builds
 
 
 @pytest.fixture(scope="module")
 def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Export:
-    """The record as the proof reads it; the meshes beside it are then written anew."""
+    """The record as the verification reads it; its meshes are then replaced."""
     folder = tmp_path_factory.mktemp("made")
     write_record(folder, small_design, shells=True)
     write_manifest(folder)
     return read_record(folder)
 
 
-@pytest.mark.parametrize(("errors", "machines"), [(COARSE, range(20)), (POSED, range(20, 24))])
-def test_random_machines_against_the_proof_of_their_meshes(
-    halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, machines: range
+@pytest.mark.parametrize(("errors", "builds"), [(COARSE, range(20)), (POSED, range(20, 24))])
+def test_random_builds_against_the_verification_of_their_meshes(
+    halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, builds: range
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
 
-    The proof knows the seam by x = 0, so mirrors halved by the seam of a moved shell are left out.
+    The verification takes x = 0 for the seam, so mirrors halved by a moved seam are left out.
     """
-    draws = draw(errors, 5, machines, len(halves[0]))
+    draws = draw(errors, 5, builds, len(halves[0]))
     fast, _ = coverage(halves, draws)
     kept = np.ones(fast.shape[1], dtype=bool)
     kept[: len(halves[0])] = (errors is COARSE) | ~halves[0].halved
-    for k in range(len(machines)):
-        meshed(small_design, draws, k, record.folder)
+    for k in range(len(builds)):
+        write_meshes(small_design, draws, k, record.folder)
         shifts = {name: drawn.camera_shift[k] for name, drawn in zip("ab", draws, strict=True)}
-        assert np.abs(fast[k] - proved(record, shifts))[kept].max() < 0.05
+        assert np.abs(fast[k] - verified_coverage(record, shifts))[kept].max() < 0.05
     assert fast.min(axis=1).max() < TARGET - 1  # the meshes are not the design's

@@ -10,14 +10,14 @@ ALL = Errors(**{field.name: Error(0.001) for field in fields(Errors)})
 NAMES = [field.name for field in fields(ShellDraws)]
 
 
-def test_a_machine_is_the_same_alone_or_among_others() -> None:
+def test_a_build_is_the_same_alone_or_among_others() -> None:
     together = draw(ALL, 5, range(7), M)
     for half, alone in zip(together, draw(ALL, 5, range(4, 5), M), strict=True):
         for name in NAMES:
             assert np.array_equal(getattr(half, name)[4:5], getattr(alone, name)), name
 
 
-def test_machines_seeds_and_halves_differ() -> None:
+def test_builds_seeds_and_halves_differ() -> None:
     a, b = draw(ALL, 5, range(2), M)
     other, _ = draw(ALL, 6, range(2), M)
     for name in NAMES:
@@ -36,7 +36,7 @@ def test_kinds_are_drawn_apart() -> None:
 
 @pytest.mark.parametrize("kind", ["sphere_centre", "scale_isotropic", "camera_tilt", "facets"])
 def test_without_one_kind_the_others_stay(kind: str) -> None:
-    """Sensitivities then compare the same machines."""
+    """Sensitivities then compare the same builds."""
     full, less = (
         draw(errors, 5, range(2), M)[0] for errors in (ALL, replace(ALL, **{kind: Error()}))
     )
@@ -67,7 +67,7 @@ def test_uniform_errors_fill_their_half_width() -> None:
     assert shift.std() == pytest.approx(0.3 / np.sqrt(3), rel=0.1)
 
 
-def test_what_one_machine_or_one_shell_has_in_common() -> None:
+def test_what_one_build_or_one_shell_has_in_common() -> None:
     a, b = draw(Errors(scale_axis=Error(0.01), coating=Error(0.02, 0.005)), 1, range(3), M)
     assert np.array_equal(a.scale, b.scale)
     assert len(np.unique(a.scale)) == 9
@@ -78,7 +78,7 @@ def test_what_one_machine_or_one_shell_has_in_common() -> None:
     assert np.all(isotropic.scale != other.scale)
 
 
-def test_no_errors_and_no_machines() -> None:
+def test_no_errors_and_no_builds() -> None:
     perfect, _ = draw(Errors(), 1, range(2), M)
     assert np.array_equal(perfect.scale, np.ones((2, 3)))
     assert not perfect.centre.any()

@@ -147,7 +147,7 @@ def test_alone_asks_for_no_other_kind() -> None:
         assert replace(errors, coating=Error()) == Errors()
 
 
-def test_facets_of_a_machine_are_linear(halves: EdgeModels) -> None:
+def test_facets_of_a_build_are_linear(halves: EdgeModels) -> None:
     """They are taken off the coverage, so the factor is what the design has to spare over them."""
     worst = real(halves, 10)
     spare = float(worst(Errors())[0]) - TARGET

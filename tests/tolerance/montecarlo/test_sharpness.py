@@ -1,4 +1,4 @@
-"""Pictures of machines that are off: where their mirrors are, and what calibration gives back."""
+"""Pictures of builds that are off: where their mirrors are, and what calibration gives back."""
 
 from dataclasses import replace
 
@@ -27,6 +27,8 @@ from tbcad.tolerance.montecarlo.sharpness import (
     sharpness,
 )
 
+Cameras = tuple[Reflector, Reflector]
+
 CAPTURE_MM = 60.0
 SIZE = (160, 120)
 # All that a sphere stays a sphere under, and large: cells move by a tenth of their width.
@@ -48,7 +50,7 @@ def little() -> MirrorDesign:
 
 
 @pytest.fixture(scope="module")
-def cameras(little: MirrorDesign) -> tuple[Reflector, Reflector]:
+def cameras(little: MirrorDesign) -> Cameras:
     return reflectors(little)
 
 
@@ -58,7 +60,7 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def wanted(scene: Scene) -> ReferenceViews:
+def reference(scene: Scene) -> ReferenceViews:
     places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
     views: list[Camera] = [
         camera_around_object(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places
@@ -66,7 +68,7 @@ def wanted(scene: Scene) -> ReferenceViews:
     return ReferenceViews(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
 
 
-def machines(cameras: tuple[Reflector, Reflector], errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
+def builds(cameras: Cameras, errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
     return draw(errors, 5, range(count), len(cameras[0]))
 
 
@@ -90,34 +92,30 @@ class OwnCells(BuiltReflector):
 
 class TestActual:
     @pytest.mark.parametrize("side", [0, 1])
-    def test_without_errors_it_is_the_designed_one(
-        self, cameras: tuple[Reflector, Reflector], side: int
-    ) -> None:
-        at, drawn = cameras[side], machines(cameras, Errors())[side]
-        made = built_reflector(at, drawn, 0)
+    def test_without_errors_it_is_the_designed_one(self, cameras: Cameras, side: int) -> None:
+        at, drawn = cameras[side], builds(cameras, Errors())[side]
+        built = built_reflector(at, drawn, 0)
         for name in ("apex", "normal", "curvature"):
             close = pytest.approx(getattr(at.mirrors, name), abs=1e-12)
-            assert getattr(made.mirrors, name) == close
-        assert made.camera.hfov == pytest.approx(at.camera.hfov, abs=1e-14)
-        assert np.array_equal(numbers(made), numbers(at))
+            assert getattr(built.mirrors, name) == close
+        assert built.camera.hfov == pytest.approx(at.camera.hfov, abs=1e-14)
+        assert np.array_equal(numbers(built), numbers(at))
 
     @pytest.mark.parametrize("side", [0, 1])
-    def test_spheres_are_where_draws_say(
-        self, cameras: tuple[Reflector, Reflector], side: int
-    ) -> None:
+    def test_spheres_are_where_draws_say(self, cameras: Cameras, side: int) -> None:
         """A point x comes to lie at R (scale x) + shift (tbcad.tolerance.montecarlo.draws)."""
-        at, drawn = cameras[side], machines(cameras, LARGE, 2)[side]
-        made = built_reflector(at, drawn, 1)
+        at, drawn = cameras[side], builds(cameras, LARGE, 2)[side]
+        built = built_reflector(at, drawn, 1)
         scale, turn = drawn.scale[1, 0], Rotation.from_rotvec(drawn.shell_tilt[1])
         centre = at.mirrors.apex - at.mirrors.normal / at.mirrors.curvature[:, None]
         moved = turn.apply(scale * (centre + drawn.centre[1])) + drawn.shell_shift[1]
-        now = made.mirrors.apex - made.mirrors.normal / made.mirrors.curvature[:, None]
+        now = built.mirrors.apex - built.mirrors.normal / built.mirrors.curvature[:, None]
         assert now == pytest.approx(moved, abs=1e-9)
         radius = scale * (1 / at.mirrors.curvature + drawn.radius[1])
-        assert 1 / made.mirrors.curvature == pytest.approx(radius, rel=1e-12)
+        assert 1 / built.mirrors.curvature == pytest.approx(radius, rel=1e-12)
 
-    def test_camera_is_where_draws_say(self, cameras: tuple[Reflector, Reflector]) -> None:
-        at, drawn = cameras[0], machines(cameras, LARGE)[0]
+    def test_camera_is_where_draws_say(self, cameras: Cameras) -> None:
+        at, drawn = cameras[0], builds(cameras, LARGE)[0]
         view = built_reflector(at, drawn, 0).camera
         assert np.array_equal(view.pinhole, at.camera.pinhole + drawn.camera_shift[0])
         angle = np.linalg.norm(drawn.camera_tilt[0])
@@ -130,15 +128,15 @@ class TestActual:
         assert longer == pytest.approx(drawn.focal[0], rel=1e-12)
         assert drawn.focal[0] != 1
 
-    def test_pixels_are_those_of_the_fast_model(self, cameras: tuple[Reflector, Reflector]) -> None:
+    def test_pixels_are_those_of_the_fast_model(self, cameras: Cameras) -> None:
         """One ray a pixel against areas of outlines; of the border half a pixel is uncertain."""
-        both, compared = machines(cameras, LARGE, 3), 0
+        both, compared = builds(cameras, LARGE, 3), 0
         for at, drawn in zip(cameras, both, strict=True):
             area = mirror_coverage(edge_model(at), drawn).pixels
             for k in range(3):
-                made = built_reflector(at, drawn, k)
-                count = np.bincount(numbers(made).ravel(), minlength=len(at) + 1)[1:]
-                box, view = made.boxes(), made.camera
+                built = built_reflector(at, drawn, k)
+                count = np.bincount(numbers(built).ravel(), minlength=len(at) + 1)[1:]
+                box, view = built.boxes(), built.camera
                 inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
                 inside &= box[:, 3] < view.height_px
                 close = pytest.approx(area[k][inside], abs=0.5 * np.sqrt(count.max()))
@@ -146,17 +144,15 @@ class TestActual:
                 compared += int(inside.sum())
         assert compared > 60
 
-    def test_rays_are_off_as_the_fast_model_says(
-        self, cameras: tuple[Reflector, Reflector]
-    ) -> None:
-        """The pixels that should show the apices, seen by the made camera off the made mirrors."""
-        for at, drawn in zip(cameras, machines(cameras, LARGE), strict=True):
-            made, m = built_reflector(at, drawn, 0), len(at)
+    def test_rays_are_off_as_the_fast_model_says(self, cameras: Cameras) -> None:
+        """The pixels that should show the apices, seen by the built camera after its mirrors."""
+        for at, drawn in zip(cameras, builds(cameras, LARGE), strict=True):
+            built, m = built_reflector(at, drawn, 0), len(at)
             ray = at.mirrors.apex - at.camera.pinhole
-            old, new = (_axes(view) for view in (at.camera, made.camera))
+            old, new = (_axes(view) for view in (at.camera, built.camera))
             way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
-            rays = reflect_pixels(made.camera.pinhole, way[None], made.mirrors, mirror)
+            rays = reflect_pixels(built.camera.pinhole, way[None], built.mirrors, mirror)
             missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
             offset = pointing(edge_model(at), drawn).offset[0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
@@ -167,15 +163,15 @@ def _axes(view: Camera) -> np.ndarray:
     return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
 
 
-def test_boxes_hold_all_pixels(cameras: tuple[Reflector, Reflector]) -> None:
+def test_boxes_hold_all_pixels(cameras: Cameras) -> None:
     """As if every mirror were looked for everywhere; the designed cells would lose some."""
     lost = 0
-    for at, drawn in zip(cameras, machines(cameras, LARGE, 3), strict=True):
+    for at, drawn in zip(cameras, builds(cameras, LARGE, 3), strict=True):
         for k in range(3):
-            made = built_reflector(at, drawn, k)
-            parts = (made.camera_id, made.camera, made.u, made.cells, made.surfaces)
+            built = built_reflector(at, drawn, k)
+            parts = (built.camera_id, built.camera, built.u, built.cells, built.surfaces)
             everywhere = numbers(WholeFrame(*parts))
-            assert np.array_equal(numbers(made), everywhere)
+            assert np.array_equal(numbers(built), everywhere)
             lost += int((numbers(OwnCells(*parts)) != everywhere).sum())
     assert lost > 0
 
@@ -183,19 +179,19 @@ def test_boxes_hold_all_pixels(cameras: tuple[Reflector, Reflector]) -> None:
 class TestSharpness:
     @staticmethod
     def found(
-        cameras: tuple[Reflector, Reflector],
+        cameras: Cameras,
         scene: Scene,
-        wanted: ReferenceViews,
+        reference: ReferenceViews,
         errors: Errors,
         left: float = 0.0,
     ) -> Sharpness:
-        return sharpness(cameras, machines(cameras, errors, 2), scene, wanted, left)
+        return sharpness(cameras, builds(cameras, errors, 2), scene, reference, left)
 
     def test_without_errors_all_are_the_designed_one(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
     ) -> None:
         """But for rounding in the last digit of a ray that decides between two pixels."""
-        found = self.found(cameras, scene, wanted, Errors())
+        found = self.found(cameras, scene, reference, Errors())
         assert found.designed.shape == (2,)
         assert found.uncalibrated.shape == found.calibrated.shape == (2, 2)
         for table in (found.uncalibrated, found.calibrated):
@@ -203,36 +199,36 @@ class TestSharpness:
         assert 0.5 < found.designed.min() < found.designed.max() < 1
 
     def test_calibration_gives_back_what_errors_cost(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
     ) -> None:
-        found = self.found(cameras, scene, wanted, LARGE, 0.5e-3)
+        found = self.found(cameras, scene, reference, LARGE, 0.5e-3)
         assert (found.uncalibrated < found.calibrated).all()
         assert (found.uncalibrated < found.designed).all()
         lost = found.designed - found.uncalibrated
         assert (np.abs(found.calibrated - found.designed) < lost / 2).all()
 
     def test_what_calibration_leaves_counts(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
     ) -> None:
         exactly, roughly = (
-            self.found(cameras, scene, wanted, Errors(), left) for left in (0.0, 0.02)
+            self.found(cameras, scene, reference, Errors(), left) for left in (0.0, 0.02)
         )
         assert (roughly.calibrated < exactly.calibrated - 0.01).all()
         assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
 
-    def test_same_machines_same_figures(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
+    def test_same_builds_same_figures(
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
     ) -> None:
-        one, two = (self.found(cameras, scene, wanted, LARGE, 1e-3) for _ in range(2))
+        one, two = (self.found(cameras, scene, reference, LARGE, 1e-3) for _ in range(2))
         assert np.array_equal(one.calibrated, two.calibrated)
         assert np.array_equal(one.uncalibrated, two.uncalibrated)
         assert not np.array_equal(one.calibrated[0], one.calibrated[1])
 
-    def test_each_machine_is_told(
-        self, cameras: tuple[Reflector, Reflector], scene: Scene, wanted: ReferenceViews
+    def test_each_build_is_reported(
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
     ) -> None:
         told: list[str] = []
-        drawn: tuple[ShellDraws, ShellDraws] = machines(cameras, Errors(), 2)
-        one = replace(wanted, views=wanted.views[:1], truths=wanted.truths[:1])
+        drawn: tuple[ShellDraws, ShellDraws] = builds(cameras, Errors(), 2)
+        one = replace(reference, views=reference.views[:1], truths=reference.truths[:1])
         sharpness(cameras, drawn, scene, one, 0.0, progress=told.append)
         assert told == ["build 1 of 2", "build 2 of 2"]

@@ -1,4 +1,4 @@
-"""Made prototypes against the slow model, closed forms, and what must not matter."""
+"""Simulated prototypes against the slow model, closed forms, and what must not matter."""
 
 from dataclasses import fields, replace
 
@@ -35,11 +35,12 @@ SPREAD = {
     "camera_tilt": Error(2e-3),
     "camera_focal": Error(3e-3),
 }
-# The slow models sample the sides, which are long at n = 6; so much may they be above the least.
+# The slow models sample the sides, which are long at n = 6; so far they may be above the minimum.
 SAMPLES = 513
 SAMPLED_MM = 1e-3
 
 Picture = tuple[np.ndarray, np.ndarray]
+Runs = tuple[PrototypeRun, PrototypeRun]
 
 
 @pytest.fixture(scope="module")
@@ -48,35 +49,35 @@ def little() -> MirrorDesign:
 
 
 @pytest.fixture(scope="module")
-def made(little: MirrorDesign) -> PrototypeLayout:
+def layout(little: MirrorDesign) -> PrototypeLayout:
     return prototype_layout(little.spec, little)
 
 
 @pytest.fixture(scope="module")
-def plan(made: PrototypeLayout) -> Plan:
-    return plan_of(made)
+def plan(layout: PrototypeLayout) -> Plan:
+    return plan_of(layout)
 
 
 @pytest.fixture(scope="module")
-def at(little: MirrorDesign, plan: Plan) -> PrototypeModel:
+def model(little: MirrorDesign, plan: Plan) -> PrototypeModel:
     return prototype_model(reflectors(little), plan)
 
 
 @pytest.fixture(scope="module")
-def both(little: MirrorDesign, plan: Plan) -> tuple[PrototypeRun, PrototypeRun]:
+def runs(little: MirrorDesign, plan: Plan) -> Runs:
     return prototype_runs(reflectors(little), plan)
 
 
-def machines(at: PrototypeModel, count: int, **errors: Error) -> PrototypeDraws:
-    return draw_prototypes(Errors(**errors), 7, range(count), at.is_cap, len(at.plan.angle))
+def draws_of(model: PrototypeModel, count: int, **errors: Error) -> PrototypeDraws:
+    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, len(model.plan.angle))
 
 
 @pytest.fixture(scope="module")
-def pictures(both: tuple[PrototypeRun, PrototypeRun]) -> list[Picture]:
+def pictures(runs: Runs) -> list[Picture]:
     """Mirror of each side of both runs' windows, and where the sides are in the picture."""
     result = []
-    for run, turn in zip(both, (np.ones(3), HALF_TURN), strict=True):
-        sides, view = cell_windows(run.reflector.cells, run.camera.pinhole), both[0].camera
+    for run, turn in zip(runs, (np.ones(3), HALF_TURN), strict=True):
+        sides, view = cell_windows(run.reflector.cells, run.camera.pinhole), runs[0].camera
         t = np.broadcast_to(np.linspace(0, 1, SAMPLES), (len(sides.arc), SAMPLES))
         way = (
             sides.rays(t, run.reflector.u, np.zeros(len(run.reflector)))
@@ -89,88 +90,88 @@ def pictures(both: tuple[PrototypeRun, PrototypeRun]) -> list[Picture]:
 
 
 def slow(
-    at: PrototypeModel,
-    both: tuple[PrototypeRun, PrototypeRun],
+    model: PrototypeModel,
+    runs: Runs,
     pictures: list[Picture],
     draws: PrototypeDraws,
-    machine: int = 0,
+    build: int = 0,
 ) -> np.ndarray:
     """Coverage of all virtual cameras by many samples, every error put in by other means."""
-    view, turn = both[0].camera, Rotation.from_rotvec(draws.camera_tilt[machine])
+    view, turn = runs[0].camera, Rotation.from_rotvec(draws.camera_tilt[build])
     axes = turn.apply([view.right, np.cross(view.forward, view.right)])
-    pinhole = view.pinhole + draws.camera_shift[machine]
-    least = np.full(int(at.virtual.max()) + 1, np.inf)
-    for half, (run, (mirror, place)) in enumerate(zip(both, pictures, strict=True)):
-        way = unit(turn.apply(view.forward) + place / draws.focal[machine] @ axes)
-        centre, radius = balls(at, run, draws, machine, half)
+    pinhole = view.pinhole + draws.camera_shift[build]
+    least = np.full(int(model.virtual.max()) + 1, np.inf)
+    for half, (run, (mirror, place)) in enumerate(zip(runs, pictures, strict=True)):
+        way = unit(turn.apply(view.forward) + place / draws.focal[build] @ axes)
+        centre, radius = balls(model, run, draws, build, half)
         miss = sphere_miss_distances(pinhole, way, centre[mirror][:, None], radius[mirror][:, None])
-        which = at.virtual[half * len(run.reflector) :][mirror]
+        which = model.virtual[half * len(run.reflector) :][mirror]
         np.minimum.at(least, which, 2 * miss.min(axis=1))
     return least
 
 
 def balls(
-    at: PrototypeModel, run: PrototypeRun, draws: PrototypeDraws, machine: int, half: int
+    model: PrototypeModel, run: PrototypeRun, draws: PrototypeDraws, build: int, half: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centre and radius of the ball in each window."""
-    frame, centre = at.plan.frame, np.empty((len(run.reflector), 3))
-    tilt = Rotation.from_rotvec(
-        draws.tilt[machine, 0] * frame[1] + draws.tilt[machine, 1] * frame[2]
-    )
-    on_base = at.plan.centre + draws.seat[machine]
+    frame, centre = model.plan.frame, np.empty((len(run.reflector), 3))
+    tilt = Rotation.from_rotvec(draws.tilt[build, 0] * frame[1] + draws.tilt[build, 1] * frame[2])
+    on_base = model.plan.centre + draws.seat[build]
     for i, (ball, stop) in enumerate(zip(run.ball, run.stop, strict=True)):
-        angle = at.plan.angle[stop] + draws.angle[machine, half, stop]
-        drift = draws.runout[machine, half, stop]
+        angle = model.plan.angle[stop] + draws.angle[build, half, stop]
+        drift = draws.runout[build, half, stop]
         about = tilt * Rotation.from_rotvec(angle * frame[0])
         centre[i] = about.apply(on_base[ball]) + drift[0] * frame[1] + drift[1] * frame[2]
-    return centre, (at.plan.radius + draws.radius[machine])[run.ball]
+    return centre, (model.plan.radius + draws.radius[build])[run.ball]
+
+
+def coverage_of(
+    model: PrototypeModel, draws: PrototypeDraws, calibrated: bool = False
+) -> np.ndarray:
+    return coverage_and_offsets(model, draws, calibrated)[0]
 
 
 class TestCoverage:
     def test_without_errors_it_is_the_record(
-        self, at: PrototypeModel, made: PrototypeLayout
+        self, model: PrototypeModel, layout: PrototypeLayout
     ) -> None:
-        diameter, offset = coverage_and_offsets(at, machines(at, 1))
-        m = len(made.half)
-        assert diameter[0, :m] == pytest.approx(made.fit.coverage, abs=1e-4)
+        diameter, offset = coverage_and_offsets(model, draws_of(model, 1))
+        m = len(layout.half)
+        assert diameter[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
 
-    def test_both_runs_are_alike(self, at: PrototypeModel, made: PrototypeLayout) -> None:
+    def test_both_runs_are_alike(self, model: PrototypeModel, layout: PrototypeLayout) -> None:
         """Mirror i of camera a and its twin of camera b are shown by the same ball."""
-        diameter = coverage_and_offsets(at, machines(at, 1))[0][0]
-        a, b = diameter[at.virtual].reshape(2, -1)
-        whole = ~at.runs[0].halved
-        assert a[whole] == pytest.approx(b[made.twin][whole], abs=1e-6)
+        diameter = coverage_of(model, draws_of(model, 1))[0]
+        a, b = diameter[model.virtual].reshape(2, -1)
+        whole = ~model.runs[0].halved
+        assert a[whole] == pytest.approx(b[layout.twin][whole], abs=1e-6)
 
     @pytest.mark.parametrize("kind", SPREAD)
     def test_each_error_against_the_slow_model(
-        self,
-        at: PrototypeModel,
-        both: tuple[PrototypeRun, PrototypeRun],
-        pictures: list[Picture],
-        kind: str,
+        self, model: PrototypeModel, runs: Runs, pictures: list[Picture], kind: str
     ) -> None:
-        draws = machines(at, 1, **{kind: SPREAD[kind]})
-        diameter, _ = coverage_and_offsets(at, draws)
-        still, _ = coverage_and_offsets(at, machines(at, 1))
+        draws = draws_of(model, 1, **{kind: SPREAD[kind]})
+        diameter = coverage_of(model, draws)
+        still = coverage_of(model, draws_of(model, 1))
         assert np.abs(diameter - still).max() > 20 * SAMPLED_MM
-        assert diameter[0] == pytest.approx(slow(at, both, pictures, draws), abs=SAMPLED_MM)
+        assert diameter[0] == pytest.approx(slow(model, runs, pictures, draws), abs=SAMPLED_MM)
 
     def test_all_errors_together_against_the_slow_model(
-        self, at: PrototypeModel, both: tuple[PrototypeRun, PrototypeRun], pictures: list[Picture]
+        self, model: PrototypeModel, runs: Runs, pictures: list[Picture]
     ) -> None:
-        draws = machines(at, 2, **SPREAD)
-        diameter, _ = coverage_and_offsets(at, draws)
-        for machine in range(2):
-            expected = slow(at, both, pictures, draws, machine)
-            assert diameter[machine] == pytest.approx(expected, abs=SAMPLED_MM)
+        draws = draws_of(model, 2, **SPREAD)
+        diameter = coverage_of(model, draws)
+        for build in range(2):
+            expected = slow(model, runs, pictures, draws, build)
+            assert diameter[build] == pytest.approx(expected, abs=SAMPLED_MM)
 
     def test_a_window_that_does_not_hold_the_middle_covers_nothing(
-        self, at: PrototypeModel
+        self, model: PrototypeModel
     ) -> None:
         """As wide as the windows are, the camera is turned."""
-        draws = machines(at, 1, camera_tilt=Error(mean=0.3))
-        diameter, _ = coverage_and_offsets(at, draws)
+        draws = draws_of(model, 1, camera_tilt=Error(mean=0.3))
+        diameter = coverage_of(model, draws)
         assert (diameter == 0).all()
 
 
@@ -184,37 +185,32 @@ def test_highlights_show_the_middle_of_the_object() -> None:
 
 
 class TestMotions:
-    def test_moving_all_alike_about_the_middle_changes_nothing(self, at: PrototypeModel) -> None:
+    def test_moving_all_alike_about_the_middle_changes_nothing(self, model: PrototypeModel) -> None:
         """The axis tilted, and the camera with it."""
-        draws = machines(at, 1, axis_tilt=Error(5e-3), seat=Error(0.1))
-        vector = draws.tilt @ at.plan.frame[1:]
-        shift = Rotation.from_rotvec(vector).apply(at.pinhole) - at.pinhole
+        draws = draws_of(model, 1, axis_tilt=Error(5e-3), seat=Error(0.1))
+        vector = draws.tilt @ model.plan.frame[1:]
+        shift = Rotation.from_rotvec(vector).apply(model.pinhole) - model.pinhole
         moved = replace(draws, camera_tilt=vector, camera_shift=shift)
         still = replace(draws, tilt=np.zeros((1, 2)))
-        assert coverage_and_offsets(at, moved)[0] == pytest.approx(
-            coverage_and_offsets(at, still)[0], abs=1e-9
-        )
-        assert (
-            np.abs(coverage_and_offsets(at, draws)[0] - coverage_and_offsets(at, still)[0]).max()
-            > 0.5
-        )
+        assert coverage_of(model, moved) == pytest.approx(coverage_of(model, still), abs=1e-9)
+        assert np.abs(coverage_of(model, draws) - coverage_of(model, still)).max() > 0.5
 
-    def test_a_base_turned_on_is_a_camera_turned_back(self, at: PrototypeModel) -> None:
+    def test_a_base_turned_on_is_a_camera_turned_back(self, model: PrototypeModel) -> None:
         """The pinhole lies on the axis."""
         delta = 3e-3
-        base = machines(at, 1, rotation_angle=Error(mean=delta))
-        camera = replace(machines(at, 1), camera_tilt=-delta * at.plan.frame[:1])
-        assert coverage_and_offsets(at, base)[0] == pytest.approx(
-            coverage_and_offsets(at, camera)[0], abs=1e-9
-        )
+        base = draws_of(model, 1, rotation_angle=Error(mean=delta))
+        camera = replace(draws_of(model, 1), camera_tilt=-delta * model.plan.frame[:1])
+        assert coverage_of(model, base) == pytest.approx(coverage_of(model, camera), abs=1e-9)
 
     def test_a_base_turned_on_moves_the_ray_as_a_closed_form_says(
-        self, at: PrototypeModel, plan: Plan
+        self, model: PrototypeModel, plan: Plan
     ) -> None:
         """A ball moved by e across the plane of incidence turns its normal by e / r there, the
         ray by 2 cos(i) as much across that plane: 2 rho cos(i) e / r at the distance rho."""
         delta = 1e-6
-        _, offset = coverage_and_offsets(at, machines(at, 1, rotation_angle=Error(mean=delta)))
+        _, offset = coverage_and_offsets(
+            model, draws_of(model, 1, rotation_angle=Error(mean=delta))
+        )
         rho, axis = norm(plan.apex), plan.frame[0]
         sideways = delta * norm(np.cross(axis, plan.centre))
         cosine = -(plan.normal * plan.apex).sum(axis=1) / rho
@@ -222,67 +218,50 @@ class TestMotions:
         assert offset[0] == pytest.approx(expected[plan.ball].ravel(), rel=1e-4)
 
     def test_known_motions_of_the_camera_about_its_pinhole_cost_nothing(
-        self, at: PrototypeModel
+        self, model: PrototypeModel
     ) -> None:
-        draws = machines(at, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
-        exact, _ = coverage_and_offsets(at, machines(at, 1))
-        fixed, _ = coverage_and_offsets(at, draws)
-        known, offset = coverage_and_offsets(at, draws, calibrated=True)
+        draws = draws_of(model, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
+        exact = coverage_of(model, draws_of(model, 1))
+        fixed = coverage_of(model, draws)
+        known, offset = coverage_and_offsets(model, draws, calibrated=True)
         assert known == pytest.approx(exact, abs=1e-6)
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
 
-    def test_known_errors_cost_less(self, at: PrototypeModel) -> None:
-        draws = machines(at, 2, **SPREAD)
+    def test_known_errors_cost_less(self, model: PrototypeModel) -> None:
+        draws = draws_of(model, 2, **SPREAD)
         fixed, known = (
-            coverage_and_offsets(at, draws, calibrated=known)[0].min(axis=1)
-            for known in (False, True)
+            coverage_of(model, draws, calibrated=known).min(axis=1) for known in (False, True)
         )
         assert (fixed < known).all()
 
 
 class TestDraws:
-    def test_a_machine_is_the_same_alone_and_among_others(self, at: PrototypeModel) -> None:
-        cap, stops = at.is_cap, len(at.plan.angle)
+    def test_a_build_is_the_same_alone_and_among_others(self, model: PrototypeModel) -> None:
+        cap, stops = model.is_cap, len(model.plan.angle)
         many = draw_prototypes(Errors(**SPREAD), 3, range(5), cap, stops)
         one = draw_prototypes(Errors(**SPREAD), 3, [4], cap, stops)
         for field in fields(PrototypeDraws):
             assert (getattr(many, field.name)[4] == getattr(one, field.name)[0]).all()
-
-    def test_one_kind_leaves_the_others_alone(self, at: PrototypeModel) -> None:
-        every = machines(at, 2, **SPREAD)
-        fewer = machines(at, 2, **{**SPREAD, "axis_runout": Error()})
-        assert (every.seat == fewer.seat).all()
-        assert (every.camera_tilt == fewer.camera_tilt).all()
-        assert not fewer.runout.any()
-
-    def test_kinds_are_drawn_apart(self, at: PrototypeModel) -> None:
-        draws = machines(at, 1, camera_shift=Error(1.0), camera_tilt=Error(1.0))
-        assert not np.isin(draws.camera_shift, draws.camera_tilt).any()
 
     def test_caps_are_off_as_made_and_balls_as_bought(self) -> None:
         cap = np.array([True, False])
         errors = Errors(sphere_radius=Error(mean=0.3), ball_radius=Error(mean=0.002))
         assert draw_prototypes(errors, 1, range(2), cap, 3).radius.tolist() == [[0.3, 0.002]] * 2
 
-    def test_stops_of_both_runs_are_apart(self, at: PrototypeModel) -> None:
-        angle = machines(at, 400, rotation_angle=Error(2e-3)).angle
+    def test_stops_of_both_runs_are_apart(self, model: PrototypeModel) -> None:
+        angle = draws_of(model, 400, rotation_angle=Error(2e-3)).angle
         assert angle.std() == pytest.approx(2e-3, rel=0.03)
         assert abs(np.corrcoef(angle[:, 0].ravel(), angle[:, 1].ravel())[0, 1]) < 0.03
 
 
 class TestMonteCarlo:
-    def test_split_as_one_likes(self, at: PrototypeModel) -> None:
-        work = PrototypeCase(at, Errors(**SPREAD), 5)
-        whole = simulate(work, 23)
-        alone = simulate(
-            work, 23, run_batches=lambda case, batches: [case(batch) for batch in batches]
-        )
-        later = simulate(work, 6, first=17)
+    def test_later_builds_continue_earlier_ones(self, model: PrototypeModel) -> None:
+        case = PrototypeCase(model, Errors(**SPREAD), 5)
+        whole, later = simulate(case, 23), simulate(case, 6, first=17)
         for field in fields(CoverageResult):
-            expected = getattr(whole, field.name)
-            assert (getattr(alone, field.name) == expected).all()
-            assert (getattr(later, field.name) == expected[17:]).all()
+            expected = getattr(whole, field.name)[17:]
+            assert (getattr(later, field.name) == expected).all()
 
     def test_results_say_what_is_in_them(self) -> None:
         coverage = np.array([[61.0, 60.0, 62.0], [63.0, 64.0, 59.0]])
@@ -294,9 +273,9 @@ class TestMonteCarlo:
 
 
 def test_windows_left_in_their_places_see_less(
-    little: MirrorDesign, plan: Plan, at: PrototypeModel
+    little: MirrorDesign, plan: Plan, model: PrototypeModel
 ) -> None:
     """Balls then stand aside of their windows' middles though nothing is off."""
     fixed = prototype_model(reflectors(little), replace(plan, moved=False))
-    apart, together = (coverage_and_offsets(one, machines(one, 1))[0] for one in (fixed, at))
+    apart, together = (coverage_of(one, draws_of(one, 1)) for one in (fixed, model))
     assert np.median(apart) < np.median(together) - 10
