@@ -55,7 +55,7 @@ class Component:
         removed: primitives that are cut out of it.
         downs: directions that may point down when it is printed, (d, 3); none: it is bought.
         part: its name in the lists of purchased parts; None: it is printed.
-        turns: whether it rotates with the base.
+        rotates: whether it rotates with the base.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Component:
     removed: tuple[Primitive, ...] = ()
     downs: tuple[tuple[float, float, float], ...] = ()
     part: str | None = None
-    turns: bool = False
+    rotates: bool = False
 
 
 def cylinder_between(start: Floats, end: Floats, radius: float) -> Cylinder:

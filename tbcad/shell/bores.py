@@ -37,22 +37,15 @@ class _Circle:
 
 def hole_faces(maker: Maker, holes: Holes, x: Floats, y: Floats) -> HoleFaces:
     """Circles and cylinders of holes whose direction is x cross y."""
-    near, far = (
-        [
-            _circle(maker, centre, x, y, radius)
-            for centre, radius in zip(start, holes.radius, strict=True)
-        ]
-        for start in (holes.centre, holes.centre + holes.direction)
-    )
-    surfaces = [
-        maker.cylinder(centre, x, y, radius)
-        for centre, radius in zip(holes.centre, holes.radius, strict=True)
-    ]
+    sizes = list(zip(holes.centre, holes.radius, strict=True))
+    near = [_circle(maker, centre, x, y, radius) for centre, radius in sizes]
+    far = [_circle(maker, centre + holes.direction, x, y, radius) for centre, radius in sizes]
+    cylinders = [maker.cylinder(centre, x, y, radius) for centre, radius in sizes]
     height = float(np.linalg.norm(holes.direction))
     return HoleFaces(
         [[(circle.edge, True)] for circle in near],
         [[(circle.edge, False)] for circle in far],
-        [_wall(maker, *wall, height) for wall in zip(surfaces, near, far, strict=True)],
+        [_wall(maker, *wall, height) for wall in zip(cylinders, near, far, strict=True)],
     )
 
 

@@ -72,7 +72,7 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
             for name, position, direction in led_poses(built.stage)
         ],
         "bought": [
-            {"name": item.name, "what": item.what, "part": item.part, "turns": item.turns}
+            {"name": item.name, "what": item.what, "part": item.part, "turns": item.rotates}
             for item in built.frame.purchased
         ],
         "frame_stock": {

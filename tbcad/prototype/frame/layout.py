@@ -226,7 +226,7 @@ def _check_clearances(
     Raises:
         SpecError: when one is less than the clearance.
     """
-    static = {component.name: component.added for component in components if not component.turns}
+    static = {component.name: component.added for component in components if not component.rotates}
     swept = {
         name: min_distance(keep_out.to_swept, bodies)
         for name, bodies in static.items()

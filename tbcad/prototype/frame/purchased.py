@@ -72,20 +72,20 @@ def purchased_components(
     face, components = base.hub.face, [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
         components += [
-            _wheel("wheel", base, drive.wheel, 0.0, turns=True),
+            _wheel("wheel", base, drive.wheel, 0.0, rotates=True),
             _wheel("pinion", base, drive.pinion, drive.centre_mm),
         ]
     if drive.coupling:
         radius, end = drive.coupling["flange_mm"] / 2, face - COUPLING_MM + COUPLING_GAP_MM
         body = axial_cylinder(base, face, end, radius)
-        components.append(_component("coupling", drive.coupling, body, turns=True))
+        components.append(_component("coupling", drive.coupling, body, rotates=True))
     return (*components, *(_on_shaft(base, plate, shaft_parts) if shaft_parts else ()))
 
 
 def _component(
-    name: str, part: PurchasedPart, body: Cylinder, *bores: Cylinder, turns: bool = False
+    name: str, part: PurchasedPart, body: Cylinder, *bores: Cylinder, rotates: bool = False
 ) -> Component:
-    return Component(name, part.what, (body,), bores, part=part.name, turns=turns)
+    return Component(name, part.what, (body,), bores, part=part.name, rotates=rotates)
 
 
 def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> list[Component]:
@@ -94,7 +94,7 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
     front, rear, width = base.hub.front, shaft_parts.rear, bearing["width_mm"]
     end = front - shaft["length_mm"]
     body = axial_cylinder(base, front, end, shaft["diameter_mm"] / 2)
-    components = [_component("shaft", shaft, body, turns=True)]
+    components = [_component("shaft", shaft, body, rotates=True)]
     for name, start in (("bearing_front", plate.front), ("bearing_rear", rear + width)):
         stop = start - width
         bore = axial_cylinder(base, start + THROUGH_MM, stop - THROUGH_MM, bearing["bore_mm"] / 2)
@@ -102,7 +102,7 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
         components.append(_component(name, bearing, ring, bore))
     bore = axial_cylinder(base, rear + THROUGH_MM, end - SHAFT_END_MM, collar["bore_mm"] / 2)
     ring = axial_cylinder(base, rear, rear - collar["width_mm"], collar["outer_mm"] / 2)
-    return [*components, _component("collar", collar, ring, bore, turns=True)]
+    return [*components, _component("collar", collar, ring, bore, rotates=True)]
 
 
 def wheel_radius(part: PurchasedPart) -> float:
@@ -111,13 +111,13 @@ def wheel_radius(part: PurchasedPart) -> float:
 
 
 def _wheel(
-    name: str, base: BaseLayout, part: PurchasedPart, out: float, turns: bool = False
+    name: str, base: BaseLayout, part: PurchasedPart, out: float, rotates: bool = False
 ) -> Component:
     """A toothed wheel behind the hub's face, on the axis or out from it."""
     start, end = base.hub.face, base.hub.face - part["width_mm"]
     bore = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2, out)
     body = axial_cylinder(base, start, end, wheel_radius(part), out)
-    return _component(name, part, body, bore, turns=turns)
+    return _component(name, part, body, bore, rotates=rotates)
 
 
 def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:

@@ -117,7 +117,7 @@ class TestFrame:
         assert norm(np.cross(body.start, around.base.frame[0])) == pytest.approx(one.centre_mm)
 
     def test_all_static_parts_are_clear(self, frame: FrameLayout) -> None:
-        still = {item.name for item in (*frame.printed, *frame.purchased) if not item.turns}
+        still = {item.name for item in (*frame.printed, *frame.purchased) if not item.rotates}
         assert set(frame.swept) == still
         assert set(frame.light) == still - {"camera"}
         assert min(frame.swept.values()) >= SMALL.prototype.frame.clearance_mm
