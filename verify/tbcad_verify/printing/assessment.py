@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tbcad_verify.printing.part_measures import PartMeasures
-from tbcad_verify.printing.placement import SLACK_MM, Placement, place, pose_text
+from tbcad_verify.printing.placement import SLACK_MM, BedPlacement, place, pose_text
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
@@ -37,7 +37,7 @@ class PrintAssessment:
     part: str
     measures: PartMeasures
     profile: Profile
-    placement: Placement
+    placement: BedPlacement
     uncut_mm: float | None
     problems: tuple[str, ...]
 
@@ -148,7 +148,9 @@ def _mesh_problems(measures: PartMeasures, profile: Profile) -> Iterator[str]:
         yield f"{measures.triangles} triangles, at most {profile.max_triangles} are read"
 
 
-def _size_problems(measures: PartMeasures, profile: Profile, placement: Placement) -> Iterator[str]:
+def _size_problems(
+    measures: PartMeasures, profile: Profile, placement: BedPlacement
+) -> Iterator[str]:
     walls, holes = measures.walls, measures.holes
     if walls.minimum < profile.wall_mm - SLACK_MM:
         yield f"minimum wall {_against(walls.minimum, profile.wall_mm)}, {_at(walls.where)}"

@@ -44,7 +44,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Placement:
+class BedPlacement:
     """The best orientation.
 
     Attributes:
@@ -58,7 +58,7 @@ class Placement:
     overhang: float | None
 
 
-def place(measures: PartMeasures, profile: Profile) -> Placement:
+def place(measures: PartMeasures, profile: Profile) -> BedPlacement:
     """Search resting faces and axes, each at its best rotation about the vertical.
 
     Of those that fit, the one with the smallest overhang, then the lowest, then the one most like
@@ -71,10 +71,10 @@ def place(measures: PartMeasures, profile: Profile) -> Placement:
     fitting = [pose for pose in poses if _fits(pose)]
     if not fitting:
         pose = min(poses, key=lambda pose: pose.excess)
-        return Placement(pose, False, _overhangs(measures, [pose], profile)[0])
+        return BedPlacement(pose, False, _overhangs(measures, [pose], profile)[0])
     areas = _overhangs(measures, fitting, profile)
     pose, area = min(zip(fitting, areas, strict=True), key=lambda pair: _rank(measures, *pair))
-    return Placement(pose, True, area)
+    return BedPlacement(pose, True, area)
 
 
 def _rank(measures: PartMeasures, pose: Pose, overhang: float | None) -> tuple[int, int, int]:

@@ -15,8 +15,8 @@ from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.prototype.pinhole_cells import (
     INSIDE,
     OUTLINE_DIRECTIONS,
-    CellOutlines,
     MirrorSpheres,
+    PinholeOutlines,
     cell_outlines,
     first_mirrors,
     mirror_spheres,
@@ -143,7 +143,9 @@ def _ray_counts(ids: list[str], counts: Floats) -> str:
     return worst_offenders(ids, counts, "rays", counts > 0, ".0f")
 
 
-def _ended_on_balls(transfer: RayTransfer, cells: CellOutlines) -> tuple[CellOutlines, Floats]:
+def _ended_on_balls(
+    transfer: RayTransfer, cells: PinholeOutlines
+) -> tuple[PinholeOutlines, Floats]:
     """Outlines drawn in to where a ball ends before its mirror's cell does.
 
     Returns:
@@ -161,7 +163,7 @@ def _ended_on_balls(transfer: RayTransfer, cells: CellOutlines) -> tuple[CellOut
 
 
 def _largest_share(
-    transfer: RayTransfer, outlines: CellOutlines, some: Ints, search: Bools, radius: float
+    transfer: RayTransfer, outlines: PinholeOutlines, some: Ints, search: Bools, radius: float
 ) -> Floats:
     """(s, directions) share of the angle to the outline up to which rays pass within a radius.
 
@@ -182,7 +184,7 @@ def _largest_share(
     return low
 
 
-def _coverage(transfer: RayTransfer, outlines: CellOutlines, nearest: Floats) -> Floats:
+def _coverage(transfer: RayTransfer, outlines: PinholeOutlines, nearest: Floats) -> Floats:
     """(m,) twice the minimum distance of the outline's image from the origin, mm.
 
     Zero where the outline does not run once round the direction in which the ball shows the
@@ -204,7 +206,7 @@ def _coverage(transfer: RayTransfer, outlines: CellOutlines, nearest: Floats) ->
     return np.where(np.abs(turns - expected) <= TURNS, diameter, 0.0)
 
 
-def _hidden(shell: MirrorSpheres, cells: CellOutlines) -> Ints:
+def _hidden(shell: MirrorSpheres, cells: PinholeOutlines) -> Ints:
     """(m,) directions of each cell, a little inside, along which another mirror comes first."""
     inside = cells.at_share(np.full(cells.angle.shape, INSIDE))
     first = first_mirrors(shell, inside.reshape(3, -1)).reshape(cells.is_edge.shape)
@@ -213,7 +215,7 @@ def _hidden(shell: MirrorSpheres, cells: CellOutlines) -> Ints:
 
 
 def _rim_rays(
-    transfer: RayTransfer, outlines: CellOutlines, nearest: Floats
+    transfer: RayTransfer, outlines: PinholeOutlines, nearest: Floats
 ) -> tuple[Floats, Ints]:
     """Rays (3, N) that graze the capture sphere after the balls, and their mirrors (N,).
 

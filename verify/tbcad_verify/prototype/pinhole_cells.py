@@ -51,7 +51,7 @@ class MirrorSpheres:
 
 
 @dataclass(frozen=True)
-class CellOutlines:
+class PinholeOutlines:
     """Cells' edges: OUTLINE_DIRECTIONS directions for each of m mirrors, in order round the apex.
 
     Attributes:
@@ -66,10 +66,10 @@ class CellOutlines:
     angle: Floats
     is_edge: Bools
 
-    def take(self, mirror: Ints) -> CellOutlines:
+    def take(self, mirror: Ints) -> PinholeOutlines:
         """The cells of some mirrors."""
         chief, direction = self.chief[:, mirror], self.direction[:, mirror]
-        return CellOutlines(chief, direction, self.angle[mirror], self.is_edge[mirror])
+        return PinholeOutlines(chief, direction, self.angle[mirror], self.is_edge[mirror])
 
     def at_share(self, share: Floats) -> Floats:
         """(3, m, OUTLINE_DIRECTIONS) directions at shares (m, ...) of the angle to the outline."""
@@ -93,7 +93,7 @@ def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:
     )
 
 
-def cell_outlines(shell: MirrorSpheres) -> CellOutlines:
+def cell_outlines(shell: MirrorSpheres) -> PinholeOutlines:
     """Outlines of all cells; of one that does not contain its own apex, the apex itself."""
     chief = unit(shell.apex - shell.pinhole[:, None])
     first, second = tangent_basis(chief)
@@ -109,7 +109,7 @@ def cell_outlines(shell: MirrorSpheres) -> CellOutlines:
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     d = np.cos(low) * chief[:, :, None] + np.sin(low) * out
     is_edge = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
-    return CellOutlines(chief, d, low, is_edge)
+    return PinholeOutlines(chief, d, low, is_edge)
 
 
 def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
