@@ -1,4 +1,4 @@
-"""Proof, on the files that tbcad wrote and without its code, that the mirrors do what they must."""
+"""Verification of the files that tbcad wrote, with code that shares nothing with tbcad."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mesh as a lump: volume, area, middle and box."""
+"""Mass properties of a mesh: volume, area, centroid and box."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from tbcad_verify.mesh.vectors import norm
 
 @dataclass(frozen=True)
 class MassProperties:
-    """Plain numbers, so that they go through JSON unchanged.
+    """Volume, area, centroid and box, as plain numbers.
 
     Attributes:
         volume: signed, mm^3.
         area: mm^2.
-        centroid: x, y, z of the volume's middle, mm.
-        low: least x, y, z, mm.
-        high: greatest x, y, z, mm.
-        bend: how fast the area of the surface at a distance grows with it at most, mm^2 / mm:
-            by Steiner, the sum over edges of length times angle. None where nobody asked.
+        centroid: x, y, z of the volume's centroid, mm.
+        low: minimum x, y, z, mm.
+        high: maximum x, y, z, mm.
+        bend: largest growth of the area of an offset surface with its distance, mm^2 / mm: by
+            Steiner, the sum over edges of length times angle. None if it was not computed.
     """
 
     volume: float

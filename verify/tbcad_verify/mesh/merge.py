@@ -1,7 +1,8 @@
-"""Join patches again that creases cut out of one surface.
+"""Merging of patches that creases cut out of one surface.
 
 The facets of a sphere need not form a convex body: where the triangulation is poor, edges inside a
-mirror look like valleys. What tells is the surface: a splinter's vertices lie on its mirror's.
+mirror look like valleys. The surface decides: the vertices of such a splinter lie on the surface of
+its mirror.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ Pairs = tuple[Ints, Ints]
 
 # A splinter belongs to a surface if it lies on it to within this, everywhere.
 SAME_MM = 2e-4
-# And if it lies along it: cosine of the angle between the normals. A wall's splinters touch a
-# mirror's edge with all their corners, but stand on it.
+# And if their normals agree, by the cosine of the angle. All corners of a wall's splinter may lie
+# on a mirror's edge, but its normal is another.
 ALONG = 0.9
-# What is thinner than this has no normal to speak of.
+# The normal of what is thinner than this is not known.
 THIN_MM = 1e-3
 # No edge inside a mirror is sharper than this.
 EDGE_RAD = 1.0
-# So many vertices, twice a sphere's four unknowns, before a surface counts as known.
-LEAST = 8
+# Vertices of a patch whose surface is known: twice a sphere's four unknowns.
+MIN_VERTICES = 8
 # Vertices of a splinter that are tried before all.
-SOME = 6
+FIRST_TRIED = 6
 ROUNDS = 8
 
 
@@ -60,9 +61,9 @@ def _joints(
 ) -> Pairs:
     """Splinters and what each belongs to: one neighbour, for none must bridge two mirrors."""
     small, large = _neighbours(mesh, edges, segments, fits.area)
-    likely = (fits.count[large] >= LEAST) & _along(fits, small, large)
+    likely = (fits.count[large] >= MIN_VERTICES) & _along(fits, small, large)
     small, large = small[likely], large[likely]
-    likely = _farthest(mesh, points, fits.surfaces, (small, large), SOME) < SAME_MM
+    likely = _farthest(mesh, points, fits.surfaces, (small, large), FIRST_TRIED) < SAME_MM
     small, large = small[likely], large[likely]
     worst = _farthest(mesh, points, fits.surfaces, (small, large))
     order = np.lexsort((worst, small))

@@ -35,18 +35,18 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Topology:
-    """What is wrong with a mesh; a good one has zeros, one component and a positive volume.
+    """Faults of a mesh; a good one has zeros, one component and a positive volume.
 
     Attributes:
         open_edges: edges that belong to one facet only.
         crowded_edges: edges of more than two facets.
-        turned_edges: edges whose two facets run the same way along them.
+        turned_edges: edges along which both facets run in the same direction.
         degenerate: facets without area.
         duplicate: facets on the same three vertices as a neighbour.
         stored_normals: facets whose stored normal contradicts their corners' order.
         components: connected pieces.
         volume: signed, mm^3; negative when inside out.
-        status: manifold3d's word.
+        status: manifold3d's; "NoError" is good.
     """
 
     open_edges: int

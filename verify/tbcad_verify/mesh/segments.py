@@ -1,4 +1,4 @@
-"""Cut a mesh along its creases into smooth patches, without a hint of where the mirrors are.
+"""Segmentation of a mesh along its creases into smooth patches; mirrors need not be known.
 
 Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat;
 the valley between two mirrors is concave, and a wall meets a mirror at a large angle. What keeps
@@ -23,7 +23,7 @@ CONCAVE_RAD = 1e-3
 # A convex one beyond this: facets of a mirror differ by 2 sqrt(2 chord error / radius), 0.1 at
 # most for 0.01 mm on the smallest mirrors; walls meet mirrors at 0.36 or more from n = 2 on.
 SHARP_RAD = 0.2
-# Rounding above which an edge's angle says nothing: it must not join two patches.
+# If rounding can change an edge's angle by more than this, it must not join two patches.
 BLIND_RAD = 0.05
 # Two facets that lie back to back, closer than this to a full turn: the surface is folded over.
 FOLD_RAD = 0.2

@@ -3,7 +3,7 @@
 A surface is a point p on it, its unit normal n there (out of the solid, toward the light) and its
 curvature k = 1 / radius, positive where it bulges toward the light:
     (x - p).n + k/2 |x - p|^2 = 0.
-A plane has k = 0, and nothing blows up on the way there.
+A plane has k = 0, and all formulas are continuous there.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class ReflectedRays:
-    """Reflected rays: points on the mirrors and directions, (3, N) each; and the way there.
+    """Reflected rays: points on the mirrors, directions, and lengths before the mirror.
 
     Attributes:
         point: (3, N) mm, where the ray meets the mirror; NaN where it misses.
@@ -81,7 +81,7 @@ class ReflectedRays:
 
 @dataclass(frozen=True)
 class PreparedSurfaces:
-    """Surfaces as seen from one point: what is the same for all rays is worked out once.
+    """Surfaces seen from one point: what is the same for all rays is computed once.
 
     Attributes:
         origin: (3,) mm, where all rays start.
@@ -114,7 +114,7 @@ def reflect(seen: PreparedSurfaces, index: NDArray[np.integer], d: Floats) -> Re
     k = row[4]
     b, c = dot(d, row[:3]), row[3]
     with np.errstate(invalid="ignore"):
-        # The root before the bulge, in the form that keeps its digits when k goes to zero.
+        # The first root, in the form that keeps its digits when k goes to zero.
         reach = 2 * c / (np.sqrt(b * b - 2 * k * c * dot(d, d)) - b)
     point = seen.origin[:, None] + reach * d
     return ReflectedRays(point, reflect_directions(d, row[5:] + k * point), reach)

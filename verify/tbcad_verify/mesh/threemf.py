@@ -1,4 +1,4 @@
-"""3MF: a zip that is data, and whose triangles must be those of the STL."""
+"""3MF files: read with care, and compared with the STL, triangle by triangle."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
 
 def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) -> Check:
     """The 3MF has the STL's facets in the same order, to the last place that float32 has there."""
-    wanted = facets.corners
-    limit = float(np.spacing(np.abs(wanted).max())) + ROUNDED_MM
-    if corners.shape != wanted.shape:
-        return at_most(name, np.inf, limit, f"{len(corners)} facets, the STL has {len(wanted)}")
-    apart = np.abs(corners - wanted).max(axis=(1, 2))
-    worst = int(apart.argmax())
-    return at_most(name, float(apart[worst]), limit, f"facet {worst} is elsewhere in the STL")
+    expected = facets.corners
+    limit = float(np.spacing(np.abs(expected).max())) + ROUNDED_MM
+    if corners.shape != expected.shape:
+        return at_most(name, np.inf, limit, f"{len(corners)} facets, the STL has {len(expected)}")
+    difference = np.abs(corners - expected).max(axis=(1, 2))
+    worst = int(difference.argmax())
+    return at_most(name, float(difference[worst]), limit, f"facet {worst} is elsewhere in the STL")
 
 
 def _check_zip(blob: FileBytes) -> None:

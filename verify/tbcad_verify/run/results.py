@@ -47,7 +47,7 @@ ResultSink: TypeAlias = Callable[[Results], None]
 
 @dataclass
 class CollectedResults(Results):
-    """The results of all stages, and who is told when a stage begins."""
+    """The results of all stages, and a report of each stage's beginning."""
 
     progress: Progress = field(default=lambda _: None)
 

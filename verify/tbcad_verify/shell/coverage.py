@@ -1,4 +1,4 @@
-"""How much of the object every virtual camera sees, and whether its mirror itself is seen."""
+"""How much of the object every virtual camera sees, and whether its mirror is visible."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tbcad_verify.shell.outline import (
 )
 from tbcad_verify.types import Floats
 
-ROUND = 0.25  # by which an outline's turns about the origin may differ from one
+MAX_TURNS_ERROR = 0.25  # of an outline's winding number about the origin, which is 1
 CHECKS = {
     "coverage, facets": "mm",
     "coverage, spheres": "mm",
@@ -114,10 +114,10 @@ def _diameters(
 ) -> Floats:
     virtual = setup.virtual
     each = [minimum_miss_distance(o, at, virtual) for o, at in zip(outlines, lines, strict=True)]
-    least = np.min(each, axis=0)
-    least[np.abs(turned - 1) > ROUND] = 0.0
-    least[virtual.index[setup.match.segment < 0]] = np.nan
-    return np.asarray(2 * least)
+    minimum = np.min(each, axis=0)
+    minimum[np.abs(turned - 1) > MAX_TURNS_ERROR] = 0.0
+    minimum[virtual.index[setup.match.segment < 0]] = np.nan
+    return np.asarray(2 * minimum)
 
 
 def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
@@ -125,12 +125,12 @@ def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
     known = np.where(lost, np.inf, diameter)
     ids = setup.virtual_ids
     short = worst_offenders(ids, diameter, "mm", known < target, badness=-known)
-    said = [f"sees too little: {short}"]
+    parts = [f"sees too little: {short}"]
     unseen = [setup.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
-    said += [f"unknown, for want of a mirror: {short_list(unseen)}"] if unseen else []
+    parts += [f"unknown, because a mirror is missing: {short_list(unseen)}"] if unseen else []
     measured = -np.inf if lost.all() else float(known.min())
-    # One missing mirror is as bad as one that sees nothing.
-    return at_least(name, 0.0 if unseen else measured, target, "; ".join(said))
+    # A missing mirror counts as one that sees nothing.
+    return at_least(name, 0.0 if unseen else measured, target, "; ".join(parts))
 
 
 def _off_the_record(setup: OpticalSetup, found: Coverage) -> float:

@@ -34,7 +34,7 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.report.report import NAME
 
 LEAST_VOLUME_MM3 = 1e-6
-PART_KINDS = (".step", ".stl", ".3mf")  # a part that nobody measures could be anything
+PART_KINDS = (".step", ".stl", ".3mf")  # of files that must be measured
 OWN_FILES = frozenset({"manifest.json", NAME})
 MANIFEST = (("manifest", "manifest.json", "wrong files"), ("other files", "", "files"))
 TOPOLOGY = {
@@ -48,7 +48,7 @@ FOLDS = {"folds": "edges"}
 
 
 def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
-    """Every listed file is there with its size and sha256; what else is there is told.
+    """Every listed file is there with its size and sha256; other files are listed.
 
     Args:
         export: the record.
@@ -56,8 +56,8 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
     """
     wrong = [
         name
-        for name, wanted in sorted(export.manifest.items())
-        if parsed.get(name, _found(export, name)) != wanted
+        for name, listed in sorted(export.manifest.items())
+        if parsed.get(name, _found(export, name)) != listed
     ]
     unlisted = sorted({*parsed} - {*export.manifest} - OWN_FILES)
     unread = sorted({*filter(_is_part, export.manifest)} - export.part_files)
@@ -138,8 +138,8 @@ def _found(export: Export, name: str) -> tuple[int, str] | None:
 
 
 def _requirements(name: CheckName, export: Export) -> Check:
-    odd = contradictions(export)
-    return at_most(name, len(odd), 0, f"the record is not its own spec's: {short_list(odd)}")
+    keys = contradictions(export)
+    return at_most(name, len(keys), 0, f"the record is not its own spec's: {short_list(keys)}")
 
 
 def _ids(name: CheckName, export: Export) -> Check:
@@ -158,11 +158,11 @@ def _figures(name: CheckName, export: Export) -> Check:
 
 
 def _directions(name: CheckName, export: Export) -> Check:
-    odd, lost = missing_directions(export)
+    misplaced, missing = missing_directions(export)
     return at_most(
         name,
-        len(odd) + lost,
+        len(misplaced) + missing,
         0,
-        f"{lost} vertices of the polyhedron without a mirror; "
-        f"no vertex of their own: {short_list(odd) or 'none'}",
+        f"{missing} vertices of the polyhedron without a mirror; "
+        f"no vertex of their own: {short_list(misplaced) or 'none'}",
     )

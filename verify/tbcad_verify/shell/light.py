@@ -62,7 +62,7 @@ class SensorScene:
 
 @dataclass(frozen=True)
 class PixelTally:
-    """Counts over pixels; sums of whole numbers and least values, so that order does not matter.
+    """Counts over pixels: sums of integers and minima, which do not depend on the order.
 
     Attributes:
         pixels: (M,) per mirror, whose reflected ray meets the capture sphere unhindered.
@@ -70,7 +70,7 @@ class PixelTally:
         blockers: (B,) facets that stop them, each once.
         on_mirrors: pixels that see any part of this camera's mirrors.
         twice: of those, how many rays meet another mirror after the first.
-        nearest: (M,) least distance of useful camera-to-mirror rays from the origin, mm.
+        nearest: (M,) minimum distance of useful camera-to-mirror rays from the origin, mm.
         spread: (P,) distance at the object between the rays off facets and off fitted
             surfaces, for one useful pixel in `SAMPLED`, mm.
     """
@@ -151,9 +151,9 @@ def _second(
 def _nearest_on_the_way(
     stage: SensorScene, mirror: NDArray[np.int32], d: Floats, reach: Floats
 ) -> Floats:
-    least = np.full(stage.mirrors, np.inf)
-    np.minimum.at(least, mirror, distance_before_mirror(stage.seen, d, reach))
-    return least
+    minimum = np.full(stage.mirrors, np.inf)
+    np.minimum.at(minimum, mirror, distance_before_mirror(stage.seen, d, reach))
+    return minimum
 
 
 def _spread(

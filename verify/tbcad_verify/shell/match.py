@@ -23,7 +23,7 @@ class Match:
 
     Attributes:
         segment: (M,) the patch of each mirror; -1 where it is missing.
-        extra: patches that are mirrors nobody asked for.
+        extra: patches that are mirrors but match none of the record.
         centre_error: (M,) mm; NaN where missing. For planes: see `compare`.
         radius_error: (M,) mm; NaN where missing, 0 for planes.
         blur: (M,) how well float32 lets either be known, mm; 0 for planes.

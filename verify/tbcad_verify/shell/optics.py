@@ -1,4 +1,4 @@
-"""All parts on one optical bench: mesh, recovered mirrors and rays, ready to be measured."""
+"""The optical setup: all parts' meshes, recovered mirrors and rays, ready to be measured."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tbcad_verify.types import Floats
 
 @dataclass(frozen=True)
 class OpticalSetup:
-    """Everything that the optical checks look at.
+    """Everything that the optical checks need.
 
     Attributes:
         export: requirements and poses.
@@ -31,8 +31,8 @@ class OpticalSetup:
         match: recorded mirrors against patches.
         virtual: recorded mirrors as virtual cameras.
         scene: for rays.
-        mirrors: (M,) reflecting surfaces as recovered, coat included; of missing ones the last
-            patch's, which nobody must ask for.
+        mirrors: (M,) reflecting surfaces as recovered, coat included; those of missing ones
+            must not be used.
     """
 
     export: Export

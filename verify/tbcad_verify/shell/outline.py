@@ -1,6 +1,6 @@
 """What a mirror sees: rays from the pinhole to the edge of the mirror, reflected.
 
-The outline of a mirror is made of the mesh edges that part its patch from others. The least
+The outline of a mirror is made of the mesh edges that separate its patch from others. The minimum
 distance from the origin of all rays reflected there is half the coverage diameter.
 """
 
@@ -71,25 +71,23 @@ class Patches:
 
 
 def trace_outline(
-    mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_], halved: NDArray[np.bool_]
+    mesh: Mesh, patches: Patches, selected: NDArray[np.bool_], halved: NDArray[np.bool_]
 ) -> Outline:
-    """Sample the outlines of wanted mirrors.
+    """Sample the outlines of selected mirrors.
 
     Args:
         mesh: all parts.
         patches: of that mesh.
-        wanted: (M,) true for mirrors of the camera in question.
+        selected: (M,) true for mirrors of the camera in question.
         halved: (M,) true for mirrors that the seam cuts.
     """
-    half, beyond = _outline_edges(mesh, patches, wanted)
+    half, beyond = _outline_edges(mesh, patches, selected)
     corner = mesh.faces.reshape(-1)
     facet, k = np.divmod(half, 3)
     start, end, far = (mesh.points[corner[3 * facet + (k + j) % 3]].T for j in range(3))
     on_mesh = _spread(start[..., None] + (end - start)[..., None] * SAMPLES)
-    height = _spread(
-        np.broadcast_to(_height(start, end, far)[None, :, None], (1, half.size, SAMPLES.size))
-    )[0]
     many = SAMPLES.size
+    height = np.repeat(_height(start, end, far), many)
     mirror = patches.owner[patches.label[facet]]
     seam = halved[mirror] & (np.abs(start[0]) < SEAM_MM) & (np.abs(end[0]) < SEAM_MM)
     middle = np.repeat((start + end + far) / 3, many, axis=1)
@@ -121,7 +119,7 @@ def reflect_on_fits(outline: Outline, seen: PreparedSurfaces) -> ReflectedRays:
 def minimum_miss_distance(
     outline: Outline, lines: ReflectedRays, virtual: VirtualCameras
 ) -> Floats:
-    """(V,) least distance from the origin over each virtual camera's outer edges, mm; inf: none.
+    """(V,) minimum distance from the origin over each virtual camera's outer edges, mm; inf: none.
 
     Between samples the image of an edge is taken for straight, as it is for a flat facet.
     """
@@ -130,10 +128,10 @@ def minimum_miss_distance(
     start, end = at[:, :, :-1].reshape(3, -1), at[:, :, 1:].reshape(3, -1)
     miss = distances_to_segments(np.zeros_like(start), start, end)
     camera = virtual.index[outline.mirror[:: SAMPLES.size][outer]]
-    least = np.full(virtual.count, np.inf)
+    minimum = np.full(virtual.count, np.inf)
     # A ray that passes its mirror by sees nothing of the object.
-    np.minimum.at(least, np.repeat(camera, SAMPLES.size - 1), np.nan_to_num(miss, nan=0.0))
-    return least
+    np.minimum.at(minimum, np.repeat(camera, SAMPLES.size - 1), np.nan_to_num(miss, nan=0.0))
+    return minimum
 
 
 def winding_numbers(
@@ -159,10 +157,10 @@ def winding_numbers(
     return np.bincount(virtual.index[edge_mirror], angle, virtual.count) / (2 * np.pi)
 
 
-def _outline_edges(mesh: Mesh, patches: Patches, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints]:
-    """Half-edges inside wanted mirrors' outlines, and the patch beyond each (-1: none)."""
+def _outline_edges(mesh: Mesh, patches: Patches, selected: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Half-edges inside selected mirrors' outlines, and the patch beyond each (-1: none)."""
     owner = patches.owner[patches.label]
-    facets = np.flatnonzero((owner >= 0) & wanted[owner])
+    facets = np.flatnonzero((owner >= 0) & selected[owner])
     half = (3 * facets[:, None] + np.arange(3)).ravel()
     twin = mesh.twin[half]
     beyond = np.where(twin >= 0, patches.label[twin // 3], -1)
@@ -181,7 +179,7 @@ def _height(start: Floats, end: Floats, far: Floats) -> Floats:
 
 
 def _nudge(height: Floats) -> Floats:
-    # 2 % of the way to the facet's middle, but at least 0.2 micrometres: Embree rounds to 0.02.
+    # 2 % of the distance to the facet's centre, at least 0.2 micrometres: Embree rounds to 0.02.
     return np.clip(2e-4 / np.maximum(height / 3, 1e-12), 0.02, 0.5)
 
 

@@ -1,4 +1,4 @@
-"""What the full sensor shows: a clear way for every useful pixel, and a place in the frame."""
+"""Checks on the full sensor: free light paths of the useful pixels, and the image in the frame."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
             them to reach the whole object.
         files: where, for the report.
     """
-    path, clear, least, median, most, framed, second, half, nearly_all = (
+    path, clear, minimum, median, maximum, framed, double, half, nearly_all = (
         (name, files, unit) for name, unit in CHECKS.items()
     )
     tally = light.total([light.full_sensor(setup.stage(camera)) for camera in setup.cameras])
@@ -54,11 +54,11 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
     return tally.pixels.astype(np.float64), [
         _path(setup, path, tally),
         _clear(setup, clear, tally, rings),
-        at_least(least, float(each.min()), 1, f"no pixel sees the object in {short_list(none)}"),
+        at_least(minimum, float(each.min()), 1, f"no pixel sees the object in {short_list(none)}"),
         informative(median, float(np.median(each))),
-        informative(most, float(each.max())),
+        informative(maximum, float(each.max())),
         _framed(setup, framed, rings),
-        informative(second, 100 * tally.twice / max(tally.on_mirrors, 1)),
+        informative(double, 100 * tally.twice / max(tally.on_mirrors, 1)),
         informative(half, float(spread[0])),
         informative(nearly_all, float(spread[1])),
     ]
@@ -101,9 +101,9 @@ def _clear(
         distance_before_mirror(setup.seen(camera), ring.direction, ring.lines.reach)
         for camera, ring in rings
     ]
-    least = np.nanmin(np.concatenate([tally.nearest, *ways]))
+    nearest = np.nanmin(np.concatenate([tally.nearest, *ways]))
     reason = "the object stands between a camera and its mirrors"
-    return at_least(name, float(least) - setup.radius, 0, reason)
+    return at_least(name, float(nearest) - setup.radius, 0, reason)
 
 
 def _framed(
@@ -115,8 +115,6 @@ def _framed(
     ids = setup.export.mirrors.ids
     lost = [ids[k] for k in np.unique(mirror[~(error < image_rim.CLOSE_MM)]).tolist()]
     if lost or not margin.size:
-        return unknown(
-            name, f"no ray grazes the object by way of {short_list(lost) or 'any mirror'}"
-        )
+        return unknown(name, f"no ray grazes the object after {short_list(lost) or 'any mirror'}")
     outside = [ids[k] for k in np.unique(mirror[margin < 0]).tolist()]
     return at_least(name, float(margin.min()), 0, f"partly out of the frame: {short_list(outside)}")

@@ -1,4 +1,4 @@
-"""Find the mirrors in a mesh: cut it into patches, heal cuts that part one surface, judge each."""
+"""The mirrors in a mesh: it is cut into patches, splinters are merged, and each is judged."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tbcad_verify.mesh.fits import SurfaceFits
-from tbcad_verify.mesh.merge import LEAST, merge_splinters
+from tbcad_verify.mesh.merge import MIN_VERTICES, merge_splinters
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import Segmentation, count_folds, measure_edges, segment_mesh
 from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
@@ -24,7 +24,7 @@ FORM_MM = 1e-3
 CHORD_MM, CHORD_SHARE = 0.1, 0.05
 # What bulges less than this over its extent is a plane: ten times what float32 rounding does.
 FLAT_MM = 1e-4
-# Light that comes or goes flatter than this cosine is not a mirror's.
+# Minimum cosine of incidence on a mirror.
 GRAZING = 0.05
 
 
@@ -97,11 +97,11 @@ def _judge(fits: SurfaceFits, pinhole: Floats | None, radius_mm: float) -> Bools
         return np.zeros(fits.form.size, dtype=np.bool_)
     middle, normal = fits.middle, fits.normal
     incoming = middle - pinhole[:, None]
-    facing = [-dot(way, normal) > GRAZING * norm(way) for way in (incoming, middle)]
+    facing = [-dot(d, normal) > GRAZING * norm(d) for d in (incoming, middle)]
     outgoing = reflect_directions(incoming, normal)
     along = dot(middle, outgoing) / dot(outgoing, outgoing)
     # Some of its light lands: what leaves the middle may miss by the patch's own image.
     image = fits.extent * (1 + norm(middle) / norm(incoming))
     lands = norm(middle - along * outgoing) <= radius_mm + image
-    bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= LEAST), np.abs(fits.sag) <= FLAT_MM
+    bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= MIN_VERTICES), np.abs(fits.sag) <= FLAT_MM
     return np.asarray(follows_fit(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))

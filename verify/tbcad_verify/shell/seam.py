@@ -1,7 +1,7 @@
 """The wedge of the object that neither half of a mirror on the seam sees.
 
 The two halves are different spheres: their cuts along x = 0 map to slightly different curves at
-the object. Where the curves leave room between them, nobody looks; where they cross, both do.
+the object. Neither half sees what lies between the curves; where they cross, both do.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def _cut(
     stretch = 16 * radius_mm
     place = half[seam] * stretch + np.clip(y[seam], -4 * radius_mm, 4 * radius_mm)
     order = np.argsort(place, kind="stable")
-    wanted = np.arange(halves.size)[:, None] * stretch + np.linspace(-radius_mm, radius_mm, STEPS)
-    curve = np.interp(wanted, place[order], x[seam][order])
+    heights = np.arange(halves.size)[:, None] * stretch + np.linspace(-radius_mm, radius_mm, STEPS)
+    curve = np.interp(heights, place[order], x[seam][order])
     return np.where(
         np.bincount(half[seam], minlength=halves.size)[:, None] > 0, curve, np.nan
     ), side
