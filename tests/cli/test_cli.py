@@ -14,12 +14,8 @@ import pytest
 from tbcad.cli import run
 from tbcad.version import __version__
 
-COMMAND = [
-    sys.executable,
-    "-c",
-    "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))",
-]
-STAGES = ("tbcad: proof:", "tbcad: mirrors:", "tbcad: prototype:")
+COMMAND = [sys.executable, "-m", "tbcad"]
+STAGES = ("tbcad: verification:", "tbcad: mirrors:", "tbcad: prototype:")
 SHELL = ["--parts", "shell"]
 SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05", *SHELL]
 WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SHELL]
@@ -43,14 +39,16 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return lines[0]
 
 
-def test_build_without_proof(export: Path) -> None:
+def test_build_without_verification(export: Path) -> None:
     assert not (export / "verify.json").exists()
     document = json.loads((export / "design.json").read_text())
     assert document["spec"]["optics"]["n"] == 6
     assert document["spec"]["mesh"]["chord_error_mm"] == 0.05
 
 
-def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_build_verifies_and_verify_agrees(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
     out = tmp_path / "exports"
     code = run([*WIDE, "--out", str(out)])
@@ -58,16 +56,18 @@ def test_build_proves_and_verify_agrees(tmp_path: Path, capsys: pytest.CaptureFi
     assert code == 0, shown.out
     assert "PASS" in shown.out
     assert "Traceback" not in shown.err
-    proof = (out / "verify.json").read_bytes()
-    assert json.loads(proof)["pass"] is True
+    verified = (out / "verify.json").read_bytes()
+    assert json.loads(verified)["pass"] is True
     assert run(["verify", str(out)]) == 0
-    assert (out / "verify.json").read_bytes() == proof
+    assert (out / "verify.json").read_bytes() == verified
     assert run([*WIDE, "--out", str(out)]) == 0
-    assert (out / "verify.json").read_bytes() == proof
+    assert (out / "verify.json").read_bytes() == verified
 
 
-def test_build_with_prototype_is_proved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Both parts; the small design's motor stands nearer to the base than large ones may."""
+def test_build_with_prototype_is_verified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both parts; in this small design the motor is nearer to the base than the default allows."""
     settings = ("hfov_deg=110", "prototype.k=4", "prototype.frame.clearance_mm=1.5")
     options = [word for setting in settings for word in ("--set", setting)]
     out = tmp_path / "exports"
@@ -80,7 +80,7 @@ def test_build_with_prototype_is_proved(tmp_path: Path, capsys: pytest.CaptureFi
     assert names >= {"coverage, spheres", "coverage, balls", "light paths, balls", "ball centres"}
 
 
-def test_failed_proof_keeps_the_files_and_names_mirrors(
+def test_failed_verification_keeps_the_files_and_names_mirrors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "paper"
@@ -170,29 +170,29 @@ def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
     build.wait()
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
     assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
-    assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # the killed one's rest is gone
+    assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # what the killed build left is gone
 
 
-def _heed_interrupts() -> None:
-    """A shell's background job, and all it starts, would ignore them."""
+def _accept_interrupts() -> None:
+    """A background job of a shell, and all that it starts, would ignore them."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def test_interrupt_is_told_in_one_line(tmp_path: Path) -> None:
+def test_interrupt_is_reported_in_one_line(tmp_path: Path) -> None:
     build = subprocess.Popen(
         [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        preexec_fn=_heed_interrupts,  # noqa: PLW1509 - no threads here
+        preexec_fn=_accept_interrupts,  # noqa: PLW1509 - no threads here
     )
     assert build.stderr is not None
     build.stderr.readline()
     time.sleep(0.1)
     build.send_signal(signal.SIGINT)
-    _, told = build.communicate(timeout=60)
+    _, errors = build.communicate(timeout=60)
     assert build.returncode == 130
-    assert "Traceback" not in told
+    assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []
 
 
@@ -215,7 +215,7 @@ def test_help_and_refusals_do_not_load_the_kernel(words: list[str]) -> None:
     assert done.returncode == 0
 
 
-def test_doctor_tells_every_finding(capsys: pytest.CaptureFixture[str]) -> None:
+def test_doctor_shows_every_finding(capsys: pytest.CaptureFixture[str]) -> None:
     code = run(["doctor"])
     shown = capsys.readouterr().out
     assert "CAD kernel" in shown
