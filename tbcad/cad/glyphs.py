@@ -1,4 +1,4 @@
-"""Numbers in relief, from squares: no font, so the same shape on every machine."""
+"""Numbers in relief, made of squares: no font, so the same shape on every computer."""
 
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
@@ -8,7 +8,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from tbcad.cad.solids import moved, polygon, prism
 from tbcad.types import Floats
 
-Step = tuple[int, int]
+Corner = tuple[int, int]
 
 ROWS = 5
 # Squares that touch by a corner alone would not be a solid: no sign has such a pair.
@@ -28,12 +28,12 @@ SIGNS = {
     "-": ("   ", "   ", "###", "   ", "   "),
     ".": (" ", " ", " ", " ", "#"),
 }
-SPACE = 1  # squares between signs
+GAP = 1  # squares between signs
 
 
 def text_width(text: str) -> int:
-    """Squares across a text."""
-    return sum(len(SIGNS[sign][0]) + SPACE for sign in text) - SPACE
+    """Width of a text in squares."""
+    return sum(len(SIGNS[sign][0]) + GAP for sign in text) - GAP
 
 
 def relief(
@@ -44,28 +44,27 @@ def relief(
     Args:
         text: of the signs above.
         height: of the signs, mm.
-        raised: how far they stand out of the face, mm.
-        sunk: how far they reach into the part, mm.
+        raised: height above the face, mm.
+        sunk: depth in the part, mm.
         axes: rows to the right, up and out of the face, (3, 3).
         at: middle of the text on the face, mm, (3,).
     """
-    square, start, found = height / ROWS, -text_width(text) / 2, []
+    square, start, solids = height / ROWS, -text_width(text) / 2, []
     for sign in text:
-        for face in _faces(SIGNS[sign], start, square, sunk):
-            solid = prism(face, np.array([0.0, 0.0, raised + sunk]))
-            found.append(moved(solid, axes, at))
-        start += len(SIGNS[sign][0]) + SPACE
-    return found
+        face = _face(SIGNS[sign], start, square, sunk)
+        solids.append(moved(prism(face, np.array([0.0, 0.0, raised + sunk])), axes, at))
+        start += len(SIGNS[sign][0]) + GAP
+    return solids
 
 
 def fitting_height(text: str, height: float, radius: float) -> float:
-    """Height at which a text, no higher than this, fits in a circle of a radius (mm)."""
-    reach = float(np.hypot(text_width(text), ROWS)) / ROWS / 2
-    return min(height, radius / reach)
+    """Largest height, mm, up to a limit at which a text fits in a circle of a radius, mm."""
+    half_diagonal = float(np.hypot(text_width(text), ROWS)) / ROWS / 2
+    return min(height, radius / half_diagonal)
 
 
-def _faces(rows: tuple[str, ...], start: float, square: float, sunk: float) -> list[TopoDS_Face]:
-    """Faces of one sign on z = -sunk: one outer loop, and the loops of its holes."""
+def _face(rows: tuple[str, ...], start: float, square: float, sunk: float) -> TopoDS_Face:
+    """Face of one sign on z = -sunk: one outer loop, and the loops of its holes."""
     outer: list[Floats] = []
     holes: list[Floats] = []
     shift = np.array([start, -ROWS / 2])
@@ -73,11 +72,11 @@ def _faces(rows: tuple[str, ...], start: float, square: float, sunk: float) -> l
         place = (np.array(loop, dtype=float) + shift) * square
         points = np.column_stack([place, np.full(len(place), -sunk)])
         (outer if _area(place) > 0 else holes).append(points)
-    (line,) = outer
-    made = BRepBuilderAPI_MakeFace(polygon(line))
+    (outline,) = outer
+    face = BRepBuilderAPI_MakeFace(polygon(outline))
     for hole in holes:
-        made.Add(TopoDS.Wire_s(_wire(hole)))
-    return [made.Face()]
+        face.Add(TopoDS.Wire_s(_wire(hole)))
+    return face.Face()
 
 
 def _wire(points: Floats) -> TopoDS_Shape:
@@ -89,27 +88,26 @@ def _area(points: Floats) -> float:
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
-def loops(rows: tuple[str, ...]) -> list[list[Step]]:
+def loops(rows: tuple[str, ...]) -> list[list[Corner]]:
     """Corners of the outlines of a sign's squares: the outer to the left, holes to the right."""
-    follow = _border(rows)
-    found = []
-    while follow:
-        start = at = min(follow)
+    sides, outlines = _border(rows), []
+    while sides:
+        start = corner = min(sides)
         loop = []
-        while at in follow:
-            loop.append(at)
-            at = follow.pop(at)
-        assert at == start
-        found.append(_corners(loop))
-    return found
+        while corner in sides:
+            loop.append(corner)
+            corner = sides.pop(corner)
+        assert corner == start
+        outlines.append(_corners(loop))
+    return outlines
 
 
-def _border(rows: tuple[str, ...]) -> dict[Step, Step]:
+def _border(rows: tuple[str, ...]) -> dict[Corner, Corner]:
     """Sides of squares that no other square shares, each from its start to its end."""
     filled = {
         (x, ROWS - 1 - y) for y, row in enumerate(rows) for x, sign in enumerate(row) if sign == "#"
     }
-    follow: dict[Step, Step] = {}
+    border: dict[Corner, Corner] = {}
     for x, y in sorted(filled):
         sides = {
             (x, y - 1): ((x, y), (x + 1, y)),
@@ -117,11 +115,11 @@ def _border(rows: tuple[str, ...]) -> dict[Step, Step]:
             (x, y + 1): ((x + 1, y + 1), (x, y + 1)),
             (x - 1, y): ((x, y + 1), (x, y)),
         }
-        follow |= {start: end for other, (start, end) in sides.items() if other not in filled}
-    return follow
+        border |= {start: end for other, (start, end) in sides.items() if other not in filled}
+    return border
 
 
-def _corners(loop: list[Step]) -> list[Step]:
+def _corners(loop: list[Corner]) -> list[Corner]:
     """A loop without the points at which it goes straight on."""
     turns = []
     for k, (x, y) in enumerate(loop):

@@ -1,1 +1,1 @@
-"""What people look at, made from the files of an export alone."""
+"""Pictures of an export, drawn from its files alone."""

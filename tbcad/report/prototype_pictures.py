@@ -47,11 +47,10 @@ COLOURS = {
     "cap": "#d9b366",
     "ball": "#c7ccd4",
 }
-# In the exploded view: what stands still is moved away from the object by this share of its
+# In the exploded view: static parts are moved away from the object by this share of their
 # distance, balls and caps are lifted out of their seats by so many radii of the capture sphere.
 APART = 0.7
 LIFTED = 1.5
-ZOOM = 1.0
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
@@ -70,7 +69,7 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
 
 
 def _whole(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
-    """Everything, bought parts too, from two sides."""
+    """The whole prototype with purchased parts, from two sides."""
     bodies = _assembly(folder, record)
     for column, eye in enumerate(((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0))):
         plotter.subplot(0, column)
@@ -91,7 +90,7 @@ def _base(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
 
 
 def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
-    """The seat of the largest ball that is bought: empty, and with the ball in it."""
+    """The seat of the largest purchased ball: empty, and with the ball in it."""
     balls = _read_balls(folder)
     ball = max([one for one in balls if not one.cap] or balls, key=lambda one: one.radius)
     seat = record["seats"][ball.number - 1]
@@ -110,7 +109,7 @@ def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
 
 
 def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
-    """All parts drawn apart: balls and caps out of their seats, the rest away from the base."""
+    """All parts apart: balls and caps out of their seats, the rest away from the base."""
     unit = record["target_mm"] / 2
     seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
     seats |= {part["name"]: seats[f"ball_{part['ball']}"] for part in _with(record, ("cap",))}
@@ -118,9 +117,9 @@ def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     for column, eye in enumerate(((-0.5, -2.6, 0.8), (2.3, -1.5, 1.1))):
         plotter.subplot(0, column)
         for body in bodies:
-            still = body.group in ("stage", "frame", "bought")
-            out = -LIFTED * unit * seats.get(body.name, np.zeros(3))
-            _add(plotter, body, APART * np.array(body.mesh.center) if still else out)
+            static = body.group in ("stage", "frame", "bought")
+            lift = -LIFTED * unit * seats.get(body.name, np.zeros(3))
+            _add(plotter, body, APART * np.array(body.mesh.center) if static else lift)
         _show_all(plotter, eye)
 
 
@@ -136,19 +135,13 @@ def _with(record: Record, roles: tuple[str, ...]) -> list[Record]:
     return [part for part in record["parts"] if part["role"] in roles]
 
 
-def _parts(
-    plotter: pyvista.Plotter,
-    folder: Path,
-    record: Record,
-    roles: tuple[str, ...],
-) -> None:
+def _parts(plotter: pyvista.Plotter, folder: Path, record: Record, roles: tuple[str, ...]) -> None:
     for part in _with(record, roles):
-        mesh = _mesh(folder, part)
-        plotter.add_mesh(mesh, color=COLOURS[part["role"]], specular=0.2)
+        plotter.add_mesh(_mesh(folder, part), color=COLOURS[part["role"]], specular=0.2)
 
 
 def _mesh(folder: Path, part: Record) -> pyvista.PolyData:
-    """A part from the printer's bed back to its place in the prototype."""
+    """A part moved from the printer's bed back to its place in the prototype."""
     mesh = pyvista.read(folder / part["stl"])
     axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
     mesh.points = (np.asarray(mesh.points, dtype=np.float64) - origin) @ axes.T
@@ -209,7 +202,6 @@ def _show_all(plotter: pyvista.Plotter, eye: Sequence[float] | Floats) -> None:
     plotter.view_vector(tuple(eye), viewup=(0.0, 0.0, 1.0))
     plotter.camera.view_angle = ANGLE_DEG
     plotter.reset_camera()
-    plotter.camera.zoom(ZOOM)
 
 
 def _look(plotter: pyvista.Plotter, eye: Floats, focus: Floats) -> None:

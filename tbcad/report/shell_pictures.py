@@ -16,7 +16,7 @@ from tbcad.types import Floats
 
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0
-# A facet farther from every apex than this many half widths belongs to the body.
+# A facet farther from every apex than this many half widths belongs to the casing.
 REACH = 3.0
 
 
@@ -57,13 +57,13 @@ def _coloured(folder: Path, camera: str) -> pyvista.PolyData:
     """A half with mirrors in the colour of their polar angle, alternating in brightness."""
     half = pyvista.read(folder / f"shell_{camera}.stl")
     apex, polar, width = _mirrors(folder, camera)
-    middle = np.asarray(half.cell_centers().points)
-    away, nearest = cKDTree(apex).query(middle)
-    turn = (polar - polar.min()) / np.ptp(polar)
-    colour = np.column_stack([0.25 + 0.7 * turn, 0.5 + 0.25 * turn, 0.95 - 0.65 * turn])
+    centre = np.asarray(half.cell_centers().points)
+    distance, nearest = cKDTree(apex).query(centre)
+    share = (polar - polar.min()) / np.ptp(polar)
+    colour = np.column_stack([0.25 + 0.7 * share, 0.5 + 0.25 * share, 0.95 - 0.65 * share])
     colour *= np.where(np.arange(len(apex)) % 3 == 0, 0.85, 1.0)[:, None]
-    inward = (np.asarray(half.cell_normals) * middle).sum(axis=1) < 0
-    mirror = inward & (away < REACH * width[nearest])
+    inward = (np.asarray(half.cell_normals) * centre).sum(axis=1) < 0
+    mirror = inward & (distance < REACH * width[nearest])
     half["colour"] = np.where(mirror[:, None], 255 * colour[nearest], 205).astype(np.uint8)
     return half
 

@@ -12,7 +12,7 @@ from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import meshed, without_degenerate
 from tbcad.prototype.printing.placing import PlacedSolid
 
-# base and cap turn with the base, stage and frame stand still; a tool is not in the assembly.
+# Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 
 # The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
