@@ -1,4 +1,4 @@
-"""Rays of the proof against the same rays given straight to Embree, in as many threads."""
+"""Rays of the verification against the same rays given straight to Embree, in as many threads."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ class Recorder:
 
 
 def tracing(export: Path, rounds: int) -> list[Row]:
-    """Camera rays alone, and all that the proof's last stage does."""
-    bench = on_bench(export)
-    first, both = (recorded(bench, stage) for stage in (camera_rays, full_sensor))
-    embree = bench.scene.embree
+    """Camera rays alone, and all that the verification's last stage does."""
+    setup = optical_setup_of(export)
+    first, both = (recorded(setup, stage) for stage in (camera_rays, full_sensor))
+    embree = setup.scene.embree
     works = [
-        partial(camera_rays, bench, bench.scene),
+        partial(camera_rays, setup, setup.scene),
         partial(straight, embree, first),
-        partial(full_sensor, bench, bench.scene),
+        partial(full_sensor, setup, setup.scene),
         partial(straight, embree, both),
     ]
     hits, raw_hits, sensor, raw_sensor = in_turns(works, rounds)
@@ -70,8 +70,8 @@ def tracing(export: Path, rounds: int) -> list[Row]:
     ]
 
 
-def on_bench(folder: Path) -> OpticalSetup:
-    """An export as the proof sees it when it is ready to trace."""
+def optical_setup_of(folder: Path) -> OpticalSetup:
+    """The optical setup of an export, ready to trace."""
     export = read_export(folder)
     meshes = [mesh_from_facets(parse(read(export.folder, part.stl))) for part in export.parts]
     pairs = zip(meshes, export.parts, strict=True)
@@ -79,9 +79,9 @@ def on_bench(folder: Path) -> OpticalSetup:
     return set_up(export, meshes, found)
 
 
-def camera_rays(bench: OpticalSetup, scene: RayScene) -> None:
+def camera_rays(setup: OpticalSetup, scene: RayScene) -> None:
     """Make every pixel's ray, find its facet, and where it meets that one in float64."""
-    for camera in bench.cameras:
+    for camera in setup.cameras:
         in_threads(partial(hit, scene, camera), row_chunks(camera))
 
 
@@ -95,10 +95,10 @@ def hit(
     return facet, distances_to_planes(scene, facet[met], origin, np.take(rays, met, axis=1))
 
 
-def full_sensor(bench: OpticalSetup, scene: RayScene) -> None:
-    """The proof's own last stage: every pixel's ray, its reflection, and the way on from there."""
-    for camera in bench.cameras:
-        light.full_sensor(replace(bench.stage(camera), scene=scene))
+def full_sensor(setup: OpticalSetup, scene: RayScene) -> None:
+    """The last stage of the verification: every pixel's ray, its reflection, and what it meets."""
+    for camera in setup.cameras:
+        light.full_sensor(replace(setup.sensor_scene(camera), scene=scene))
 
 
 def straight(embree: Any, calls: Calls) -> None:
@@ -106,10 +106,10 @@ def straight(embree: Any, calls: Calls) -> None:
     in_threads(lambda call: embree.run(*call), calls)
 
 
-def recorded(bench: OpticalSetup, stage: Any) -> Calls:
+def recorded(setup: OpticalSetup, stage: Any) -> Calls:
     """The rays that a stage gives to Embree."""
-    recorder = Recorder(bench.scene.embree)
-    stage(bench, replace(bench.scene, embree=recorder))
+    recorder = Recorder(setup.scene.embree)
+    stage(setup, replace(setup.scene, embree=recorder))
     return recorder.calls
 
 

@@ -1,4 +1,4 @@
-"""The whole proof: what it writes, what it says, and that it fails when it should."""
+"""The whole verification: what it writes, what it says, and that it fails when it should."""
 
 from __future__ import annotations
 
@@ -317,7 +317,7 @@ def test_a_check_that_breaks_is_unknown_and_no_pass(
     assert "unknown: light paths" in report.verdict
 
 
-def test_everything_optical_is_unknown_without_a_bench(
+def test_everything_optical_is_unknown_without_a_setup(
     export_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tbcad_verify.run import stages
@@ -369,9 +369,9 @@ def test_checks_hold_their_limits() -> None:
     assert each_at_most(name, names, values * np.nan, 9, "mm").passed is False
 
 
-def test_the_proof_shares_no_code_with_what_it_proves() -> None:
+def test_the_verification_shares_no_code_with_what_it_verifies() -> None:
     root = Path(tbcad_verify.__file__).parent
-    kernel = root / "step" / "kernel.py"  # run apart, and never for the optical proof
+    kernel = root / "step" / "kernel.py"  # run apart, and never for the optical checks
     for path in root.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []

@@ -219,7 +219,7 @@ def test_a_lost_half_is_no_coverage(optical_setup: OpticalSetup) -> None:
 
 
 @pytest.mark.parametrize("coating", [0.0, 0.05])
-def test_a_coated_export_is_proved_like_a_bare_one(tmp_path: Path, coating: float) -> None:
+def test_a_coated_export_is_verified_like_a_bare_one(tmp_path: Path, coating: float) -> None:
     """The record speaks of the coated spheres: with the coat on, the same mirrors see the same."""
     folder, _ = export(tmp_path / "x", Design(coating=coating))
     optical_setup = optical_setup_of(folder)

@@ -63,7 +63,7 @@ def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.nd
 
 
 def test_pixel_counts_against_brute_force(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
-    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
+    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
     mirror, useful = exact(exact_cells, pixel_directions(optical_setup), optical_setup.radius)
     expected = np.bincount(mirror[useful], minlength=len(exact_cells.mirrors))
     found = tally.pixels[: len(exact_cells.mirrors)]
@@ -81,18 +81,18 @@ def test_nearest_way_against_brute_force(optical_setup: OpticalSetup, exact_cell
     d = d[useful]
     foot = -(d @ PIN) / (d * d).sum(axis=1)
     expected = np.linalg.norm(PIN + foot[:, None] * d, axis=1).min()
-    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
+    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
     assert tally.nearest.min() == pytest.approx(expected, rel=0.02)
 
 
 def test_chunks_and_threads_do_not_matter(
     optical_setup: OpticalSetup, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stage = optical_setup.stage(optical_setup.cameras[1])
-    one = light.full_sensor(stage)
+    sensor = optical_setup.sensor_scene(optical_setup.cameras[1])
+    one = light.full_sensor(sensor)
     monkeypatch.setattr(rays, "RAYS_A_CHUNK", 999)
     monkeypatch.setattr(rays, "THREADS", 3)
-    two = light.full_sensor(stage)
+    two = light.full_sensor(sensor)
     for name in ("pixels", "blocked", "on_mirrors", "twice", "nearest", "spread"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
@@ -114,7 +114,7 @@ def test_hits_in_float64(optical_setup: OpticalSetup) -> None:
 def test_facet_error_is_the_facets_size(optical_setup: OpticalSetup) -> None:
     """Off a facet of size s on a sphere of radius r the normal is wrong by up to s / 2 r, and the
     ray at the object by twice that times the distance: millimetres, here."""
-    tally = light.full_sensor(optical_setup.stage(optical_setup.cameras[0]))
+    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
     assert 0.3 < np.median(tally.spread) < 5
 
 

@@ -84,9 +84,9 @@ class PixelTally:
     spread: NDArray[np.float32]
 
 
-def full_sensor(stage: SensorScene) -> PixelTally:
+def full_sensor(sensor: SensorScene) -> PixelTally:
     """Trace every pixel of one camera, twice."""
-    return total(in_threads(lambda rows: trace_rows(stage, *rows), row_chunks(stage.camera)))
+    return total(in_threads(lambda rows: trace_rows(sensor, *rows), row_chunks(sensor.camera)))
 
 
 def total(tallies: list[PixelTally]) -> PixelTally:
@@ -102,34 +102,34 @@ def total(tallies: list[PixelTally]) -> PixelTally:
     )
 
 
-def trace_rows(stage: SensorScene, first: int, last: int) -> PixelTally:
+def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     """Trace the pixels of some rows."""
-    rays = pixel_rows(stage.camera, first, last)
-    facet = first_hits(stage.scene, stage.camera.pinhole[:, None], rays)
-    mirror = stage.owner[facet]
+    rays = pixel_rows(sensor.camera, first, last)
+    facet = first_hits(sensor.scene, sensor.camera.pinhole[:, None], rays)
+    mirror = sensor.owner[facet]
     on = np.flatnonzero(mirror >= 0)
     d, facet, mirror = np.take(rays, on, axis=1), facet[on], mirror[on]
-    lines = reflect(stage.seen, mirror, d)
+    lines = reflect(sensor.seen, mirror, d)
     miss = nearest_to_origin(lines)
     distance = norm(miss)
-    useful = distance <= stage.radius_mm
-    second, stopped = _second(stage, lines, miss, distance, useful)
+    useful = distance <= sensor.radius_mm
+    second, stopped = _second(sensor, lines, miss, distance, useful)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
-    some = clear[(first * stage.camera.width + on[clear]) % SAMPLED == 0]
+    some = clear[(first * sensor.camera.width + on[clear]) % SAMPLED == 0]
     return PixelTally(
-        np.bincount(on_object, minlength=stage.mirrors),
-        np.bincount(mirror[stopped], minlength=stage.mirrors),
+        np.bincount(on_object, minlength=sensor.mirrors),
+        np.bincount(mirror[stopped], minlength=sensor.mirrors),
         np.unique(second[stopped]).astype(np.int64),
         on.size,
-        int((stage.other[second] & ~stopped).sum()),
-        _nearest_on_the_way(stage, on_object, np.take(d, clear, axis=1), lines.reach[clear]),
-        _spread(stage, facet[some], *(np.take(x, some, axis=1) for x in (d, lines.toward, miss))),
+        int((sensor.other[second] & ~stopped).sum()),
+        _nearest_on_the_way(sensor, on_object, np.take(d, clear, axis=1), lines.reach[clear]),
+        _spread(sensor, facet[some], *(np.take(x, some, axis=1) for x in (d, lines.toward, miss))),
     )
 
 
 def _second(
-    stage: SensorScene,
+    sensor: SensorScene,
     lines: ReflectedRays,
     miss: Floats,
     distance: Floats,
@@ -138,30 +138,30 @@ def _second(
     """The next facet along reflected rays, and which useful rays it stops before the object."""
     length = norm(lines.toward)
     start = lines.point + (LIFT_MM / length) * lines.toward
-    second = first_hits(stage.scene, start, lines.toward)
+    second = first_hits(sensor.scene, start, lines.toward)
     stopped = np.zeros(second.size, dtype=np.bool_)
     hit = np.flatnonzero(useful & (second >= 0))
     toward, begin = np.take(lines.toward, hit, axis=1), np.take(start, hit, axis=1)
-    at = distances_to_planes(stage.scene, second[hit], begin, toward) * length[hit]
-    depth = np.sqrt(np.maximum(stage.radius_mm**2 - distance[hit] ** 2, 0))
+    at = distances_to_planes(sensor.scene, second[hit], begin, toward) * length[hit]
+    depth = np.sqrt(np.maximum(sensor.radius_mm**2 - distance[hit] ** 2, 0))
     stopped[hit] = at < norm(np.take(miss, hit, axis=1) - begin) - depth
     return second, stopped
 
 
 def _nearest_on_the_way(
-    stage: SensorScene, mirror: NDArray[np.int32], d: Floats, reach: Floats
+    sensor: SensorScene, mirror: NDArray[np.int32], d: Floats, reach: Floats
 ) -> Floats:
-    minimum = np.full(stage.mirrors, np.inf)
-    np.minimum.at(minimum, mirror, distance_before_mirror(stage.seen, d, reach))
+    minimum = np.full(sensor.mirrors, np.inf)
+    np.minimum.at(minimum, mirror, distance_before_mirror(sensor.seen, d, reach))
     return minimum
 
 
 def _spread(
-    stage: SensorScene, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
+    sensor: SensorScene, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
 ) -> NDArray[np.float32]:
     """Distance at the object, across the fitted ray, of the ray off the facet's plane."""
-    plane = np.take(stage.scene.planes, facet, axis=0).T
-    pinhole = stage.camera.pinhole[:, None]
-    t = (plane[3] + stage.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
+    plane = np.take(sensor.scene.planes, facet, axis=0).T
+    pinhole = sensor.camera.pinhole[:, None]
+    t = (plane[3] + sensor.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
     point, bounced = pinhole + t * d, reflect_directions(d, plane[:3])
     return norm(crossings(point, bounced, toward) - miss).astype(np.float32)

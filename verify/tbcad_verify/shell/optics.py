@@ -91,8 +91,8 @@ class OpticalSetup:
             self.export.coating_mm,
         )
 
-    def stage(self, camera: Camera) -> SensorScene:
-        """One camera, as the full sensor needs it."""
+    def sensor_scene(self, camera: Camera) -> SensorScene:
+        """What one camera sees, as the trace of the full sensor needs it."""
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label

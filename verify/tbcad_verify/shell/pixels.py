@@ -46,7 +46,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
     path, clear, minimum, median, maximum, framed, double, half, nearly_all = (
         (name, files, unit) for name, unit in CHECKS.items()
     )
-    tally = light.total([light.full_sensor(setup.stage(camera)) for camera in setup.cameras])
+    tally = light.total([light.full_sensor(setup.sensor_scene(camera)) for camera in setup.cameras])
     rings = [(camera, _ring(setup, camera, seen)) for camera in setup.cameras]
     each = np.bincount(setup.virtual.index, tally.pixels, setup.virtual.count)
     none = [setup.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
