@@ -14,7 +14,7 @@ from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats
 
-# Beyond this, one ray stands for a block of pixels: the paper's largest sensor, 8320 x 6208,
+# Beyond this, one ray represents a block of pixels: the paper's largest sensor, 8320 x 6208,
 # counted with 2080 x 1552 rays differs from all its pixels by less than 5e-5 of the count.
 MAX_RAYS = 4_000_000
 LEAST_SIDE, LARGEST_SIDE = 16, 32_768

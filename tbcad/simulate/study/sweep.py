@@ -73,7 +73,7 @@ def for_each_n(
     Args:
         work: for one n; with a scheduler it must be fit for pickling.
         ns: subdivisions.
-        progress: told of each n that is done.
+        progress: called with each n that is done.
         scheduler: address of a Dask scheduler; None for this machine's cores.
     """
     # The largest take longest, so they are begun first.
