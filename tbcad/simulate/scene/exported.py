@@ -65,7 +65,7 @@ class _Document(Record):
 
 
 class Exported(Record):
-    """An export as light meets it.
+    """What the simulation needs of an export.
 
     Attributes:
         folder: where it lies.

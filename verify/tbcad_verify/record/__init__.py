@@ -1,1 +1,1 @@
-"""The record of an export: files that nobody vouches for, read strictly."""
+"""The records of an export: untrusted files, read strictly."""

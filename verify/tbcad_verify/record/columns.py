@@ -1,4 +1,4 @@
-"""CSV files that nobody vouches for, read column by column into arrays."""
+"""Untrusted CSV files, validated column by column and read into arrays."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ WIDEST = 200  # characters of a text
 class Columns(BaseModel):
     """A table: one field a column, in the order of the header line, as arrays over the rows.
 
-    Numbers are finite. A column model says how many rows there may be, and whether columns may
-    follow that are not read.
+    Numbers are finite. A subclass sets the maximum number of rows, and whether further columns may
+    follow, which are not read.
     """
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)

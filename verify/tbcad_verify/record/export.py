@@ -1,4 +1,4 @@
-"""What the export says about itself: cameras, parts, mirrors, and the manifest.
+"""The records of an export: design.json, mirrors.csv, manifest.json and those of a prototype.
 
 Only requirements and poses are taken from here. What the mirrors are is measured on the mesh.
 """
@@ -191,7 +191,7 @@ class Export:
 
     @property
     def mesh_error_mm(self) -> float:
-        """How far the spec lets the mesh be from the exact surface, mm; NaN if it does not say."""
+        """Largest distance from mesh to exact surface that the spec allows, mm; NaN if not given."""
         mesh = self.spec.get("mesh")
         keys = ("chord_error_mm", "structure_error_mm")
         values = [mesh.get(key) for key in keys] if isinstance(mesh, dict) else [None]

@@ -1,4 +1,4 @@
-"""Reading a folder that is not trusted: plain names, regular files, honest sizes."""
+"""Reading an untrusted folder: plain names, regular files, limited sizes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""prototype.json and the tables that go with it, strictly.
+"""prototype.json and its tables, validated strictly.
 
-What is wrong in form is refused here; what is wrong in fact is for the checks.
+A wrong form is refused here; wrong numbers are found by the checks.
 """
 
 from __future__ import annotations
@@ -124,15 +124,15 @@ class Prototype(Strict):
 
     Attributes:
         camera: id of the camera that it serves.
-        target_mm: coverage wanted.
+        target_mm: coverage diameter that is required.
         picture: whether pictures are moved along with their balls when they are merged.
         frame: of the base.
-        swing: least and greatest base angle driven, degrees.
-        pad_um: by which pads may misplace a ball.
+        swing: smallest and largest base angle driven, degrees.
+        pad_um: largest error of a ball's centre that its pads may cause.
         seats: one for each ball.
         parts: printed.
         leds: of the stage.
-        bought: what is neither printed nor a ball.
+        bought: purchased parts other than balls.
         assembly: files of the whole.
         balls: K of them.
         plan: every picture.

@@ -1,4 +1,4 @@
-"""Values that nobody vouches for, checked by pydantic models; a refusal is one clear line."""
+"""Untrusted values, validated by pydantic models; every refusal is one clear line."""
 
 from __future__ import annotations
 
@@ -146,10 +146,10 @@ def fault(
     error: ValidationError,
     where: Callable[[tuple[int | str, ...]], str] = key_path,
 ) -> str:
-    """What is wrong first in a value that does not fit: where, the value, and what is allowed.
+    """The first fault of a value that does not fit: its place, the value, and what is allowed.
 
     Args:
-        model: that the value was held against.
+        model: that the value was validated with.
         error: why it does not fit.
         where: names the place of a value.
     """
