@@ -109,21 +109,21 @@ class TestSmall:
         base, _, plan, parts, _ = small
         (joint,) = plan.joints
         used, size = base.spec, joint_hardware(base.spec)
-        angle = base.axes
+        axes = base.axes
         press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
         sides = {
             -1: cylinders(parts[piece_at(plan, joint, -1)]),
             1: cylinders(parts[piece_at(plan, joint, 1)]),
         }
-        normal = joint.plane.normal @ angle
-        for place in joint.dowels @ angle:
+        normal = joint.plane.normal @ axes
+        for place in joint.dowels @ axes:
             assert on_axis(sides[-1], place, normal) == pytest.approx([press / 2])
             assert on_axis(sides[1], place, normal) == pytest.approx([slip / 2])
-        for place, head in zip(joint.screws @ angle, joint.heads.tolist(), strict=True):
+        for place, head in zip(joint.screws @ axes, joint.heads.tolist(), strict=True):
             assert on_axis(sides[-head], place, normal) == pytest.approx([used.insert_hole_mm / 2])
-            found = on_axis(sides[head], place, normal)
-            assert found[0] == pytest.approx(SCREW_MM / 2)
-            assert found[-1] <= access_radius(size) + 1e-9
+            radii = on_axis(sides[head], place, normal)
+            assert radii[0] == pytest.approx(SCREW_MM / 2)
+            assert radii[-1] <= access_radius(size) + 1e-9
 
     def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
         """Straight from the plane into the material, until the mesh is met."""
@@ -210,23 +210,23 @@ def heads_volume(base: BaseLayout, joint: Joint) -> float:
 
 def cylinders(part: PlacedSolid) -> list[Cylinder]:
     """Radius, a point and the direction of each cylindrical face."""
-    found = []
+    cylinders = []
     for face in faces(part.shape):
         surface = BRep_Tool.Surface_s(face)
         if isinstance(surface, Geom_CylindricalSurface):
             at, along = surface.Location(), surface.Axis().Direction()
             point = np.array([at.X(), at.Y(), at.Z()])
             direction = np.array([along.X(), along.Y(), along.Z()])
-            found.append((surface.Radius(), point, direction))
-    return found
+            cylinders.append((surface.Radius(), point, direction))
+    return cylinders
 
 
-def on_axis(found: list[Cylinder], at: np.ndarray, along: np.ndarray) -> list[float]:
-    """Radii, each once, of the cylinders about a line, the least first."""
+def on_axis(cylinders: list[Cylinder], at: np.ndarray, along: np.ndarray) -> list[float]:
+    """Radii, each once, of the cylinders about a line, the smallest first."""
     return sorted(
         {
             round(radius, 9)
-            for radius, point, direction in found
+            for radius, point, direction in cylinders
             if abs(abs(direction @ along) - 1) < 1e-12 and norm(np.cross(point - at, along)) < 1e-9
         }
     )
@@ -245,7 +245,7 @@ def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
 
 
 def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:
-    found = meshed(small[3][0].shape, 0.2)
-    check_mesh("piece", found)
+    mesh = meshed(small[3][0].shape, 0.2)
+    check_mesh("piece", mesh)
     with pytest.raises(InvalidSolidError, match="piece: the kernel's mesh of the solid is not"):
-        check_mesh("piece", Mesh(found.vertices, found.triangles[1:]))
+        check_mesh("piece", Mesh(mesh.vertices, mesh.triangles[1:]))

@@ -65,7 +65,7 @@ class TestTorque:
         masses = PointMasses(np.array([100.0]), np.array([[50.0, 20, 10]]))
         assert sum_masses(upright, masses).torque_amplitude == 0
 
-    def test_worst_at_an_end_or_beside_the_axis(self) -> None:
+    def test_max_torque_at_an_end_or_beside_the_axis(self) -> None:
         balance = sum_masses(FRAME, at(0, 100, 0))
         assert balance.max_torque(-1, 0.5) == pytest.approx(balance.torque_amplitude * np.sin(1))
         assert balance.max_torque(-0.5, 2) == balance.torque_amplitude
@@ -78,7 +78,7 @@ class TestTorque:
         width=st.floats(0, 6),
         mass=st.floats(1, 1e4),
     )
-    def test_worst_is_that_of_all_angles(
+    def test_max_torque_is_that_of_all_angles(
         self, azimuth: float, low: float, width: float, mass: float
     ) -> None:
         summed = sum_masses(FRAME, at(0, 100, azimuth, mass), at(0, 30, 1.0))
@@ -86,7 +86,7 @@ class TestTorque:
         assert tried <= summed.max_torque(low, low + width) * (1 + 1e-12)
         assert summed.max_torque(low, low + width) == pytest.approx(tried, rel=1e-5)
 
-    def test_holding_torque_wanted(self) -> None:
+    def test_required_torque(self) -> None:
         balance = sum_masses(FRAME, at(0, 100, 0))
         inertia = 0.1 * 0.1**2  # kg m^2
         assert balance.required_torque(-2, 2, 3.0, 2.0) == pytest.approx(
