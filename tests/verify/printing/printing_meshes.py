@@ -18,7 +18,9 @@ def mesh_of(*solids: trimesh.Trimesh) -> Mesh:
     return mesh_from_facets(Facets("x.stl", np.zeros((len(corners), 3), np.float32), corners))
 
 
-def measured(mesh: Mesh) -> PartMeasures:
+def shape(*solids: trimesh.Trimesh) -> PartMeasures:
+    """All solids in one mesh, measured."""
+    mesh = mesh_of(*solids)
     return measure(mesh, manifold_status(mesh), mass_properties(mesh))
 
 

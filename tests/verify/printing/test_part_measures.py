@@ -7,26 +7,20 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Unknown
 
 from tests.verify.printing.printing_meshes import (
     box,
-    measured,
-    mesh_of,
     plate,
     prism,
     rectangle,
     ring,
+    shape,
     turned_inside_out,
 )
 
 COARSE = 1e-5  # mm, what float32 leaves of parts of this size
-
-
-def shape(*solids: trimesh.Trimesh) -> PartMeasures:
-    return measured(mesh_of(*solids))
 
 
 def flange(corners: int = 64, radius: float = 2.0) -> trimesh.Trimesh:

@@ -23,21 +23,17 @@ from tbcad_verify.report.checks import all_passed
 
 from tests.verify.printing.printing_meshes import (
     box,
-    measured,
     mesh_of,
     plate,
     prism,
     rectangle,
     ring,
+    shape,
     turned,
     turned_inside_out,
 )
 
 DOWN = np.array([0.0, 0.0, -1.0])
-
-
-def shape(*solids: object) -> PartMeasures:
-    return measured(mesh_of(*solids))  # type: ignore[arg-type]
 
 
 @cache
