@@ -13,7 +13,7 @@ from tbcad_verify.run.verify import VerifyOptions, verify
 from tbcad_verify.run.watch import STAGE_LIMIT_S
 
 ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole
-object, and every part can be made. The result is written to DIR/verify.json.
+object, and the parts are those of the record. The result is written to DIR/verify.json.
 Exit status: 0 verified, 1 not verified, 2 DIR is not an export."""
 PIPED_WIDTH = 160  # columns of the table when stdout is no terminal
 
