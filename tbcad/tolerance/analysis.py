@@ -27,7 +27,7 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import Errors, draw
+from tbcad.tolerance.montecarlo.draws import Errors, draw, shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.sensitivity import (
     SingleErrorEffect,
@@ -46,11 +46,6 @@ SEARCH_BUILDS = 100
 # Builds whose pictures are simulated; elevations, azimuths and distance of their viewpoints.
 PHOTOGRAPHED_BUILDS = 2
 VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
-# Kinds of error that a shell can have; the others are the prototype's.
-SHELL_ERRORS = (
-    *("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis", "shell_shift"),
-    *("shell_tilt", "camera_shift", "camera_tilt", "camera_focal", "coating", "facets"),
-)
 
 
 @dataclass(frozen=True)
@@ -247,7 +242,7 @@ def _single_errors(
         wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
         return one_at_a_time(errors, kind, wanted, target, reported)
 
-    effects = [effect(kind) for kind in present_kinds(errors) if kind in SHELL_ERRORS]
+    effects = [effect(kind) for kind in present_kinds(errors) if kind in shell_error_shapes(0)]
     return tuple(sorted(effects, key=lambda one: -one.loss))
 
 

@@ -122,12 +122,12 @@ def draw(
         builds: numbers of the builds.
         mirrors: m of each half.
     """
-    drawn = draw_kinds(errors, seed, builds, _shapes(mirrors))
+    drawn = draw_kinds(errors, seed, builds, shell_error_shapes(mirrors))
     return _half(drawn, 0), _half(drawn, 1)
 
 
-def _shapes(m: int) -> dict[str, Shape]:
-    """Shape of each kind's errors, in the order of their random streams; only append to it."""
+def shell_error_shapes(m: int) -> dict[str, Shape]:
+    """Shape of each kind of error of a shell, in the order of the streams; only append to it."""
     return {
         "sphere_centre": (2, m, 3),
         "sphere_radius": (2, m),
