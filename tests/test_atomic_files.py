@@ -22,7 +22,7 @@ def test_files_are_replaced_and_others_left_alone(tmp_path: Path) -> None:
 
 def test_no_file_is_replaced_before_all_are_written(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"old")
-    with pytest.raises(InputError, match="cannot be written: .*: choose another folder"):
+    with pytest.raises(InputError, match=r"cannot be written: .*: choose another folder"):
         replace_files(tmp_path, {"a": b"new", "no/such/folder": b""})
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a": b"old"}
 
