@@ -1,4 +1,4 @@
-"""Whole commands as a user runs them, a process each: `tbcad build`, with exports and proof."""
+"""Whole commands as a user runs them, a process each: `tbcad build` with verification."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from timing import Figure, Row, at_most, measured
 
 COMMAND = "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))"
-BUILT = {0: "proved", 1: "built, the proof fails"}
+BUILT = {0: "verified", 1: "built, the verification fails"}
 MEGABYTE = 1e6
 SHELLS = ("--parts", "shell")
 # At this size float32 rounding costs facets up to 0.7 mm of coverage: docs/construction.md.

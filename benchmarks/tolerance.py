@@ -1,4 +1,4 @@
-"""Made machines by the fast model, against the same machines meshed, written, read and proved."""
+"""Simulated builds by the fast model, against the same builds meshed, written and verified."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.export import read_export as read_record
 from tbcad_verify.record.files import read
-from tbcad_verify.shell import coverage as proof
+from tbcad_verify.shell.coverage import measure
 from tbcad_verify.shell.optics import set_up
 from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, measured
@@ -35,7 +35,7 @@ from tbcad.tolerance.montecarlo.edge_model import EdgeModel, edge_model
 COUNTS = (100, 300, 1000)
 MESHED = 10
 SEED = 1
-# Such as a mesh can show as spheres and the proof can place: spheres and coats.
+# Errors that a mesh can represent as spheres, so that the verification can place them.
 ERRORS = Errors(sphere_centre=Error(0.02), sphere_radius=Error(0.02), coating=Error(0.005))
 
 
@@ -120,4 +120,4 @@ def _measured(record: Export) -> np.ndarray:
         recover(one, record.cameras[part.camera].pinhole, record.target_mm / 2)
         for one, part in zip(meshes, record.parts, strict=True)
     ]
-    return proof.measure(set_up(record, meshes, found)).fitted
+    return measure(set_up(record, meshes, found)).fitted

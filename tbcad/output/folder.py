@@ -176,10 +176,21 @@ def _is_written(folder: Path) -> bool:
     except BlockingIOError:
         return True
     except OSError:  # a file system without locks
-        return Path("/proc", folder.stem.rpartition("-")[2]).exists()
+        return _runs(folder.stem.rpartition("-")[2])
     finally:
         os.close(descriptor)
     return False
+
+
+def _runs(process: str) -> bool:
+    """Tell whether a process of this number runs."""
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, ValueError, OverflowError):
+        return False
+    except PermissionError:  # it is another user's
+        return True
+    return True
 
 
 def _finish(out: Path, new: Path, force: bool) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 TEXTS = ("id", "camera")  # columns of mirrors.csv
-VERDICT = "verify.json"  # written by every proof, so never shared
+VERDICT = "verify.json"  # written by every verification, so never shared
 
 
 def copy(export: Path, folder: Path) -> Path:

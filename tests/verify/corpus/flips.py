@@ -1,4 +1,4 @@
-"""What a random change to a file may leave as it was, judged without the proof's own readers."""
+"""Random changes to a file that leave its meaning, judged without the verification's readers."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 from tests.helpers import read_3mf
 from tests.verify.corpus import facets, part21
 
-# Nothing that the proof promises hangs on these.
+# Nothing that the verification promises hangs on these.
 FREE = re.compile(
     r"spec\.(name|schema|step|printer|prototype|shell|mesh|mirrors\.(radius_rule|margin_mm|max_))"
 )
 FREE_COLUMN = "coverage_mm"
-TINY = 1e-8  # mm or of the value: what the proof's tightest limits let pass
+TINY = 1e-8  # mm or of the value: what the verification's tightest limits let pass
 STEP_TINY = 2e-6  # mm; a face's area and middle are held to about this
 FREE_STEP = re.compile(
     r"(APPLICATION|PRODUCT|SHAPE_ASPECT|PROPERTY_DEFINITION|SHAPE_DEFINITION|REPRESENTATION|"
@@ -27,7 +27,7 @@ FREE_STEP = re.compile(
 
 
 def same(before: Path, after: Path) -> bool:
-    """Whether a file that was changed still says the same, as far as the proof promises."""
+    """Whether a file that was changed still says the same, as far as the verification promises."""
     kind = {".json": _json, ".csv": _table, ".stl": _stl, ".3mf": _model, ".step": _step}
     return kind[before.suffix](before, after)
 

@@ -57,7 +57,7 @@ def link_inside(folder: Path) -> Sequence[str]:
 
 
 def wide(folder: Path) -> Sequence[str]:
-    """A column that the proof does not know."""
+    """A column that the verification does not know."""
     how = b"\n".join
     change(folder, "mirrors.csv", lambda b: how(line + b",x" for line in b.splitlines()) + b"\n")
     return ()

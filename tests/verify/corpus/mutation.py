@@ -1,4 +1,4 @@
-"""One way to break a good export, and what the proof must say then."""
+"""One way to break a good export, and what the verification must say then."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Mutation:
         name: what is wrong with it.
         kind: the kind of file that is broken.
         job: breaks it.
-        status: exit status that the proof must end with: 1 not proved, 2 no export.
+        status: exit status that the verification must end with: 1 not verified, 2 no export.
         checks: of these one at least must fail (exit 1).
         words: must be in what the failed checks of that name say, or in the refusal; so must what
             the job returns.
         unknown: the checks cannot be made, instead of being made and failing.
-        during: the stage at whose beginning the job is done; empty: before the proof.
+        during: the stage at whose beginning the job is done; empty: before the verification.
         signed: the manifest is written anew, so that measuring and not hashing must catch it.
         heavy: wants gigabytes of memory; not for every test run.
     """

@@ -1,4 +1,4 @@
-"""What a proof works out from the bytes of one file alone, worked out once for many proofs."""
+"""What a verification works out from the bytes of one file alone, worked out once for many verifications."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from tests.verify.corpus.whole_corpus import ALL
 
 HEADING = "| mutation | breaks | expected | found | caught | s |\n|---|---|---|---|---|---|"
 LONGEST = 160  # characters of a cell
-STATUS = {0: "proved", 1: "not proved", 2: "refused", 3: "crashed"}
+STATUS = {0: "verified", 1: "not verified", 2: "refused", 3: "crashed"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("export", type=Path, help="a good export that tbcad build wrote")
-    parser.add_argument("--jobs", type=int, default=2, help="proofs at once")
+    parser.add_argument("--jobs", type=int, default=2, help="verifications at once")
     parser.add_argument("--only", nargs="+", default=[""], help="words in their names")
     parser.add_argument("--heavy", action="store_true", help="also those that want much memory")
     return parser.parse_args(argv)

@@ -43,7 +43,7 @@ def test_not_refused_without_need(mutation: Mutation, good: Path, tmp_path: Path
     assert not outcome.wanting, outcome
 
 
-@pytest.mark.xfail(strict=True, reason="not proved yet; when it is, it belongs to the corpus")
+@pytest.mark.xfail(strict=True, reason="not verified yet; when it is, it belongs to the corpus")
 @pytest.mark.parametrize("mutation", HOLES, ids=lambda m: m.name)
 def test_known_to_pass(mutation: Mutation, good: Path, tmp_path: Path) -> None:
     assert not attempt(mutation, good, tmp_path, HERE).wanting

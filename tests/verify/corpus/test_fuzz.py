@@ -77,15 +77,15 @@ def test_a_piece_replaced(good: Path, name: str, place: float, piece: bytes, len
 
 
 def holds(good: Path, name: str, how: Callable[[bytes], bytes]) -> None:
-    """The proof ends without a traceback, and passes only what says the same as before."""
+    """The verification ends without a traceback, and passes only what says the same as before."""
     with tempfile.TemporaryDirectory() as room:
         folder = copy(good, Path(room) / "export")
         change(folder, name, how)
         if name != "manifest.json":
             sign(folder)
-        proved, said = outcome(folder)
+        verified, said = outcome(folder)
         assert "\n" not in said
-        assert not proved or same(good / name, folder / name)
+        assert not verified or same(good / name, folder / name)
 
 
 def outcome(folder: Path) -> tuple[bool, str]:

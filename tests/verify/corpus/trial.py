@@ -1,4 +1,4 @@
-"""Trying one mutation: break a copy, prove it, and judge what the proof says."""
+"""Trying one mutation: break a copy, verify it, and judge what the verification says."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from tests.verify.corpus.mutation import Mutation
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the proof said.
+    """What the verification said.
 
     Attributes:
         status: exit status; 3 for a traceback.
         said: every check that did not pass, or the refusal.
         wanting: what it should have said and did not; empty: the mutation was caught.
-        seconds: of the proof.
+        seconds: of the verification.
     """
 
     status: int
@@ -34,7 +34,7 @@ class Outcome:
 
 
 def attempt(mutation: Mutation, export: Path, room: Path, options: VerifyOptions) -> Outcome:
-    """Break a copy in an empty folder of its own, and prove it."""
+    """Break a copy in an empty folder of its own, and verify it."""
     folder = copy(export, room / "export")
     words = list(mutation.words)
     if not mutation.during:

@@ -78,7 +78,7 @@ def checks(prints: Sequence[PrintAssessment], required: bool) -> list[Check]:
 
     Args:
         prints: assessed.
-        required: whether the user asked for these machines: then a problem fails, else it informs.
+        required: whether the user asked for these printers: then a problem fails, else it informs.
     """
     return [_check(one, required) for one in prints]
 
