@@ -1,4 +1,4 @@
-"""Mutations that the verification is known to let pass. Whoever mends one moves it to its kind's list."""
+"""Mutations that the verification is known to pass; one that it catches moves to its own list."""
 
 from __future__ import annotations
 

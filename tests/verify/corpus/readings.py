@@ -1,4 +1,4 @@
-"""What a verification works out from the bytes of one file alone, worked out once for many verifications."""
+"""What a verification derives from the bytes of one file alone, shared by many verifications."""
 
 from __future__ import annotations
 
