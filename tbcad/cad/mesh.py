@@ -31,8 +31,7 @@ class Mesh:
         """Areas of the triangles, mm^2, (t,)."""
         corner = self.vertices[self.triangles]
         across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        result: Floats = norm(across) / 2
-        return result
+        return np.asarray(norm(across) / 2)
 
     def mirrored(self) -> "Mesh":
         """Mirror image in the plane x = 0."""

@@ -43,8 +43,7 @@ class Ellipsoid:
     def radial_distance(self, u: Floats) -> Floats:
         """Distance rho of the ellipsoid from the origin along u (m, 3), mm, shape (m,)."""
         along = u @ self.axis
-        rho: Floats = self.semi_minor**2 / (self.semi_major - self.linear_eccentricity * along)
-        return rho
+        return np.asarray(self.semi_minor**2 / (self.semi_major - self.linear_eccentricity * along))
 
     def apices(self, u: Floats) -> Floats:
         """Apex P = rho u of each mirror, mm, shape (m, 3)."""

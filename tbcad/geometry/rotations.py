@@ -14,8 +14,7 @@ def rotated(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
     axis = np.broadcast_to(axis, vectors.shape)
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = dot(axis, vectors)[..., None] * axis
-    result: Floats = cosine * vectors + sine * np.cross(axis, vectors) + (1 - cosine) * along
-    return result
+    return np.asarray(cosine * vectors + sine * np.cross(axis, vectors) + (1 - cosine) * along)
 
 
 def rotated_about_x(points: Floats, angle: Floats) -> Floats:

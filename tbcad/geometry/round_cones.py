@@ -65,8 +65,7 @@ def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
     with np.errstate(over="ignore"):  # next to the axis the ratio may be infinite
         shares = [np.zeros_like(under[0]), np.ones_like(under[0]), *_stationary(over, under)]
         cosine = np.min([_ratio(over, under, share) for share in shares], axis=0)
-    angle: Floats = np.arccos(np.clip(cosine, -1, 1))
-    return angle
+    return np.asarray(np.arccos(np.clip(cosine, -1, 1)))
 
 
 def _quadratic(centre: Floats, radius: Floats, cones: RoundCones) -> tuple[Floats, Floats, Floats]:

@@ -154,8 +154,7 @@ def numbered_directions(n: int) -> tuple[Floats, Ints]:
 
 def _in_half_a(u: Floats) -> Bools:
     """Whether a direction is one of camera a's: on its side of the seam, and not below."""
-    result: Bools = (u[:, 0] >= 0) & (u[:, 2] >= 0)
-    return result
+    return np.asarray((u[:, 0] >= 0) & (u[:, 2] >= 0))
 
 
 def _half_a(spec: Spec, progress: Progress) -> MirrorArray:

@@ -85,8 +85,7 @@ def _hits_sphere(point: Floats, normal: Floats, camera: Floats, capture: float) 
     """Whether rays from the camera meet the capture sphere after mirrors at points (..., 3)."""
     toward_origin = -dot(reflected_rays(camera, point, normal), point)
     tangent_length = np.sqrt(np.maximum(dot(point, point) - capture**2, 0))
-    hits: Bools = toward_origin > tangent_length
-    return hits
+    return np.asarray(toward_origin > tangent_length)
 
 
 def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
@@ -133,12 +132,10 @@ def enclosed_areas(outline: Floats) -> Floats:
     count = outline.shape[1]
     terms = np.fft.fft(outline[..., 0] + 1j * outline[..., 1], axis=1) / count
     order = np.fft.fftfreq(count, 1 / count)
-    area: Floats = np.abs(np.pi * (order * np.abs(terms) ** 2).sum(axis=1))
-    return area
+    return np.asarray(np.abs(np.pi * (order * np.abs(terms) ** 2).sum(axis=1)))
 
 
 def field_angles(ellipsoid: Ellipsoid, polar: Floats) -> Floats:
     """Angle at the pinhole between the axis (to the origin) and each apex, radians, (k,)."""
     ray = unit(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
-    angle: Floats = np.arctan2(ray[:, 1], -ray[:, 0])
-    return angle
+    return np.asarray(np.arctan2(ray[:, 1], -ray[:, 0]))

@@ -54,8 +54,7 @@ class Camera:
         """Column and row (..., 2) where points (..., 3) appear; whole numbers are pixel centres."""
         image = (points - self.pinhole) @ self.axes.T
         size = np.array([self.width_px, self.height_px])
-        result: Floats = image[..., :2] / image[..., 2:] / self.pixel_pitch + (size - 1) / 2
-        return result
+        return np.asarray(image[..., :2] / image[..., 2:] / self.pixel_pitch + (size - 1) / 2)
 
     def fill(self, points: Floats) -> float:
         """How far points (k, 3) fill the frame: 1 when the outermost is on its edge.

@@ -52,8 +52,7 @@ class Cells:
 
         Their other halves belong to the other camera and share their virtual cameras.
         """
-        result: Bools = self.surfaces.apex[: self.mirrors, 0] == 0
-        return result
+        return np.asarray(self.surfaces.apex[: self.mirrors, 0] == 0)
 
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
@@ -122,15 +121,13 @@ class Arcs:
     @property
     def length(self) -> Floats:
         """Distance of each arc's ends, mm, (e,)."""
-        result: Floats = norm(self.points[:, 2] - self.points[:, 0])
-        return result
+        return np.asarray(norm(self.points[:, 2] - self.points[:, 0]))
 
     def at(self, arc: Ints, t: Floats) -> Floats:
         """Points (..., 3) on arcs (...) at parameters t (...) in [0, 1]."""
         basis = np.stack([(1 - t) ** 2, 2 * t * (1 - t) * self.weight[arc], t**2], axis=-1)
         weighted = np.einsum("...k,...kx->...x", basis, self.points[arc])
-        result: Floats = weighted / basis.sum(axis=-1)[..., None]
-        return result
+        return np.asarray(weighted / basis.sum(axis=-1)[..., None])
 
 
 def _arcs(cells: Cells) -> Arcs:
@@ -159,8 +156,7 @@ def _merged(between: Ints, short: Bools, corners: int) -> Ints:
     graph = coo_array((np.ones(short.sum()), between[short].T), shape=(corners, corners))
     _, group = connected_components(graph, directed=False)
     _, first = np.unique(group, return_index=True)
-    result: Ints = first[group][between]
-    return result
+    return np.asarray(first[group][between])
 
 
 def _curves(

@@ -122,8 +122,7 @@ def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
 def _mean_apices(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     """Mean of the apices of those faces of each corner that are mirrors."""
     mirror = (triangles < mirrors)[:, :, None]
-    mean: Floats = np.mean(surfaces.apex[triangles], axis=1, where=mirror)
-    return mean
+    return np.asarray(np.mean(surfaces.apex[triangles], axis=1, where=mirror))
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
@@ -234,13 +233,11 @@ def _first_in_both(one: Ints, other: Ints) -> Bools:
     rank = np.full(max(one.max(initial=0), other.max(initial=0)) + 1, len(one))
     np.minimum.at(rank, one, order)
     np.minimum.at(rank, other, order)
-    result: Bools = (rank[one] == order) & (rank[other] == order)
-    return result
+    return np.asarray((rank[one] == order) & (rank[other] == order))
 
 
 def _opposite(triangles: Ints, edge: Ints) -> Ints:
-    result: Ints = triangles[edge // 3, (edge + 2) % 3]
-    return result
+    return np.asarray(triangles[edge // 3, (edge + 2) % 3])
 
 
 def _flip(triangles: Ints, edge: Ints, twin: Ints) -> Ints:

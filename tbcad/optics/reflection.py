@@ -14,8 +14,7 @@ def reflect(ray: Floats, normal: Floats) -> Floats:
 
     Lengths stay as they are; the sign of the normal does not matter.
     """
-    result: Floats = ray - 2 * dot(ray, normal)[..., None] * normal
-    return result
+    return np.asarray(ray - 2 * dot(ray, normal)[..., None] * normal)
 
 
 def reflected_rays(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
@@ -58,5 +57,4 @@ def sphere_miss_distances(pinhole: Floats, ray: Floats, centre: Floats, radius: 
     point = pinhole + (along - np.sqrt(np.maximum(inside, 0)))[..., None] * ray
     direction = reflected_rays(pinhole, point, (point - centre) / radius[..., None])
     missed = (inside < 0) | (dot(direction, point) > 0)
-    distance: Floats = np.where(missed, np.inf, norm(np.cross(point, direction)))
-    return distance
+    return np.asarray(np.where(missed, np.inf, norm(np.cross(point, direction))))

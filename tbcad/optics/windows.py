@@ -86,8 +86,7 @@ class Windows:
         forward = self.cells.arcs.left[self.arc] == self.mirror
         total = np.zeros(self.cells.mirrors)
         np.add.at(total, self.mirror, np.where(forward, winding, -winding))
-        inside: Bools = np.abs(total) > np.where(self.cells.halved, np.pi / 2, np.pi)
-        return inside
+        return np.asarray(np.abs(total) > np.where(self.cells.halved, np.pi / 2, np.pi))
 
 
 def cell_windows(cells: Cells, pinhole: Floats) -> Windows:

@@ -69,8 +69,7 @@ class KeepOut:
     def to_light(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to the light in use, mm, (n,); negative in it."""
         local = _cylindrical(self.frame, points)
-        result: Floats = _to_cones(_from_range(local, self.used), self.cones).min(axis=1)
-        return result
+        return np.asarray(_to_cones(_from_range(local, self.used), self.cones).min(axis=1))
 
     def to_light_outside_sphere(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to the light outside the capture sphere, mm, (n,).
@@ -89,8 +88,7 @@ class KeepOut:
         for section in self.sections:
             place = _from_range(local, np.array([[section.low, section.high]]))[:, 0]
             distances.append(np.hypot(_to_polygon(place[:, :2], section.polygon), place[:, 2]))
-        result: Floats = np.min(distances, axis=0)
-        return result
+        return np.asarray(np.min(distances, axis=0))
 
 
 def keep_out_volume(
@@ -183,8 +181,7 @@ def _boss(base: BaseLayout, k: int) -> Floats:
     lengths = (seats.front[k], seats.back[k] + base.spec.relief_mm)
     ends = [seats.centre[k] + length * seats.axes[k, 2] + circle for length in lengths]
     section = _cylindrical(base.frame, np.vstack(ends))[:, :2]
-    result: Floats = section[ConvexHull(section).vertices]
-    return result
+    return np.asarray(section[ConvexHull(section).vertices])
 
 
 def _cylindrical(frame: Floats, points: Floats) -> Floats:
@@ -222,8 +219,7 @@ def _to_cones(points: Floats, cones: RoundCones) -> Floats:
     # Foot of the perpendicular on the common tangent, as a share of the way between the circles.
     foot = np.clip((along - out * shrink / straight) / length, 0, 1)
     radius = cones.start_radius + foot * (cones.end_radius - cones.start_radius)
-    result: Floats = np.hypot(along - foot * length, out) - radius
-    return result
+    return np.asarray(np.hypot(along - foot * length, out) - radius)
 
 
 def _to_polygon(points: Floats, polygon: Floats) -> Floats:

@@ -98,13 +98,11 @@ def _strip_width(ray_error: float, radius: Floats, distance: Floats, points: Flo
     """
     largest = np.abs(points).max(axis=1).astype(np.float32)
     rounding = np.spacing(largest).astype(np.float64) / 2
-    result: Floats = np.maximum(ray_error * radius / distance, np.sqrt(2 * radius * rounding))
-    return result
+    return np.asarray(np.maximum(ray_error * radius / distance, np.sqrt(2 * radius * rounding)))
 
 
 def _by_cell(function: np.ufunc, cell: Ints, values: Floats) -> Floats:
-    result: Floats = function.reduceat(values, np.unique(cell, return_index=True)[1])
-    return result
+    return np.asarray(function.reduceat(values, np.unique(cell, return_index=True)[1]))
 
 
 @dataclass(frozen=True)

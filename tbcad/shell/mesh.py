@@ -169,5 +169,4 @@ def _edges(
 
 def _proper(triangles: Ints) -> Ints:
     a, b, c = triangles.T
-    result: Ints = triangles[(a != b) & (b != c) & (c != a)]
-    return result
+    return np.asarray(triangles[(a != b) & (b != c) & (c != a)])

@@ -114,5 +114,4 @@ def allowed_azimuths(
 def seat_half_angles(balls: Balls, wall: float) -> Floats:
     """Angle at the axis between a ball's centre and the edge of its seat, radians, (k,)."""
     out = np.maximum(balls.body_centre[:, 1], NEAR_AXIS_MM)
-    angle: Floats = np.arcsin(np.minimum((balls.body_radius + wall) / out, 1))
-    return angle
+    return np.asarray(np.arcsin(np.minimum((balls.body_radius + wall) / out, 1)))

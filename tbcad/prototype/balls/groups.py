@@ -43,8 +43,7 @@ class MirrorGroups:
 
 
 def _means(group_of: Ints, values: Floats, k: int) -> Floats:
-    means: Floats = np.bincount(group_of, values, k) / np.bincount(group_of)
-    return means
+    return np.asarray(np.bincount(group_of, values, k) / np.bincount(group_of))
 
 
 def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) -> MirrorGroups:
@@ -89,8 +88,7 @@ def _features(polar: Floats, radius: Floats, radius_weight_deg: float) -> Floats
 
 
 def _distinct(features: Floats) -> Floats:
-    result: Floats = np.unique(np.round(features / SAME_DEG) * SAME_DEG, axis=0)
-    return result
+    return np.asarray(np.unique(np.round(features / SAME_DEG) * SAME_DEG, axis=0))
 
 
 def _start(features: Floats, k: int) -> Floats:
@@ -105,5 +103,4 @@ def _start(features: Floats, k: int) -> Floats:
     even = low + (high - low) * (np.arange(k) + 0.5) / k
     nearest = np.searchsorted(distinct[:, 0], even) - np.arange(k)
     chosen = np.clip(np.maximum.accumulate(nearest), 0, len(distinct) - k) + np.arange(k)
-    result: Floats = distinct[chosen]
-    return result
+    return np.asarray(distinct[chosen])

@@ -271,5 +271,4 @@ def _twins(half: MirrorArray) -> Ints:
     mirror with the number of (x, -y, z).
     """
     image = half.u * FLIP_X[[1, 0, 2]]
-    result: Ints = (half.u @ image.T).argmax(axis=0)
-    return result
+    return np.asarray((half.u @ image.T).argmax(axis=0))

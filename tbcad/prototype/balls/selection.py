@@ -56,8 +56,7 @@ class Balls:
     @property
     def cap(self) -> Bools:
         """Which are caps, not bought, (k,)."""
-        caps: Bools = self.stock == CAP
-        return caps
+        return np.asarray(self.stock == CAP)
 
     @property
     def centre(self) -> Floats:
@@ -72,8 +71,7 @@ class Balls:
     @property
     def used_radius(self) -> Floats:
         """Largest distance of the part in use from the apex, mm, (k,)."""
-        result: Floats = norm(self.outline - self.poses.apex[:, None]).max(axis=1)
-        return result
+        return np.asarray(norm(self.outline - self.poses.apex[:, None]).max(axis=1))
 
     @property
     def mass_g(self) -> Floats:
@@ -121,8 +119,7 @@ class BallCandidates:
     def covers_groups(self, radius: Floats, ignored: Bools, moved: bool) -> Bools:
         """Whether radii (k,) show the target for all mirrors of each group but those ignored."""
         covered = np.where(ignored, np.inf, self.coverage(radius, moved))
-        result: Bools = self.groups.minimum(covered) >= self.target - COVERAGE_ROUNDING_MM
-        return result
+        return np.asarray(self.groups.minimum(covered) >= self.target - COVERAGE_ROUNDING_MM)
 
     def _window_rotation(self) -> Floats:
         """Rotation of each mirror's window about the pinhole that takes its apex to the ball's."""

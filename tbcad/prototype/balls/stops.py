@@ -44,8 +44,7 @@ class StopRequests:
 
     def base_angles(self, azimuth: Floats) -> Floats:
         """Base angles (m,) that balls at azimuths (k,) serve the mirrors at without error."""
-        angle: Floats = self.azimuth - azimuth[self.ball]
-        return angle
+        return np.asarray(self.azimuth - azimuth[self.ball])
 
     def intervals(self, azimuth: Floats) -> tuple[Floats, Floats]:
         """Minimum and maximum base angles (m,) at which each mirror may be served."""
@@ -150,8 +149,7 @@ def _free_azimuths(
     separation = np.abs(tried[:, None] - np.delete(azimuth, ball))
     clear = (separation >= np.delete(problem.min_separation[ball], ball)).all(axis=1)
     clear[0] = True
-    result: Floats = tried[clear]
-    return result
+    return np.asarray(tried[clear])
 
 
 def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) -> int:
@@ -191,8 +189,7 @@ def _stop_angles(exact: Floats, low: Floats, high: Floats) -> Floats:
     minimum = np.maximum(_extremes(np.maximum, low, which, count), high.min())
     maximum = np.minimum(_extremes(np.minimum, high, which, count), low.max())
     maximum = np.maximum(minimum, maximum)  # equal but for rounding where one stop suits all
-    angle: Floats = np.clip((first + last) / 2, minimum, maximum)
-    return angle
+    return np.asarray(np.clip((first + last) / 2, minimum, maximum))
 
 
 def _extremes(extreme: np.ufunc, values: Floats, group_of: Ints, count: int) -> Floats:
@@ -206,5 +203,4 @@ def angle_between(polar: Floats, other: Floats, azimuth: Floats) -> Floats:
     """Angles (m,) between directions at two polar angles and a difference of azimuth, radians."""
     half = np.sin((polar - other) / 2) ** 2
     half += np.sin(polar) * np.sin(other) * np.sin(azimuth / 2) ** 2
-    angle: Floats = 2 * np.arcsin(np.sqrt(np.clip(half, 0, 1)))
-    return angle
+    return np.asarray(2 * np.arcsin(np.sqrt(np.clip(half, 0, 1))))

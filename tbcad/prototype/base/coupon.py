@@ -177,8 +177,7 @@ def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) ->
 def _seat_middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
     """Where the axis of a row's n-th seat meets the bed, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
-    middle: Floats = left + np.array([right - float(seats.boss[row.seat]), 0.0])
-    return middle
+    return np.asarray(left + np.array([right - float(seats.boss[row.seat]), 0.0]))
 
 
 def _seat(seats: Seats, spec: BaseSpec, k: int, offset: float) -> TopoDS_Shape:

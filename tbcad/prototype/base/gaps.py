@@ -57,8 +57,7 @@ def _points_of_section(ring: Floats) -> Floats:
     shares = np.linspace(0, 1, WIDTH_POINTS)
     s, t = (grid.ravel()[:, None] for grid in np.meshgrid(shares, shares))
     a, b, c, d = ring
-    result: Floats = (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * d + t * c)
-    return result
+    return np.asarray((1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * d + t * c))
 
 
 def _free(seats: Seats, points: Floats) -> Bools:

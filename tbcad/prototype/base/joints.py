@@ -42,8 +42,7 @@ class CutPlane:
 
     def height(self, points: Floats) -> Floats:
         """Distance of points (..., 3) on the side the normal points to, mm, (...)."""
-        result: Floats = points @ self.normal - self.level
-        return result
+        return np.asarray(points @ self.normal - self.level)
 
     @property
     def row(self) -> Floats:
@@ -200,12 +199,10 @@ class _Flanges:
         section = half_plane(points)
         near = (section >= [top[0, 0], self.base.hub.disc]) & (section <= top.max(axis=0))
         points = points[near.all(axis=1)]
-        inside: Floats = points[self._in_flange(points, 0.0)]
-        return inside
+        return np.asarray(points[self._in_flange(points, 0.0)])
 
     def _along(self, points: Floats, lengths: Floats) -> Floats:
-        result: Floats = points[:, None] + lengths[:, None] * self.plane.normal
-        return result
+        return np.asarray(points[:, None] + lengths[:, None] * self.plane.normal)
 
     def _in_flange(self, points: Floats, margin: float) -> Bools:
         """Whether points (..., 3) are a margin (mm) inside of what a flange may fill, (...)."""
@@ -214,7 +211,7 @@ class _Flanges:
         low, high = base.sector
         azimuth = np.arctan2(points[..., 1], points[..., 0])
         to_edge = np.clip(np.minimum(azimuth - low, high - azimuth), -1, 1)
-        inside: Bools = (
+        return np.asarray(
             (distance_outside(base.inner, section) >= margin)
             & (distance_outside(flange_top(base), section) <= -margin)
             & ((section - base.inner[-1]) @ end <= -margin - OFF_END_MM)
@@ -222,7 +219,6 @@ class _Flanges:
             & (section[..., 1] * np.sin(to_edge) >= margin + base.spec.rib_mm)
             & in_region(points, self.region, -margin)
         )
-        return inside
 
     def _off_bosses(self, points: Floats, margin: float, over: float) -> Bools:
         """Whether points (..., 3) are a margin off all bosses and the space over their ends."""

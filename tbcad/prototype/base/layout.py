@@ -171,8 +171,7 @@ def _front_corners(seats: Seats) -> Floats:
     """Corners of a polygon round the front of each boss, mm, (k, FRONT_CORNERS, 3)."""
     circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
     middle = seats.at_depth(seats.front)[:, None]
-    corners: Floats = middle + seats.boss[:, None, None] * (circle @ seats.axes[:, :2])
-    return corners
+    return np.asarray(middle + seats.boss[:, None, None] * (circle @ seats.axes[:, :2]))
 
 
 def _half_plane(points: Floats) -> Floats:

@@ -46,8 +46,7 @@ class LightSpheroid:
         return unit(points) + unit(self._from_pinhole(points))
 
     def _from_pinhole(self, points: Floats) -> Floats:
-        result: Floats = points - np.eye(points.shape[-1])[0] * self.pinhole
-        return result
+        return np.asarray(points - np.eye(points.shape[-1])[0] * self.pinhole)
 
     def min_excess(self, corners: Floats) -> Floats:
         """Lower bound (m,) of the excess on each line or facet with corners (m, c, 2 or 3), mm.
@@ -56,8 +55,7 @@ class LightSpheroid:
         """
         middle = corners.mean(axis=1)
         rise = dot(self.slope(middle)[:, None], corners - middle[:, None])
-        result: Floats = self.excess(middle) + rise.min(axis=1)
-        return result
+        return np.asarray(self.excess(middle) + rise.min(axis=1))
 
     def outline(self) -> Floats:
         """Corners of a polygon round the spheroid's half, (OUTLINE_PARTS + 1, 2)."""
@@ -66,8 +64,7 @@ class LightSpheroid:
         angle = np.pi * (1 - np.arange(OUTLINE_PARTS + 1) / OUTLINE_PARTS)
         circumscribed = 1 / np.cos(np.pi / (2 * OUTLINE_PARTS))
         points = [major, minor] * unit_circle(angle) * circumscribed
-        result: Floats = points + np.array([focal, 0.0])
-        return result
+        return np.asarray(points + np.array([focal, 0.0]))
 
 
 def half_plane(points: Floats) -> Floats:
@@ -151,11 +148,9 @@ def _intersection(four: Floats) -> Floats:
     """Intersection of the lines through the first two and the last two of four points, (2,)."""
     a, b = four[1] - four[0], four[3] - four[2]
     share = np.linalg.solve(np.stack([a, -b], axis=1), four[2] - four[0])
-    result: Floats = four[0] + share[0] * a
-    return result
+    return np.asarray(four[0] + share[0] * a)
 
 
 def distance_outside(line: Floats, points: Floats) -> Floats:
     """Lower bound (...) of the distance of points (..., 2) from a convex line; < 0 inside."""
-    result: Floats = dot(points[..., None, :] - line[:-1], outward(line)).max(axis=-1)
-    return result
+    return np.asarray(dot(points[..., None, :] - line[:-1], outward(line)).max(axis=-1))

@@ -203,16 +203,12 @@ def _with_clear_pads(seats: Seats) -> Seats:
 def _first_with_enough(room: Floats) -> NDArray[np.int64]:
     """First row of (t, k) that has enough room in each column, else the one with most, (k,)."""
     enough = room >= ENOUGH_ROOM_MM
-    first: NDArray[np.int64] = np.where(
-        enough.any(axis=0), enough.argmax(axis=0), room.argmax(axis=0)
-    )
-    return first
+    return np.asarray(np.where(enough.any(axis=0), enough.argmax(axis=0), room.argmax(axis=0)))
 
 
 def insertion_clearance(seats: Seats) -> Floats:
     """Room between each pad and the insertion paths of the other balls, mm, (k, 3)."""
-    result: Floats = _room_at_pads(seats).min(axis=2)
-    return result
+    return np.asarray(_room_at_pads(seats).min(axis=2))
 
 
 def _room_at_pads(seats: Seats) -> Floats:

@@ -31,8 +31,7 @@ class RoundBodies:
     @property
     def axis(self) -> Floats:
         """Unit vectors from start to end, (m, 3)."""
-        result: Floats = (self.end - self.start) / norm(self.end - self.start)[:, None]
-        return result
+        return np.asarray((self.end - self.start) / norm(self.end - self.start)[:, None])
 
     def levels(self, normals: Floats) -> tuple[Floats, Floats]:
         """Minimum and maximum level of each along unit normals (n, 3), both (n, m)."""
@@ -47,8 +46,7 @@ class RoundBodies:
         circle = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
         circle *= (self.radius / np.cos(np.pi / RIM_CORNERS))[:, None, None]
         ends = np.stack([self.start, self.end], axis=1)
-        rims: Floats = ends[:, :, None] + circle[:, None]
-        return rims
+        return np.asarray(ends[:, :, None] + circle[:, None])
 
 
 def bosses_and_hub(base: BaseLayout) -> RoundBodies:

@@ -68,8 +68,7 @@ class BaseBalance:
     @property
     def centre(self) -> Floats:
         """Centre of gravity at base angle zero, mm, in the frame of the shell, (3,)."""
-        result: Floats = self.first_moment @ self.frame / self.mass_g
-        return result
+        return np.asarray(self.first_moment @ self.frame / self.mass_g)
 
     @property
     def moment(self) -> float:
@@ -97,8 +96,7 @@ class BaseBalance:
 
         w . (r x F) with F = -m g z: m g (r2 z1 - r1 z2), r and z along the second and third row.
         """
-        result: Floats = self.torque_amplitude * np.sin(self.azimuth + angle - self._up)
-        return result
+        return np.asarray(self.torque_amplitude * np.sin(self.azimuth + angle - self._up))
 
     def max_torque(self, low: float, high: float) -> float:
         """Largest magnitude of the torque between two base angles (radians), N mm."""
@@ -169,5 +167,4 @@ def cap_volume(balls: Balls) -> Floats:
 
 def _segment_volume(radius: Floats, height: Floats) -> Floats:
     """Volume of a sphere's segment (spherical cap), mm^3."""
-    result: Floats = np.pi * height**2 * (3 * radius - height) / 3
-    return result
+    return np.asarray(np.pi * height**2 * (3 * radius - height) / 3)

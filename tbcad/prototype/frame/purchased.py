@@ -54,8 +54,7 @@ class ShaftParts:
 
 def hub_point(base: BaseLayout, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
     """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
-    result: Floats = np.array([along, out, side]) @ base.frame
-    return result
+    return np.asarray(np.array([along, out, side]) @ base.frame)
 
 
 def axial_cylinder(

@@ -44,8 +44,7 @@ def min_bed(corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> F
     """Smallest bed for corners (n, 3) in the orientation nearest to fitting, mm, (3,)."""
     sizes = _sizes(corners, downs)
     size = sizes[_shortfalls(sizes, printer).argmin()]
-    bed: Floats = np.ceil(size + np.array(printer.bed_mm) - usable_size(printer))
-    return bed
+    return np.asarray(np.ceil(size + np.array(printer.bed_mm) - usable_size(printer)))
 
 
 def _sizes(corners: Floats, downs: Sequence[Floats]) -> Floats:
@@ -54,8 +53,7 @@ def _sizes(corners: Floats, downs: Sequence[Floats]) -> Floats:
 
 
 def _shortfalls(sizes: Floats, printer: PrinterSpec) -> Floats:
-    result: Floats = (sizes - usable_size(printer)).max(axis=1)
-    return result
+    return np.asarray((sizes - usable_size(printer)).max(axis=1))
 
 
 def size_text(bed: Floats) -> str:
@@ -69,5 +67,4 @@ def _orientations(down: Floats) -> Floats:
     rotation = [[cosine, sine, zero], [-sine, cosine, zero], [zero, zero, zero + 1]]
     side = unit(np.cross(np.eye(3)[np.argmin(np.abs(down))], down))
     upright = np.stack([side, np.cross(-down, side), -down]).T
-    orientations: Floats = upright @ np.moveaxis(np.array(rotation), -1, 0)
-    return orientations
+    return np.asarray(upright @ np.moveaxis(np.array(rotation), -1, 0))
