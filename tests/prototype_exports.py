@@ -8,7 +8,7 @@ import numpy as np
 from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
-from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files import balls_csv, plan_csv
 from tbcad.simulate.prototype.plan import Plan
 
@@ -34,7 +34,7 @@ def plan_of(made: PrototypeLayout) -> Plan:
 def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
-    plan = plan_csv.picture_rows(planned_pictures(made))
+    plan = plan_csv.picture_rows(made)
     write_table(folder / "rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan)
     write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.ball_rows(made))
     axis, zero, third = made.half.ellipsoid.frame().tolist()

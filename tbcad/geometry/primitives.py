@@ -53,7 +53,7 @@ class Component:
         what: what it is, for lists of parts.
         added: primitives it is the union of.
         removed: primitives that are cut out of it.
-        downs: directions that may point down when it is printed, (d, 3); none: it is bought.
+        downs: unit directions (3,) that may point down when it is printed; none: it is bought.
         part: its name in the lists of purchased parts; None: it is printed.
         rotates: whether it rotates with the base.
     """
@@ -62,7 +62,7 @@ class Component:
     what: str
     added: tuple[Primitive, ...]
     removed: tuple[Primitive, ...] = ()
-    downs: tuple[tuple[float, float, float], ...] = ()
+    downs: tuple[Floats, ...] = ()
     part: str | None = None
     rotates: bool = False
 

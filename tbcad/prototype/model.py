@@ -65,11 +65,12 @@ class PrototypeModel:
 
     @property
     def purchased(self) -> dict[str, int]:
-        """Quantity of purchased parts by name, without balls, drive and LEDs."""
-        in_base = Counter(base_purchased_parts(self.base, self.split))
-        in_caps = Counter(cap_magnets(self.base, self.layout, self.parts))
-        in_frame = Counter(frame_purchased_parts(self.frame))
-        return dict(sorted((in_base + in_caps + in_frame).items()))
+        """Quantity of purchased parts by name, without balls and drive."""
+        counts = Counter(base_purchased_parts(self.base, self.split))
+        counts.update(cap_magnets(self.base, self.layout, self.parts))
+        counts.update(frame_purchased_parts(self.frame))
+        counts[self.stage.led.name] += len(self.stage.leds)
+        return counts
 
 
 def build_prototype_model(

@@ -1,6 +1,6 @@
 """What each rule for choosing the balls costs."""
 
-from dataclasses import dataclass
+from typing import Any
 
 from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.balls.catalogue import Catalogue
@@ -15,30 +15,6 @@ from tbcad.prototype.balls.selection import (
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import PrototypeSpec
 
-
-@dataclass(frozen=True)
-class BallAlternative:
-    """What one rule for choosing the balls costs.
-
-    Attributes:
-        name: name of the rule.
-        kept_share: share of the shell's pixels that is kept.
-        pixels: pixels that are kept, of all mirrors of camera a together.
-        min_coverage: minimum coverage diameter within the moved cells, mm.
-        below_target: number of mirrors whose coverage there is below the target.
-        mass_g: mass of the balls.
-        caps: number of caps.
-    """
-
-    name: str
-    kept_share: float
-    pixels: float
-    min_coverage: float
-    below_target: int
-    mass_g: float
-    caps: int
-
-
 SELECTION_RULES = {
     "cover, with caps": {"snap": "cover", "caps": True},
     "cover, balls only": {"snap": "cover", "caps": False},
@@ -49,8 +25,12 @@ SELECTION_RULES = {
 
 def ball_alternatives(
     spec: Spec, half: MirrorArray, groups: MirrorGroups, catalogue: Catalogue
-) -> list[BallAlternative]:
-    """What each rule costs, for groups of camera a's mirrors."""
+) -> list[dict[str, Any]]:
+    """What each rule costs, for groups of camera a's mirrors: records for prototype.json.
+
+    pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
+    within the moved cells, and mirrors_below_target counts those whose coverage is less.
+    """
     candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
     return [
         _alternative(name, candidates, spec.prototype.model_copy(update=rule), catalogue)
@@ -60,15 +40,17 @@ def ball_alternatives(
 
 def _alternative(
     name: str, candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue
-) -> BallAlternative:
+) -> dict[str, Any]:
     balls = choose_balls(candidates, spec, catalogue)
     fit = ball_fit(candidates, balls, spec)
-    return BallAlternative(
-        name,
-        fit.kept_share,
-        float(fit.pixels.sum()),
-        float(fit.coverage.min()),
-        int((fit.coverage < candidates.target - COVERAGE_ROUNDING_MM).sum()),
-        float(balls.mass_g.sum()),
-        int(balls.cap.sum()),
-    )
+    return {
+        "name": name,
+        "pixels": float(fit.pixels.sum()),
+        "pixels_kept_share": fit.kept_share,
+        "coverage_mm": float(fit.coverage.min()),
+        "mirrors_below_target": int(
+            (fit.coverage < candidates.target - COVERAGE_ROUNDING_MM).sum()
+        ),
+        "balls_mass_g": float(balls.mass_g.sum()),
+        "caps": int(balls.cap.sum()),
+    }

@@ -106,31 +106,6 @@ class PrototypeLayout:
         return float(np.ptp(self.placement.azimuth))
 
 
-@dataclass(frozen=True)
-class PlannedPicture:
-    """One photograph for one mirror.
-
-    Attributes:
-        object_angle: of the object about z, radians: 0 for camera a's mirrors, pi for camera b's.
-        stop: number of the stop, from 0.
-        angle: of the base, radians.
-        ball: that replaces the mirror, from 0.
-        mirror: its id.
-        azimuth_error: radians.
-        polar_error: radians.
-        error: of direction, radians.
-    """
-
-    object_angle: float
-    stop: int
-    angle: float
-    ball: int
-    mirror: str
-    azimuth_error: float
-    polar_error: float
-    error: float
-
-
 def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
@@ -157,31 +132,6 @@ def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
         stops=plan_stops(groups, half.polar, requests, azimuth),
         twin=_twins(half),
     )
-
-
-def planned_pictures(prototype: PrototypeLayout) -> list[PlannedPicture]:
-    """All photographs in order: camera a's mirrors, then camera b's with the object turned.
-
-    The base goes through its stops twice, both times upward, so that play in the drive has no
-    effect. One stop shows several mirrors, so several entries share a photograph.
-    """
-    stops, half = prototype.stops, prototype.half
-    order = np.lexsort((np.arange(len(half)), stops.stop)).tolist()
-    names = half.ids, [f"b{i + 1:04d}" for i in prototype.twin.tolist()]
-    return [
-        PlannedPicture(
-            object_angle,
-            int(stops.stop[i]),
-            float(stops.angle[stops.stop[i]]),
-            int(prototype.fit.ball[i]),
-            ids[i],
-            float(stops.azimuth_error[i]),
-            float(stops.polar_error[i]),
-            float(stops.error[i]),
-        )
-        for object_angle, ids in zip((0.0, np.pi), names, strict=True)
-        for i in order
-    ]
 
 
 def _check_half_turn(spec: Spec) -> None:

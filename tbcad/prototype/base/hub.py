@@ -27,27 +27,21 @@ class HolePattern:
         hole: diameter of the holes; zero: inserts of the spec.
         head: diameter and depth of the counterbore on the side of the object, mm; zero: none.
         boss: whether the hub has a boss with a shaft bore that is locked.
-        source: where the pattern comes from.
     """
 
     circle: float
     hole: float
     head: tuple[float, float]
     boss: bool
-    source: str
 
 
 PATTERNS: dict[Drive, HolePattern] = {
     # There is no standard for bolted GT2 wheels: the wheel is made to this circle.
-    "nema17-belt": HolePattern(28.0, 0.0, (0.0, 0.0), True, "own: a GT2 wheel made to fit"),
+    "nema17-belt": HolePattern(28.0, 0.0, (0.0, 0.0), True),
     # Sold as "5 mm flange coupling": flange 22 mm, four M3 holes on 16 mm, collar 10 mm.
-    "nema17-direct": HolePattern(
-        16.0, 0.0, (0.0, 0.0), True, "flange couplings on sale, 22 x 16 mm"
-    ),
-    # Stage tops with tapped M6 holes on the 25 mm grid of optical tables, one of them central.
-    "stage-60": HolePattern(
-        50.0, 6.6, (11.0, 6.5), False, "25 mm grid of optical tables, M6 (ISO 273)"
-    ),
+    "nema17-direct": HolePattern(16.0, 0.0, (0.0, 0.0), True),
+    # Stage tops with tapped M6 holes (ISO 273) on the 25 mm grid of optical tables, one central.
+    "stage-60": HolePattern(50.0, 6.6, (11.0, 6.5), False),
 }
 
 
@@ -68,7 +62,6 @@ class Hub:
         head: diameter and depth of their counterbores from the front; zero: none.
         lock: how the shaft is held; None without a boss.
         lock_z: z of the lock's screws.
-        source: where the pattern of holes comes from.
     """
 
     front: float
@@ -83,7 +76,6 @@ class Hub:
     head: tuple[float, float]
     lock: str | None
     lock_z: float
-    source: str
 
 
 def hub_layout(spec: BaseSpec, front: float) -> Hub:
@@ -116,7 +108,6 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         head=pattern.head,
         lock=spec.lock if pattern.boss else None,
         lock_z=(back + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
-        source=pattern.source,
     )
 
 

@@ -35,21 +35,6 @@ class PointMasses:
 
 
 @dataclass(frozen=True)
-class Counterweight:
-    """A mass that balances a base.
-
-    Attributes:
-        mass_g: grams.
-        radius: distance from the axis, mm.
-        azimuth: on the base, radians: that of the base's centre of gravity plus pi.
-    """
-
-    mass_g: float
-    radius: float
-    azimuth: float
-
-
-@dataclass(frozen=True)
 class BaseBalance:
     """Sums over all masses on the base.
 
@@ -117,10 +102,6 @@ class BaseBalance:
             safety: factor on gravity and acceleration together; it covers friction too.
         """
         return safety * (self.max_torque(low, high) + self.inertia * acceleration * 1e-6)
-
-    def counterweight(self, radius: float) -> Counterweight:
-        """The mass at a distance from the axis (mm) that balances the base."""
-        return Counterweight(self.moment / radius, radius, self.azimuth + np.pi)
 
 
 def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:

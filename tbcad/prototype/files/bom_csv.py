@@ -1,8 +1,8 @@
 """bom.csv: everything to buy and to print; and the drive's loads for prototype.json."""
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,52 +29,44 @@ class PrintedItem:
     Attributes:
         name: of the part and of its files.
         what: it is for.
-        volume: of one, mm^3.
-        quantity: how many.
+        volume: mm^3.
     """
 
     name: str
     what: str
     volume: float
-    quantity: int = 1
-
-
-@dataclass(frozen=True)
-class PartsNeeded:
-    """What is needed beside balls, caps and drive.
-
-    Attributes:
-        purchased: quantity of each purchased part, by its name in the lists.
-        printed: parts to print, without caps.
-        print_density: of their material, g/cm^3.
-        leds: quantity on the object stage.
-        led: name of the part.
-    """
-
-    purchased: dict[str, int] = field(default_factory=dict)
-    printed: tuple[PrintedItem, ...] = ()
-    print_density: float = 1.27
-    leds: int = 4
-    led: str = "LED-3"
 
 
 def bom_rows(
-    prototype: PrototypeLayout, drive: Drive, needed: PartsNeeded, parts: Parts
+    prototype: PrototypeLayout,
+    drive: Drive,
+    purchased: Mapping[str, int],
+    printed: Iterable[PrintedItem],
+    density: float,
+    parts: Parts,
 ) -> list[Row]:
     """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
 
     Balls and caps come first, by size, then the drive, other purchased parts, and last what is
     printed.
 
+    Args:
+        prototype: with its balls.
+        drive: of the base.
+        purchased: quantity of each other purchased part, by its name in the lists.
+        printed: parts to print, without caps.
+        density: of their material, g/cm^3.
+        parts: the lists.
+
     Raises:
         SpecError: when a part is in no list.
     """
     rows = [
         *_balls(prototype),
-        *(_printed(cap, needed.print_density) for cap in _caps(prototype)),
+        *(_printed(cap, density) for cap in _caps(prototype)),
         *(_purchased(part, 1) for part in drive.parts),
-        *_other_purchased(needed, parts),
-        *(_printed(item, needed.print_density) for item in needed.printed if item.quantity),
+        *_other_purchased(purchased, parts),
+        *(_printed(item, density) for item in printed),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
@@ -114,7 +106,7 @@ def drive_record(
         "wind_up_deg": float(np.degrees(drive.wind_up_angle(torque))),
         "belt_pull_n": drive.belt_pull(torque),
         "belt_centre_mm": drive.centre_mm,
-        "counterweight_g": balance.counterweight(radius).mass_g,
+        "counterweight_g": balance.moment / radius,
         "counterweight_radius_mm": radius,
     }
 
@@ -141,7 +133,7 @@ def _purchased(part: PurchasedPart, quantity: int) -> Row:
 
 def _printed(item: PrintedItem, density: float) -> Row:
     mass = item.volume * 1e-3 * density
-    return _row(item.quantity, item.name, item.what, PRINT_MATERIAL, mass, item.volume)
+    return _row(1, item.name, item.what, PRINT_MATERIAL, mass, item.volume)
 
 
 def _balls(prototype: PrototypeLayout) -> Iterator[Row]:
@@ -162,9 +154,9 @@ def _caps(prototype: PrototypeLayout) -> Iterator[PrintedItem]:
         yield PrintedItem(f"cap {j + 1}", what, float(volume[j]))
 
 
-def _other_purchased(needed: PartsNeeded, parts: Parts) -> list[Row]:
+def _other_purchased(purchased: Mapping[str, int], parts: Parts) -> list[Row]:
     """Parts by name, in the order of the lists; those of none are left out."""
-    counts = Counter({**ALWAYS, needed.led: needed.leds}) + Counter(needed.purchased)
+    counts = Counter(ALWAYS) + Counter(purchased)
     if unknown := [name for name in counts if name not in parts]:
         raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
     return [_purchased(part, counts[name]) for name, part in parts.items() if counts[name]]

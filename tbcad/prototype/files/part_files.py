@@ -40,7 +40,7 @@ def part_record(part: PrintedPart) -> dict[str, Any]:
         **file_names(part),
         "role": part.role,
         "ball": part.ball + 1 if part.ball >= 0 else None,
-        "quantity": part.quantity,
+        "quantity": 1,
         "axes": (part.solid.axes + 0.0).tolist(),
         "origin_mm": (part.solid.origin + 0.0).tolist(),
     }

@@ -7,7 +7,7 @@ the base plate is drilled and tapped.
 import numpy as np
 
 from tbcad.formats.csv_table import Row
-from tbcad.prototype.balls.layout import PlannedPicture, PrototypeLayout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.layout import FrameLayout
 
 PICTURE_COLUMNS = (
@@ -19,13 +19,27 @@ HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 
 
-def picture_rows(pictures: list[PlannedPicture]) -> list[Row]:
+def picture_rows(layout: PrototypeLayout) -> list[Row]:
     """One row for each mirror's picture, in order; stops and balls are numbered from 1.
 
-    One photograph shows all mirrors of a stop with the object as it is turned. Errors of azimuth
-    and polar angle are the ball's less the mirror's.
+    Camera a's mirrors come first, then camera b's with the object turned. The base goes through
+    its stops twice, both times upward, so that play in the drive has no effect. One photograph
+    shows all mirrors of a stop. Errors of azimuth and polar angle are the ball's less the mirror's.
     """
-    return [_picture_row(order, picture) for order, picture in enumerate(pictures, 1)]
+    stops, ball = layout.stops, (layout.fit.ball + 1).tolist()
+    errors = [stops.polar_error, stops.azimuth_error, stops.error]
+    degrees = (np.degrees([stops.angle[stops.stop], *errors]) + 0.0).T.tolist()
+    order = np.argsort(stops.stop, kind="stable").tolist()
+    mirrors_b = [f"b{i + 1:04d}" for i in layout.twin.tolist()]
+    rows = [
+        (turn, int(stops.stop[i]) + 1, degrees[i][0], ball[i], mirrors[i], *degrees[i][1:])
+        for turn, mirrors in ((0, layout.half.ids), (180, mirrors_b))
+        for i in order
+    ]
+    return [
+        dict(zip(PICTURE_COLUMNS, (number, *row), strict=True))
+        for number, row in enumerate(rows, 1)
+    ]
 
 
 def stop_rows(layout: PrototypeLayout) -> list[Row]:
@@ -47,20 +61,6 @@ def hole_rows(frame: FrameLayout) -> list[Row]:
         dict(zip(HOLE_COLUMNS, (number, x, y, THREAD, name), strict=True))
         for number, ((x, y), name) in enumerate(zip(places, frame.holds, strict=True), 1)
     ]
-
-
-def _picture_row(order: int, picture: PlannedPicture) -> Row:
-    values = (
-        *(
-            order,
-            round(float(np.degrees(picture.object_angle))),
-            picture.stop + 1,
-            _degrees(picture.angle),
-        ),
-        *(picture.ball + 1, picture.mirror),
-        *(_degrees(picture.polar_error), _degrees(picture.azimuth_error), _degrees(picture.error)),
-    )
-    return dict(zip(PICTURE_COLUMNS, values, strict=True))
 
 
 def _stop_row(layout: PrototypeLayout, stop: int) -> Row:

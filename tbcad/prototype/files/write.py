@@ -10,12 +10,10 @@ from tbcad.formats.step_assembly import write_assembly
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.balls.alternatives import ball_alternatives
-from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
 from tbcad.prototype.files.part_files import part_record, write_part
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.stage.layout import led_poses
-from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Progress
 
@@ -60,7 +58,9 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
-        "alternatives": _alternatives(layout, design.spec),
+        "alternatives": ball_alternatives(
+            design.spec, layout.half, layout.groups, layout.balls.catalogue
+        ),
         "seats": _seats(built),
         "parts": [part_record(part) for part in built.printed],
         "leds": [
@@ -87,23 +87,6 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
     }
 
 
-def _alternatives(layout: PrototypeLayout, spec: Spec) -> list[dict[str, Any]]:
-    """What each way to choose balls from the stock costs; the chosen one is among them."""
-    alternatives = ball_alternatives(spec, layout.half, layout.groups, layout.balls.catalogue)
-    return [
-        {
-            "name": alternative.name,
-            "pixels": alternative.pixels,
-            "pixels_kept_share": alternative.kept_share,
-            "coverage_mm": alternative.min_coverage,
-            "mirrors_below_target": alternative.below_target,
-            "balls_mass_g": alternative.mass_g,
-            "caps": alternative.caps,
-        }
-        for alternative in alternatives
-    ]
-
-
 def _swing(built: PrototypeModel, motion: MotionSpec) -> list[float]:
     """Base angles that the program drives between: it starts below the first stop."""
     todo = gcode.stop_sequence(built.layout, motion)
@@ -128,11 +111,16 @@ def _seats(built: PrototypeModel) -> list[dict[str, Any]]:
 
 def _write_tables(built: PrototypeModel, design: MirrorDesign, folder: Path) -> None:
     layout, motion = built.layout, design.spec.prototype.motion
-    pictures = plan_csv.picture_rows(planned_pictures(layout))
-    bill = bom_csv.bom_rows(layout, built.drive, _needed(built, design), built.parts)
+    printed = (
+        bom_csv.PrintedItem(part.name, part.what, part.solid.volume)
+        for part in built.printed
+        if part.role != "cap"
+    )
+    density = design.spec.printer.density_g_cm3
+    bill = bom_csv.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts)
     for name, columns, rows in (
         (BALLS_FILE, balls_csv.COLUMNS, balls_csv.ball_rows(layout)),
-        ("rotation_plan.csv", plan_csv.PICTURE_COLUMNS, pictures),
+        ("rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan_csv.picture_rows(layout)),
         ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(layout)),
         ("plate_holes.csv", plan_csv.HOLE_COLUMNS, plan_csv.hole_rows(built.frame)),
         ("bom.csv", bom_csv.COLUMNS, bill),
@@ -140,17 +128,3 @@ def _write_tables(built: PrototypeModel, design: MirrorDesign, folder: Path) -> 
         write_table(folder / name, columns, rows)
     program = gcode.gcode_program(layout, built.drive, motion)
     gcode.write_program(folder / "rotation_plan.nc", program)
-
-
-def _needed(built: PrototypeModel, design: MirrorDesign) -> bom_csv.PartsNeeded:
-    return bom_csv.PartsNeeded(
-        purchased=built.purchased,
-        leds=len(built.stage.leds),
-        led=built.stage.led.name,
-        printed=tuple(
-            bom_csv.PrintedItem(part.name, part.what, part.solid.volume, part.quantity)
-            for part in built.printed
-            if part.role != "cap"
-        ),
-        print_density=design.spec.printer.density_g_cm3,
-    )

@@ -69,12 +69,6 @@ def drilled_holes(places: Sequence[Floats], depth: Floats, diameter: float) -> l
     ]
 
 
-def direction(vector: Floats) -> tuple[float, float, float]:
-    """A direction (3,) as a component takes it."""
-    x, y, z = vector.tolist()
-    return x, y, z
-
-
 def choose_part(
     parts: Parts, kind: str, key: str, hint: str, order: str = "length_mm", **sizes: float
 ) -> PurchasedPart:

@@ -12,7 +12,6 @@ from tbcad.prototype.frame.brackets import (
     OVERLAP_MM,
     THROUGH_MM,
     Bracket,
-    direction,
     drilled_holes,
     level_prism,
     rectangle,
@@ -100,7 +99,7 @@ def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Brack
         "foot of the uprights",
         tuple(added),
         tuple(removed),
-        (direction(-axes[2]), direction(-side * axes[0])),
+        (-axes[2], -side * axes[0]),
     )
     ends = (start, start + side * FOOT_DEPTH_MM)
     foot = np.array([[x, y] for x in ends for y in (-half, half)])
@@ -140,7 +139,7 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
         "clamp of the stage's post",
         added,
         removed,
-        (direction(-up), direction(up)),
+        (-up, up),
     )
     return Bracket(component, holes, np.array([[-half, -half], [end, half]]))
 
@@ -207,7 +206,7 @@ def camera_bracket(spec: PrototypeSpec, axes: Floats, camera: Camera) -> Bracket
         "bracket of the camera",
         tuple(added),
         (*_camera_slot(frame, axes, camera, out, radius), *_foot_slots(frame, axes, holes)),
-        tuple(direction(down) for down in (-out @ axes, -axes[2], out @ axes, axes[1])),
+        (-out @ axes, -axes[2], out @ axes, axes[1]),
     )
     return Bracket(component, holes, np.array([[start, -half], [end, half]]))
 

@@ -18,7 +18,6 @@ from tbcad.prototype.frame.brackets import (
     OVERLAP_MM,
     THROUGH_MM,
     choose_part,
-    direction,
     drilled_holes,
     level_prism,
     rectangle,
@@ -110,7 +109,7 @@ def bearing_head(
         "head with bearings and motor",
         tuple(added),
         tuple(removed),
-        tuple(direction(down) for down in (w, -w, axes[0], -axes[0], axes[1])),
+        (w, -w, axes[0], -axes[0], axes[1]),
     )
     return BearingHead(
         component=component,

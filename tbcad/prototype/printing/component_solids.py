@@ -53,8 +53,8 @@ def placed_component(component: Component, printer: PrinterSpec) -> PlacedSolid:
         SpecError: when it does not fit.
         InvalidSolidError: when the kernel fails.
     """
-    downs = [np.array(down) for down in component.downs]
-    return placed_on_bed(component.name, component_solid(component), downs, np.eye(3), printer)
+    solid = component_solid(component)
+    return placed_on_bed(component.name, solid, component.downs, np.eye(3), printer)
 
 
 def _outward(body: Prism) -> Floats:

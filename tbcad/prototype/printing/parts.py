@@ -28,14 +28,12 @@ class PrintedPart:
         role: what it belongs to.
         what: it is for.
         ball: of a cap, the number of its seat, from 0; -1 for all others.
-        quantity: how many are printed.
     """
 
     solid: PlacedSolid
     role: Role
     what: str
     ball: int = -1
-    quantity: int = 1
 
     @property
     def name(self) -> str:

@@ -39,8 +39,7 @@ POCKET = 0.75  # height of a pocket's wall: share of the LED's body below the ce
 THROUGH_MM = 1.0  # by which a removed body extends beyond the part
 ROOT_MM = 1.0  # by which studs reach into the plate
 SCREW_DIRECTION = np.array([0.0, -1.0, 0.0])
-UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
-LEVEL = (1.0, 0.0, 0.0)
+LEVEL, _, UP = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def crown_component(
     stud, root = _stud_radius(stage), sizes.plate - ROOT_MM
     added: list[Primitive] = [Revolved(_profile(sizes))]
     added += [
-        Cylinder(np.array([*place, root]), np.array(UP), stud, STUD_HEIGHT_MM + ROOT_MM)
+        Cylinder(np.array([*place, root]), UP, stud, STUD_HEIGHT_MM + ROOT_MM)
         for place in _stud_places(stage, leds, sizes.wire)
     ]
     removed: list[Primitive] = []
@@ -94,7 +93,7 @@ def crown_component(
         "crown of the object stage with pockets for LEDs",
         tuple(added),
         tuple(removed),
-        (UP, DOWN),
+        (UP, -UP),
     )
 
 
@@ -122,7 +121,7 @@ def _pocket(
     low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
     return [
         cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
-        cylinder_between(low, bottom + THROUGH_MM * np.array(UP), stage.wire_mm / 2),
+        cylinder_between(low, bottom + THROUGH_MM * UP, stage.wire_mm / 2),
         _groove(stage, dome, groove, plate + OPEN_MM),
     ]
 
@@ -169,12 +168,12 @@ def disc_component(stage: StageSpec, leds: Floats, sizes: CrownSizes) -> Compone
     return Component(
         "stage_disc",
         "disc under the object, turned by 180 degrees for the other half",
-        (Cylinder(np.array([0, 0, sizes.plate]), np.array(UP), stage.disc_mm / 2, DISC_MM),),
+        (Cylinder(np.array([0, 0, sizes.plate]), UP, stage.disc_mm / 2, DISC_MM),),
         tuple(
-            Cylinder(np.array([*place, low]), np.array(UP), radius, depth)
+            Cylinder(np.array([*place, low]), UP, radius, depth)
             for place in _stud_places(stage, leds, sizes.wire)
         ),
-        (DOWN,),
+        (-UP,),
     )
 
 
@@ -191,5 +190,5 @@ def post_component(sizes: CrownSizes, foot: float) -> Component:
             cylinder_between(bottom - beyond, top + beyond, sizes.post - sizes.wall),
             Cylinder(screw, SCREW_DIRECTION, SET_SCREW_MM / 2, sizes.post + THROUGH_MM),
         ),
-        (DOWN, UP, LEVEL),
+        (-UP, UP, LEVEL),
     )

@@ -132,7 +132,7 @@ def stage_layout(
 
 def led_poses(stage: StageLayout) -> list[tuple[str, Floats, Floats]]:
     """Name, centre of the dome (mm, (3,)) and unit direction (3,) of each LED."""
-    return [(f"led_{i}", centre, np.array(UP)) for i, centre in enumerate(stage.leds, 1)]
+    return [(f"led_{i}", centre, UP) for i, centre in enumerate(stage.leds, 1)]
 
 
 def _grazing_radius(prototype: PrototypeLayout, capture: float) -> float:

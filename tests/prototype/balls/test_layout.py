@@ -12,7 +12,7 @@ from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.alternatives import ball_alternatives
 from tbcad.prototype.balls.fit import ball_fit
-from tbcad.prototype.balls.layout import PrototypeLayout, planned_pictures, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
@@ -20,6 +20,7 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
+from tbcad.prototype.files.plan_csv import picture_rows
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
@@ -113,20 +114,20 @@ class TestBalls:
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)
         alternatives = {
-            c.name: c
+            c["name"]: c
             for c in ball_alternatives(
                 spec, prototype.half, prototype.groups, prototype.balls.catalogue
             )
         }
-        assert alternatives["cover, with caps"].kept_share == pytest.approx(
+        assert alternatives["cover, with caps"]["pixels_kept_share"] == pytest.approx(
             prototype.fit.kept_share
         )
-        assert alternatives["cover, with caps"].below_target == 0
+        assert alternatives["cover, with caps"]["mirrors_below_target"] == 0
         assert (
-            alternatives["cover, balls only"].kept_share
-            < alternatives["cover, with caps"].kept_share
+            alternatives["cover, balls only"]["pixels_kept_share"]
+            < alternatives["cover, with caps"]["pixels_kept_share"]
         )
-        assert alternatives["nearest, with caps"].below_target > 10
+        assert alternatives["nearest, with caps"]["mirrors_below_target"] > 10
 
 
 class TestPlaces:
@@ -236,11 +237,11 @@ class TestStops:
         """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
         b = paper_design.halves[1]
         assert b.u[prototype.twin] == pytest.approx(prototype.half.u * [-1, -1, 1], abs=1e-9)
-        shots = planned_pictures(prototype)
-        assert len(shots) == 2 * 847
-        assert {shot.mirror for shot in shots} == {*prototype.half.ids, *b.ids}
-        assert [shot.object_angle for shot in shots] == [0.0] * 847 + [np.pi] * 847
-        first = [shot.stop for shot in shots[:847]]
+        rows = picture_rows(prototype)
+        assert len(rows) == 2 * 847
+        assert {row["mirror"] for row in rows} == {*prototype.half.ids, *b.ids}
+        assert [row["object_turn_deg"] for row in rows] == [0] * 847 + [180] * 847
+        first = [int(str(row["stop"])) for row in rows[:847]]
         assert first == sorted(first)
 
 

@@ -180,7 +180,6 @@ class TestHub:
         assert norm(hub.holes) == pytest.approx(np.full(4, circle / 2))
         assert hub.hole == hole
         assert hub.disc > circle / 2 + hole / 2 + 2
-        assert hub.source
 
     def test_a_shaft_too_thick(self) -> None:
         with pytest.raises(SpecError, match=r"prototype.base.shaft_mm 9 or less"):

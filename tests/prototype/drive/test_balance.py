@@ -9,7 +9,6 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
     BaseBalance,
-    Counterweight,
     PointMasses,
     ball_masses,
     cap_volume,
@@ -101,25 +100,24 @@ class TestCentre:
         assert FRAME @ both.centre == pytest.approx([22.5, 100, 0])
 
 
-def placed(weight: Counterweight, along: float) -> PointMasses:
-    return at(along, weight.radius, weight.azimuth, weight.mass_g)
+def counterweight(balance: BaseBalance, along: float, radius: float) -> PointMasses:
+    return at(along, radius, balance.azimuth + np.pi, balance.moment / radius)
 
 
 class TestCounterweight:
     @given(azimuth=st.floats(-3, 3), radius=st.floats(10, 300), mass=st.floats(1, 5000))
     def test_nothing_is_left(self, azimuth: float, radius: float, mass: float) -> None:
         masses = at(30, 90, azimuth, mass)
-        weight = sum_masses(FRAME, masses).counterweight(radius)
+        weight = counterweight(sum_masses(FRAME, masses), -80, radius)
         assert weight.mass_g == pytest.approx(mass * 90 / radius)
-        balanced = sum_masses(FRAME, masses, placed(weight, -80))
+        balanced = sum_masses(FRAME, masses, weight)
         assert balanced.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
-        assert balanced.mass_g == pytest.approx(mass + weight.mass_g)
+        assert balanced.mass_g == pytest.approx(mass + weight.mass_g.sum())
 
     def test_of_a_prototype(self, small_prototype: PrototypeLayout) -> None:
         masses = ball_masses(small_prototype, 1.27)
         before = sum_masses(small_prototype.half.ellipsoid.frame(), masses)
-        weight = before.counterweight(100)
-        after = sum_masses(before.frame, masses, placed(weight, -70))
+        after = sum_masses(before.frame, masses, counterweight(before, -70, 100))
         assert before.torque_amplitude > 100
         assert after.torque_amplitude < 1e-9 * before.torque_amplitude
 

@@ -12,7 +12,6 @@ from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.bom_csv import (
     COLUMNS,
-    PartsNeeded,
     PrintedItem,
     bom_rows,
     drive_record,
@@ -25,13 +24,12 @@ from tests.csv_files import Rows, read_csv
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
-NEEDED = PartsNeeded(
-    purchased={
-        **{"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 1},
-        **{"MAGNET-4x3": 2, "MAGNET-8x3": 3},
-    },
-    printed=(PrintedItem("base", "carrier", 5e5), PrintedItem("foot", "below the plate", 1e3, 4)),
-)
+PURCHASED = {
+    **{"M3x10": 8, "INSERT-M3": 8, "608-2Z": 2, "DOWEL-4x20": 0, "LED-3": 5, "RELAY": 2},
+    **{"MAGNET-4x3": 2, "MAGNET-8x3": 3},
+}
+PRINTED = (PrintedItem("base", "carrier", 5e5), PrintedItem("foot", "below the plate", 1e3))
+NEEDED = PURCHASED, PRINTED, 1.27, PARTS
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +48,7 @@ def drive() -> Drive:
 @pytest.fixture(scope="module")
 def read(layout: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
-    write_table(path, COLUMNS, bom_rows(layout, drive, NEEDED, PARTS))
+    write_table(path, COLUMNS, bom_rows(layout, drive, *NEEDED))
     return read_csv(path)
 
 
@@ -72,10 +70,9 @@ def test_rows(read: Rows) -> None:
 
 def test_totals_are_the_sum_of_the_parts(layout: PrototypeLayout, drive: Drive, read: Rows) -> None:
     balls = layout.mass_g + 1.27e-3 * cap_volume(layout.balls).sum()
-    bought = sum(count * PARTS[name].mass_g for name, count in NEEDED.purchased.items())
+    bought = sum(count * PARTS[name].mass_g for name, count in PURCHASED.items())
     electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
-    printed = 1.27e-3 * (5e5 + 4e3)
-    expected = balls + bought + electronics + printed + 4 * PARTS["LED-3"].mass_g
+    expected = balls + bought + electronics + 1.27e-3 * (5e5 + 1e3)
     expected += sum(part.mass_g for part in drive.parts)
     assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)
 
@@ -95,7 +92,7 @@ def test_equal_balls_share_a_row(layout: PrototypeLayout, drive: Drive) -> None:
     stock = layout.balls.stock.copy()
     stock[:] = 10
     alike = replace(layout, balls=replace(layout.balls, stock=stock))
-    first, *others = bom_rows(alike, drive, PartsNeeded(), PARTS)
+    first, *others = bom_rows(alike, drive, {}, (), 1.27, PARTS)
     assert first["quantity"] == len(layout)
     assert not any(str(row["part"]).startswith("ball ") for row in others)
 
@@ -103,10 +100,10 @@ def test_equal_balls_share_a_row(layout: PrototypeLayout, drive: Drive) -> None:
 def test_counts_add_up(read: Rows) -> None:
     assert of(read, "M3x10")["quantity"] == "8"
     assert "ISO 4762" in of(read, "M3x10")["what"]
-    assert of(read, "LED-3")["quantity"] == "5"  # four on the stage, one asked for
+    assert of(read, "RELAY")["quantity"] == "3"  # one for the camera, two asked for
     assert of(read, "MAGNET-4x3")["quantity"] == "2"
     assert of(read, "MAGNET-8x3")["quantity"] == "3"
-    assert of(read, "foot")["quantity"] == "4"
+    assert of(read, "foot")["quantity"] == "1"
     assert not [row for row in read if row["part"] == "DOWEL-4x20"]
 
 
@@ -124,12 +121,12 @@ def test_drive_is_in_it(drive: Drive, read: Rows) -> None:
 
 def test_unknown_part(layout: PrototypeLayout, drive: Drive) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
-        bom_rows(layout, drive, PartsNeeded(purchased={"M3x11": 1}), PARTS)
+        bom_rows(layout, drive, {"M3x11": 1}, (), 1.27, PARTS)
 
 
 def test_same_bytes(layout: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        write_table(tmp_path / name, COLUMNS, bom_rows(layout, drive, NEEDED, load_parts()))
+        write_table(tmp_path / name, COLUMNS, bom_rows(layout, drive, *NEEDED))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
