@@ -1,9 +1,8 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
 import sys
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,14 +21,6 @@ BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
 VERIFY_STAGES, PIPED_WIDTH = 9, 160
 
 
-class RadiusRule(StrEnum):
-    """Rule for the radii of the mirrors."""
-
-    TRACED = "traced"
-    PAPER = "paper"
-    FLAT = "flat"
-
-
 @app.command()
 def build(
     design: Annotated[
@@ -45,7 +36,7 @@ def build(
     ] = None,
     out: OutReplaced = Path("exports"),
     radius_rule: Annotated[
-        RadiusRule | None,
+        Literal["traced", "paper", "flat"] | None,
         typer.Option(
             help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 "
             "and 2 of the paper; flat: planar mirrors."

@@ -1,8 +1,7 @@
 """Options that several commands share."""
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -35,32 +34,13 @@ Fov = Annotated[
         help="Horizontal angle of view, degrees; by default the capture sphere fills the picture."
     ),
 ]
-
-
-class Paint(StrEnum):
-    """Colours of the object."""
-
-    OWN = "own"
-    PATTERN = "pattern"
-    PLAIN = "plain"
-
-
 PaintOption = Annotated[
-    Paint,
+    Literal["own", "pattern", "plain"],
     typer.Option(
         help="own: colours or texture of the file, or a pattern where it has none; pattern: always "
         "the pattern; plain: grey."
     ),
 ]
-
-
-class Method(StrEnum):
-    """How the rays of a view get their colours."""
-
-    NEAREST = "nearest"
-    BLEND = "blend"
-
-
 ObjectFile = Annotated[
     Path | None,
     typer.Option(
@@ -71,21 +51,12 @@ ObjectFile = Annotated[
     ),
 ]
 MethodOption = Annotated[
-    Method,
+    Literal["nearest", "blend"],
     typer.Option(
         help="nearest: the colour of the nearest captured ray, as in the paper; blend: the mean "
         "of several virtual cameras that see the same point."
     ),
 ]
-
-
-class Surface(StrEnum):
-    """The surface on which a blend compares virtual cameras."""
-
-    PLANE = "plane"
-    OBJECT = "object"
-
-
 Scheduler = Annotated[
     str | None,
     typer.Option(

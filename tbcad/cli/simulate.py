@@ -1,7 +1,7 @@
 """Simulate what an export photographs: capture, views, refocusing."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,13 +15,10 @@ from tbcad.cli.options import (
     Force,
     Fov,
     Height,
-    Method,
     MethodOption,
     ObjectFile,
     OutReplaced,
-    Paint,
     PaintOption,
-    Surface,
     Width,
 )
 from tbcad.errors import InputError
@@ -46,7 +43,7 @@ def capture(
     fit: Annotated[
         bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
     ] = False,
-    paint: PaintOption = Paint.OWN,
+    paint: PaintOption = "own",
     samples: Annotated[
         int,
         typer.Option(
@@ -79,7 +76,7 @@ def capture(
     check_replaceable(out, force)
     with stages(3) as screen:
         taken = photograph(
-            folder, object_file, geometry, fit, paint.value, samples, screen.stage, screen.detail
+            folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
         )
         record = write_photographs(taken, out, force, screen.stage)
     for camera, counts in record["cameras"].items():
@@ -102,14 +99,14 @@ def view(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("view.png"),
-    method: MethodOption = Method.NEAREST,
+    method: MethodOption = "nearest",
     surface: Annotated[
-        Surface,
+        Literal["plane", "object"],
         typer.Option(
             help="Surface of the points that are compared by blend: the plane through the centre "
             "of the object, or the object itself."
         ),
-    ] = Surface.PLANE,
+    ] = "plane",
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
@@ -133,15 +130,15 @@ def view(
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
         scene = _scene(capture_folder)
         depth = None
-        if surface is Surface.OBJECT:
+        if surface == "object":
             if scene is None:
                 raise InputError(f"{capture_folder} has no object: use --surface plane")
             depth = depth_along_rays(scene)
         screen.stage("view")
-        picture = synthesise(MirrorTiles(source), at, method.value, depth).image
+        picture = synthesise(MirrorTiles(source), at, method, depth).image
         screen.stage("truth")
         truth = None if scene is None else to_bytes(pinhole_picture(scene, at))
-    _show(out, picture, truth, (method.value, "ray-traced"))
+    _show(out, picture, truth, (method, "ray-traced"))
     return 0
 
 

@@ -10,11 +10,9 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.options import (
     Distance,
-    Method,
     MethodOption,
     ObjectFile,
     Out,
-    Paint,
     PaintOption,
     Scheduler,
     Settings,
@@ -141,9 +139,9 @@ def ssim_command(
     settings: Settings = None,
     out: Out = STUDIES,
     object_file: ObjectFile = None,
-    paint: PaintOption = Paint.OWN,
+    paint: PaintOption = "own",
     sensors: Sensors = None,
-    method: MethodOption = Method.NEAREST,
+    method: MethodOption = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
 ) -> int:
@@ -162,10 +160,10 @@ def ssim_command(
         out,
         lambda spec, progress: ssim(
             spec,
-            load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint.value),
+            load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint),
             given or default_sensors(spec),
             places,
-            method.value,
+            method,
             progress,
         ),
     )
@@ -176,8 +174,8 @@ def prototype_command(
     folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
     out: Out = STUDIES,
     object_file: ObjectFile = None,
-    paint: PaintOption = Paint.OWN,
-    method: MethodOption = Method.NEAREST,
+    paint: PaintOption = "own",
+    method: MethodOption = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
     samples: Annotated[
@@ -192,11 +190,11 @@ def prototype_command(
 
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
-    subject = load_or_built_in(object_file, export.capture_mm, paint=paint.value)
+    subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
     return _write(
         out,
         lambda progress: prototype_vs_shell(
-            export, subject, places, method.value, samples, progress
+            export, subject, places, method, samples, progress
         ),
     )
 
