@@ -193,9 +193,7 @@ def prototype_command(
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
     return _write(
         out,
-        lambda progress: prototype_vs_shell(
-            export, subject, places, method, samples, progress
-        ),
+        lambda progress: prototype_vs_shell(export, subject, places, method, samples, progress),
     )
 
 

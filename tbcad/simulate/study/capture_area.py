@@ -4,7 +4,6 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.paper import claims
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.simulate.study.plots import Panel, Series
@@ -66,11 +65,11 @@ def _record(spec: Spec, n: int) -> Record:
         rule: try_design(spec, optics={"n": n}, mirrors={"radius_rule": rule}) for rule in RULES
     }
     half = next((attempt.half for attempt in attempts.values() if attempt.half), None)
-    record: Record = {
-        "n": n,
-        "virtual_cameras": virtual_cameras(half) if half else None,
-        "flat_closed_form_mm": _closed_form(half) if half else None,
-    }
+    record: Record = {"n": n, "virtual_cameras": None, "flat_closed_form_mm": None}
+    if half:
+        smallest = float(np.sin(half.theta0.min()))
+        record["virtual_cameras"] = virtual_cameras(half)
+        record["flat_closed_form_mm"] = 2 * half.ellipsoid.camera_distance * smallest
     for rule, attempt in attempts.items():
         coverage = _coverage(attempt, spec.optics.capture_diameter_mm)
         record |= {f"{rule}_{name}": cell for name, cell in coverage.items()}
@@ -78,10 +77,6 @@ def _record(spec: Spec, n: int) -> Record:
     record["paper_claim_flat_mm"] = flat.value if flat else None
     record["paper_claim_convex_mm"] = convex.value if n == claims()["design_n"].value else None
     return record
-
-
-def _closed_form(half: MirrorArray) -> float:
-    return float(2 * half.ellipsoid.camera_distance * np.sin(half.theta0.min()))
 
 
 def _coverage(attempt: DesignAttempt, capture_mm: float) -> dict[str, Cell]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.lens import (
     DepthRange,
     Lens,
@@ -97,15 +96,6 @@ class LensOptions:
         return self
 
 
-@dataclass(frozen=True)
-class _Mirrors:
-    """The mirrors by one radius rule, and the images of the object in them."""
-
-    rule: str
-    half: MirrorArray
-    images: VirtualImages
-
-
 def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
     camera, wide_open = spec.camera, options.checked().wide_open
@@ -124,33 +114,33 @@ def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda
     return Study("depth-of-field", figures, tables, panels)
 
 
-def _by_rule(spec: Spec, progress: Progress) -> tuple[list[_Mirrors], list[str]]:
+def _by_rule(spec: Spec, progress: Progress) -> tuple[dict[str, VirtualImages], list[str]]:
     """Mirrors by each radius rule that makes them, and why the others do not."""
-    by_rule, refusals = [], []
+    by_rule, refusals = {}, []
     for rule in RULES:
         progress(f"radii by rule {rule}")
         attempt = try_design(spec, mirrors={"radius_rule": rule})
         if attempt.half is None:
             refusals.append(f"No figures of {rule} radii: {attempt.reason}")
-            continue
-        images = virtual_images(attempt.half, spec.optics.capture_diameter_mm / 2)
-        by_rule.append(_Mirrors(rule, attempt.half, images))
+        else:
+            radius = spec.optics.capture_diameter_mm / 2
+            by_rule[rule] = virtual_images(attempt.half, radius)
     return by_rule, refusals
 
 
-def _mirror_table(by_rule: list[_Mirrors], notes: tuple[str, ...]) -> Table:
-    numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule)])
+def _mirror_table(by_rule: dict[str, VirtualImages], notes: tuple[str, ...]) -> Table:
+    numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule.values())])
     columns = {
-        "id": [name for mirrors in by_rule for name in mirrors.half.ids],
-        "radii": [mirrors.rule for mirrors in by_rule for _ in mirrors.half.ids],
+        "id": [name for images in by_rule.values() for name in images.half.ids],
+        "radii": [rule for rule, images in by_rule.items() for _ in images.half.ids],
         **dict(zip(NUMBERS, numbers.T, strict=True)),
     }
     return Table.of_columns("depth-of-field", columns, notes)
 
 
-def _numbers(mirrors: _Mirrors) -> Floats:
+def _numbers(images: VirtualImages) -> Floats:
     """The columns NUMBERS of some mirrors, (m, 16)."""
-    half, images = mirrors.half, mirrors.images
+    half = images.half
     return np.column_stack(
         [
             np.degrees(half.polar),
@@ -167,11 +157,11 @@ def _range(values: Floats) -> DepthRange:
     return DepthRange(float(values.min()), float(values.max()))
 
 
-def _ranges(by_rule: list[_Mirrors]) -> dict[str, DepthRange]:
+def _ranges(by_rule: dict[str, VirtualImages]) -> dict[str, DepthRange]:
     """Ranges of depth that are to be sharp, by name."""
     return {
-        **{f"{m.rule} radii, along the axis": _range(m.images.depth) for m in by_rule},
-        **{f"{m.rule} radii, distances": _range(m.images.distance) for m in by_rule},
+        **{f"{rule} radii, along the axis": _range(one.depth) for rule, one in by_rule.items()},
+        **{f"{rule} radii, distances": _range(one.distance) for rule, one in by_rule.items()},
         PAPER_RANGE: DepthRange(claimed("depth_near"), claimed("depth_far")),
     }
 
@@ -185,28 +175,28 @@ def _stop_records(ranges: dict[str, DepthRange], lens: Lens, blur_px: float) -> 
             "focus_mm": over.focus,
             "focal_mm": focal_length(lens, over),
             "stop": kind,
-            "pupil_mm": stop.pupil,
-            "f_number": stop.f_number,
-            "blur_px": stop.blur_px,
-            "airy_px": stop.airy_px,
-            "total_px": stop.total_px,
-            "light": stop.light,
-            "stops_lost": stop.stops_lost,
+            **stop,
         }
         for name, over in ranges.items()
         for kind, stop in aperture_stops(lens, over, blur_px).items()
     ]
 
 
-def _image_figures(by_rule: list[_Mirrors]) -> list[Figure]:
-    near, far = claims()["depth_near"], claims()["depth_far"]
+def _image_figures(by_rule: dict[str, VirtualImages]) -> list[Figure]:
+    ends = (
+        ("nearest", np.min, claims()["depth_near"]),
+        ("farthest", np.max, claims()["depth_far"]),
+    )
     return [
-        Figure(f"camera to {which} image, {m.rule} radii", "mm", end, claim.value, claim.where)
-        for m in by_rule
-        for which, end, claim in (
-            ("nearest", float(m.images.distance.min()), near),
-            ("farthest", float(m.images.distance.max()), far),
+        Figure(
+            f"camera to {which} image, {rule} radii",
+            "mm",
+            float(end(images.distance)),
+            claim.value,
+            claim.where,
         )
+        for rule, images in by_rule.items()
+        for which, end, claim in ends
     ]
 
 
@@ -220,14 +210,13 @@ def _stop_figures(stops: list[Record]) -> list[Figure]:
     ]
 
 
-def _image_panel(by_rule: list[_Mirrors]) -> Panel:
+def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
     series = [
-        Series(label, np.degrees(m.half.polar), m.images.distance[:, place, fan], mark)
+        Series(label, np.degrees(one.half.polar), one.distance[:, place, fan], mark)
         for rule, place, fan, label, mark in IMAGES
-        for m in by_rule
-        if m.rule == rule
+        if (one := by_rule.get(rule))
     ]
-    polar = np.concatenate([m.half.polar for m in by_rule] or [np.zeros(1)])
+    polar = np.concatenate([one.half.polar for one in by_rule.values()] or [np.zeros(1)])
     ends = np.degrees([polar.min(), polar.max()])
     for key, style in (("depth_near", "r--"), ("depth_far", "r-.")):
         paper = claimed(key)
@@ -242,7 +231,7 @@ def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
     shown = [(name, over) for name, over in ranges.items() if name in RANGES_SHOWN]
     for k, (name, over) in enumerate(shown):
         stops = [aperture_stop(lens, over, focal_length(lens, over) / f) for f in f_numbers]
-        blur, total = np.array([(stop.blur_px, stop.total_px) for stop in stops]).T
+        blur, total = np.array([(stop["blur_px"], stop["total_px"]) for stop in stops]).T
         series += [
             Series(f"blur circle, {name}", f_numbers, blur, f"C{k}--"),
             Series(f"with diffraction, {name}", f_numbers, total, f"C{k}-"),

@@ -41,35 +41,6 @@ class DepthRange:
         return 1 / self.near - 1 / self.far
 
 
-@dataclass(frozen=True)
-class ApertureStop:
-    """What a stop does.
-
-    Attributes:
-        pupil: diameter, mm.
-        f_number: focal length / pupil.
-        blur_px: diameter of the blur circle at both ends of the range.
-        airy_px: diameter of the Airy disc on the lens's axis.
-        light: relative to the lens wide open.
-    """
-
-    pupil: float
-    f_number: float
-    blur_px: float
-    airy_px: float
-    light: float
-
-    @property
-    def total_px(self) -> float:
-        """Blur circle and Airy disc together, as the root of the sum of their squares."""
-        return math.hypot(self.blur_px, self.airy_px)
-
-    @property
-    def stops_lost(self) -> float:
-        """Light lost in photographic stops (factors of two)."""
-        return math.log2(1 / self.light)
-
-
 def lens_for(
     hfov: float, width_px: int, pixel: float, wide_open: float, wavelength: float = 550e-6
 ) -> Lens:
@@ -103,18 +74,29 @@ def _open(lens: Lens, over: DepthRange) -> float:
     return focal_length(lens, over) / lens.wide_open
 
 
-def aperture_stop(lens: Lens, over: DepthRange, pupil: float) -> ApertureStop:
-    """What a pupil (mm) does to a range."""
-    return ApertureStop(
-        pupil=pupil,
-        f_number=focal_length(lens, over) / pupil,
-        blur_px=pupil * lens.image * over.spread / 2 / lens.pixel,
-        airy_px=AIRY_FACTOR * lens.wavelength * lens.image / pupil / lens.pixel,
-        light=(pupil / _open(lens, over)) ** 2,
-    )
+def aperture_stop(lens: Lens, over: DepthRange, pupil: float) -> dict[str, float]:
+    """What a pupil (mm) does to a range.
+
+    Returns:
+        pupil_mm and f_number; diameters of the blur circle at both ends of the range and of the
+        Airy disc on the lens's axis, and the root of the sum of their squares, in pixels; light
+        relative to the lens wide open, and light lost in photographic stops (factors of two).
+    """
+    blur = pupil * lens.image * over.spread / 2 / lens.pixel
+    airy = AIRY_FACTOR * lens.wavelength * lens.image / pupil / lens.pixel
+    light = (pupil / _open(lens, over)) ** 2
+    return {
+        "pupil_mm": pupil,
+        "f_number": focal_length(lens, over) / pupil,
+        "blur_px": blur,
+        "airy_px": airy,
+        "total_px": math.hypot(blur, airy),
+        "light": light,
+        "stops_lost": math.log2(1 / light),
+    }
 
 
-def aperture_stops(lens: Lens, over: DepthRange, blur_px: float) -> dict[str, ApertureStop]:
+def aperture_stops(lens: Lens, over: DepthRange, blur_px: float) -> dict[str, dict[str, float]]:
     """The three stops that matter, by name."""
     pupils = {
         "wide open": _open(lens, over),

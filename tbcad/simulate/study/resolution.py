@@ -63,19 +63,6 @@ class Ratio:
         return f"{self.cameras:g}:{self.pixels:g}"
 
 
-@dataclass(frozen=True)
-class Balance:
-    """Where virtual cameras and pixels are in a ratio.
-
-    Attributes:
-        n: on a continuous scale; NaN when it lies outside the sweep.
-        nearest: place in the sweep of the n whose own ratio comes nearest.
-    """
-
-    n: float
-    nearest: int
-
-
 def parse_ratio(text: str) -> Ratio:
     """A ratio from text like 1:4.
 
@@ -100,8 +87,8 @@ def default_sensors(spec: Spec) -> tuple[Sensor, ...]:
     return tuple(one.times(k) for k in MULTIPLES)
 
 
-def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> Balance:
-    """Where cameras : pixels is the ratio.
+def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> tuple[float, int]:
+    """Where cameras : pixels is the ratio, and where in the sweep it comes nearest to that.
 
     Args:
         n: subdivisions in ascending order, (k,).
@@ -109,20 +96,24 @@ def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> Balance
         pixels: average pixels of one, (k,).
         ratio: of cameras to pixels that is asked for.
 
+    Returns:
+        n on a continuous scale, NaN when it lies outside the sweep; and the place in the sweep of
+        the n whose own ratio comes nearest.
+
     Cameras grow and pixels shrink with n^2, so the logarithm of their ratio is nearly a straight
     line over log n: linear between two neighbours it errs by less than 0.01 in n.
     """
     known = np.flatnonzero(np.isfinite(cameras) & (pixels > 0))
     if len(known) == 0:
-        return Balance(np.nan, 0)
+        return np.nan, 0
     surplus = np.log(cameras[known] / pixels[known]) - np.log(ratio.cameras / ratio.pixels)
     nearest = int(known[np.argmin(np.abs(surplus))])
     after = np.flatnonzero((surplus[:-1] <= 0) & (surplus[1:] >= 0)) + 1
     if len(after) == 0:
-        return Balance(np.nan, nearest)
+        return np.nan, nearest
     pair = slice(after[0] - 1, after[0] + 1)
     where = np.interp(0, surplus[pair], np.log(n[known][pair]))
-    return Balance(float(np.exp(where)), nearest)
+    return float(np.exp(where)), nearest
 
 
 def resolution(
@@ -182,25 +173,20 @@ def _of_sensor(table: Table, sensor: Sensor) -> Table:
 def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
     counted = _of_sensor(counts, sensor)
     cameras, pixels = counted.numbers("virtual_cameras"), counted.numbers(KINDS[kind])
-    balanced = balance(counted.numbers("n"), cameras, pixels, ratio)
-    inside = not np.isnan(balanced.n)
-    nearest = counted.records()[balanced.nearest]
+    n, place = balance(counted.numbers("n"), cameras, pixels, ratio)
+    inside, nearest = not np.isnan(n), counted.records()[place]
+    known = str(sensor) == "2080x1552" and ratio.cameras == ratio.pixels
     return {
         **asdict(sensor),
         "ratio": str(ratio),
         "pixels_counted": kind,
-        "balanced_n": balanced.n if inside else None,
+        "balanced_n": n if inside else None,
         "nearest_n": nearest["n"] if inside else None,
         "virtual_cameras": nearest["virtual_cameras"] if inside else None,
         "average_px": nearest[KINDS[kind]] if inside else None,
-        "paper_n": _paper_n(sensor, ratio),
+        "paper_n": int(claimed("design_n")) if known else None,
         "reason": "" if inside else "outside the sweep: change --from or --to",
     }
-
-
-def _paper_n(sensor: Sensor, ratio: Ratio) -> int | None:
-    known = str(sensor) == "2080x1552" and ratio.cameras == ratio.pixels
-    return int(claimed("design_n")) if known else None
 
 
 def _definition_figures(defined: Table) -> list[Figure]:

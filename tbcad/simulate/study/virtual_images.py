@@ -19,6 +19,7 @@ class VirtualImages:
     A principal ray runs from the camera over the apex to the centre of the capture sphere.
 
     Attributes:
+        half: the camera and its mirrors.
         to_mirror: from camera to apex, mm, (m,).
         incidence: at the apex, radians, (m,).
         distance: from camera to the image of the sphere's nearest point, centre and farthest
@@ -26,6 +27,7 @@ class VirtualImages:
         depth: the same along the camera's optical axis, mm, (m, 3, 2).
     """
 
+    half: MirrorArray
     to_mirror: Floats
     incidence: Floats
     distance: Floats
@@ -63,4 +65,4 @@ def virtual_images(half: MirrorArray, radius: float) -> VirtualImages:
     image = image_distances(mirrors.curvature[:, None], incidence[:, None], objects)
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
     along = ray @ half.camera.forward
-    return VirtualImages(to_mirror, incidence, distance, distance * along[:, None, None])
+    return VirtualImages(half, to_mirror, incidence, distance, distance * along[:, None, None])

@@ -103,22 +103,22 @@ def test_table_1(paper_half: MirrorArray) -> None:
 def test_balance_of_power_laws_is_exact(ratio: Ratio) -> None:
     """5 n^2 cameras with 500,000 / n^2 pixels balance where n^4 = 100,000 ratio."""
     n = np.arange(5.0, 40.0)
-    found = balance(n, 5 * n**2, 5e5 / n**2, ratio)
-    assert found.n == pytest.approx((1e5 * ratio.cameras / ratio.pixels) ** 0.25, rel=1e-12)
-    assert abs(n[found.nearest] - found.n) < 0.51
+    balanced, nearest = balance(n, 5 * n**2, 5e5 / n**2, ratio)
+    assert balanced == pytest.approx((1e5 * ratio.cameras / ratio.pixels) ** 0.25, rel=1e-12)
+    assert abs(n[nearest] - balanced) < 0.51
 
 
 def test_balance_outside_the_sweep_is_none() -> None:
     n = np.arange(20.0, 25.0)
-    assert np.isnan(balance(n, 5 * n**2, 5e5 / n**2, Ratio(1, 1)).n)
-    assert np.isnan(balance(n, n * np.nan, n * np.nan, Ratio(1, 1)).n)
+    assert np.isnan(balance(n, 5 * n**2, 5e5 / n**2, Ratio(1, 1))[0])
+    assert np.isnan(balance(n, n * np.nan, n * np.nan, Ratio(1, 1))[0])
 
 
 def test_balance_passes_over_designs_that_were_refused() -> None:
     n = np.arange(15.0, 21.0)
     cameras, pixels = 5 * n**2, 5e5 / n**2
     cameras[2], pixels[2] = np.nan, np.nan
-    assert balance(n, cameras, pixels, Ratio(1, 1)).n == pytest.approx(1e5**0.25, rel=1e-12)
+    assert balance(n, cameras, pixels, Ratio(1, 1))[0] == pytest.approx(1e5**0.25, rel=1e-12)
 
 
 def test_sensors_and_ratios_from_text() -> None:
