@@ -1,7 +1,5 @@
 """Effect of a manufacturing process on a design: yield, sensitivity, and the margin needed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

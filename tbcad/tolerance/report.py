@@ -1,7 +1,5 @@
 """An analysis as a summary in words, tables, plots and JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

@@ -13,8 +13,6 @@ and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64, and boxes
 columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixels.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -67,10 +65,6 @@ class Frame:
         """All arrays of a part of the picture."""
         return {name: np.asarray(plane[rows, columns]) for name, plane in self.planes.items()}
 
-    def in_memory(self) -> Frame:
-        """The same with all arrays in memory."""
-        return replace(self, planes=self.read(slice(None)))
-
     def image(self) -> NDArray[np.uint8]:
         """The picture, (h, w, 3)."""
         return np.asarray(self.planes["colour"][:])
@@ -92,7 +86,7 @@ class LightField:
 
     @staticmethod
     @contextmanager
-    def open(path: Path) -> Iterator[LightField]:
+    def open(path: Path) -> Iterator["LightField"]:
         """Open a file, or the file in a folder that `tbcad capture` wrote, for reading.
 
         Raises:
@@ -103,14 +97,17 @@ class LightField:
             yield _read(file, store)
 
     @staticmethod
-    def read(path: Path) -> LightField:
+    def read(path: Path) -> "LightField":
         """Read a whole file, or the file in a folder that `tbcad capture` wrote, into memory.
 
         Raises:
             InputError: as `open`.
         """
         with LightField.open(path) as stored:
-            frames = {name: frame.in_memory() for name, frame in stored.frames.items()}
+            frames = {
+                name: replace(frame, planes=frame.read(slice(None)))
+                for name, frame in stored.frames.items()
+            }
             return replace(stored, frames=frames)
 
     def __len__(self) -> int:

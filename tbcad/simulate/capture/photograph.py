@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, in_batches
-from tbcad.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
-from tbcad.types import Bytes, Progress
-
-Colours = NDArray[np.float32]
+from tbcad.types import Bytes, Colours, Progress
 
 Tracer = Callable[[range, Shift], ReflectedRays]
 
@@ -96,11 +94,7 @@ def _hidden(
 ) -> ReflectedRays:
     """Paint the object where the camera sees it directly, and remove the rays there."""
     direction = unit_directions(view, rows, shift).reshape(-1, 3)
-    direct = cast_rays(scene, np.broadcast_to(view.pinhole, direction.shape), direction)
-    hit = np.flatnonzero(np.isfinite(direct.depth))
-    to_mirror = norm(rays.origin.reshape(-1, 3)[hit] - view.pinhole)
-    front = hit[(rays.mirror.ravel()[hit] == 0) | (direct.depth[hit] < to_mirror)]
-    colour.reshape(-1, 3)[front] = direct.colour[front]
-    removed = np.zeros(rays.mirror.shape, dtype=bool)
-    removed.ravel()[front] = True
-    return rays.without(removed)
+    distance = np.where(rays.mirror == 0, np.inf, norm(rays.origin - view.pinhole))
+    front, direct = object_in_front(scene, view.pinhole, direction, distance.ravel())
+    colour.reshape(-1, 3)[front] = direct[front]
+    return rays.without(front.reshape(rays.mirror.shape))

@@ -1,26 +1,27 @@
-"""What the prototype's camera sees along given directions: balls, and the object in them."""
+"""What the prototype's camera sees: balls, and the object in them, but no printed part.
 
-from __future__ import annotations
+Along given directions, in the whole photograph of a stop, or in the pixels that are interpolated.
+"""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.optics.reflection import reflect
-from tbcad.simulate.parallel import compiled
+from tbcad.simulate.capture.photograph import row_bands, subpixel_shifts, to_bytes
+from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.prototype.run import PrototypeRun
-from tbcad.simulate.scene.ray_casting import Scene, cast_rays
-from tbcad.types import Bools, Floats, Ints
-
-Colours = NDArray[np.float32]
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
+from tbcad.types import Bytes, Colours, Floats, Ints
 
 # Where a ball's front ends its body begins; for a bought ball both are the same sphere.
 SAME_MM = 1e-9
 # What lies beyond the outermost pixels' centres by no more than rounding is on them.
 EDGE_PX = 1e-6
+CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
 @dataclass(frozen=True)
@@ -60,18 +61,10 @@ def reflected_colours(scene: Scene, hits: BallHits) -> Colours:
     return colour
 
 
-def object_in_front(
-    scene: Scene, camera: Camera, direction: Floats, distance: Floats
-) -> tuple[Bools, Colours]:
-    """Where (n,) the object is nearer than a distance (n,), mm, and its colours there (n, 3)."""
-    direct = cast_rays(scene, np.broadcast_to(camera.pinhole, direction.shape), direction)
-    return np.isfinite(direct.depth) & (direct.depth < distance), direct.colour
-
-
 def camera_colours(run: PrototypeRun, scene: Scene, direction: Floats, stop: Ints) -> Colours:
     """What the camera records along unit directions (n, 3) at stops (n,), 0 to 255."""
     hits = trace_balls(run, direction, stop)
-    front, direct = object_in_front(scene, run.camera, direction, hits.distance)
+    front, direct = object_in_front(scene, run.camera.pinhole, direction, hits.distance)
     return np.where(front[:, None], direct, reflected_colours(scene, hits))
 
 
@@ -90,6 +83,50 @@ def image_points(camera: Camera, direction: Floats) -> Floats:
     outside = (pixels < -EDGE_PX) | (pixels > last + EDGE_PX)
     pixels[outside.any(axis=1)] = np.nan
     return np.asarray(np.clip(pixels, 0, last))
+
+
+def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: int = 1) -> Bytes:
+    """The whole photograph of a stop, (h, w, 3).
+
+    Args:
+        run: of camera a's mirrors, or of camera b's with the object turned.
+        scene: the object.
+        stop: number of the stop, from 0.
+        samples: a pixel is the mean of samples x samples rays.
+    """
+    height, width = run.camera.height_px, run.camera.width_px
+    bands = [np.arange(rows.start * width, rows.stop * width) for rows in row_bands(height)]
+    colours = in_threads(partial(_pixels, run, scene, stop, samples), bands)
+    return np.concatenate(colours).reshape(height, width, 3)
+
+
+def resampled_photograph(
+    run: PrototypeRun, scene: Scene, stop: int, samples: int, places: Floats
+) -> Bytes:
+    """The photograph of a stop at columns and rows (n, 2) between its pixels' centres, (n, 3).
+
+    Bilinear between the four nearest pixels, which are whole numbers as in a file.
+    """
+    corner = np.floor(places).astype(np.int64)
+    x, y = (places - corner).T
+    weight = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
+    # Beyond the last column and row a corner has no weight.
+    near = corner[:, None] + CORNERS
+    pixel = near[..., 0] + near[..., 1] * run.camera.width_px
+    traced, which = np.unique(pixel, return_inverse=True)
+    corners = _pixels(run, scene, stop, samples, traced)[which.reshape(len(places), 4)]
+    return to_bytes(np.einsum("nk,nkc->nc", weight, corners))
+
+
+def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: int, pixels: Ints) -> Bytes:
+    """Pixels (n,) of a photograph, counted row by row, (n, 3)."""
+    row, column = np.divmod(pixels, run.camera.width_px)
+    centres = np.column_stack([column, row]).astype(np.float64)
+    stops = np.full(len(pixels), stop)
+    total = np.zeros((len(pixels), 3), dtype=np.float32)
+    for shift in subpixel_shifts(samples):
+        total += camera_colours(run, scene, pixel_rays(run.camera, centres + shift), stops)
+    return to_bytes(total / np.float32(samples**2))
 
 
 @compiled

@@ -5,8 +5,6 @@ is rotated along with its ball (tbcad.optics.windows); what the photograph of th
 shows there is its colour. Its ray comes from the record: ball and base are where the plan has them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,19 +27,17 @@ from tbcad.simulate.parallel import in_batches, in_threads
 from tbcad.simulate.prototype.ball_rays import (
     BallHits,
     image_points,
-    object_in_front,
     pixel_rays,
     reflected_colours,
+    resampled_photograph,
     trace_balls,
 )
 from tbcad.simulate.prototype.run import PrototypeRun
-from tbcad.simulate.prototype.stop_photograph import resampled_photograph
-from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.ray_casting import Scene, object_in_front
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import MARGIN_PX
-from tbcad.types import Bools, Bytes, Floats, Ints, Progress
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints, Progress
 
-Colours = NDArray[np.float32]
 Resample = Literal["photograph", "exact"]
 
 NO_BALL = -1
@@ -221,5 +217,5 @@ def _merged_pixels(plan: MergePlan, rows: range, shift: Shift) -> MergedPixels:
     hits = trace_balls(run, direction, plan.stop[mirror])
     inside = np.isfinite(image_points(camera, direction)[:, 0])
     ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
-    front, direct = object_in_front(plan.scene, camera, direction, hits.distance)
+    front, direct = object_in_front(plan.scene, camera.pinhole, direction, hits.distance)
     return MergedPixels(mirror, replace(hits, ball=ball), front & inside, direct)

@@ -1,7 +1,5 @@
 """What an export says of its prototype: balls and plan of rotation, checked before use."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal

@@ -5,8 +5,6 @@ object the prototype is turned instead: its camera is then where the shell's cam
 ball in the place of one of camera b's mirrors. Both runs differ only in where the prototype is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What an export says of its cameras and mirrors: design.json and mirrors.csv, checked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

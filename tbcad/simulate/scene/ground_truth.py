@@ -1,7 +1,6 @@
 """What a real camera in the same place would photograph, ray-traced: the ground truth."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import subpixel_shifts
@@ -9,9 +8,7 @@ from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.refocus import Focus, lens_rays
-from tbcad.types import Floats, Progress
-
-Colours = NDArray[np.float32]
+from tbcad.types import Colours, Floats, Progress
 
 RAYS_PER_CHUNK = 1 << 15
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.scene.embree import embree_scene
 from tbcad.simulate.scene.object import SceneObject, pattern
 from tbcad.simulate.scene.rays import meets_sphere
-from tbcad.types import Bytes, Floats, Ints
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
 # Matt surfaces under two lamps and a bright sky, fixed to the object: light that leaves a point is
 # the same in all directions, as light-field rendering assumes. No cast shadows.
@@ -46,8 +45,29 @@ class RayHits:
         depth: mm along the ray, infinite where nothing is, (n,).
     """
 
-    colour: NDArray[np.float32]
+    colour: Colours
     depth: Floats
+
+
+def embree_scene(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any:
+    """A scene of facets, ready for queries from several threads, which release the lock.
+
+    Args:
+        points: corners, mm, (v, 3); or, without faces, facets by their corners, (f, 3, 3).
+        faces: corners of the facets, (f, 3).
+    """
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    corners = points.astype(np.float32)
+    if faces is None:
+        TriangleMesh(scene, corners)
+    else:
+        TriangleMesh(scene, corners, faces.astype(np.int32))
+    one = np.ones((1, 3), dtype=np.float32)
+    scene.run(one, one)  # the first call commits
+    return scene
 
 
 def prepared_scene(subject: SceneObject) -> Scene:
@@ -75,6 +95,14 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     depth[rows] = hits["tfar"][hit]
     colour[rows] = 255 * shaded_colours(scene, facet, weight)
     return RayHits(colour, depth)
+
+
+def object_in_front(
+    scene: Scene, pinhole: Floats, direction: Floats, distance: Floats
+) -> tuple[Bools, Colours]:
+    """Where (n,) the object is nearer than a distance (n,), mm, and its colours there (n, 3)."""
+    direct = cast_rays(scene, np.broadcast_to(pinhole, direction.shape), direction)
+    return np.isfinite(direct.depth) & (direct.depth < distance), direct.colour
 
 
 def depth_along_rays(scene: Scene) -> Callable[[Floats, Floats], Floats]:

@@ -5,8 +5,6 @@ A facet reflects like a flat mirror, which deflects rays by some 2 mm at the obj
 sphere through the vertices of the mirror's facets.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +17,8 @@ from scipy.spatial import cKDTree
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import REBUILD
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.scene.embree import embree_scene
 from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.simulate.scene.rays import MirrorNumbers, ReflectedRays, pixel_directions, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats, Ints

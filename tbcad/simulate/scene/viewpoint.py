@@ -45,20 +45,13 @@ def camera_around_object(
         )
     if not np.isfinite(azimuth):
         raise InputError("--azimuth is not a number: give degrees")
-    forward, right = _axes(azimuth, elevation)
-    fov = hfov if hfov is not None else _fitted_fov(capture_mm / 2 / distance, size)
-    return Camera(-distance * forward, forward, right, *size, fov)
-
-
-def _axes(azimuth: float, elevation: float) -> tuple[Floats, Floats]:
     horizontal = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    outward = np.cos(elevation) * horizontal + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
-    return -outward, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-
-
-def _fitted_fov(sine: float, size: tuple[int, int]) -> float:
-    half = FRAME_MARGIN * np.tan(np.arcsin(sine)) * size[0] / min(size)
-    return float(2 * np.arctan(half))
+    forward = -np.cos(elevation) * horizontal - np.sin(elevation) * np.array([0.0, 0.0, 1.0])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    if hfov is None:
+        tangent = np.tan(np.arcsin(capture_mm / 2 / distance))
+        hfov = float(2 * np.arctan(FRAME_MARGIN * tangent * size[0] / min(size)))
+    return Camera(-distance * forward, forward, right, *size, hfov)
 
 
 def view_directions(view: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:

@@ -11,7 +11,6 @@ from tbcad.simulate.parallel import in_batches
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import (
-    Colours,
     Rays,
     SynthesisedView,
     nearby_rays,
@@ -20,7 +19,7 @@ from tbcad.simulate.views.synthesis import (
     search_radius,
 )
 from tbcad.simulate.views.two_plane import two_plane_along
-from tbcad.types import Bools, Floats, Progress
+from tbcad.types import Bools, Colours, Floats, Progress
 
 # 69 points of a square lattice, the paper's number of pinholes, are within this squared radius
 # in steps of the lattice.
@@ -97,14 +96,17 @@ def refocus(tiles: MirrorTiles, view: Camera, focus: Focus) -> SynthesisedView:
     """
     places = lens_pinholes() * focus.aperture_mm / 2
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
-    corners = [_target_rays(tiles, view, focus, place)[1] for place in _square_around(places)]
+    square = np.abs(places).max() * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
+    corners = [
+        rays_to_capture_sphere(tiles, lens_rays(view, focus, corner))[1] for corner in square
+    ]
     origin, direction = (np.concatenate(part) for part in zip(*corners, strict=True))
     bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
 
     def one(place: Floats) -> tuple[Bools, Colours, Bools]:
-        meets, rays = _target_rays(tiles, view, focus, place)
+        meets, rays = rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
         return meets, *ray_colours(bundle, rays)
 
     for meets, colours, seen in in_batches(one, list(places)):
@@ -129,16 +131,3 @@ def refocus_sweep(
         progress(f"picture {k + 1} of {count}")
         pictures.append(refocus(tiles, view, Focus(aperture_mm, plane)).image)
     return pictures
-
-
-def _target_rays(
-    tiles: MirrorTiles, view: Camera, focus: Focus, place: Floats
-) -> tuple[Bools, Rays]:
-    """Which rays from a place on the lens meet the capture sphere, (h, w), and those, (n, 3)."""
-    return rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
-
-
-def _square_around(places: Floats) -> Floats:
-    """The four corners of the square about places (n, 2)."""
-    half = float(np.abs(places).max(initial=0.0))
-    return half * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])

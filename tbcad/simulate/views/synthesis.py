@@ -15,9 +15,8 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
 from tbcad.simulate.views.ray_bundle import RayBundle, candidate_mirrors, ray_bundle
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
-from tbcad.types import Bools, Floats, Ints
+from tbcad.types import Bools, Colours, Floats, Ints
 
-Colours = NDArray[np.float32]
 Method = Literal["nearest", "blend"]
 Rays = tuple[Floats, Floats]
 """Origins and unit directions, (n, 3) each."""

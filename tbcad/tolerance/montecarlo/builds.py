@@ -1,7 +1,5 @@
 """Thousands of simulated builds: what the cameras of each one cover, and how many cover enough."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from math import sqrt

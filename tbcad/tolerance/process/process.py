@@ -4,8 +4,6 @@ docs/decisions/0007-how-tolerances-are-computed.md says what a figure means, and
 from a maker's tolerance.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from difflib import get_close_matches

@@ -147,10 +147,10 @@ def test_missing_file(tmp_path: Path) -> None:
 
 
 def test_the_reader_is_found_where_the_documentation_has_it(file: Path) -> None:
-    import tbcad.simulate
+    import tbcad
 
-    with tbcad.simulate.LightField.open(file) as source:
+    with tbcad.LightField.open(file) as source:
         part = source.frames["a"].read(slice(100, 120), slice(100, 140))
     assert part["origin"].shape == (20, 40, 3)
     with pytest.raises(AttributeError, match="Nothing"):
-        tbcad.simulate.Nothing  # noqa: B018
+        tbcad.Nothing  # noqa: B018

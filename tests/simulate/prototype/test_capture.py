@@ -17,11 +17,16 @@ from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import CENTRE, Band
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
-from tbcad.simulate.prototype.ball_rays import image_points, pixel_rays, trace_balls
+from tbcad.simulate.prototype.ball_rays import (
+    image_points,
+    pixel_rays,
+    resampled_photograph,
+    stop_photograph,
+    trace_balls,
+)
 from tbcad.simulate.prototype.merge import Resample, merge_run
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector, prototype_runs
-from tbcad.simulate.prototype.stop_photograph import resampled_photograph, stop_photograph
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
