@@ -86,7 +86,7 @@ class MirrorArray:
     @property
     def foot(self) -> float:
         """Height z of the foot plane, mm."""
-        return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
+        return float(self.cells.surfaces.apex[self.cells.foot, 2])
 
     def mirrored(self) -> "MirrorArray":
         """Camera b's mirrors: the mirror image in the plane x = 0."""
@@ -165,7 +165,6 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     theta0 = flat.half_angles(ellipsoid, u, every)
     half_width = flat.half_widths(ellipsoid, u, theta0)
     theta1 = flat.required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
-    triangles, boundary = bounded_triangulation(faces, every, _in_half_a(every))
     problem = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u),
@@ -173,8 +172,7 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
             flat.paper_curvatures(theta0, theta1, half_width),
         ),
         planes=_bounding_planes(u, half_width),
-        boundary=boundary,
-        triangles=triangles,
+        triangles=bounded_triangulation(faces, every, _in_half_a(every)),
         pinhole=ellipsoid.pinhole,
         min_curvature=1 / (spec.mirrors.max_radius_widths * half_width),
         target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
@@ -220,4 +218,4 @@ def _cells_under_coat(cells: Cells, coating: float) -> Cells:
             f"{np.nanmin(mirrors.radius):.3g} mm: make the coat thinner"
         )
     modelled = mirrors.offset(-coating).joined(cells.surfaces.subset(slice(cells.mirrors, None)))
-    return cells_of(modelled, cells.boundary, cells.triangles)
+    return cells_of(modelled, cells.triangles)

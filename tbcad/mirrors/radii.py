@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.power_diagram import Boundary, NotRegularError
+from tbcad.optics.power_diagram import NotRegularError
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.trace import coverage_diameters
 from tbcad.spec.errors import SpecError
@@ -26,7 +26,6 @@ class RadiusProblem:
     Attributes:
         mirrors: surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
         planes: the seam and the foot plane.
-        boundary: indices of the planes.
         triangles: dual triangulation, (t, 3).
         pinhole: of the camera, mm, (3,).
         min_curvature: smallest curvature a sphere may have, 1/mm, (m,).
@@ -35,7 +34,6 @@ class RadiusProblem:
 
     mirrors: Surfaces
     planes: Surfaces
-    boundary: Boundary
     triangles: Ints
     pinhole: Floats
     min_curvature: Floats
@@ -45,7 +43,7 @@ class RadiusProblem:
         """Cells for curvatures (m,), from the given triangulation or the first one."""
         surfaces = self.mirrors.with_curvature(curvature).joined(self.planes)
         start = self.triangles if triangles is None else triangles
-        return cells_of(surfaces, self.boundary, start)
+        return cells_of(surfaces, start)
 
     @property
     def paper_curvature(self) -> Floats:

@@ -119,9 +119,8 @@ def pixel_counts(camera: Camera, frame: Floats, outline: Floats, azimuth: Floats
         azimuth: radians, (m,).
     """
     ray = rotated_about_x(outline, azimuth[:, None]) @ frame - camera.pinhole
-    axes = np.stack([camera.right, np.cross(camera.forward, camera.right)])
-    pitch = camera.half_sizes[0] * 2 / camera.width_px
-    return enclosed_areas((ray @ axes.T) / (ray @ camera.forward)[..., None] / pitch)
+    across = ray @ camera.axes[:2].T
+    return enclosed_areas(across / (ray @ camera.forward)[..., None] / camera.pixel_pitch)
 
 
 def enclosed_areas(outline: Floats) -> Floats:

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tbcad.geometry.vectors import FLIP_X, dot, norm, unit
-from tbcad.optics.power_diagram import Boundary, flip_until_regular, half_edges, radical_planes
+from tbcad.optics.power_diagram import PLANES, flip_until_regular, half_edges, radical_planes
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
@@ -26,20 +26,28 @@ class Cells:
 
     Attributes:
         surfaces: the m mirrors and the two planes.
-        boundary: indices of the planes.
         triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
         corners: points, mm, (t, 3).
     """
 
     surfaces: Surfaces
-    boundary: Boundary
     triangles: Ints
     corners: Floats
 
     @property
     def mirrors(self) -> int:
         """Number of mirrors m."""
-        return self.boundary.seam
+        return len(self.surfaces) - PLANES
+
+    @property
+    def seam(self) -> int:
+        """Index of the seam's plane."""
+        return self.mirrors
+
+    @property
+    def foot(self) -> int:
+        """Index of the foot plane."""
+        return self.mirrors + 1
 
     @property
     def mirror_surfaces(self) -> Surfaces:
@@ -56,9 +64,7 @@ class Cells:
 
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
-        return Cells(
-            self.surfaces.mirrored(), self.boundary, self.triangles[:, ::-1], self.corners * FLIP_X
-        )
+        return Cells(self.surfaces.mirrored(), self.triangles[:, ::-1], self.corners * FLIP_X)
 
     @cached_property
     def arcs(self) -> "Arcs":
@@ -180,19 +186,17 @@ def _curves(
     return np.stack([start, control, end], axis=1), cosine
 
 
-def cells_of(surfaces: Surfaces, boundary: Boundary, triangles: Ints) -> Cells:
+def cells_of(surfaces: Surfaces, triangles: Ints) -> Cells:
     """Cells of m mirrors between the seam and the foot plane.
 
     Args:
         surfaces: the m mirrors, then the two planes.
-        boundary: indices of the planes.
         triangles: a dual triangulation that is right or nearly so, (t, 3).
 
     Raises:
         NotRegularError: when the mirrors bound no proper cells.
     """
-    regular, corners = flip_until_regular(surfaces, triangles, boundary.seam)
-    return Cells(surfaces, boundary, regular, corners)
+    return Cells(surfaces, *flip_until_regular(surfaces, triangles))
 
 
 def cell_areas(cells: Cells) -> Floats:

@@ -6,14 +6,14 @@ step. Where four cells meet in one point either diagonal will do: the two corner
 tolerance decides the topology, only when the flips stop.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from tbcad.geometry.vectors import dot
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
+# The seam and the foot plane bound the array; they follow the mirrors.
+PLANES = 2
 # An edge is flipped when a corner lies deeper than this inside the mirror across it. It only keeps
 # rounding from flipping an edge to and fro; arcs this short are merged later.
 FLIP_DEPTH_MM = 1e-9
@@ -30,16 +30,8 @@ class NotRegularError(ArithmeticError):
     """No dual triangulation was found whose corners all lie outside the other mirrors."""
 
 
-@dataclass(frozen=True)
-class Boundary:
-    """Indices of the two planes that bound an array of m mirrors: they follow the mirrors."""
-
-    seam: int
-    foot: int
-
-
-def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints, Boundary]:
-    """Part of a triangulation on the kept directions, closed by a seam and a foot vertex.
+def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> Ints:
+    """Part of a triangulation on m kept directions, closed by a seam (m) and a foot (m + 1).
 
     Args:
         triangles: outward triangles over all directions, (t, 3).
@@ -47,19 +39,18 @@ def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> tuple[Ints
         kept: which directions are kept, (k,); their new indices count them in order.
 
     Returns:
-        Triangles over the m kept directions and the two planes, and the planes' indices.
+        Triangles over the m kept directions and the two planes.
     """
     new = np.cumsum(kept) - 1
     inner = new[triangles[kept[triangles].all(axis=1)]]
     m = int(kept.sum())
-    boundary = Boundary(seam=m, foot=m + 1)
     half = np.concatenate([inner[:, [0, 1]], inner[:, [1, 2]], inner[:, [2, 0]]])
     key = half[:, 0] * m + half[:, 1]
     rim = half[~np.isin(key, half[:, 1] * m + half[:, 0])]
     middle = u[kept][rim].sum(axis=1)
-    plane = np.where(middle[:, 0] < middle[:, 2], boundary.seam, boundary.foot)
+    plane = np.where(middle[:, 0] < middle[:, 2], m, m + 1)
     closing = np.column_stack([rim[:, 1], rim[:, 0], plane])
-    return np.concatenate([inner, closing, _plane_ends(rim, plane)]), boundary
+    return np.concatenate([inner, closing, _plane_ends(rim, plane)])
 
 
 def _plane_ends(rim: Ints, plane: Ints) -> Ints:
@@ -85,16 +76,15 @@ def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
     return ends, twin
 
 
-def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
     """Points where three surfaces meet on the light's side, in closed form, mm, (t, 3).
 
     Two planes of equal power (radical planes) meet in a line, and the line meets the sphere of the
     largest curvature: the corner is the intersection nearer to the mirrors' apices.
 
     Args:
-        surfaces: the mirrors, followed by the bounding planes.
+        surfaces: the mirrors, followed by the two bounding planes.
         triangles: indices of three surfaces each, (t, 3).
-        mirrors: number of mirrors.
 
     Returns:
         NaN where three surfaces have no point in common.
@@ -109,7 +99,7 @@ def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
         line = line / length
-        start = _mean_apices(surfaces, triangles, mirrors)
+        start = _mean_apices(surfaces, triangles)
         point += dot(line, start)[:, None] * line
         gradient = surfaces.gradient(p, point)
         slope = dot(line, gradient)
@@ -119,9 +109,9 @@ def corners(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
     return result
 
 
-def _mean_apices(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+def _mean_apices(surfaces: Surfaces, triangles: Ints) -> Floats:
     """Mean of the apices of those faces of each corner that are mirrors."""
-    mirror = (triangles < mirrors)[:, :, None]
+    mirror = (triangles < len(surfaces) - PLANES)[:, :, None]
     return np.asarray(np.mean(surfaces.apex[triangles], axis=1, where=mirror))
 
 
@@ -136,13 +126,12 @@ def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats
     return g[q] - ratio[:, None] * g[p], h[q] - ratio * h[p]
 
 
-def flip_until_regular(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tuple[Ints, Floats]:
+def flip_until_regular(surfaces: Surfaces, triangles: Ints) -> tuple[Ints, Floats]:
     """Flip edges until no corner is covered by the mirror across an edge.
 
     Args:
-        surfaces: the mirrors, followed by the bounding planes.
+        surfaces: the mirrors, followed by the two bounding planes, between which no edge is added.
         triangles: a triangulation to start from, (t, 3).
-        mirrors: number of mirrors; higher indices are planes, between which no edge is added.
 
     Returns:
         Triangles (t, 3) and their corners (t, 3).
@@ -153,15 +142,13 @@ def flip_until_regular(surfaces: Surfaces, triangles: Ints, mirrors: int) -> tup
     steps = 1
     while steps <= MAX_STEPS:
         try:
-            return _flip_in_steps(surfaces, triangles, mirrors, steps)
+            return _flip_in_steps(surfaces, triangles, steps)
         except NotRegularError:
             steps *= 4
     raise NotRegularError(f"no regular cells were found in {MAX_STEPS} steps from flat mirrors")
 
 
-def _flip_in_steps(
-    surfaces: Surfaces, start: Ints, mirrors: int, steps: int
-) -> tuple[Ints, Floats]:
+def _flip_in_steps(surfaces: Surfaces, start: Ints, steps: int) -> tuple[Ints, Floats]:
     """Flip edges directly, or while the mirrors curve from flat to their radii in some steps.
 
     Tangent planes of an ellipsoid always bound proper cells; in small steps of curvature each
@@ -170,19 +157,19 @@ def _flip_in_steps(
     triangles = start.copy()
     for share in np.linspace(0, 1, steps + 1) if steps > 1 else [1.0]:
         scaled = surfaces.with_curvature(share * surfaces.curvature)
-        points = _flip_in_rounds(scaled, triangles, mirrors)
+        points = _flip_in_rounds(scaled, triangles)
     return triangles, points
 
 
-def _flip_in_rounds(surfaces: Surfaces, triangles: Ints, mirrors: int) -> Floats:
+def _flip_in_rounds(surfaces: Surfaces, triangles: Ints) -> Floats:
     """Flip edges of the triangles in place until none is left to flip; return the corners."""
-    points = corners(surfaces, triangles, mirrors)
+    points = corners(surfaces, triangles)
     for _ in range(MAX_ROUNDS):
-        edge, twin = _flips(surfaces, triangles, points, mirrors)
+        edge, twin = _flips(surfaces, triangles, points)
         if not len(edge):
             break
         changed = _flip(triangles, edge, twin)
-        points[changed] = corners(surfaces, triangles[changed], mirrors)
+        points[changed] = corners(surfaces, triangles[changed])
     lowest = lowest_value(surfaces, points)
     if not lowest > -ROUNDING_MM:
         raise NotRegularError(f"a corner lies {-lowest:.3g} mm inside another mirror")
@@ -204,7 +191,7 @@ def lowest_value(surfaces: Surfaces, points: Floats) -> float:
     return float(np.min(lowest))
 
 
-def _flips(surfaces: Surfaces, triangles: Ints, points: Floats, mirrors: int) -> tuple[Ints, Ints]:
+def _flips(surfaces: Surfaces, triangles: Ints, points: Floats) -> tuple[Ints, Ints]:
     """Directed edges to flip, at most one in any triangle, and their twins; deepest first."""
     ends, twin = half_edges(triangles)
     edge = np.flatnonzero(np.arange(len(ends)) < twin)
@@ -216,7 +203,8 @@ def _flips(surfaces: Surfaces, triangles: Ints, points: Floats, mirrors: int) ->
     low, high = np.minimum(one, other), np.maximum(one, other)
     new_edge = low * len(surfaces) + high
     present = ends.min(axis=1) * len(surfaces) + ends.max(axis=1)
-    flippable = (np.nan_to_num(value, nan=0.0) < -FLIP_DEPTH_MM) & (low < mirrors) & (low != high)
+    possible = (low < len(surfaces) - PLANES) & (low != high)
+    flippable = (np.nan_to_num(value, nan=0.0) < -FLIP_DEPTH_MM) & possible
     flippable[flippable] = ~np.isin(new_edge[flippable], present)
     candidates = np.flatnonzero(flippable)
     candidates = candidates[np.argsort(value[candidates], kind="stable")]

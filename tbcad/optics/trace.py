@@ -23,7 +23,7 @@ def limiting_sides(cells: Cells) -> tuple[Ints, Ints]:
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]
-    limiting = ~(cells.halved[mirror] & (other == cells.boundary.seam))
+    limiting = ~(cells.halved[mirror] & (other == cells.seam))
     return mirror[limiting], arc[limiting]
 
 

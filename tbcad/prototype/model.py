@@ -59,11 +59,6 @@ class PrototypeModel:
     capture_radius: float
 
     @property
-    def swing(self) -> tuple[float, float]:
-        """Smallest and largest base angle, radians."""
-        return _swing(self.layout)
-
-    @property
     def purchased(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls and drive."""
         counts = Counter(base_purchased_parts(self.base, self.split))
@@ -118,15 +113,11 @@ def build_prototype_model(
     )
 
 
-def _swing(layout: PrototypeLayout) -> tuple[float, float]:
-    return float(layout.stops.angle.min()), float(layout.stops.angle.max())
-
-
 def _drive(
     layout: PrototypeLayout, balance: BaseBalance, spec: PrototypeSpec, parts: Parts
 ) -> Drive:
     acceleration = float(np.radians(spec.motion.acceleration_deg_s2))
-    torque = balance.required_torque(*_swing(layout), acceleration, spec.motion.safety)
+    torque = balance.required_torque(*layout.stops.range, acceleration, spec.motion.safety)
     return choose_drive(spec.base.drive, torque, load_drives(parts))
 
 

@@ -12,21 +12,6 @@ from tbcad.types import Floats
 
 
 @dataclass(frozen=True)
-class HoleFaces:
-    """Faces of a flange's holes and their rings on the flange's faces.
-
-    Attributes:
-        near: inner rings of the joining face.
-        far: inner rings of the opposite face.
-        walls: the cylinders.
-    """
-
-    near: list[Ring]
-    far: list[Ring]
-    walls: list[TopoDS_Face]
-
-
-@dataclass(frozen=True)
 class _Circle:
     """A whole circle as an edge, with the point and vertex where it starts and ends."""
 
@@ -35,14 +20,20 @@ class _Circle:
     point: Floats
 
 
-def hole_faces(maker: Maker, holes: Holes, x: Floats, y: Floats) -> HoleFaces:
-    """Circles and cylinders of holes whose direction is x cross y."""
+def hole_faces(
+    maker: Maker, holes: Holes, x: Floats, y: Floats
+) -> tuple[list[Ring], list[Ring], list[TopoDS_Face]]:
+    """Holes whose direction is x cross y.
+
+    Returns:
+        Inner rings of the joining face, those of the opposite face, and the cylinders.
+    """
     sizes = list(zip(holes.centre, holes.radius, strict=True))
     near = [_circle(maker, centre, x, y, radius) for centre, radius in sizes]
     far = [_circle(maker, centre + holes.direction, x, y, radius) for centre, radius in sizes]
     cylinders = [maker.cylinder(centre, x, y, radius) for centre, radius in sizes]
     height = float(np.linalg.norm(holes.direction))
-    return HoleFaces(
+    return (
         [[(circle.edge, True)] for circle in near],
         [[(circle.edge, False)] for circle in far],
         [_wall(maker, *wall, height) for wall in zip(cylinders, near, far, strict=True)],

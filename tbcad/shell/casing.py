@@ -24,8 +24,8 @@ FAR_RIMS = {"seam": "seam_rim_back", "foot": "foot_rim_top"}
 def casing_faces(front: FrontEdges, envelope: Envelope) -> list[tuple[str, TopoDS_Face]]:
     """Names and faces of everything but the mirrors."""
     maker, edges = front.maker, _edges(front, envelope)
-    seam_holes = hole_faces(maker, envelope.seam_holes, Y, Z)
-    foot_holes = hole_faces(maker, envelope.foot_holes, X, Y)
+    seam_near, seam_far, seam_walls = hole_faces(maker, envelope.seam_holes, Y, Z)
+    foot_near, foot_far, foot_walls = hole_faces(maker, envelope.foot_holes, X, Y)
     seam, foot, base = envelope.seam_thickness, envelope.foot_thickness, envelope.foot * Z
 
     def ring(face: str) -> list[Side]:
@@ -37,14 +37,14 @@ def casing_faces(front: FrontEdges, envelope: Envelope) -> list[tuple[str, TopoD
 
     return [
         ("back", _back(maker, envelope, edges)),
-        ("seam", plane(0 * X, -X, reversed_ring(ring("seam")), *seam_holes.near)),
-        ("foot", plane(base, -Z, reversed_ring(ring("foot")), *foot_holes.near)),
-        ("seam_flange", plane(seam, X, ring("seam_flange"), *seam_holes.far)),
-        ("foot_flange", plane(base + foot, Z, ring("foot_flange"), *foot_holes.far)),
+        ("seam", plane(0 * X, -X, reversed_ring(ring("seam")), *seam_near)),
+        ("foot", plane(base, -Z, reversed_ring(ring("foot")), *foot_near)),
+        ("seam_flange", plane(seam, X, ring("seam_flange"), *seam_far)),
+        ("foot_flange", plane(base + foot, Z, ring("foot_flange"), *foot_far)),
         ("seam_rim", _rim(maker, "seam", envelope.seam_rim, seam, edges, outward=Z)),
         ("foot_rim", _rim(maker, "foot", envelope.foot_rim, foot, edges, outward=X)),
-        *((f"seam_hole_{k + 1:02d}", face) for k, face in enumerate(seam_holes.walls)),
-        *((f"foot_hole_{k + 1:02d}", face) for k, face in enumerate(foot_holes.walls)),
+        *((f"seam_hole_{k + 1:02d}", face) for k, face in enumerate(seam_walls)),
+        *((f"foot_hole_{k + 1:02d}", face) for k, face in enumerate(foot_walls)),
     ]
 
 
@@ -55,7 +55,7 @@ def reversed_ring(ring: Ring) -> list[Side]:
 
 def _edges(front: FrontEdges, envelope: Envelope) -> Edges:
     maker, cells, arcs = front.maker, front.cells, casing_arcs(envelope)
-    corners = chain_ends(cells, boundary_chain(cells, cells.boundary.seam))
+    corners = chain_ends(cells, boundary_chain(cells, cells.seam))
     points: dict[str, Floats] = {}
     for name, arc in arcs.items():
         points.setdefault(ARC_ENDS[name], arc.at(np.array([0.0, 1.0])))
@@ -73,8 +73,8 @@ def _edges(front: FrontEdges, envelope: Envelope) -> Edges:
     return {
         **curves,
         **casing_lines(line),
-        "seam_front": front.chain(cells.boundary.seam),
-        "foot_front": front.chain(cells.boundary.foot),
+        "seam_front": front.chain(cells.seam),
+        "foot_front": front.chain(cells.foot),
     }
 
 

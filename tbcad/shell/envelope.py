@@ -83,7 +83,7 @@ def closing_envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> En
     Raises:
         SpecError: when holes or flanges do not fit.
     """
-    foot = float(cells.surfaces.apex[cells.boundary.foot, 2])
+    foot = float(cells.surfaces.apex[cells.foot, 2])
     deepest = enclosing_offset(ellipsoid, _arc_points(cells))
     back = Spheroid(ellipsoid, wall_offset(ellipsoid, deepest, shell.wall_mm))
     try:

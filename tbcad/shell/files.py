@@ -2,16 +2,18 @@
 
 from pathlib import Path
 
-from tbcad.cad.brep import Solid
+from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
+from tbcad.cad.solids import one_solid
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import shell_record
+from tbcad.shell.casing import casing_faces
 from tbcad.shell.envelope import Envelope, closing_envelope
+from tbcad.shell.front import front_edges
 from tbcad.shell.mesh import shell_mesh
-from tbcad.shell.solid import shell_solid
 from tbcad.types import Progress
 
 
@@ -49,15 +51,18 @@ def shell_envelope(design: MirrorDesign) -> Envelope:
 def camera_solid(
     design: MirrorDesign, half: MirrorArray, envelope: Envelope | None = None
 ) -> Solid:
-    """Solid of one camera's half; the envelope is worked out when it is not given.
+    """Solid of one camera's half, face by face; without an envelope it is worked out.
 
     Raises:
         SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds the solid invalid.
     """
-    name, cells = shell_record(half)["name"], design.halves[0].modelled_cells
-    envelope = envelope or shell_envelope(design)
-    return shell_solid(name, half.ids, cells, envelope, mirrored=half.camera_id == "b")
+    name, maker = shell_record(half)["name"], Maker(mirrored=half.camera_id == "b")
+    mirrors = front_edges(maker, design.halves[0].modelled_cells)
+    casing = casing_faces(mirrors, envelope or shell_envelope(design))
+    faces = [*zip(half.ids, mirrors.faces(), strict=True), *casing]
+    solid = one_solid(name, maker.solid([face for _, face in faces]))
+    return Solid(name, solid, tuple(faces))
 
 
 def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:

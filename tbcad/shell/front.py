@@ -60,37 +60,21 @@ def front_edges(maker: Maker, cells: Cells) -> FrontEdges:
     arcs = cells.arcs
     used = np.unique(np.concatenate([arcs.start, arcs.end])).tolist()
     vertices = {corner: maker.vertex(cells.corners[corner]) for corner in used}
-    circles = _circles(arcs)
-    ends = zip(arcs.start.tolist(), arcs.end.tolist(), strict=True)
-    edges = [
-        _edge(maker, circles, arcs, k, vertices[start], vertices[end])
-        for k, (start, end) in enumerate(ends)
-    ]
+    edges = []
+    for k, (centre, x, y, radius, angle) in enumerate(zip(*_circles(arcs), strict=True)):
+        start, end = vertices[int(arcs.start[k])], vertices[int(arcs.end[k])]
+        if angle == 0:
+            edges.append(maker.line(arcs.points[k, 0], arcs.points[k, 2], start, end))
+        else:
+            edges.append(maker.circle(centre, x, y, radius, angle, start, end))
     return FrontEdges(maker, cells, vertices, edges)
 
 
-@dataclass(frozen=True)
-class _Circles:
-    """Circles of e arcs, each from centre + radius x by an angle toward y; straight ones: 0."""
+def _circles(arcs: Arcs) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Circles of e arcs from their control polygons: centre, axes x and y, radius and angle.
 
-    centre: Floats
-    x: Floats
-    y: Floats
-    radius: Floats
-    angle: Floats
-
-
-def _edge(
-    maker: Maker, circles: _Circles, arcs: Arcs, k: int, start: TopoDS_Vertex, end: TopoDS_Vertex
-) -> TopoDS_Edge:
-    if circles.angle[k] == 0:
-        return maker.line(arcs.points[k, 0], arcs.points[k, 2], start, end)
-    frame = circles.centre[k], circles.x[k], circles.y[k]
-    return maker.circle(*frame, circles.radius[k], circles.angle[k], start, end)
-
-
-def _circles(arcs: Arcs) -> _Circles:
-    """Circles of the arcs from their control polygons."""
+    Each runs from centre + radius x by the angle toward y; the angle of straight ones is 0.
+    """
     start, control, end = (arcs.points[:, k] for k in range(3))
     along = unit(control - start)
     half = norm(end - start) / 2
@@ -101,4 +85,4 @@ def _circles(arcs: Arcs) -> _Circles:
     outward = unit(along - dot(along, chord)[:, None] * chord)
     x = arcs.weight[:, None] * outward - sine[:, None] * chord
     angle = np.where(straight, 0.0, 2 * np.arcsin(np.minimum(sine, 1)))
-    return _Circles(start - radius[:, None] * x, x, along, radius, angle)
+    return start - radius[:, None] * x, x, along, radius, angle

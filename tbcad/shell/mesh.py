@@ -159,8 +159,8 @@ def _edges(
         "seam_rim_back": seam_rim_back,
         "foot_rim": foot_rim,
         "foot_rim_top": foot_rim_top,
-        "seam_front": front.outlines.along(boundary_chain(cells, cells.boundary.seam)),
-        "foot_front": front.outlines.along(boundary_chain(cells, cells.boundary.foot)),
+        "seam_front": front.outlines.along(boundary_chain(cells, cells.seam)),
+        "foot_front": front.outlines.along(boundary_chain(cells, cells.foot)),
     }
     ends = {ARC_ENDS[name]: curves[name][[0, -1]] for name in ARC_ENDS}
     ends["front"] = curves["seam_front"][[0, -1]]

@@ -32,7 +32,7 @@ def within(cells: Cells, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """First hit of rays that end on a mirror between the seam and the foot plane."""
     hit, distance = first_hit(cells.mirror_surfaces, directions)
     point = distance[:, None] * directions
-    foot = cells.surfaces.apex[cells.boundary.foot, 2]
+    foot = cells.surfaces.apex[cells.foot, 2]
     inside = (point[:, 0] >= 0) & (point[:, 2] >= foot)
     return hit[inside], point[inside]
 
@@ -128,8 +128,8 @@ def test_four_cells_that_meet_in_one_point(diagonal: int, curvature: float) -> N
     mirrors = Surfaces(10 * u, -u, np.full(4, curvature))
     walls = planes(np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     inner = np.array([[[0, 2, 3], [0, 3, 1]], [[0, 2, 1], [2, 3, 1]]])[diagonal]
-    triangles, boundary = bounded_triangulation(inner, u, np.ones(4, dtype=bool))
-    cells = cells_of(mirrors.joined(walls), boundary, triangles)
+    triangles = bounded_triangulation(inner, u, np.ones(4, dtype=bool))
+    cells = cells_of(mirrors.joined(walls), triangles)
     arcs = cells.arcs
     ends = np.concatenate([arcs.start, arcs.end])
     centre = np.flatnonzero(np.bincount(ends) == 4)

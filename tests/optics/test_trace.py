@@ -69,7 +69,6 @@ def test_smaller_radius_sees_more(paper_half: MirrorArray) -> None:
     before = coverage_diameters(cells, PINHOLE)
     finer = Cells(
         cells.surfaces.with_curvature(1.01 * cells.surfaces.curvature),
-        cells.boundary,
         cells.triangles,
         cells.corners,
     )

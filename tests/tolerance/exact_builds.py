@@ -38,7 +38,7 @@ def made(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     centre = half.mirrors.centre + draws.centre[k]
     spheres = Surfaces(centre + radius[:, None] * every.normal[:m], every.normal[:m], 1 / radius)
     walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
-    return cells_of(spheres.joined(walls), half.cells.boundary, half.cells.triangles)
+    return cells_of(spheres.joined(walls), half.cells.triangles)
 
 
 def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
@@ -68,7 +68,7 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]
-    counted = whole[mirror] | (other != cells.boundary.seam)
+    counted = whole[mirror] | (other != cells.seam)
     return mirror[counted], arc[counted]
 
 

@@ -74,6 +74,11 @@ class StopPlan:
         """Number of stops."""
         return len(self.angle)
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest base angle, radians."""
+        return float(self.angle[0]), float(self.angle[-1])
+
     def mirrors(self, stop: int) -> Ints:
         """Mirrors that the balls replace at a stop."""
         return np.flatnonzero(self.stop == stop)

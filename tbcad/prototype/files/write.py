@@ -82,7 +82,7 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
         },
         "assembly": {"step": STEP, "glb": GLB},
         "drive": bom_csv.drive_record(
-            built.balance, built.drive, spec.motion, built.swing, built.base.hub.disc
+            built.balance, built.drive, spec.motion, layout.stops.range, built.base.hub.disc
         ),
     }
 

@@ -113,16 +113,14 @@ def _reflector(
             f"{kept.sum()} at n = {n}: {REBUILD}"
         )
     mirrored = camera.id == "b"
-    triangles, boundary = bounded_triangulation(faces, every, kept)
+    triangles = bounded_triangulation(faces, every, kept)
     u, surfaces = _surfaces(path, mirrors)
     walls = planes(
         np.array([[0, 0, 0], [0, 0, document.foot_z_mm]]),
         np.array([[-1.0 if mirrored else 1.0, 0, 0], [0, 0, 1]]),
     )
     try:
-        cells = cells_of(
-            surfaces.joined(walls), boundary, triangles[:, ::-1] if mirrored else triangles
-        )
+        cells = cells_of(surfaces.joined(walls), triangles[:, ::-1] if mirrored else triangles)
     except NotRegularError as error:
         raise InputError(
             f"{path}: the mirrors of camera {camera.id} bound no cells: {error}: {REBUILD}"

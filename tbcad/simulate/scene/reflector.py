@@ -43,7 +43,7 @@ class Reflector:
     @property
     def foot(self) -> float:
         """Height z of the foot plane, mm."""
-        return float(self.cells.surfaces.apex[self.cells.boundary.foot, 2])
+        return float(self.cells.surfaces.apex[self.cells.foot, 2])
 
     @property
     def side(self) -> float:

@@ -121,7 +121,7 @@ class TestGeometry:
         """The record is computed at the mirror's own azimuth, these rays at the stop."""
         for run, order in zip(runs, (np.arange(len(layout.half)), layout.twin), strict=True):
             arcs, m = run.reflector.cells.arcs, len(run.reflector)
-            wall, t = run.reflector.cells.boundary.seam, np.linspace(0, 1, 201)
+            wall, t = run.reflector.cells.seam, np.linspace(0, 1, 201)
             least = np.full(m, np.inf)
             for mine, other in (arcs.faces.T, arcs.faces.T[::-1]):
                 # A cell halved by the seam goes on in the other camera's picture.
