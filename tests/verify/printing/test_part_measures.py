@@ -43,7 +43,7 @@ def test_the_thin_side_of_a_hollow_box_and_where() -> None:
     # Seen from both sides of that wall: 20 x 20 less a rim that looks past the hollow, and 16 x 16.
     assert thin_area(found.walls, 1.5) == pytest.approx(2 * 256, rel=0.05)
     assert thin_area(found.walls, 0.5) == 0
-    assert (found.pieces.solids, found.pieces.cavities) == (1, 1)
+    assert (found.solids, found.cavities) == (1, 1)
 
 
 def test_a_tube() -> None:
@@ -62,7 +62,7 @@ def test_a_spherical_shell() -> None:
     found = shape(outer, inner)
     apothem = (outer.triangles_center * outer.face_normals).sum(1).min() / 20
     assert found.walls.minimum == pytest.approx(apothem, abs=1e-4)
-    assert (found.pieces.solids, found.pieces.cavities) == (1, 1)
+    assert (found.solids, found.cavities) == (1, 1)
 
 
 @pytest.mark.parametrize(("degrees", "is_wall"), [(20, True), (28, True), (32, False), (45, False)])
@@ -196,13 +196,13 @@ def test_an_open_hole_needs_three_quarters_of_its_turn(missing: float, count: in
 
 def test_loose_shells() -> None:
     found = shape(box(10, 10, 10), box(1, 1, 1, at=(20, 0, 0)), box(1, 1, 1, at=(0, 20, 0)))
-    assert (found.pieces.solids, found.pieces.cavities) == (3, 0)
+    assert (found.solids, found.cavities) == (3, 0)
     assert found.mass.volume == pytest.approx(1002)
 
 
 def test_inside_out_is_a_cavity_and_has_no_wall() -> None:
     found = shape(turned_inside_out(box(10, 10, 10)))
-    assert (found.pieces.solids, found.pieces.cavities) == (0, 1)
+    assert (found.solids, found.cavities) == (0, 1)
     assert found.mass.volume == pytest.approx(-1000)
 
 

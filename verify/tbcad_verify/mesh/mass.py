@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh, facet_volumes
 from tbcad_verify.mesh.vectors import norm
 
 
@@ -34,11 +34,10 @@ class MassProperties:
 
 def mass_properties(mesh: Mesh) -> MassProperties:
     """Figures of a closed mesh, by the divergence theorem facet by facet."""
-    middle = mesh.points.mean(axis=0)  # about which large terms do not cancel
+    middle, share = mesh.points.mean(axis=0), facet_volumes(mesh)
+    volume = float(share.sum())
     corners = np.take(mesh.points - middle, mesh.faces, axis=0)
-    sixth = np.einsum("ni,in->n", corners[:, 0], mesh.area) / 6
-    volume = float(sixth.sum())
-    moment = np.einsum("n,ni->i", sixth, corners.sum(axis=1) / 4)
+    moment = np.einsum("n,ni->i", share, corners.sum(axis=1) / 4)
     return MassProperties(
         volume,
         float(norm(mesh.area).sum() / 2),

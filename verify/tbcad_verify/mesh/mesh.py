@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.mesh.vectors import cross, dot
+from tbcad_verify.mesh.vectors import cross, norm
 from tbcad_verify.types import Floats
 
 Ints = NDArray[np.int32]
@@ -91,18 +91,42 @@ def join_meshes(meshes: list[Mesh]) -> Mesh:
 
 def examine_topology(mesh: Mesh, facets: Facets) -> Topology:
     """Count what keeps a mesh from being one closed solid."""
-    opened, crowded = _edge_faults(mesh)
+    lost = _edge_keys(mesh.faces, len(mesh.points))[mesh.twin < 0]
+    counts = np.unique(lost, return_counts=True)[1]
+    first, second = paired_half_edges(mesh)
+    start, far = mesh.faces.ravel(), np.roll(mesh.faces, -2, axis=1).ravel()
+    # Below 1e-12 of the longest side even float64 sees no height at all.
+    flat = norm(mesh.area) <= 1e-12 * longest_sides(mesh) ** 2
     return Topology(
-        open_edges=opened,
-        crowded_edges=crowded,
-        turned_edges=_turned(mesh),
-        degenerate=int(_flatness(mesh).sum()),
-        duplicate=_duplicates(mesh),
-        stored_normals=_contradicted(facets.normals, mesh.area),
-        components=_components(mesh),
-        volume=_volume(mesh),
+        open_edges=int((counts == 1).sum()),
+        crowded_edges=int((counts > 2).sum()),
+        turned_edges=int((start[first] == start[second]).sum()),
+        degenerate=int(flat.sum()),
+        duplicate=int((far[first] == far[second]).sum()),
+        stored_normals=int((np.einsum("ni,in->n", facets.normals, mesh.area) < 0).sum()),
+        components=connected_groups(len(mesh.faces), first // 3, second // 3)[0],
+        volume=float(facet_volumes(mesh).sum()),
         status=manifold_status(mesh),
     )
+
+
+def paired_half_edges(mesh: Mesh) -> tuple[NDArray[np.intp], Ints]:
+    """The half-edges of every edge between two facets: (E,) the smaller number, (E,) its twin."""
+    first = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
+    return first, mesh.twin[first]
+
+
+def longest_sides(mesh: Mesh) -> Floats:
+    """(F,) longest side of every facet, mm."""
+    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
+    return np.asarray(np.max([norm(corner[k] - corner[k - 1]) for k in range(3)], axis=0))
+
+
+def facet_volumes(mesh: Mesh) -> Floats:
+    """(F,) signed volumes between the facets and the vertices' mean, mm^3."""
+    # About the middle, so that large terms do not cancel.
+    corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
+    return np.asarray(np.einsum("ni,in->n", corner, mesh.area) / 6)
 
 
 def connected_groups(
@@ -151,54 +175,6 @@ def _twins(faces: Ints, count: int) -> Ints:
     twin = np.full(keys.size, -1, dtype=np.int32)
     twin[first], twin[second] = second, first
     return twin
-
-
-def _edge_faults(mesh: Mesh) -> tuple[int, int]:
-    lost = _edge_keys(mesh.faces, len(mesh.points))[mesh.twin < 0]
-    counts = np.unique(lost, return_counts=True)[1]
-    return int((counts == 1).sum()), int((counts > 2).sum())
-
-
-def _paired(mesh: Mesh) -> tuple[NDArray[np.intp], Ints]:
-    first = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
-    return first, mesh.twin[first]
-
-
-def _turned(mesh: Mesh) -> int:
-    first, second = _paired(mesh)
-    start = mesh.faces.ravel()
-    return int((start[first] == start[second]).sum())
-
-
-def _duplicates(mesh: Mesh) -> int:
-    first, second = _paired(mesh)
-    far = np.roll(mesh.faces, -2, axis=1).ravel()
-    return int((far[first] == far[second]).sum())
-
-
-def _flatness(mesh: Mesh) -> NDArray[np.bool_]:
-    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
-    sides = [corner[k] - corner[k - 1] for k in range(3)]
-    longest = np.max([dot(side, side) for side in sides], axis=0)
-    # Below 1e-12 of the longest side even float64 sees no height at all.
-    return np.asarray(dot(mesh.area, mesh.area) <= (1e-12 * longest) ** 2)
-
-
-def _contradicted(stored: NDArray[np.float32], area: Floats) -> int:
-    agreement = np.einsum("ni,in->n", stored, area)
-    return int((agreement < 0).sum())
-
-
-def _components(mesh: Mesh) -> int:
-    first, second = _paired(mesh)
-    size = len(mesh.faces)
-    return connected_groups(size, first // 3, second // 3)[0]
-
-
-def _volume(mesh: Mesh) -> float:
-    # About the middle, so that large terms do not cancel.
-    corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
-    return float(np.einsum("ni,in->n", corner, mesh.area).sum()) / 6
 
 
 def manifold_status(mesh: Mesh) -> str:

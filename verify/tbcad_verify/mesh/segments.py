@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import Mesh, connected_groups
+from tbcad_verify.mesh.mesh import Mesh, connected_groups, paired_half_edges
 from tbcad_verify.mesh.vectors import chunks, cross, dot, norm, unit
 from tbcad_verify.types import Bools, Floats
 
@@ -59,7 +59,7 @@ class Segmentation:
 
 def measure_edges(mesh: Mesh) -> Edges:
     """Angle over every edge that has two facets, and how far rounding can have moved it."""
-    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size, dtype=np.int32))
+    half, _ = paired_half_edges(mesh)
     normal, double = unit(mesh.area), np.maximum(norm(mesh.area), np.finfo(np.float64).tiny)
     angle, tilt = np.empty((2, half.size))
     for part in chunks(half.size):

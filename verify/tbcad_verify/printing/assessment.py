@@ -100,8 +100,8 @@ def to_row(one: PrintAssessment) -> dict[str, Any]:
         "centre_mm": _all_rounded(mass.centroid),
         "status": measures.status,
         "triangles": measures.triangles,
-        "solids": measures.pieces.solids,
-        "cavities": measures.pieces.cavities,
+        "solids": measures.solids,
+        "cavities": measures.cavities,
         "wall_mm": _rounded(wall),
         "wall_at_mm": None if wall is None else _all_rounded(walls.where.tolist()),
         "thin_mm2": _rounded(thin_area(walls, one.profile.wall_mm - SLACK_MM)),
@@ -137,13 +137,12 @@ def _check(one: PrintAssessment, required: bool) -> Check:
 
 
 def _mesh_problems(measures: PartMeasures, profile: Profile) -> Iterator[str]:
-    pieces = measures.pieces
     if measures.status != "NoError":
         yield f"no closed solid: manifold3d says {measures.status}"
-    if pieces.solids != 1:
-        yield f"{pieces.solids} separate solids, 1 allowed"
-    if pieces.cavities and not profile.cavities:
-        yield f"{pieces.cavities} closed cavities, none allowed"
+    if measures.solids != 1:
+        yield f"{measures.solids} separate solids, 1 allowed"
+    if measures.cavities and not profile.cavities:
+        yield f"{measures.cavities} closed cavities, none allowed"
     if profile.max_triangles is not None and measures.triangles > profile.max_triangles:
         yield f"{measures.triangles} triangles, at most {profile.max_triangles} are read"
 

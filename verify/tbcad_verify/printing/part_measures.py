@@ -8,7 +8,7 @@ import numpy as np
 
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.mesh.mesh import Mesh, connected_groups
+from tbcad_verify.mesh.mesh import Mesh, connected_groups, facet_volumes, paired_half_edges
 from tbcad_verify.mesh.segments import Edges, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.holes import RoundHoles, round_holes
@@ -31,19 +31,6 @@ class InnerEdges:
 
 
 @dataclass(frozen=True)
-class MeshPieces:
-    """Numbers of connected surfaces.
-
-    Attributes:
-        solids: that enclose material; more than one means loose shells.
-        cavities: that enclose a void: turned inside out.
-    """
-
-    solids: int
-    cavities: int
-
-
-@dataclass(frozen=True)
 class PartMeasures:
     """One part.
 
@@ -51,7 +38,8 @@ class PartMeasures:
         mesh: its triangles.
         status: of manifold3d; "NoError" is good.
         mass: volume, area, centroid, box.
-        pieces: separate solids, and closed cavities.
+        solids: connected surfaces that enclose material; more than one means loose shells.
+        cavities: connected surfaces that enclose a void: turned inside out.
         walls: thickness.
         holes: round ones.
         inner_edges: between concave faces.
@@ -61,7 +49,8 @@ class PartMeasures:
     mesh: Mesh
     status: str
     mass: MassProperties
-    pieces: MeshPieces
+    solids: int
+    cavities: int
     walls: WallThickness
     holes: RoundHoles
     inner_edges: InnerEdges
@@ -92,7 +81,7 @@ def measure(mesh: Mesh, status: str, mass: MassProperties) -> PartMeasures:
         mesh,
         status,
         mass,
-        count_pieces(mesh),
+        *_solids_and_cavities(mesh),
         wall_thickness(mesh, edges, rays.build_scene(mesh)),
         round_holes(mesh, edges),
         _inner_edges(mesh, edges),
@@ -100,14 +89,11 @@ def measure(mesh: Mesh, status: str, mass: MassProperties) -> PartMeasures:
     )
 
 
-def count_pieces(mesh: Mesh) -> MeshPieces:
-    """Connected surfaces by the sign of their volume."""
-    half = np.flatnonzero(mesh.twin > np.arange(mesh.twin.size))
-    count, label = connected_groups(len(mesh.faces), half // 3, mesh.twin[half] // 3)
-    corner = np.take(mesh.points - mesh.points.mean(axis=0), mesh.faces[:, 0], axis=0)
-    volume = np.einsum("ni,in->n", corner, mesh.area)
-    inside_out = int((np.bincount(label, volume, count) < 0).sum())
-    return MeshPieces(count - inside_out, inside_out)
+def _solids_and_cavities(mesh: Mesh) -> tuple[int, int]:
+    first, second = paired_half_edges(mesh)
+    count, label = connected_groups(len(mesh.faces), first // 3, second // 3)
+    inside_out = int((np.bincount(label, facet_volumes(mesh), count) < 0).sum())
+    return count - inside_out, inside_out
 
 
 def _inner_edges(mesh: Mesh, edges: Edges) -> InnerEdges:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.mesh import Mesh, longest_sides
 from tbcad_verify.mesh.rays import RayScene, distances_to_planes, first_hits, in_threads
 from tbcad_verify.mesh.segments import Edges, half_edge_vectors, rounding
 from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
@@ -75,7 +75,7 @@ def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
         edges: of the mesh.
         scene: of the mesh.
     """
-    longest = _longest(mesh)
+    longest = longest_sides(mesh)
     # Twice the area over the longest side is the smallest height; both ends of it are rounded.
     sound = norm(mesh.area) * SOUND_RAD > 2 * rounding(mesh) * longest
     step = STEP * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
@@ -115,13 +115,6 @@ def _measure(scene: RayScene, sound: Bools, probe: ThicknessRays) -> Floats:
         return np.where((facet >= 0) & sound[facet] & faces_ray, np.maximum(depth, 0), np.inf)
 
     return np.concatenate(in_threads(part, chunks(probe.share.size)) or [np.empty(0)])
-
-
-def _longest(mesh: Mesh) -> Floats:
-    """(F,) longest side of every facet, mm."""
-    corner = [np.take(mesh.points, mesh.faces[:, k], axis=0).T for k in range(3)]
-    squares = [dot(side, side) for side in (corner[k] - corner[k - 1] for k in range(3))]
-    return np.asarray(np.sqrt(np.max(squares, axis=0)))
 
 
 def _from_facets(mesh: Mesh, sound: Bools, longest: Floats, step: float) -> Iterator[ThicknessRays]:

@@ -191,7 +191,7 @@ class Export:
 
     @property
     def mesh_error_mm(self) -> float:
-        """Largest distance from mesh to exact surface that the spec allows, mm; NaN if not given."""
+        """Largest distance from mesh to exact surface the spec allows, mm; NaN if not given."""
         mesh = self.spec.get("mesh")
         keys = ("chord_error_mm", "structure_error_mm")
         values = [mesh.get(key) for key in keys] if isinstance(mesh, dict) else [None]

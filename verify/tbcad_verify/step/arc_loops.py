@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tbcad_verify.step.map_arcs import MapArcs, arc_length, quadratic_roots
+from tbcad_verify.step.map_arcs import MapArcs, arc_length, form_along_circles, quadratic_roots
 from tbcad_verify.types import Bools, Floats, Ints
 
 CLOSED = 1e-8  # of the spread: maximum distance of one corner in two arcs
@@ -91,7 +91,8 @@ def inside(arcs: MapArcs, mirror: Ints, y: Floats) -> Bools:
     index, other = _partners(mirror, arcs.mirror)
     some, from_ = arcs.take(other), y[:, index]
     across = np.array([[-RAY[1]], [RAY[0]]])
-    form = some.form(np.zeros(len(other)), across + 0 * from_, -(across * from_).sum(axis=0))
+    line = (np.zeros(len(other)), across + 0 * from_, -(across * from_).sum(axis=0))
+    form = form_along_circles(some.near, some.inward, some.bend, line)
     crossings = np.zeros(len(mirror), dtype=np.intp)
     for t in quadratic_roots(form):
         hit = (t > some.t[0]) & (t < some.t[1]) & np.isfinite(t)

@@ -2,68 +2,53 @@
 
 With d = x - p, n = N + k d and m = |d|^2 = -2 N.d / k, by Stokes on the surface:
 
-    integral of d_x m^j dA = 1 / (2 (j + 1)) loop integral of m^(j + 1) dd_y,   and -dd_x for d_y.
+    integral of d_x dA = 1 / 2 loop integral of m dd_y,   and -dd_x for d_y.
 
 For the rest, with w = 1 - k^2 m / 4 and the map's polar angle theta about the apex, integrate
 along the radius of the map (Green); with tau = d_x dd_y - d_y dd_x = (w |y|)^2 dtheta:
 
-    area: tau / 2w,   m: m tau / 4w,   m^2: m^2 tau / 6w,
-    d_x^2, d_x d_y, d_y^2: the same times (1 + 2w) tau / 12 w^2.
+    area: tau / 2w,   m: m tau / 4w.
 
 Nothing divides by k, so nearly flat mirrors lose no digits.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.step.map_arcs import MapArcs
 from tbcad_verify.step.stereographic import SurfaceMaps
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Bools, Floats
 
 NODES = 20
 MAX_PIECES = 64
 
 
-@dataclass(frozen=True)
-class CellMoments:
-    """Integrals over M cells, about each mirror's apex p and in its own axes right, up, normal.
+def cell_moments(maps: SurfaceMaps, arcs: MapArcs, whole: Bools) -> tuple[Floats, Floats]:
+    """Integrals over the cells of M maps by Gauss-Legendre quadrature along their arcs.
 
-    Attributes:
-        area: (M,) mm^2.
-        first: (3, M) of d = x - p, mm^3.
-        second: (3, 3, M) of d d^T, mm^4.
+    Args:
+        maps: of the mirrors.
+        arcs: that bound the cells.
+        whole: (M,) whole spheres, which have no arcs.
+
+    Returns:
+        Area (M,), mm^2, and first moment (3, M) of d = x - p about each mirror's apex p, in its own
+        axes right, up, normal, mm^3.
     """
-
-    area: Floats
-    first: Floats
-    second: Floats
-
-
-def cell_moments(maps: SurfaceMaps, arcs: MapArcs) -> CellMoments:
-    """Integrals over the cells of M maps by Gauss-Legendre quadrature along their arcs."""
     k = maps.surfaces.curvature
-    total = np.zeros((10, len(k)))
+    total = np.zeros((4, len(k)))
     for part in chunks(len(arcs.mirror), 1 << 13):
         pieces = _pieces(arcs.take(np.arange(len(arcs.mirror))[part]), k)
         values = _line_integrals(pieces, k[pieces.mirror])
         total += [np.bincount(pieces.mirror, value, minlength=len(k)) for value in values]
-    area, x, y, m, mm, xx, xy, yy, xm, ym = total
-    xz, yz = -k / 2 * xm, -k / 2 * ym
-    second = np.stack([[xx, xy, xz], [xy, yy, yz], [xz, yz, k**2 / 4 * mm]])
-    return CellMoments(area, np.stack([x, y, -k / 2 * m]), second)
-
-
-def whole_sphere(k: Floats) -> CellMoments:
-    """Integrals over whole spheres of curvatures k (M,), about any of their points."""
-    area = 4 * np.pi / k**2
-    zero = np.zeros_like(k)
-    part = area / (3 * k**2)
-    second = np.stack([[part, zero, zero], [zero, part, zero], [zero, zero, part + area / k**2]])
-    return CellMoments(area, np.stack([zero, zero, -area / k]), second)
+    area, x, y, m = total
+    radius = 1 / np.where(whole, k, 1.0)
+    area = np.where(whole, 4 * np.pi * radius**2, area)
+    return area, np.stack([x, y, np.where(whole, -area * radius, -k / 2 * m)])
 
 
 def _pieces(arcs: MapArcs, k: Floats) -> MapArcs:
@@ -82,9 +67,9 @@ def _pieces(arcs: MapArcs, k: Floats) -> MapArcs:
 
 
 def _line_integrals(pieces: MapArcs, k: Floats) -> Floats:
-    """(10, N): area, and integrals of x, y, m, m^2, xx, xy, yy, x m, y m."""
+    """(4, N): area, and integrals of x, y, m."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    total = np.zeros((10, len(k)))
+    total = np.zeros((4, len(k)))
     for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
         s = pieces.s[0] + pieces.length * (1 + node) / 2
         total += weight / 2 * pieces.length * _integrands(pieces.point(s), pieces.direction(s), k)
@@ -92,24 +77,10 @@ def _line_integrals(pieces: MapArcs, k: Floats) -> Floats:
 
 
 def _integrands(y: Floats, along: Floats, k: Floats) -> Floats:
-    """(10, N) per mm of the map's arcs, at points y (2, N) that move along `along` (2, N)."""
+    """(4, N) per mm of the map's arcs, at points y (2, N) that move along `along` (2, N)."""
     square = y[0] ** 2 + y[1] ** 2
     w = 1 / (1 + k**2 * square / 4)
     turn = y[0] * along[1] - y[1] * along[0]
     growth = -(k**2) / 2 * w**2 * (y[0] * along[0] + y[1] * along[1])
-    (dx, dy), step, m = w * y, w * along + growth * y, w * square
-    flat = (1 + 2 * w) / 12 * turn
-    return np.stack(
-        [
-            w * turn / 2,
-            m * step[1] / 2,
-            -m * step[0] / 2,
-            m * w * turn / 4,
-            m**2 * w * turn / 6,
-            dx * dx * flat,
-            dx * dy * flat,
-            dy * dy * flat,
-            m**2 * step[1] / 4,
-            -(m**2) * step[0] / 4,
-        ]
-    )
+    step, m = w * along + growth * y, w * square
+    return np.stack([w * turn / 2, m * step[1] / 2, -m * step[0] / 2, m * w * turn / 4])

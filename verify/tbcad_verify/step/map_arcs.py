@@ -61,10 +61,6 @@ class MapArcs:
         angle = self.bend * s
         return np.asarray(np.cos(angle) * self.forward - np.sin(angle) * self.inward)
 
-    def form(self, alpha: Floats, beta: Floats, gamma: Floats) -> Floats:
-        """(3, N) forms (N,), (2, N), (N,), one an arc, as c0 + c1 t + c2 t^2 along it."""
-        return form_along_circles(self.near, self.inward, self.bend, (alpha, beta, gamma))
-
     @property
     def forward(self) -> Floats:
         """(2, N) unit tangents at the nearest points."""

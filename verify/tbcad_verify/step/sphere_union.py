@@ -5,8 +5,8 @@ of the same camera covers, on the side that faces the light, cut by the seam x =
 plane. It does not depend on a STEP file, a mesh, a CAD kernel, or neighbours found elsewhere: it is
 an independent reference for them.
 
-By Gauss' theorem the columns `volume` and `moment`, summed over all faces of a closed solid, are
-its volume and its volume times its centroid; `vector_area` sums to zero.
+By Gauss' theorem the column `volume`, summed over all faces of a closed solid, is its volume;
+`vector_area` sums to zero.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.export import Export
 from tbcad_verify.step.arc_loops import arc_loops, front_pieces
 from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
-from tbcad_verify.step.cell_boxes import cell_boxes
-from tbcad_verify.step.cell_moments import CellMoments, cell_moments, whole_sphere
+from tbcad_verify.step.cell_moments import cell_moments
 from tbcad_verify.step.map_arcs import MapArcs
 from tbcad_verify.step.stereographic import to_surface
 from tbcad_verify.types import Bools, Floats, Ints
@@ -55,8 +54,6 @@ class ClosedFormCells:
         vector_area: (M, 3) mm^2, the integral of the unit normal n out of the solid.
         first: (M, 3) mm^3, the integral of x.
         volume: (M,) mm^3, the integral of x.n / 3.
-        moment: (M, 3) mm^4, the integral of x (x.n) / 4.
-        box: (M, 2, 3) mm, minimum and maximum x, y, z; NaN for empty cells.
         corners: (M,) number; where four cells meet within rounding, one corner.
         edges: (M,) number; a full circle is an edge without corners.
         empty: (M,) the mirror is covered completely.
@@ -69,8 +66,6 @@ class ClosedFormCells:
     vector_area: Floats
     first: Floats
     volume: Floats
-    moment: Floats
-    box: Floats
     corners: Ints
     edges: Ints
     empty: Bools
@@ -96,7 +91,7 @@ def closed_form_cells(
             from it; else all of it.
 
     Returns:
-        Their integrals, boxes and edges. Empty and open cells are marked, not refused.
+        Their integrals and edges. Empty and open cells are marked, not refused.
 
     Source: Archimedes' projection and Stokes' theorem, see `moments`.
     """
@@ -143,7 +138,7 @@ def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
     """All figures of the cells; `horizon` is the number of the horizon."""
     count, arcs = len(boundaries.whole), boundaries.arcs
     empty = ~boundaries.whole & (_count(arcs.mirror, count) == 0)
-    area, vector_area, first, volume, moment = _integrals(boundaries)
+    area, vector_area, first, volume = _integrals(boundaries)
     passed, circles = _far_points(arcs)
     corners = _count(arcs.mirror, count) - _count(passed, count)
     wrong = arc_loops(arcs, boundaries.spread).loose | (arcs.circle == horizon)
@@ -152,8 +147,6 @@ def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
         vector_area=vector_area.T,
         first=first.T,
         volume=volume,
-        moment=moment.T,
-        box=np.where(empty[:, None, None], np.nan, _box(boundaries)),
         corners=corners,
         edges=corners + _count(circles, count),
         empty=empty,
@@ -173,36 +166,17 @@ def _edges(boundaries: CellBoundaries) -> CellEdges:
     return CellEdges(arcs.mirror, arcs.circle, points)
 
 
-def _integrals(boundaries: CellBoundaries) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Area (M,), vector area and first moment (3, M), volume (M,), moment (3, M)."""
-    mine, local = boundaries.maps.surfaces, _moments(boundaries)
-    p, n, k, area = mine.point, mine.normal, mine.curvature, local.area
+def _integrals(boundaries: CellBoundaries) -> tuple[Floats, Floats, Floats, Floats]:
+    """Area (M,), vector area and first moment (3, M), volume (M,)."""
+    mine = boundaries.maps.surfaces
+    p, n, k = mine.point, mine.normal, mine.curvature
+    area, local = cell_moments(boundaries.maps, boundaries.arcs, boundaries.whole)
     axes = np.stack([boundaries.maps.right, boundaries.maps.up, n])
-    first = np.einsum("aim,am->im", axes, local.first)
+    first = np.einsum("aim,am->im", axes, local)
     # On the surface x.n = p.n0 + d.e: linear in d = x - p, for n = n0 + k d and d.(2 n0 + k d) = 0.
     height, e = dot(p, n), k * p - n
     volume = height * area + dot(e, first)
-    bent = np.einsum("aim,abm,bjm,jm->im", axes, local.second, axes, e, optimize=False)
-    moment = p * volume + height * first + bent
-    return area, n * area + k * first, p * area + first, volume / 3, moment / 4
-
-
-def _moments(boundaries: CellBoundaries) -> CellMoments:
-    """Integrals over the cells about their apices; of whole spheres too, which have no arcs."""
-    some, k = cell_moments(boundaries.maps, boundaries.arcs), boundaries.maps.surfaces.curvature
-    full = whole_sphere(np.where(boundaries.whole, k, 1.0))
-    pairs = ((full.area, some.area), (full.first, some.first), (full.second, some.second))
-    return CellMoments(*(np.where(boundaries.whole, a, b) for a, b in pairs))
-
-
-def _box(boundaries: CellBoundaries) -> Floats:
-    mine = boundaries.maps.surfaces
-    radius = 1 / np.where(boundaries.whole, mine.curvature, 1.0)
-    centre = (mine.point - radius * mine.normal).T
-    whole = np.stack([centre - radius[:, None], centre + radius[:, None]], axis=1)
-    return np.where(
-        boundaries.whole[:, None, None], whole, cell_boxes(boundaries.maps, boundaries.arcs)
-    )
+    return area, n * area + k * first, p * area + first, volume / 3
 
 
 def _far_points(arcs: MapArcs) -> tuple[Ints, Ints]:
