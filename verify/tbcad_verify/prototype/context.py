@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.prototype import axis
+from tbcad_verify.mesh.lines import axis_frame
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.record.prototype import Prototype
@@ -39,11 +39,6 @@ class PrototypeContext:
         return self.camera.pinhole
 
     @property
-    def semi_minor(self) -> float:
-        """Semi-minor axis of the ellipsoid, mm."""
-        return float(self.export.spec["optics"]["semi_minor_mm"])
-
-    @property
     def radius(self) -> float:
         """Radius of the capture sphere, mm."""
         return self.export.target_mm / 2
@@ -51,7 +46,7 @@ class PrototypeContext:
     @cached_property
     def frame(self) -> Floats:
         """(3, 3) rows axis, azimuth zero, third: from the camera, not from the record."""
-        return axis.axis_frame(self.pinhole)
+        return axis_frame(self.pinhole)
 
     def base_rotation(self, angle: Floats) -> Rotation:
         """Rotations of the base by angles (N,), radians: from its own frame to the ground's."""

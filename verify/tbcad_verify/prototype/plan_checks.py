@@ -7,8 +7,8 @@ from collections import Counter
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tbcad_verify.mesh.lines import wrapped
-from tbcad_verify.prototype import axis, gcode
+from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
+from tbcad_verify.prototype import gcode
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
@@ -109,8 +109,8 @@ def direction_errors(context: PrototypeContext) -> Floats:
     u = context.export.mirrors.columns("ux", 3)[:, context.mirror_rows]
     apex = context.prototype.balls.columns("px", 3)[:, context.ball]
     at = context.base_rotation(context.angle).apply(apex.T).T
-    (mirror, phi), (ball, psi) = (axis.polar_and_azimuth(context.frame, d) for d in (u, at))
-    return np.stack([ball - mirror, wrapped(psi - phi), axis.angles_between(at, u)], axis=1)
+    (mirror, phi), (ball, psi) = (polar_and_azimuth(context.frame, d) for d in (u, at))
+    return np.stack([ball - mirror, wrapped(psi - phi), angles_between(at, u)], axis=1)
 
 
 def _errors(name: CheckName, context: PrototypeContext) -> Check:

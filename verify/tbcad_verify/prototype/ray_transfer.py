@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tbcad_verify.mesh.lines import polar_and_azimuth
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK
 from tbcad_verify.mesh.surfaces import ReflectedRays, nearest_on_rays, reflect
 from tbcad_verify.mesh.vectors import chunks
-from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.types import Floats, Ints
@@ -66,8 +66,8 @@ def _picture_rotation(context: PrototypeContext, ball_apex: Floats) -> Rotation:
     _, zero, third = frame = context.frame
     mirror_apex = context.export.mirrors.columns("px", 3)[:, context.mirror_rows]
     apices, pinhole = (mirror_apex, ball_apex), context.pinhole[:, None]
-    (_, phi), (_, psi) = (axis.polar_and_azimuth(frame, x) for x in apices)
-    (low, _), (high, _) = (axis.polar_and_azimuth(frame, x - pinhole) for x in apices)
+    (_, phi), (_, psi) = (polar_and_azimuth(frame, x) for x in apices)
+    (low, _), (high, _) = (polar_and_azimuth(frame, x - pinhole) for x in apices)
     # At right angles to the plane of axis and ball: rotates the axis toward the ball's azimuth.
     across = -np.sin(psi)[:, None] * zero + np.cos(psi)[:, None] * third
     tilt = Rotation.from_rotvec((high - low)[:, None] * across)

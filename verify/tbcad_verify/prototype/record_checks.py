@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import wrapped
+from tbcad_verify.mesh.lines import polar_and_azimuth, wrapped
 from tbcad_verify.mesh.vectors import dot, norm, unit
-from tbcad_verify.prototype import axis
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype import BALLS, RECORD
@@ -70,8 +69,8 @@ def position_errors(context: PrototypeContext) -> Floats:
     """
     balls, pinhole = context.prototype.balls, context.pinhole[:, None]
     p, n, c, b = (balls.columns(key, 3) for key in ("px", "nx", "cx", "bx"))
-    double_a = 2 * np.sqrt(context.semi_minor**2 + (context.pinhole**2).sum() / 4)
-    polar, azimuth = axis.polar_and_azimuth(context.frame, p)
+    double_a = 2 * np.sqrt(context.export.semi_minor_mm**2 + (context.pinhole**2).sum() / 4)
+    polar, azimuth = polar_and_azimuth(context.frame, p)
     depth = dot(p - b, n)
     worst = np.max(
         [

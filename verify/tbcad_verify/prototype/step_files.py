@@ -24,7 +24,7 @@ def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unkn
     Raises:
         BadExport: a file is missing, foreign or truncated.
     """
-    parts = _parts(export)
+    parts = [part for part in export.printed if part.step]
     # The largest first, so that the processes take about equally long.
     blobs = [load(export.folder, part.step) for part in parts]
     order = sorted(range(len(parts)), key=lambda k: (-blobs[k].data.size, k))
@@ -49,13 +49,10 @@ def part_step_checks(
     """
     return [
         check
-        for part in _parts(export)
+        for part in export.printed
+        if part.step
         for check in _part(export, part, files[part.name], masses.get(part.name))
     ]
-
-
-def _parts(export: Export) -> list[Printed]:
-    return [part for part in (export.prototype.parts if export.prototype else ()) if part.step]
 
 
 def _part(

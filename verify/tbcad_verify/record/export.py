@@ -17,11 +17,10 @@ from pydantic import Field, field_validator, model_validator
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
+from tbcad_verify.record.prototype import RECORD, Printed, Prototype, read_prototype
 from tbcad_verify.record.validation import (
-    FileOrNone,
     Name,
-    PlainFile,
+    PartFiles,
     Strict,
     Vector,
     parse_json,
@@ -87,28 +86,14 @@ class Camera(Strict):
         return 2 * math.tan(self.hfov / 2) / self.width
 
 
-class Part(Strict):
-    """One exported solid, the camera its mirrors are for, and its files; empty: it has none."""
+class Part(PartFiles):
+    """One solid of the shell, and the camera its mirrors are for."""
 
-    name: Name
     camera: str = ""
-    stl: PlainFile
-    step: FileOrNone = ""
-    threemf: FileOrNone = Field("", alias="3mf")
 
 
 class Design(Strict):
-    """design.json.
-
-    Attributes:
-        spec: the resolved design, as written.
-        target_mm: diameter that every virtual camera must see.
-        coating_mm: thickness of the reflecting coat over the meshed surface.
-        foot_z_mm: height of the foot plane.
-        cameras: one or more.
-        parts: of the shell.
-        mirrors: the file that has them.
-    """
+    """design.json: see `Export`."""
 
     spec: dict[str, Any]
     target_mm: float = Field(ge=1e-3, le=1e6)
@@ -183,11 +168,23 @@ class Export:
     prototype: Prototype | None = None
 
     @property
+    def printed(self) -> tuple[Printed, ...]:
+        """Parts of the prototype."""
+        return tuple(self.prototype.parts) if self.prototype else ()
+
+    @property
     def part_files(self) -> frozenset[str]:
         """All files of all parts, and of their assembly."""
-        files = ((part.stl, part.step, part.threemf) for part in self.parts)
-        more = self.prototype.part_files if self.prototype else frozenset()
-        return frozenset(name for names in files for name in names if name) | more
+        parts = (*self.parts, *self.printed)
+        names = {name for part in parts for name in (part.stl, part.step, part.threemf)}
+        if self.prototype:
+            names |= {self.prototype.assembly.step, self.prototype.assembly.glb}
+        return frozenset(names - {""})
+
+    @property
+    def semi_minor_mm(self) -> float:
+        """Semi-minor axis of the ellipsoid."""
+        return float(self.spec["optics"]["semi_minor_mm"])
 
     @property
     def mesh_error_mm(self) -> float:

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.record.columns import Columns, Texts, numbers, numbers_or_empty
 from tbcad_verify.types import Bools, Floats
 
@@ -60,3 +61,8 @@ class Mirrors(Columns):
     def flat(self) -> Bools:
         """(M,) true for planar mirrors, which have no radius."""
         return np.isnan(self.radius_mm)
+
+    def surfaces(self) -> Surfaces:
+        """The M reflecting surfaces, by apex, normal and radius."""
+        curvature = np.where(self.flat, 0.0, 1 / np.where(self.flat, 1.0, self.radius_mm))
+        return Surfaces(self.columns("px", 3), self.columns("nx", 3), curvature)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tbcad_verify.mesh.lines import axis_frame, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
@@ -18,6 +19,7 @@ from tbcad_verify.types import Floats
 POSE_MM = 1e-9
 ON_SEAM = 1e-9  # |ux| below which the seam cuts a mirror in two
 SAME_DIRECTION = 1e-9  # of unit vectors
+NEIGHBOURS = 19  # a vertex and two rings round it; farther planes never bound a flat mirror
 UNLIKE_SPEC = 1e-9  # by which a number may be off that of the spec
 WELL_FORMED = re.compile(r"[a-z][0-9]{4,}")
 
@@ -75,7 +77,28 @@ def pose_errors(export: Export) -> Floats:
     errors = np.full(len(mirrors), np.inf)
     for camera in export.cameras.values():
         rows = np.flatnonzero(mirrors.camera == camera.id)
-        errors[rows] = _deviations(mirrors, rows, camera, _semi_minor(export))
+        errors[rows] = _deviations(mirrors, rows, camera, export.semi_minor_mm)
+    return errors
+
+
+def figure_errors(export: Export) -> Floats:
+    """(M,) largest deviation of each mirror's figures, mm; inf where its camera is unknown.
+
+    Checked, angles as lengths at 1 mm: polar angle and azimuth about the axis from the origin to
+    the pinhole, theta_0 of the flat mirror, its half width l and theta_1 of equation 1.
+
+    Source: DESIGN.md section 2.
+    """
+    mirrors = export.mirrors
+    vertices = geodesic(int(export.spec["optics"]["n"]))
+    errors = np.full(len(mirrors), np.inf)
+    for camera in export.cameras.values():
+        rows = np.flatnonzero(mirrors.camera == camera.id)
+        one = mirrors.take(rows)
+        expected = _figures(export, camera, one.columns("ux", 3), vertices)
+        angles = np.radians(one.columns("theta0_deg", 4))
+        turns = wrapped(angles - expected[1:])
+        errors[rows] = np.abs([one.size_mm - expected[0], *turns]).max(axis=0, initial=0)
     return errors
 
 
@@ -130,10 +153,6 @@ def geodesic(n: int) -> Floats:
     points = faces.reshape(-1, 3)
     _, first = np.unique(np.round(points, 9) + 0.0, axis=0, return_index=True)
     return np.ascontiguousarray(points[np.sort(first)].T)
-
-
-def _semi_minor(export: Export) -> float:
-    return float(export.spec["optics"]["semi_minor_mm"])
 
 
 def _deviations(mirrors: Mirrors, rows: NDArray[np.intp], camera: Camera, b: float) -> Floats:
@@ -196,3 +215,45 @@ def _split(faces: Floats, p: int) -> Floats:
     weights = np.concatenate([p - grid.sum(axis=2, keepdims=True), grid], axis=2) / p
     points = np.einsum("tcw,fwx->ftcx", weights, faces).reshape(-1, 3, 3)
     return np.asarray(points / np.linalg.norm(points, axis=2, keepdims=True))
+
+
+def _figures(export: Export, camera: Camera, u: Floats, vertices: Floats) -> Floats:
+    """(5, M) half widths, mm, theta_0, theta_1, polar angles and azimuths, rad."""
+    b = export.semi_minor_mm
+    rho = _radial_distance(camera, b, u)
+    theta0 = _half_angles(camera, b, u, vertices)
+    width = (_camera_distance(camera, b) - rho) * np.tan(theta0)
+    theta1 = np.arctan2(export.target_mm / 2 - width, rho)
+    polar, azimuth = polar_and_azimuth(axis_frame(camera.pinhole), u)
+    return np.stack([width, theta0, theta1, polar, azimuth])
+
+
+def _half_angles(camera: Camera, b: float, u: Floats, vertices: Floats) -> Floats:
+    """(M,) half angle, at the virtual camera, of the largest cone inside each flat mirror.
+
+    Mirrors are bounded by the tangent planes of the ellipsoid at all vertices. The plane through a
+    virtual camera and the line where two tangent planes meet is in the pencil of the two.
+    """
+    count = min(NEIGHBOURS, vertices.shape[1])
+    own, *others = np.asarray(cKDTree(vertices.T).query(u.T, k=count)[1]).T
+    rho = _radial_distance(camera, b, vertices)
+    normal = unit(unit(camera.pinhole[:, None] - rho * vertices) - vertices)
+    virtual = _camera_distance(camera, b) * u
+    sines = []
+    own_height = dot(normal[:, own], virtual - rho[own] * vertices[:, own])
+    for other in others:
+        height = dot(normal[:, other], virtual - rho[other] * vertices[:, other])
+        plane = unit(height * normal[:, own] - own_height * normal[:, other])
+        sines.append(np.abs(dot(plane, u)))
+    return np.asarray(np.arcsin(np.min(sines, axis=0)))
+
+
+def _camera_distance(camera: Camera, b: float) -> float:
+    """Of every virtual camera from the origin, mm: twice the semi-major axis."""
+    return float(np.hypot(2 * b, np.linalg.norm(camera.pinhole)))
+
+
+def _radial_distance(camera: Camera, b: float, u: Floats) -> Floats:
+    """(N,) of the ellipsoid from the origin along u (3, N), mm."""
+    focal = float(np.linalg.norm(camera.pinhole)) / 2
+    return np.asarray(b**2 / (np.hypot(b, focal) - camera.pinhole @ u / 2))

@@ -19,7 +19,7 @@ from tbcad_verify.record.validation import (
     FileOrNone,
     Matrix,
     Name,
-    PlainFile,
+    PartFiles,
     Strict,
     Vector,
     parse_json,
@@ -66,28 +66,22 @@ class Seat(Strict):
     pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)
 
 
-class Printed(Strict):
+class Printed(PartFiles):
     """One part to be printed; y = x @ axes + origin lays it on the bed.
 
+    The meshes are on the bed, the STEP file has the solid in its place.
+
     Attributes:
-        name: of the part.
         role: what it is.
         number: of a cap, its ball's, from 1.
         quantity: how many are made.
-        stl: the mesh, on the bed.
-        step: the solid, in its place; empty: none.
-        threemf: the mesh again; empty: none.
         axes: (3, 3).
         origin: (3,) mm.
     """
 
-    name: Name
     role: Literal["base", "cap", "stage", "frame", "tool"]
     number: int | None = Field(alias="ball")
     quantity: int = Field(ge=1, le=MOST)
-    stl: PlainFile
-    step: FileOrNone = ""
-    threemf: FileOrNone = Field("", alias="3mf")
     axes: Matrix
     origin: Vector = Field(alias="origin_mm")
 
@@ -178,12 +172,6 @@ class Prototype(Strict):
     def moved(self) -> bool:
         """Whether pictures are moved along with their balls when they are merged."""
         return self.picture == "moved"
-
-    @property
-    def part_files(self) -> frozenset[str]:
-        """All files of all parts and of the assembly."""
-        files = [name for part in self.parts for name in (part.stl, part.step, part.threemf)]
-        return frozenset(filter(None, [*files, self.assembly.step, self.assembly.glb]))
 
 
 def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:

@@ -99,6 +99,15 @@ Matrix = Annotated[
 """Three rows of three numbers, (3, 3)."""
 
 
+class PartFiles(Strict):
+    """A part's name and files; an empty name is no file."""
+
+    name: Name
+    stl: PlainFile
+    step: FileOrNone = ""
+    threemf: FileOrNone = Field("", alias="3mf")
+
+
 def parse_json(blob: FileBytes, schema: str = "") -> dict[str, Any]:
     """The JSON object in a file.
 

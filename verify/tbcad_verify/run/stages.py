@@ -22,7 +22,7 @@ from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.prototype.stages import PRINTING, verify_prototype
 from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, Part, read_export
-from tbcad_verify.record.prototype import Printed
+from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
@@ -50,8 +50,6 @@ SHELL_STAGES = (
     "every pixel",
 )
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
-
-Digests = dict[str, tuple[int, str]]  # size and sha256 by file name
 
 
 @dataclass(frozen=True)
@@ -96,22 +94,24 @@ def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> 
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))
     export = read_export(folder)
-    printed = export.prototype.parts if export.prototype else ()
-    shell_facets, digests = _read_stls(export, export.parts)
-    printed_facets, printed_digests = _read_stls(export, printed)
-    digests |= printed_digests
+    parts = (*export.parts, *export.printed)
+    blobs = [read_facets(export.folder, part.stl) for part in parts]
+    digests = {blob.name: blob.digest for _, blob in blobs}
+    facets = [facets for facets, _ in blobs]
+    del blobs  # half of the memory
 
     sink(Results(stages=[THREEMF]))
-    digests |= _compare_3mfs(export, export.parts, shell_facets, sink)
-    digests |= _compare_3mfs(export, printed, printed_facets, sink)
+    for part, stl in zip(parts, facets, strict=True):
+        if part.threemf:
+            digests[part.threemf] = _compare_3mf(export, part, stl, sink)
 
     sink(Results(stages=[RECORD]))
     manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
     sink(Results(checks=manifest + record_checks(export)))
 
     sink(Results(stages=[MESHES]))
-    shells = _measure_shells(export, shell_facets, sink)
-    del shell_facets  # half of the memory
+    shells = _measure_shells(export, facets[: len(export.parts)], sink)
+    facets[: len(export.parts)] = []  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
     for shell in shells:
@@ -120,26 +120,14 @@ def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> 
     if export.parts:
         _trace_shells(export, shells, sink)
     if export.prototype:
-        measured = verify_prototype(export, export.prototype, printed_facets, sink)
+        measured = verify_prototype(export, export.prototype, facets, sink)
         sink(Results(stages=[PRINTING]))
-        for part in measured:
-            _assess_printing(part, profiles, bool(printers), sink)
-
-
-def _read_stls(export: Export, parts: Sequence[Part | Printed]) -> tuple[list[Facets], Digests]:
-    pairs = [read_facets(export.folder, part.stl) for part in parts]
-    return [facets for facets, _ in pairs], {blob.name: blob.digest for _, blob in pairs}
-
-
-def _compare_3mfs(
-    export: Export, parts: Sequence[Part | Printed], stls: list[Facets], sink: ResultSink
-) -> Digests:
-    pairs = [pair for pair in zip(parts, stls, strict=True) if pair[0].threemf]
-    return {part.threemf: _compare_3mf(export, part, facets, sink) for part, facets in pairs}
+        for printed in measured:
+            _assess_printing(printed, profiles, bool(printers), sink)
 
 
 def _compare_3mf(
-    export: Export, part: Part | Printed, facets: Facets, sink: ResultSink
+    export: Export, part: PartFiles, facets: Facets, sink: ResultSink
 ) -> tuple[int, str]:
     corners, blob = read_3mf(export.folder, part.threemf)
     name = ("3MF", part.threemf, "mm")

@@ -11,9 +11,9 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
 from tbcad_verify.prototype import step_files
-from tbcad_verify.record.export import TEXTS, Export, Part, read_export
+from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
-from tbcad_verify.record.prototype import Printed
+from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import Report, mirror_figures
 from tbcad_verify.run.results import CollectedResults, Results
@@ -110,7 +110,7 @@ def _prototype_steps(
     results: CollectedResults,
     reading: Future[dict[str, StepFile | Unknown]],
 ) -> None:
-    if export.prototype and any(part.step for part in export.prototype.parts):
+    if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
         checks = step_files.part_step_checks(export, results.masses, reading.result())
         results.add(Results(checks=checks))
@@ -128,19 +128,17 @@ def _refuse_changes(export: Export, before: Stamps) -> None:
 
 
 def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> list[Check]:
-    shells = [_expected(export, part, _spheres(export, part), results) for part in export.parts]
-    prototype = export.prototype.parts if export.prototype else ()
-    printed = [_expected(export, part, None, results) for part in prototype]
-    return check_with_programs(export.folder, shells + printed, seconds, results.progress)
-
-
-def _spheres(export: Export, part: Part) -> int:
-    mirrors = export.mirrors.camera == part.camera
-    return int((mirrors & ~export.mirrors.flat).sum())
+    cameras = export.mirrors.camera[~export.mirrors.flat]
+    parts = [
+        _expected(export, part, int((cameras == part.camera).sum()), results)
+        for part in export.parts
+    ]
+    parts += [_expected(export, part, None, results) for part in export.printed]
+    return check_with_programs(export.folder, parts, seconds, results.progress)
 
 
 def _expected(
-    export: Export, part: Part | Printed, spheres: int | None, results: Results
+    export: Export, part: PartFiles, spheres: int | None, results: Results
 ) -> ExpectedPart:
     """What other programs should find in a part's files."""
     mass = results.masses.get(part.name)

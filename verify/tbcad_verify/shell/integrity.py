@@ -11,11 +11,11 @@ from pathlib import PurePosixPath
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mesh import Topology
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.figures import figure_errors
 from tbcad_verify.record.files import digest, listing
 from tbcad_verify.record.poses import (
     POSE_MM,
     contradictions,
+    figure_errors,
     malformed,
     missing_directions,
     pose_errors,

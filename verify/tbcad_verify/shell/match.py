@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, norm, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.shell.recover import FLAT_MM, Recovery
@@ -89,29 +88,20 @@ def centre_and_radius_errors(
     return errors[0], errors[1]
 
 
-def recorded_surfaces(mirrors: Mirrors) -> Surfaces:
-    """The M reflecting surfaces as recorded, by apex, normal and radius."""
-    radius = mirrors.radius_mm
-    curvature = np.where(mirrors.flat, 0.0, 1 / np.where(mirrors.flat, 1.0, radius))
-    return Surfaces(mirrors.columns("px", 3), mirrors.columns("nx", 3), curvature)
-
-
-def nearest_mirrors(mirrors: Mirrors, middle: Floats) -> list[int]:
-    """The recorded mirrors nearest to patches whose middles are (3, N)."""
-    if not middle.size:
-        return []
-    tree = cKDTree(mirrors.columns("px", 3).T)
-    return [int(k) for k in np.atleast_1d(tree.query(middle.T)[1])]
+def owners(segment: Ints, count: int) -> Ints:
+    """(K,) the mirror of each of `count` patches, by the patch (M,) of each mirror; -1 for none."""
+    owner = np.full(count, -1, dtype=np.intp)
+    found = np.flatnonzero(segment >= 0)
+    owner[segment[found]] = found
+    return owner
 
 
 def _surface_errors(
     mirrors: Mirrors, recovery: Recovery, mesh: Mesh, segment: Ints, coating_mm: float
 ) -> Floats:
-    owner = np.full(recovery.segments.count, -1, dtype=np.intp)
-    owner[segment[segment >= 0]] = np.flatnonzero(segment >= 0)
-    mirror = owner[recovery.segments.label]
+    mirror = owners(segment, recovery.segments.count)[recovery.segments.label]
     facets = np.flatnonzero(mirror >= 0)
-    modelled = recorded_surfaces(mirrors).coated(-coating_mm)
+    modelled = mirrors.surfaces().coated(-coating_mm)
     worst = np.where(segment >= 0, 0.0, np.nan)
     for part in chunks(facets.size):
         mine = mirror[facets[part]]

@@ -17,7 +17,6 @@ from tbcad_verify.report.checks import (
     short_list,
     worst_offenders,
 )
-from tbcad_verify.shell.match import nearest_mirrors
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import FORM_MM
 from tbcad_verify.types import Floats
@@ -74,7 +73,8 @@ def _missing_and_extra(setup: OpticalSetup, missing: list[str]) -> str:
     extra, mirrors = setup.match.extra, setup.export.mirrors
     parts = [f"missing: {short_list(missing)}"] if missing else []
     if extra.size:
-        near = nearest_mirrors(mirrors, setup.recovery.fits.middle[:, extra])
+        apices = cKDTree(mirrors.columns("px", 3).T)
+        near = np.atleast_1d(apices.query(setup.recovery.fits.middle[:, extra].T)[1])
         names = short_list([mirrors.ids[k] for k in near])
         parts.append(f"{extra.size} not in the record, near {names}")
     return "; ".join(parts)

@@ -13,7 +13,7 @@ from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_r
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
-from tbcad_verify.shell.match import Match, match
+from tbcad_verify.shell.match import Match, match, owners
 from tbcad_verify.shell.outline import Patches
 from tbcad_verify.shell.recover import Recovery, follows_fit, join_recoveries
 from tbcad_verify.types import Floats
@@ -75,10 +75,7 @@ class OpticalSetup:
 
     def owner(self) -> NDArray[np.intp]:
         """(K,) recorded mirror of each patch; -1 for none."""
-        owner = np.full(self.recovery.segments.count, -1, dtype=np.intp)
-        found = np.flatnonzero(self.match.segment >= 0)
-        owner[self.match.segment[found]] = found
-        return owner
+        return owners(self.match.segment, self.recovery.segments.count)
 
     def patches(self) -> Patches:
         """Facets, patches and mirrors, as outlines need them."""

@@ -120,10 +120,7 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     """
     rows = export.mirrors
     mine = np.flatnonzero(rows.camera == camera)
-    radius = rows.radius_mm
-    curvature = np.where(rows.flat, 0.0, 1 / np.where(rows.flat, 1.0, radius))
-    recorded = Surfaces(rows.columns("px", 3), rows.columns("nx", 3), curvature)
-    solid = recorded.take(mine).coated(0.0 if coated else -export.coating_mm)
+    solid = rows.surfaces().take(mine).coated(0.0 if coated else -export.coating_mm)
     side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
     walls = np.array([[side, 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
     return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
