@@ -1,8 +1,11 @@
 """What several test files build once."""
 
+from pathlib import Path
+
 import pytest
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.mirrors.record import write_record
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope
 from tbcad.spec.load import load_spec
@@ -33,3 +36,18 @@ def small_half(small_design: MirrorDesign) -> MirrorArray:
 @pytest.fixture(scope="session")
 def small_envelope(small_design: MirrorDesign) -> Envelope:
     return shell_envelope(small_design)
+
+
+@pytest.fixture(scope="session")
+def low_resolution_design() -> MirrorDesign:
+    """The small one for photographs of few pixels, with five balls."""
+    options = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
+    return design(load_spec(None, options))
+
+
+@pytest.fixture(scope="session")
+def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the record only, as `tbcad build` writes it."""
+    folder = tmp_path_factory.mktemp("record")
+    write_record(folder, low_resolution_design, shells=False)
+    return folder

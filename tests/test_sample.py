@@ -11,7 +11,7 @@ from tbcad_verify.run.verify import verify
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS, document, mirror_rows
 from tbcad.spec.load import load_spec
-from tests.csv_files import read_csv
+from tests.exported_files import read_csv
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "docs" / "sample"

@@ -1,8 +1,8 @@
 """The command as a user meets it: exit codes, one line of error, nothing half done."""
 
-import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +13,7 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.version import __version__
+from tests.exported_files import contents, read_csv
 
 COMMAND = [sys.executable, "-m", "tbcad"]
 STAGES = ("tbcad: verification:", "tbcad: mirrors:", "tbcad: prototype:")
@@ -94,8 +95,7 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
     passed = {check["name"]: check["pass"] for check in verdict["checks"]}
     assert passed["coverage, facets"] is False
     assert passed["coverage, spheres"] is False
-    with (out / "mirrors.csv").open(newline="") as file:
-        exact = {row["id"]: float(row["coverage_mm"]) for row in csv.DictReader(file)}
+    exact = {row["id"]: float(row["coverage_mm"]) for row in read_csv(out / "mirrors.csv")}
     for mirror in verdict["mirrors"]:
         assert mirror["coverage_fitted_mm"] == pytest.approx(exact[mirror["id"]], abs=0.3)
 
@@ -154,8 +154,8 @@ def test_foreign_files_are_refused_and_kept_on_force(
 def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
     """SIGKILL while the new one is being written: not a byte of the old one changes."""
     out = tmp_path / "exports"
-    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
-    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    shutil.copytree(export, out)
+    before = contents(out)
     build = subprocess.Popen(
         [*COMMAND, "build", "--n", "7", *SHELL, "--out", str(out)],
         stderr=subprocess.PIPE,
@@ -168,7 +168,7 @@ def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
             break
     build.send_signal(signal.SIGKILL)
     build.wait()
-    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+    assert contents(out) == before
     assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
     assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # what the killed build left is gone
 

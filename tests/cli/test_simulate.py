@@ -1,6 +1,5 @@
 """tbcad capture, view and refocus from the command line."""
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -10,19 +9,8 @@ import trimesh
 from PIL import Image
 
 from tbcad.cli import run
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.spec.load import load_spec
-from tests.simulate.conftest import OPTIONS
-
-
-@pytest.fixture(scope="module")
-def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the record only, as `tbcad build` writes it."""
-    folder = tmp_path_factory.mktemp("record")
-    write_record(folder, design(load_spec(None, OPTIONS)), shells=False)
-    return folder
+from tests.exported_files import contents
 
 
 @pytest.fixture(scope="module")
@@ -30,10 +18,6 @@ def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("captures") / "knot"
     assert run(["capture", str(record), "--out", str(out)]) == 0
     return out
-
-
-def digest(folder: Path) -> dict[str, str]:
-    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
 
 
 def test_capture_writes_pictures_and_light_field(captured: Path) -> None:
@@ -52,9 +36,9 @@ def test_capture_writes_pictures_and_light_field(captured: Path) -> None:
 
 
 def test_capture_repeats_and_replaces(captured: Path, record: Path) -> None:
-    before = digest(captured)
+    before = contents(captured)
     assert run(["capture", str(record), "--out", str(captured)]) == 0
-    assert digest(captured) == before
+    assert contents(captured) == before
 
 
 def test_capture_keeps_what_is_not_its_own(
@@ -139,10 +123,10 @@ def test_view_without_an_object_has_no_truth(captured: Path, tmp_path: Path) -> 
 def test_views_that_cannot_be(
     captured: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
 ) -> None:
-    before = digest(captured)
+    before = contents(captured)
     assert run(["view", str(captured), *more]) == 2
     assert wrong in capsys.readouterr().err
-    assert digest(captured) == before
+    assert contents(captured) == before
 
 
 def test_refocus_and_sweep(

@@ -1,7 +1,5 @@
 """tbcad tolerance from the command line, on a small export with its prototype."""
 
-import csv
-import hashlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +12,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.spec.load import load_spec
+from tests.exported_files import contents, read_csv
 from tests.prototype_exports import write_export
 
 SMALL = ["camera.width_px=208", "camera.height_px=155"]
@@ -71,26 +70,19 @@ def written(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def digest(folder: Path) -> dict[str, str]:
-    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
-
-
-def table(folder: Path, name: str) -> list[dict[str, str]]:
-    with (folder / f"tolerance-{name}.csv").open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 class TestWritten:
     def test_files(self, written: Path) -> None:
         assert {path.name for path in written.iterdir()} == FILES
 
     def test_json_agrees_with_tables(self, written: Path) -> None:
         read = json.loads((written / "tolerance.json").read_text())
-        worst = np.array([float(row["worst_coverage_mm"]) for row in table(written, "builds")])
+        worst = np.array(
+            [float(row["worst_coverage_mm"]) for row in read_csv(written / "tolerance-builds.csv")]
+        )
         assert len(worst) == read["builds"] == 20
         assert read["yield"]["share"] == (worst >= 60).mean()
         assert read["worst_camera_mm"]["0.5"] == np.median(worst)
-        losses = [float(row["loss_mm"]) for row in table(written, "sensitivity")]
+        losses = [float(row["loss_mm"]) for row in read_csv(written / "tolerance-sensitivity.csv")]
         assert losses == [one["loss_mm"] for one in read["single_errors"]]
         assert losses == sorted(losses, reverse=True)
 
@@ -138,13 +130,13 @@ class TestWritten:
         self, written: Path, export: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Again, with one thread instead of two."""
-        before, mine = digest(written), written / "notes-of-mine.txt"
+        before, mine = contents(written), written / "notes-of-mine.txt"
         mine.write_text("mine")
         monkeypatch.setattr("tbcad.schedule.cores", lambda: 1)
         assert run(["tolerance", str(export), *FEW, "--out", str(written)]) == 0
         assert mine.read_text() == "mine"
         mine.unlink()
-        assert digest(written) == before
+        assert contents(written) == before
 
     def test_other_process_and_seed(self, bare: Path, tmp_path: Path) -> None:
         """A process of one's own: with a change it is no longer the built-in one."""

@@ -22,7 +22,7 @@ from tbcad_verify.report.checks import Check
 from tbcad_verify.run.child import Limits
 
 from tbcad.cli import run
-from tests.csv_files import read_csv
+from tests.exported_files import read_csv
 
 pytestmark = pytest.mark.clients
 

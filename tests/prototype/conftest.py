@@ -36,6 +36,13 @@ def small_prototype(small_design: MirrorDesign) -> PrototypeLayout:
 
 
 @pytest.fixture(scope="session")
+def layout(small_design: MirrorDesign) -> PrototypeLayout:
+    """Six balls and caps, both, of the nearest sizes."""
+    options = ["n=6", "prototype.k=6", "prototype.snap=nearest"]
+    return prototype_layout(load_spec(None, options), small_design)
+
+
+@pytest.fixture(scope="session")
 def carrier(spec: PrototypeSpec, small_prototype: PrototypeLayout) -> BaseLayout:
     return base_layout(spec.base, small_prototype)
 

@@ -11,7 +11,7 @@ from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 from tbcad.shell.files import camera_a_mesh, camera_solid
 from tbcad.spec.load import load_spec, spec_dict
-from tests.csv_files import read_csv
+from tests.exported_files import contents, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
 
 
@@ -114,8 +114,7 @@ def test_manifest_holds_every_file(exported: Path) -> None:
 
 def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
     write_export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
-    for path in exported.iterdir():
-        assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
+    assert contents(tmp_path) == contents(exported)
 
 
 def test_pcurves_on_request(tmp_path: Path) -> None:

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import write_record
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
@@ -14,24 +13,9 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.spec.load import load_spec
 from tests.prototype_exports import write_export
 
-OPTIONS = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
 CAPTURE_MM = 60.0
-
-
-@pytest.fixture(scope="session")
-def low_resolution_design() -> MirrorDesign:
-    return design(load_spec(None, OPTIONS))
-
-
-@pytest.fixture(scope="session")
-def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the record only, as `tbcad build` writes it."""
-    folder = tmp_path_factory.mktemp("record")
-    write_record(folder, low_resolution_design, shells=False)
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -220,12 +220,6 @@ class TestJson:
         lost = replace(analysis, prototype=prototype_yield(0.0, 0.0, math.inf))
         json.loads(json_text(lost))
 
-    def test_same_bytes(self, analysis: Analysis) -> None:
-        assert json_text(analysis) == json_text(replace(analysis))
-        one, two = study_files(tolerance_study(analysis)), study_files(tolerance_study(analysis))
-        assert one == two
-        assert one["tolerance.png"].startswith(b"\x89PNG")
-
 
 class TestTables:
     def test_summary(self, analysis: Analysis) -> None:

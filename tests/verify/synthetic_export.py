@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -19,6 +21,8 @@ import numpy as np
 PIN = np.array([100.0, 0.0, -100.0])
 B = 100.0
 FOOT = -12.0
+HEAD = 80  # bytes of an STL before the number of its facets
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 COLUMNS = (
     "id,camera,ux,uy,uz,px,py,pz,nx,ny,nz,cx,cy,cz,radius_mm,size_mm,theta0_deg,theta1_deg,"
     "polar_deg,azimuth_deg,cell_area_mm2,coverage_mm"
@@ -301,13 +305,25 @@ def solid(cells: Cells, thickness: float = 1.1) -> np.ndarray:
     return points[faces].astype(np.float32)
 
 
-def stl(facets: np.ndarray) -> bytes:
-    table = np.zeros(len(facets), dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+def stl(facets: np.ndarray, turn: int = 1) -> bytes:
+    """A binary STL; `turn` -1 stores the normals against the corners' order."""
+    table = np.zeros(len(facets), FACET)
+    table["normal"], table["corners"] = turn * normals(facets), facets
+    return b"synthetic".ljust(HEAD) + np.uint32(len(facets)).tobytes() + table.tobytes()
+
+
+def normals(facets: np.ndarray) -> np.ndarray:
+    """(F, 3) unit normals; zero where a facet has no area."""
     x = facets.astype(np.float64)
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    size = np.linalg.norm(normal, axis=1, keepdims=True)
-    table["n"], table["v"] = normal / np.where(size > 0, size, 1), facets
-    return b"synthetic".ljust(80) + np.uint32(len(facets)).tobytes() + table.tobytes()
+    across = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return across / np.where(length > 0, length, 1)
+
+
+def facets_of(path: Path) -> np.ndarray:
+    """(F, 3, 3) corners in a binary STL."""
+    data = path.read_bytes()[HEAD + 4 :]
+    return np.frombuffer(data, FACET)["corners"].copy()
 
 
 def mirrored(facets: np.ndarray) -> np.ndarray:
@@ -374,29 +390,29 @@ def write(folder: Path, files: dict[str, bytes]) -> Path:
     return sign(folder, list(files))
 
 
-def sign(folder: Path, names: list[str]) -> Path:
+def sign(folder: Path, names: Iterable[str] | None = None) -> Path:
     """Write a manifest that is right for what is there now."""
     entries = {}
-    for name in names:
+    for name in names or sorted(
+        {path.name for path in folder.iterdir()} - {"manifest.json", "verify.json"}
+    ):
         data = (folder / name).read_bytes()
         entries[name] = {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
     (folder / "manifest.json").write_text(json.dumps({"files": entries}))
     return folder
 
 
+def csv_bytes(columns: str, rows: Iterable[Sequence[object]]) -> bytes:
+    """A table with its heading; None is an empty cell, floats keep all their digits."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns.split(","))
+    writer.writerows(rows)
+    return stream.getvalue().encode()
+
+
 def table(mirrors: list[dict[str, Any]]) -> bytes:
-    names = COLUMNS.split(",")
-    lines = [",".join(names)]
-    for m in mirrors:
-        cells = [
-            "" if m[k] is None else m[k] if isinstance(m[k], str) else repr(m[k]) for k in names
-        ]
-        lines.append(",".join(cells))
-    return ("\n".join(lines) + "\n").encode()
-
-
-def read_table(data: bytes) -> list[list[str]]:
-    return list(csv.reader(data.decode().splitlines()))
+    return csv_bytes(COLUMNS, [[mirror[name] for name in COLUMNS.split(",")] for mirror in mirrors])
 
 
 def export(folder: Path, design: Design) -> tuple[Path, Cells]:

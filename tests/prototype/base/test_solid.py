@@ -218,12 +218,6 @@ class TestCarrier:
             PrinterSpec(bed_mm=tuple(bed)),
         )
 
-    def test_the_same_bytes(self, base: BaseLayout, part: PlacedSolid, tmp_path: Path) -> None:
-        (rebuilt,) = carrier_parts(base, split_base(base, PRINTER), PRINTER)
-        for name, again in (("one", part), ("two", rebuilt)):
-            write_step(tmp_path / name, Solid(again.name, again.shape, ()))
-        assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
-
 
 def test_booleans_in_parallel_give_the_same_bytes(
     base: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

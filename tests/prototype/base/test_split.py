@@ -91,12 +91,6 @@ class TestPlanes:
         assert (np.sum(inside, axis=0) == 1).all()
         assert all(one.any() for one in inside)
 
-    def test_the_same_again(self, small_prototype: PrototypeLayout) -> None:
-        one, two = (split_base(base_layout(SPEC, small_prototype), cube(150.0)) for _ in range(2))
-        for first, second in zip(one.joints, two.joints, strict=True):
-            assert (first.screws == second.screws).all()
-            assert (first.plane.normal == second.plane.normal).all()
-
     def test_a_bed_too_small_names_one_that_does(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"make printer\.bed_mm at least") as caught:
             split_base(base_layout(SPEC, small_prototype), PrinterSpec(bed_mm=(135.0, 135.0, 60.0)))

@@ -5,19 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tbcad.formats.csv_table import write_table
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files.balls_csv import COLUMNS, ball_rows
-from tbcad.spec.load import load_spec
-from tests.csv_files import Rows, read_csv
-
-
-@pytest.fixture(scope="module")
-def layout(small_design: MirrorDesign) -> PrototypeLayout:
-    """Balls and caps, both."""
-    return prototype_layout(
-        load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
-    )
+from tests.exported_files import Rows, read_csv
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +77,8 @@ def test_what_they_show(layout: PrototypeLayout, read: Rows) -> None:
         assert float(row["error_deg"]) == np.degrees(layout.stops.error[own]).max()
 
 
-def test_same_bytes(layout: PrototypeLayout, tmp_path: Path) -> None:
-    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    for path in paths:
-        write_table(path, COLUMNS, ball_rows(layout))
-    data = [path.read_bytes() for path in paths]
-    assert data[0] == data[1]
-    assert b"\r" not in data[0]
-    assert b"-0.0," not in data[0]
+def test_no_carriage_return_and_no_minus_zero(layout: PrototypeLayout, tmp_path: Path) -> None:
+    write_table(tmp_path / "balls.csv", COLUMNS, ball_rows(layout))
+    data = (tmp_path / "balls.csv").read_bytes()
+    assert b"\r" not in data
+    assert b"-0.0," not in data

@@ -1,13 +1,11 @@
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tbcad.formats.csv_table import write_table
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import ball_masses, cap_volume, sum_masses
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
 from tbcad.prototype.files.bom_csv import (
@@ -18,9 +16,8 @@ from tbcad.prototype.files.bom_csv import (
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import MotionSpec
-from tests.csv_files import Rows, read_csv
+from tests.exported_files import Rows, read_csv
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)
@@ -30,14 +27,6 @@ PURCHASED = {
 }
 PRINTED = (PrintedItem("base", "carrier", 5e5), PrintedItem("foot", "below the plate", 1e3))
 NEEDED = PURCHASED, PRINTED, 1.27, PARTS
-
-
-@pytest.fixture(scope="module")
-def layout(small_design: MirrorDesign) -> PrototypeLayout:
-    """Balls and caps, both."""
-    return prototype_layout(
-        load_spec(None, ["n=6", "prototype.k=6", "prototype.snap=nearest"]), small_design
-    )
 
 
 @pytest.fixture(scope="module")
@@ -122,12 +111,6 @@ def test_drive_is_in_it(drive: Drive, read: Rows) -> None:
 def test_unknown_part(layout: PrototypeLayout, drive: Drive) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
         bom_rows(layout, drive, {"M3x11": 1}, (), 1.27, PARTS)
-
-
-def test_same_bytes(layout: PrototypeLayout, drive: Drive, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        write_table(tmp_path / name, COLUMNS, bom_rows(layout, drive, *NEEDED))
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 def test_record_of_the_drive(layout: PrototypeLayout) -> None:

@@ -1,19 +1,10 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tbcad.formats.csv_table import Row, write_table
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.formats.csv_table import write_table
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files.plan_csv import PICTURE_COLUMNS, STOP_COLUMNS, picture_rows, stop_rows
-from tbcad.spec.load import load_spec
-from tests.csv_files import Rows, read_csv
-
-
-@pytest.fixture(scope="module")
-def layout(small_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
+from tests.exported_files import Rows, read_csv
 
 
 @pytest.fixture(scope="module")
@@ -82,11 +73,3 @@ def test_stops_sum_up_the_plan(plan: Rows, stops: Rows) -> None:
             assert max(float(row["error_deg"]) for row in own) == float(stop["error_deg"])
             worst = max(abs(float(row["azimuth_error_deg"])) for row in own)
             assert worst == float(stop["azimuth_error_deg"])
-
-
-def test_same_bytes(layout: PrototypeLayout, tmp_path: Path) -> None:
-    def written(name: str, records: list[Row]) -> bytes:
-        write_table(tmp_path / name, PICTURE_COLUMNS, records)
-        return (tmp_path / name).read_bytes()
-
-    assert written("a", picture_rows(layout)) == written("b", picture_rows(layout))

@@ -214,7 +214,3 @@ class TestRefusals:
     def test_a_shaft_that_no_bearing_takes(self) -> None:
         with pytest.raises(SpecError, match="set it to 8"):
             choose_part(PARTS, "bearings", "key", "set it to 8", "width_mm", bore_mm=9.0)
-
-
-def test_the_same_frame_twice(around: Surroundings, frame: FrameLayout) -> None:
-    assert repr(around.frame(drive("nema17-belt"))) == repr(frame)

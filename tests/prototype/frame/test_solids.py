@@ -273,9 +273,3 @@ def allowed(pair: set[str]) -> float:
 def test_a_bed_too_small_is_refused(frame: FrameLayout) -> None:
     with pytest.raises(SpecError, match="does not fit on the printer's bed"):
         printed_solids(frame, PrinterSpec(bed_mm=(90.0, 90.0, 90.0)))
-
-
-def test_the_same_bytes_twice(frame: FrameLayout) -> None:
-    one, two = (meshed(component_solid(frame.printed[0]), 0.05) for _ in range(2))
-    assert one.vertices.tobytes() == two.vertices.tobytes()
-    assert one.triangles.tobytes() == two.triangles.tobytes()

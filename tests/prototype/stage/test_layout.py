@@ -310,9 +310,3 @@ class TestBodies:
         assert isinstance(middle, Prism)
         assert np.ptp(middle.corners, axis=0) == pytest.approx([6, 3, 0])
         assert [end.start[0] for end in ends if isinstance(end, Cylinder)] == [-3, 3]
-
-
-def test_the_same_stage_twice(
-    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut, stage: StageLayout
-) -> None:
-    assert repr(stage_layout(spec, small_prototype, keep_out, PARTS)) == repr(stage)

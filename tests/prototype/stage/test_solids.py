@@ -1,14 +1,11 @@
 """The stage as solids: pockets and bores recovered from meshes, volumes by closed forms."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from tbcad.cad.brep import Solid
-from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.printing.component_solids import placed_component
@@ -115,10 +112,3 @@ class TestSolids:
     def test_a_bed_too_small_is_refused(self, stage: StageLayout) -> None:
         with pytest.raises(SpecError, match="stage_post does not fit"):
             placed(stage, PrinterSpec(bed_mm=(120.0, 120.0, 120.0)))
-
-
-def test_the_same_bytes_twice(stage: StageLayout, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        crown = placed_component(stage.components[1], PRINTER)
-        write_step(tmp_path / name, Solid(crown.name, crown.shape, ()))
-    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

@@ -1,6 +1,6 @@
 """Capture with the prototype: its plan as read, its photographs, and what is merged of them."""
 
-import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -32,14 +32,11 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.spec.load import load_spec
-from tests.csv_files import edit_csv
+from tests.exported_files import Rows, edit_csv, edit_json
 from tests.prototype_exports import plan_of
-from tests.simulate.conftest import CAPTURE_MM, OPTIONS
+from tests.simulate.conftest import CAPTURE_MM
 
-SPEC = load_spec(None, OPTIONS)
 Runs = tuple[PrototypeRun, PrototypeRun]
-Rows = list[dict[str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -347,6 +344,18 @@ def capture_rays(planes: dict[str, np.ndarray]) -> np.ndarray:
     return near & (planes["mirror"] > 0) & ((origin * direction).sum(axis=2) < 0)
 
 
+@pytest.fixture
+def broken_export(export_folder: Path, tmp_path: Path) -> Path:
+    """A copy, to be broken."""
+    return Path(shutil.copytree(export_folder, tmp_path / "broken"))
+
+
+def check_refusal(folder: Path, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read_plan(read_export(folder))
+    assert "\n" not in str(caught.value)
+
+
 class TestReading:
     def test_plan_round_trip(self, export_folder: Path, layout: PrototypeLayout) -> None:
         found, wanted = read_plan(read_export(export_folder)), plan_of(layout)
@@ -381,13 +390,10 @@ class TestReading:
         ],
     )
     def test_refused_plans(
-        self, export_folder: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+        self, broken_export: Path, change: Callable[[Rows], object], message: str
     ) -> None:
-        folder = copied(export_folder, tmp_path)
-        edit_csv(folder / "rotation_plan.csv", change)
-        with pytest.raises(InputError, match=message) as caught:
-            read_plan(read_export(folder))
-        assert "\n" not in str(caught.value)
+        edit_csv(broken_export / "rotation_plan.csv", change)
+        check_refusal(broken_export, message)
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -401,16 +407,10 @@ class TestReading:
         ],
     )
     def test_refused_records(
-        self, export_folder: Path, tmp_path: Path, change: Callable[[dict], object], message: str
+        self, broken_export: Path, change: Callable[[dict], object], message: str
     ) -> None:
-        folder = copied(export_folder, tmp_path)
-        path = folder / "prototype.json"
-        record = json.loads(path.read_text())
-        change(record)
-        path.write_text(json.dumps(record))
-        with pytest.raises(InputError, match=message) as caught:
-            read_plan(read_export(folder))
-        assert "\n" not in str(caught.value)
+        edit_json(broken_export / "prototype.json", change)
+        check_refusal(broken_export, message)
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -426,25 +426,17 @@ class TestReading:
         ],
     )
     def test_refused_balls(
-        self, export_folder: Path, tmp_path: Path, change: Callable[[Rows], object], message: str
+        self, broken_export: Path, change: Callable[[Rows], object], message: str
     ) -> None:
-        folder = copied(export_folder, tmp_path)
-        edit_csv(folder / "balls.csv", change)
-        with pytest.raises(InputError, match=message) as caught:
-            read_plan(read_export(folder))
-        assert "\n" not in str(caught.value)
+        edit_csv(broken_export / "balls.csv", change)
+        check_refusal(broken_export, message)
 
     @pytest.mark.parametrize("name", ["prototype.json", "balls.csv", "rotation_plan.csv"])
-    def test_files_that_are_not_there_or_no_text(
-        self, export_folder: Path, tmp_path: Path, name: str
-    ) -> None:
-        folder = copied(export_folder, tmp_path)
-        (folder / name).write_bytes(b"\xff\xfe\x00")
-        with pytest.raises(InputError, match=f"{name} cannot be read"):
-            read_plan(read_export(folder))
-        (folder / name).unlink()
-        with pytest.raises(InputError, match=f"{name} is not there"):
-            read_plan(read_export(folder))
+    def test_files_that_are_not_there_or_no_text(self, broken_export: Path, name: str) -> None:
+        (broken_export / name).write_bytes(b"\xff\xfe\x00")
+        check_refusal(broken_export, f"{name} cannot be read")
+        (broken_export / name).unlink()
+        check_refusal(broken_export, f"{name} is not there")
 
     def test_one_camera_that_cannot_take_both_halves(self, export_folder: Path) -> None:
         exported = read_export(export_folder)
@@ -452,12 +444,6 @@ class TestReading:
         askew = replace(b, camera=replace(b.camera, pinhole=b.camera.pinhole + np.array([0, 1, 0])))
         with pytest.raises(InputError, match="one camera cannot take both halves"):
             read_plan(exported.model_copy(update={"reflectors": (a, askew)}))
-
-
-def copied(folder: Path, target: Path) -> Path:
-    for path in folder.iterdir():
-        (target / path.name).write_bytes(path.read_bytes())
-    return target
 
 
 def raised(table: Rows, name: str, by: float) -> None:

@@ -1,6 +1,5 @@
 """What an export says of itself, and what is refused of it."""
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -13,10 +12,9 @@ from tbcad.errors import InputError
 from tbcad.simulate.scene.exported import Exported, read_export
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tests.csv_files import edit_csv
+from tests.exported_files import Rows, edit_csv, edit_json
 
 Document = dict[str, Any]
-Rows = list[dict[str, str]]
 
 
 def test_the_record_gives_the_designs_rays(
@@ -32,10 +30,8 @@ def test_the_record_gives_the_designs_rays(
 
 
 def changed(record: Path, folder: Path, change: Callable[[Document], object]) -> Path:
-    document = json.loads((record / "design.json").read_text())
-    change(document)
-    (folder / "design.json").write_text(json.dumps(document))
-    shutil.copy(record / "mirrors.csv", folder)
+    shutil.copytree(record, folder, dirs_exist_ok=True)
+    edit_json(folder / "design.json", change)
     return folder
 
 

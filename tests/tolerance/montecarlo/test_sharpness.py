@@ -203,6 +203,7 @@ class TestSharpness:
     ) -> None:
         found = self.found(cameras, scene, reference, LARGE, 0.5e-3)
         assert (found.uncalibrated < found.calibrated).all()
+        assert not np.array_equal(found.calibrated[0], found.calibrated[1])
         assert (found.uncalibrated < found.designed).all()
         lost = found.designed - found.uncalibrated
         assert (np.abs(found.calibrated - found.designed) < lost / 2).all()
@@ -215,14 +216,6 @@ class TestSharpness:
         )
         assert (roughly.calibrated < exactly.calibrated - 0.01).all()
         assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
-
-    def test_same_builds_same_figures(
-        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
-    ) -> None:
-        one, two = (self.found(cameras, scene, reference, LARGE, 1e-3) for _ in range(2))
-        assert np.array_equal(one.calibrated, two.calibrated)
-        assert np.array_equal(one.uncalibrated, two.uncalibrated)
-        assert not np.array_equal(one.calibrated[0], one.calibrated[1])
 
     def test_each_build_is_reported(
         self, cameras: Cameras, scene: Scene, reference: ReferenceViews

@@ -61,6 +61,14 @@ RECORDS: tuple[Mutation, ...] = (
     fails("a direction without its mirror", TABLE, mirrors(leave_out, 0), "directions", "1 vert"),
     fails("a mirror twice in the record", TABLE, mirrors(twin, 0), "directions", "a9999"),
     fails(
+        "an id twice in the record",
+        TABLE,
+        mirrors(lambda rows, _: rows[3].update(id="a0010"), 0),
+        "ids",
+        "a0010",
+    ),
+    fails("an odd id", TABLE, mirrors(lambda rows, _: rows[3].update(id="m 4"), 0), "ids", "m 4"),
+    fails(
         "cameras 0.1 mm lower", JSON, design(shift_camera(-0.1, False)), "requirements", "pinhole"
     ),
     fails("cameras and spec 0.1 mm lower", JSON, design(shift_camera(-0.1, True)), "poses"),

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.verify.corpus.copies import put
+from tests.verify.synthetic_export import facets_of, stl
 
 Corners = NDArray[np.float32]  # (F, 3, 3) facet, corner, axis; mm
-HEAD = 84
-FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 MODEL = "3D/3dmodel.model"
 VERTEX = '<vertex x="%.6f" y="%.6f" z="%.6f"/>\n'
 TRIANGLE = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
@@ -23,34 +22,19 @@ HALVES = ("a", "b")
 
 def read(folder: Path, half: str) -> Corners:
     """Corners from the STL."""
-    data = (folder / f"shell_{half}.stl").read_bytes()
-    return np.frombuffer(data[HEAD:], FACET)["corners"].copy()
+    return facets_of(folder / f"shell_{half}.stl")
 
 
 def write(folder: Path, half: str, corners: Corners) -> None:
-    """The same corners to both files."""
+    """The same corners to both files; the synthetic export has no 3MF."""
     write_stl(folder, f"shell_{half}.stl", corners)
-    write_3mf(folder, f"shell_{half}.3mf", corners)
+    if (folder / f"shell_{half}.3mf").exists():
+        write_3mf(folder, f"shell_{half}.3mf", corners)
 
 
 def write_stl(folder: Path, name: str, corners: Corners, turn: int = 1) -> None:
     """Corners as binary STL; `turn` -1 stores the normals against the corners' order."""
     put(folder, name, stl(corners, turn))
-
-
-def stl(corners: Corners, turn: int = 1) -> bytes:
-    """A binary STL."""
-    table = np.zeros(len(corners), FACET)
-    table["normal"], table["corners"] = turn * normals(corners), corners
-    return b"corpus".ljust(80) + np.uint32(len(corners)).tobytes() + table.tobytes()
-
-
-def normals(corners: Corners) -> NDArray[np.float64]:
-    """(F, 3) unit normals; zero where a facet has no area."""
-    x = corners.astype(np.float64)
-    across = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    return across / np.where(length > 0, length, 1)
 
 
 def write_3mf(folder: Path, name: str, corners: Corners) -> None:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from tests.helpers import read_3mf
-from tests.verify.corpus import facets, part21
+from tests.verify.corpus import part21
+from tests.verify.synthetic_export import facets_of
 
 # Nothing that the verification promises hangs on these.
 FREE = re.compile(
@@ -74,11 +75,7 @@ def _value(word: str | None) -> str | float | None:
 
 
 def _stl(before: Path, after: Path) -> bool:
-    one, two = (
-        np.frombuffer(path.read_bytes()[facets.HEAD :], facets.FACET)["corners"]
-        for path in (before, after)
-    )
-    return np.array_equal(one, two)
+    return np.array_equal(*(facets_of(path) for path in (before, after)))
 
 
 def _model(before: Path, after: Path) -> bool:

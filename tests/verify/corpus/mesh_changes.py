@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from tests.verify.corpus.copies import change, load, put, store
-from tests.verify.corpus.facets import HALVES, Corners, normals, read, write, write_3mf, write_stl
+from tests.verify.corpus.facets import HALVES, Corners, read, write, write_3mf, write_stl
 from tests.verify.corpus.mutation import Job
 from tests.verify.corpus.patches import Ball, balls, inner, patch, replaced, reshaped
+from tests.verify.synthetic_export import normals
 
 # Takes a half's corners and its balls, those well inside first.
 Change = Callable[[Corners, list[Ball]], Corners]

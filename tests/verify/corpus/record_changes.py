@@ -39,11 +39,19 @@ def mirror(how: Callable[[Row], object]) -> Job:
 
 def design(how: Callable[[Design], object]) -> Job:
     """Change design.json; no mirror is concerned."""
+    return json_file(JSON, how)
 
+
+def manifest(how: Callable[[dict[str, Any]], object]) -> Job:
+    """Change the list of files in the manifest."""
+    return json_file("manifest.json", lambda value: how(value["files"]))
+
+
+def json_file(name: str, how: Callable[[dict[str, Any]], object]) -> Job:
     def job(folder: Path) -> Sequence[str]:
-        value = load(folder, JSON)
+        value = load(folder, name)
         how(value)
-        store(folder, JSON, value)
+        store(folder, name, value)
         return ()
 
     return job

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,22 +12,14 @@ from tests.verify.corpus.broken_files import gone
 from tests.verify.corpus.broken_meshes import MESHES
 from tests.verify.corpus.broken_records import RECORDS
 from tests.verify.corpus.copies import copy, sign
-from tests.verify.corpus.good import HERE, export
 from tests.verify.corpus.harmless import HARMLESS
 from tests.verify.corpus.holes import HOLES
 from tests.verify.corpus.mesh_changes import dented, mesh
 from tests.verify.corpus.mutation import Mutation, fails, refused
-from tests.verify.corpus.readings import remembered
-from tests.verify.corpus.trial import attempt
+from tests.verify.corpus.trial import HERE, attempt
 from tests.verify.corpus.whole_corpus import ALL
 
 pytestmark = pytest.mark.corpus
-
-
-@pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    with export(tmp_path_factory.mktemp("corpus")) as folder, remembered():
-        yield folder
 
 
 @pytest.mark.parametrize("mutation", [*MESHES, *RECORDS], ids=lambda mutation: mutation.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,8 +13,7 @@ from tbcad_verify import BadExport, verify
 
 from tests.verify.corpus.copies import change, copy, sign
 from tests.verify.corpus.flips import same
-from tests.verify.corpus.good import HERE, export
-from tests.verify.corpus.readings import remembered
+from tests.verify.corpus.trial import HERE
 
 pytestmark = pytest.mark.corpus
 
@@ -32,12 +31,6 @@ QUICK = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )
-
-
-@pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    with export(tmp_path_factory.mktemp("corpus")) as folder, remembered():
-        yield folder
 
 
 @given(

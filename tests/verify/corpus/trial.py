@@ -15,6 +15,8 @@ from tbcad_verify.run.verify import VerifyOptions, verify
 from tests.verify.corpus.copies import copy, sign
 from tests.verify.corpus.mutation import Mutation
 
+HERE = VerifyOptions(write=False, apart=False)
+
 
 @dataclass(frozen=True)
 class Outcome:

@@ -6,8 +6,6 @@ meshes. Angles in degrees, lengths in mm.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -22,6 +20,7 @@ from tests.verify.synthetic_export import (
     PIN,
     B,
     Cells,
+    csv_bytes,
     document,
     mirrored,
     poses,
@@ -282,19 +281,6 @@ def ball_rows(
     return out
 
 
-def text(columns: str, lines: list[list[Any]]) -> bytes:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns.split(","))
-    writer.writerows(
-        [
-            ["" if x is None else repr(x) if isinstance(x, float) else x for x in line]
-            for line in lines
-        ]
-    )
-    return stream.getvalue().encode()
-
-
 def parts(
     spec: SyntheticPrototype, balls: list[Ball]
 ) -> dict[str, tuple[str, int | None, np.ndarray]]:
@@ -321,13 +307,15 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
     stops = stop_rows(plan)
     rows_ = ball_rows(spec, balls, plan)
     files = {
-        "balls.csv": text(BALL_COLUMNS, [list(row.values()) for row in rows_]),
-        "rotation_plan.csv": text(
+        "balls.csv": csv_bytes(BALL_COLUMNS, [list(row.values()) for row in rows_]),
+        "rotation_plan.csv": csv_bytes(
             "order,object_turn_deg,stop,base_angle_deg,ball,mirror,polar_error_deg,"
             "azimuth_error_deg,error_deg",
             plan,
         ),
-        "stops.csv": text("stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg", stops),
+        "stops.csv": csv_bytes(
+            "stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg", stops
+        ),
         "rotation_plan.nc": program(stops).encode(),
     }
     entries = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,6 +40,7 @@ from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
+from tests.exported_files import edit_json
 from tests.verify.prototype.synthetic_prototype import (
     SyntheticPrototype,
     export,
@@ -305,13 +305,15 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
     text = (folder / "stage.step").read_text()
     text = text.replace("MANIFOLD_SOLID_BREP('',", "MANIFOLD_SOLID_BREP('stage',")
     (folder / "stage.step").write_text(text)
-    record = json.loads((folder / "prototype.json").read_text())
-    next(p for p in record["parts"] if p["name"] == "stage")["step"] = "stage.step"
-    (folder / "prototype.json").write_text(json.dumps(record))
-    design = json.loads((folder / "design.json").read_text())
-    design["spec"]["mesh"] = {"chord_error_mm": 0.01, "structure_error_mm": 0.02}
-    (folder / "design.json").write_text(json.dumps(design))
-    return sign(folder, [p.name for p in folder.iterdir() if p.name != "manifest.json"])
+    edit_json(
+        folder / "prototype.json",
+        lambda record: next(part for part in record["parts"] if part["name"] == "stage").update(
+            step="stage.step"
+        ),
+    )
+    mesh = {"chord_error_mm": 0.01, "structure_error_mm": 0.02}
+    edit_json(folder / "design.json", lambda design: design["spec"].update(mesh=mesh))
+    return sign(folder)
 
 
 def test_the_step_file_is_held_against_the_mesh_in_its_place(prototype_folder: Path) -> None:

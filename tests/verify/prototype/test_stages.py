@@ -13,7 +13,7 @@ import pytest
 from tbcad_verify import main, verify
 from tbcad_verify.report.checks import Check
 
-from tests.csv_files import Rows, edit_csv
+from tests.exported_files import Rows, contents, edit_csv, edit_json
 from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export, make_balls
 from tests.verify.synthetic_export import sign
@@ -39,10 +39,6 @@ ON_BALLS = (
 )
 
 
-def signed(folder: Path) -> Path:
-    return sign(folder, sorted(p.name for p in folder.iterdir() if p.name != "manifest.json"))
-
-
 def failures(folder: Path) -> dict[str, Check]:
     """Failed and unknown checks by name."""
     report = verify(folder, options=replace(IN_PROCESS, write=False))
@@ -50,16 +46,13 @@ def failures(folder: Path) -> dict[str, Check]:
 
 
 def edited(folder: Path, change: Callable[[Row], None]) -> Path:
-    path = folder / "prototype.json"
-    value = json.loads(path.read_text())
-    change(value)
-    path.write_text(json.dumps(value))
-    return signed(folder)
+    edit_json(folder / "prototype.json", change)
+    return sign(folder)
 
 
 def table(folder: Path, name: str, change: Callable[[Rows], object]) -> Path:
     edit_csv(folder / name, change)
-    return signed(folder)
+    return sign(folder)
 
 
 def moved(row: dict[str, str], name: str, by: float) -> None:
@@ -117,7 +110,7 @@ def program(old: str, new: str) -> Callable[[Path], Path]:
         before = path.read_text()
         assert old in before
         path.write_text(before.replace(old, new, 1))
-        return signed(folder)
+        return sign(folder)
 
     return change
 
@@ -128,7 +121,7 @@ def angle_off(folder: Path) -> Path:
     place = next(k for k, line in enumerate(lines) if line == "M8") - 2
     lines[place] = f"G1 X{float(lines[place][4:]) + 0.01:.4f}"
     path.write_text("\n".join(lines) + "\n")
-    return signed(folder)
+    return sign(folder)
 
 
 def in_record(*path: Any, to: Any) -> Callable[[Path], Path]:
@@ -365,17 +358,12 @@ def test_a_broken_prototype_fails(tmp_path: Path, how: str) -> None:
 
 def test_parts_of_a_prototype_are_listed_or_fail(prototype_folder: Path) -> None:
     (prototype_folder / "stray.stl").write_bytes((prototype_folder / "stage.stl").read_bytes())
-    signed(prototype_folder)
+    sign(prototype_folder)
     assert "stray.stl" in failures(prototype_folder)["manifest"].detail
 
 
 def test_a_prototype_that_the_manifest_does_not_list_fails(prototype_folder: Path) -> None:
-    names = [
-        p.name
-        for p in prototype_folder.iterdir()
-        if p.name not in ("manifest.json", "prototype.json")
-    ]
-    sign(prototype_folder, names)
+    sign(prototype_folder, contents(prototype_folder).keys() - {"manifest.json", "prototype.json"})
     assert "prototype.json" in failures(prototype_folder)["manifest"].detail
 
 
@@ -385,7 +373,7 @@ def test_a_mesh_with_a_hole_fails(prototype_folder: Path) -> None:
     (prototype_folder / "stage.stl").write_bytes(
         data[:80] + np.uint32(count).tobytes() + data[84:-50]
     )
-    failed = failures(signed(prototype_folder))
+    failed = failures(sign(prototype_folder))
     assert failed["watertight"].file == "stage.stl"
 
 

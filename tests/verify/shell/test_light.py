@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from tbcad_verify import verify
 from tbcad_verify.mesh import rays
-from tbcad_verify.mesh.surfaces import distance_before_mirror
+from tbcad_verify.mesh.surfaces import distance_before_mirror, miss_distances
+from tbcad_verify.report.checks import Check
 from tbcad_verify.shell import coverage, image_rim, light, pixels
 from tbcad_verify.shell.optics import OpticalSetup
 
+from tests.exported_files import edit_json
 from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 from tests.verify.synthetic_export import PIN, Cells, sign, stl
-
-NAMES = ["design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl"]
 
 
 def pixel_directions(optical_setup: OpticalSetup) -> np.ndarray:
@@ -29,6 +29,11 @@ def pixel_directions(optical_setup: OpticalSetup) -> np.ndarray:
     j, i = np.meshgrid(np.arange(c.width), np.arange(c.height))
     x, y = j.ravel() + 0.5 - c.width / 2, i.ravel() + 0.5 - c.height / 2
     return c.forward + (x[:, None] * c.right + y[:, None] * down) / focal
+
+
+@pytest.fixture(scope="module")
+def tally(optical_setup: OpticalSetup) -> light.PixelTally:
+    return light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
 
 
 def test_pixel_rays_are_the_definitions(optical_setup: OpticalSetup) -> None:
@@ -62,8 +67,9 @@ def exact(cells: Cells, d: np.ndarray, radius: float) -> tuple[np.ndarray, np.nd
     return mirror, (miss <= radius) & ~outside
 
 
-def test_pixel_counts_against_brute_force(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
-    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
+def test_pixel_counts_against_brute_force(
+    optical_setup: OpticalSetup, exact_cells: Cells, tally: light.PixelTally
+) -> None:
     mirror, useful = exact(exact_cells, pixel_directions(optical_setup), optical_setup.radius)
     expected = np.bincount(mirror[useful], minlength=len(exact_cells.mirrors))
     found = tally.pixels[: len(exact_cells.mirrors)]
@@ -75,13 +81,14 @@ def test_pixel_counts_against_brute_force(optical_setup: OpticalSetup, exact_cel
     assert tally.blocked.sum() == 0
 
 
-def test_nearest_way_against_brute_force(optical_setup: OpticalSetup, exact_cells: Cells) -> None:
+def test_nearest_way_against_brute_force(
+    optical_setup: OpticalSetup, exact_cells: Cells, tally: light.PixelTally
+) -> None:
     d = pixel_directions(optical_setup)
     useful = exact(exact_cells, d, optical_setup.radius)[1]
     d = d[useful]
     foot = -(d @ PIN) / (d * d).sum(axis=1)
     expected = np.linalg.norm(PIN + foot[:, None] * d, axis=1).min()
-    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
     assert tally.nearest.min() == pytest.approx(expected, rel=0.02)
 
 
@@ -111,21 +118,34 @@ def test_hits_in_float64(optical_setup: OpticalSetup) -> None:
     np.testing.assert_allclose(back, x.T, atol=1e-9)
 
 
-def test_facet_error_is_the_facets_size(optical_setup: OpticalSetup) -> None:
+def test_facet_error_is_the_facets_size(tally: light.PixelTally) -> None:
     """Off a facet of size s on a sphere of radius r the normal is wrong by up to s / 2 r, and the
     ray at the object by twice that times the distance: millimetres, here."""
-    tally = light.full_sensor(optical_setup.sensor_scene(optical_setup.cameras[0]))
     assert 0.3 < np.median(tally.spread) < 5
+
+
+def with_cameras(folder: Path, **changed: float) -> Path:
+    """Change all cameras of the record."""
+
+    def change(design: dict[str, Any]) -> None:
+        for camera in design["cameras"]:
+            camera.update(changed)
+
+    edit_json(folder / "design.json", change)
+    return folder
+
+
+def pixel_checks(optical_setup: OpticalSetup) -> dict[str, Check]:
+    return {check.name: check for check in pixels.checks(optical_setup, None, "x")[1]}
 
 
 def with_post(folder: Path, low: list[float], high: list[float]) -> Path:
     """Add a part to the export: a box, in the way."""
     box = trimesh.creation.box(bounds=[low, high])
     (folder / "post.stl").write_bytes(stl(box.triangles.astype(np.float32)))
-    design = json.loads((folder / "design.json").read_text())
-    design["parts"].append({"name": "post", "stl": "post.stl"})
-    (folder / "design.json").write_text(json.dumps(design))
-    return sign(folder, [*NAMES, "post.stl"])
+    part = {"name": "post", "stl": "post.stl"}
+    edit_json(folder / "design.json", lambda design: design["parts"].append(part))
+    return sign(folder)
 
 
 def test_a_post_between_camera_and_mirrors_is_named(export_folder: Path) -> None:
@@ -139,7 +159,7 @@ def test_a_post_between_camera_and_mirrors_is_named(export_folder: Path) -> None
 
 def test_a_post_between_mirror_and_object_is_named(export_folder: Path) -> None:
     optical_setup = optical_setup_of(with_post(export_folder, [-6, -6, 30], [6, 6, 32]))
-    lines = {c.name: c for c in pixels.checks(optical_setup, None, "x")[1]}
+    lines = pixel_checks(optical_setup)
     assert lines["light paths"].passed is False
     assert "blocked by post (no mirror)" in lines["light paths"].detail
     assert lines["light paths"].measured > 10
@@ -147,7 +167,7 @@ def test_a_post_between_mirror_and_object_is_named(export_folder: Path) -> None:
 
 def test_a_post_inside_the_capture_sphere_is_the_object(export_folder: Path) -> None:
     optical_setup = optical_setup_of(with_post(export_folder, [-5, -5, -5], [5, 5, 5]))
-    lines = {c.name: c for c in pixels.checks(optical_setup, None, "x")[1]}
+    lines = pixel_checks(optical_setup)
     assert lines["light paths"].passed is True
 
 
@@ -166,7 +186,7 @@ def test_an_object_too_large_stands_in_the_light(optical_setup: OpticalSetup) ->
     lines = {}
     for diameter in (40.0, 75.0):
         big = replace(optical_setup, export=replace(optical_setup.export, target_mm=diameter))
-        lines[diameter] = {c.name: c for c in pixels.checks(big, None, "x")[1]}["object clearance"]
+        lines[diameter] = pixel_checks(big)["object clearance"]
     assert lines[40.0].passed is True
     assert lines[75.0].passed is False
 
@@ -175,18 +195,12 @@ def test_ring_grazes_the_capture_sphere(optical_setup: OpticalSetup) -> None:
     camera = optical_setup.cameras[0]
     ring = pixels._ring(optical_setup, camera, None)
     assert ring.error.max() < 1e-6
-    from tbcad_verify.mesh.surfaces import miss_distances
-
     np.testing.assert_allclose(miss_distances(ring.lines), optical_setup.radius, atol=1e-6)
     assert np.bincount(ring.mirror).max() == image_rim.AZIMUTHS
 
 
 def test_a_narrow_camera_cuts_mirrors_off(export_folder: Path) -> None:
-    design = json.loads((export_folder / "design.json").read_text())
-    for camera in design["cameras"]:
-        camera["hfov_deg"] = 70.0
-    (export_folder / "design.json").write_text(json.dumps(design))
-    lines = {c.name: c for c in pixels.checks(optical_setup_of(export_folder), None, "x")[1]}
+    lines = pixel_checks(optical_setup_of(with_cameras(export_folder, hfov_deg=70.0)))
     assert lines["frame margin"].passed is False
     assert "partly out of the frame: a0" in lines["frame margin"].detail
 
@@ -196,8 +210,6 @@ def test_the_rim_is_looked_for_only_where_a_mirror_reaches(optical_setup: Optica
     found = coverage.measure(optical_setup)
     short = replace(found, fitted=np.full_like(found.fitted, 10.0))
     ring = pixels._ring(optical_setup, optical_setup.cameras[0], short)
-    from tbcad_verify.mesh.surfaces import miss_distances
-
     np.testing.assert_allclose(miss_distances(ring.lines), 5.0, atol=1e-6)
 
 
@@ -212,11 +224,8 @@ def test_margins_by_hand(optical_setup: OpticalSetup) -> None:
 
 
 def test_a_mirror_without_pixels_fails(export_folder: Path) -> None:
-    design = json.loads((export_folder / "design.json").read_text())
-    for camera in design["cameras"]:
-        camera["width_px"], camera["height_px"] = 13, 10
-    (export_folder / "design.json").write_text(json.dumps(design))
-    report = verify(export_folder, options=replace(IN_PROCESS, write=False))
+    folder = with_cameras(export_folder, width_px=13, height_px=10)
+    report = verify(folder, options=replace(IN_PROCESS, write=False))
     lines = {c.name: c for c in report.checks}
     assert lines["pixels, minimum"].passed is False
     assert lines["pixels, minimum"].measured == 0

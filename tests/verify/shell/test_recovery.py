@@ -15,7 +15,7 @@ from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
 from tests.verify.optical_setups import optical_setup_of
-from tests.verify.synthetic_export import Cells, Design, export
+from tests.verify.synthetic_export import Cells, Design, export, facets_of, stl
 
 RNG = np.random.default_rng(7)
 PINHOLE = np.array([100.0, 0, -100])
@@ -81,15 +81,8 @@ def test_centres_swapped_in_the_record_are_named(export_folder: Path) -> None:
 
 
 def test_inches_are_recognised(export_folder: Path) -> None:
-    from tests.verify.synthetic_export import stl
-
-    for name in ("shell_a.stl", "shell_b.stl"):
-        data = np.frombuffer(
-            (export_folder / name).read_bytes()[84:], dtype=[("v", "<f4", 12), ("a", "<u2")]
-        )
-        (export_folder / name).write_bytes(
-            stl(data["v"][:, 3:].reshape(-1, 3, 3) * np.float32(25.4))
-        )
+    for path in export_folder.glob("*.stl"):
+        path.write_bytes(stl(facets_of(path) * np.float32(25.4)))
     said = failing(export_folder)
     assert " x the record's size" in said["mirrors found"]
 

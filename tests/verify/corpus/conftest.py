@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from tbcad_verify.run.verify import VerifyOptions
+import pytest
 
 from tbcad.cli import run
 from tests.verify.corpus.copies import digests
+from tests.verify.corpus.readings import remembered
 
-HERE = VerifyOptions(write=False, apart=False)
 SETTINGS = (
     "optics.n=4",
     "camera.hfov_deg=110",
@@ -23,12 +22,13 @@ SETTINGS = (
 )
 
 
-@contextmanager
-def export(room: Path) -> Iterator[Path]:
-    """A small export as `tbcad build` writes and proves it; whoever breaks copies leaves it so."""
-    folder = room / "good"
+@pytest.fixture(scope="session")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A small export as `tbcad build` writes and verifies it; tests break copies of it only."""
+    folder = tmp_path_factory.mktemp("corpus") / "good"
     options = [word for setting in SETTINGS for word in ("--set", setting)]
     assert run(["build", "--parts", "shell", *options, "--out", str(folder)]) == 0
     before = digests(folder)
-    yield folder
+    with remembered():
+        yield folder
     assert digests(folder) == before, "a mutation wrote through a link"

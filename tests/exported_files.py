@@ -1,10 +1,24 @@
-"""CSV files that tests read and change."""
+"""Files of an export that tests read, compare and change."""
 
 import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 Rows = list[dict[str, str]]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """The bytes of all files by name."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def edit_json(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change a JSON object in place."""
+    value = json.loads(path.read_text())
+    change(value)
+    path.write_text(json.dumps(value))
 
 
 def read_csv(path: Path) -> Rows:
