@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.lines import nearest_on_lines
-from tbcad_verify.mesh.vectors import dot, norm
+from tbcad_verify.mesh.vectors import dot, norm, take
 from tbcad_verify.types import Floats
 
 
@@ -34,11 +34,7 @@ class Surfaces:
 
     def take(self, index: NDArray[np.integer]) -> Surfaces:
         """The surfaces with these numbers, in this order."""
-        return Surfaces(
-            np.take(self.point, index, axis=1),
-            np.take(self.normal, index, axis=1),
-            np.take(self.curvature, index),
-        )
+        return take(self, index)
 
     def coated(self, thickness: float) -> Surfaces:
         """The surfaces at this distance above, mm."""

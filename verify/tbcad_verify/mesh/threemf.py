@@ -32,7 +32,10 @@ def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
     """
     blob = read(folder, name)
     _check_zip(blob)
-    return _corners(blob), blob
+    with tempfile.TemporaryDirectory(prefix="tbcad-3mf-") as place:
+        copy = Path(place) / "part.3mf"  # the library takes bytes one by one, and files at once
+        blob.data.tofile(copy)
+        return _corners(blob.name, copy), blob
 
 
 def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) -> Check:
@@ -61,14 +64,7 @@ def _check_zip(blob: FileBytes) -> None:
         raise BadExport(f"{blob.name}: the zip's member {broken} is damaged; {AGAIN}")
 
 
-def _corners(blob: FileBytes) -> NDArray[np.float32]:
-    with tempfile.TemporaryDirectory(prefix="tbcad-3mf-") as place:
-        copy = Path(place) / "part.3mf"  # the library takes bytes one by one, and files at once
-        blob.data.tofile(copy)
-        return _mesh(blob.name, copy)
-
-
-def _mesh(name: str, path: Path) -> NDArray[np.float32]:
+def _corners(name: str, path: Path) -> NDArray[np.float32]:
     import lib3mf
 
     model = lib3mf.get_wrapper().CreateModel()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad_verify.types import Floats
+
+Columns = TypeVar("Columns")
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -34,6 +39,31 @@ def cross(a: Floats, b: Floats) -> Floats:
 def chunks(count: int, step: int = 1 << 17) -> Iterator[slice]:
     """Consecutive pieces of `count` columns, so that intermediate results stay small."""
     return (slice(k, min(k + step, count)) for k in range(0, count, step))
+
+
+def take(columns: Columns, index: NDArray[Any]) -> Columns:
+    """Some columns of a dataclass of arrays (..., N), and of those within it, by number or mask."""
+
+    def some(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return np.take(value, numbers, axis=-1)
+        return type(value)(*(some(getattr(value, field.name)) for field in fields(value)))
+
+    numbers = np.flatnonzero(index) if index.dtype == np.bool_ else index
+    return cast(Columns, some(columns))
+
+
+def joined(parts: Sequence[Columns]) -> Columns:
+    """The columns of several dataclasses of arrays (..., N), end to end."""
+
+    def end_to_end(values: Sequence[Any]) -> Any:
+        if isinstance(values[0], np.ndarray):
+            return np.concatenate(values, axis=-1)
+        names = [field.name for field in fields(values[0])]
+        columns = (end_to_end([getattr(value, name) for value in values]) for name in names)
+        return type(values[0])(*columns)
+
+    return cast(Columns, end_to_end(parts))
 
 
 def tangent_basis(n: Floats) -> tuple[Floats, Floats]:

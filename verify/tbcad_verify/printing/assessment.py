@@ -110,8 +110,8 @@ def to_row(one: PrintAssessment) -> dict[str, Any]:
             None if smallest is None else _all_rounded(holes.middle[:, smallest].tolist())
         ),
         "holes": holes.diameter.size,
-        "fits": one.placement.fits,
-        "too_large_mm": 0.0 if one.placement.fits else _rounded(pose.excess),
+        "fits": pose.fits,
+        "too_large_mm": 0.0 if pose.fits else _rounded(pose.excess),
         "orientation": pose_text(pose),
         "rotation": [_all_rounded(row) for row in pose.rotation.tolist()],
         "size_mm": _all_rounded(pose.size.tolist()),
@@ -157,7 +157,7 @@ def _size_problems(
     if k is not None and holes.diameter[k] < profile.hole_mm - SLACK_MM:
         hole = _against(float(holes.diameter[k]), profile.hole_mm)
         yield f"smallest hole {hole}, {_at(holes.middle[:, k])}"
-    if not placement.fits:
+    if not placement.pose.fits:
         size, bed = _by(placement.pose.size), _by(profile.bed_mm)
         yield (
             f"{placement.pose.excess:.2f} mm too large: {size} with {pose_text(placement.pose)}, "

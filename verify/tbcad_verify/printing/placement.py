@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm, tangent_basis
 from tbcad_verify.printing.orientations import PartHull
-from tbcad_verify.printing.overhang import overhang_area
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.rotating_callipers import best_rotation
@@ -19,6 +19,9 @@ from tbcad_verify.types import Floats
 SLACK_MM = 1e-3  # below any machine's precision, and the error of float32
 AXIS_COS = math.cos(math.radians(0.01))
 AXES = ("x", "y", "z")
+BED_MM = 0.01  # facets within this of the lowest point lie on the bed; far less than a layer
+# Normals of fine facets are uncertain by this: faces at just the allowed lean are allowed.
+UNCERTAINTY_RAD = 1e-3
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,11 @@ class Pose:
     excess: float
 
     @property
+    def fits(self) -> bool:
+        """Whether it fits the bed less the clearance at its rim."""
+        return self.excess <= SLACK_MM
+
+    @property
     def down(self) -> Floats:
         """(3,) the file's direction that points down."""
         return np.asarray(-self.rotation[2])
@@ -49,12 +57,10 @@ class BedPlacement:
 
     Attributes:
         pose: the orientation.
-        fits: whether it fits the bed less the clearance at its rim.
         overhang: area that needs support, mm^2; None for processes without support.
     """
 
     pose: Pose
-    fits: bool
     overhang: float | None
 
 
@@ -66,15 +72,15 @@ def place(measures: PartMeasures, profile: Profile) -> BedPlacement:
     those tried are not searched.
     """
     poses = _poses(measures.hull, measures.hull.down, profile)
-    if not any(_fits(pose) for pose in poses):
+    if not any(pose.fits for pose in poses):
         poses += _poses(measures.hull, measures.hull.tilted, profile)
-    fitting = [pose for pose in poses if _fits(pose)]
+    fitting = [pose for pose in poses if pose.fits]
     if not fitting:
         pose = min(poses, key=lambda pose: pose.excess)
-        return BedPlacement(pose, False, _overhangs(measures, [pose], profile)[0])
+        return BedPlacement(pose, _overhangs(measures, [pose], profile)[0])
     areas = _overhangs(measures, fitting, profile)
     pose, area = min(zip(fitting, areas, strict=True), key=lambda pair: _rank(measures, *pair))
-    return BedPlacement(pose, True, area)
+    return BedPlacement(pose, area)
 
 
 def _rank(measures: PartMeasures, pose: Pose, overhang: float | None) -> tuple[int, int, int]:
@@ -112,12 +118,25 @@ def _pose(hull: PartHull, down: Floats, profile: Profile) -> Pose:
     return Pose(np.einsum("ij,jk->ik", rotation, level), size, angle, excess)
 
 
-def _fits(pose: Pose) -> bool:
-    return pose.excess <= SLACK_MM
-
-
 def _overhangs(measures: PartMeasures, poses: list[Pose], profile: Profile) -> list[float | None]:
     if profile.overhang_deg is None:
         return [None] * len(poses)
     double, lean = norm(measures.mesh.area), math.radians(profile.overhang_deg)
     return [overhang_area(measures.mesh, double, pose.down, lean) for pose in poses]
+
+
+def overhang_area(mesh: Mesh, double: Floats, down: Floats, lean_rad: float) -> float:
+    """Area of facets that lean more than allowed and do not lie on the bed, mm^2.
+
+    Args:
+        mesh: a part's.
+        double: (F,) twice the facets' areas, mm^2.
+        down: (3,) unit, the direction that points down.
+        lean_rad: maximum lean from the vertical without support: 0 for walls, pi/2 for ceilings.
+    """
+    limit = math.sin(min(lean_rad + UNCERTAINTY_RAD, math.pi / 2))
+    below = np.flatnonzero(np.einsum("in,i->n", mesh.area, down) > limit * double)
+    depth = np.einsum("ni,i->n", mesh.points, down)
+    lying = depth > depth.max() - BED_MM
+    on_bed = lying[mesh.faces[below]].all(axis=1)
+    return float(double[below[~on_bed]].sum()) / 2

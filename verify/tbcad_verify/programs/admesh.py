@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 
-from tbcad_verify.programs.answers import count_check, text_of, volume_check
+from tbcad_verify.programs.answers import VOLUME, mesh_checks, text_of
 from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
-from tbcad_verify.report.checks import Check, Unknown, at_most
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most
 
-PARTS, VOLUME = "parts", "mm^3 off"
 FLAWS = (
     "Total disconnected facets",
     "Degenerate facets",
@@ -22,7 +21,7 @@ FLAWS = (
 MIN_FACETS = 4
 
 
-def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+def ask(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """Nothing to repair, one part, the mesh's volume.
 
     Raises:
@@ -32,16 +31,8 @@ def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
     flaws = {key: report[key] for key in FLAWS}
     repairs = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)
     return [
-        at_most(("admesh repairs", sandbox.file, "flaws"), sum(flaws.values()), 0, repairs),
-        count_check(
-            ("admesh parts", sandbox.file, PARTS), report["Number of parts"], 1, "must be one"
-        ),
-        volume_check(
-            ("admesh volume", sandbox.file, VOLUME),
-            report["Volume"],
-            expected.volume,
-            expected.volume_error,
-        ),
+        at_most(names[0], sum(flaws.values()), 0, repairs),
+        *mesh_checks(names[1:], report["Number of parts"], report["Volume"], expected),
     ]
 
 
@@ -59,7 +50,7 @@ STL = ProgramQuery(
     program="admesh",
     kind="stl",
     install="apt install admesh",
-    questions={"admesh repairs": "flaws", "admesh parts": PARTS, "admesh volume": VOLUME},
+    questions={"admesh repairs": "flaws", "admesh parts": "parts", "admesh volume": VOLUME},
     find=lambda: on_path("admesh"),
     ask=ask,
 )

@@ -55,44 +55,42 @@ def count_check(check: CheckName, measured: float, limit: float, detail: str = "
     return Check(name, file, good, finite(measured), limit, unit, "" if good else detail)
 
 
-def volume_check(check: CheckName, measured: float, mesh: float, error: float) -> Check:
-    """A check that a volume is the same as the mesh's.
-
-    Args:
-        check: name, file, unit.
-        measured: by the program, mm^3.
-        mesh: mm^3, NaN when unknown.
-        error: largest difference allowed, mm^3.
-    """
-    if not math.isfinite(mesh + error):
+def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check:
+    """A check that a volume, mm^3, is the same as the mesh's."""
+    if not math.isfinite(part.volume + part.volume_error):
         return unknown(check, "the mesh's volume is unknown")
-    return at_most(
-        check, abs(measured - mesh), error, f"{measured:.6g} mm^3, but the mesh has {mesh:.6g}"
-    )
+    detail = f"{measured:.6g} mm^3, but the mesh has {part.volume:.6g}"
+    return at_most(check, abs(measured - part.volume), part.volume_error, detail)
+
+
+def mesh_checks(
+    names: Sequence[CheckName], parts: float, volume: float, part: ExpectedPart
+) -> list[Check]:
+    """One part; the mesh's volume."""
+    return [
+        count_check(names[0], parts, 1, "must be one"),
+        volume_check(names[1], volume, part),
+    ]
 
 
 def solid_checks(
-    program: str, file: str, figures: Mapping[str, float], part: ExpectedPart
+    names: Sequence[CheckName], figures: Mapping[str, float], part: ExpectedPart
 ) -> tuple[Check, Check, Check]:
     """One solid; every mirror a face on an exact sphere, and nothing else; the mesh's volume.
 
     Args:
-        program: that read the file.
-        file: STEP.
+        names: of the three checks.
         figures: of solids, spheres and volume.
         part: what is expected.
     """
-    solids, spheres, volume = (
-        (f"{program} {key}", file, unit)
-        for key, unit in (("solids", SOLID), ("spheres", SPHERES), ("volume", VOLUME))
-    )
+    solids, spheres, volume = names
     count = figures["spheres"]
     return (
         count_check(solids, figures["solids"], 1, "must be one"),
         informative(spheres, count, "no mirrors: any number is allowed")
         if part.spheres is None
         else count_check(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
-        volume_check(volume, figures["volume"], part.volume, part.volume_error),
+        volume_check(volume, figures["volume"], part),
     )
 
 

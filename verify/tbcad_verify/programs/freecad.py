@@ -11,7 +11,7 @@ from tbcad_verify.programs.answers import (
     solid_checks,
 )
 from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
-from tbcad_verify.report.checks import Check, at_most
+from tbcad_verify.report.checks import Check, CheckName, at_most
 
 KEYS = ("solids", "invalid", "open", "loose", "spheres", "volume")
 
@@ -39,7 +39,7 @@ def message(error):
 """
 
 
-def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+def ask(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """One valid, closed solid with the mirrors' faces and the mesh's volume.
 
     Raises:
@@ -48,17 +48,17 @@ def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
     script = sandbox.folder / "look.py"
     script.write_text(SCRIPT + SCRIPT_END, encoding="utf-8")
     figures = script_figures(sandbox.run(script), sandbox.folder, KEYS)
-    solids, spheres, volume = solid_checks("freecad", sandbox.file, figures, expected)
-    return [solids, _valid(sandbox.file, figures), spheres, volume]
+    solids, spheres, volume = solid_checks([names[0], *names[2:]], figures, expected)
+    return [solids, _valid(names[1], figures), spheres, volume]
 
 
-def _valid(file: str, figures: dict[str, float]) -> Check:
+def _valid(name: CheckName, figures: dict[str, float]) -> Check:
     flaws = sum(abs(figures[key]) for key in ("invalid", "open", "loose"))
     detail = (
         f"{figures['solids']:.0f} solids, {figures['invalid']:.0f} of them not valid, "
         f"{figures['open']:.0f} not closed; {figures['loose']:.0f} faces of no solid"
     )
-    return at_most(("freecad valid", file, "flaws"), flaws + (figures["solids"] < 1), 0, detail)
+    return at_most(name, flaws + (figures["solids"] < 1), 0, detail)
 
 
 STEP = ProgramQuery(

@@ -26,7 +26,7 @@ from tbcad_verify.programs.program_query import (
     Sandbox,
     on_path,
 )
-from tbcad_verify.report.checks import Check, Unknown
+from tbcad_verify.report.checks import Check, CheckName, Unknown
 
 INSTALL = "pip install gmsh"
 KEYS = ("solids", "spheres", "volume")
@@ -75,23 +75,21 @@ def find() -> Command:
     return on_path("gmsh")
 
 
-def ask(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+def ask(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """One solid with the mirrors' faces and the mesh's volume.
 
     Raises:
         Unknown: the program gives no answer.
     """
     is_package = len(sandbox.command) > 1
-    figures = _package(sandbox) if is_package else _program(sandbox)
-    solids, spheres, volume = solid_checks("gmsh", sandbox.file, figures, expected)
+    if is_package:
+        figures = script_figures(sandbox.run(), sandbox.folder, KEYS)
+    else:
+        figures = _program(sandbox)
+    solids, spheres, volume = solid_checks(names, figures, expected)
     if not is_package:
-        name = ("gmsh spheres", sandbox.file, SPHERES)
-        spheres = skipped(name, f"only its package counts them: {INSTALL}")
+        spheres = skipped(names[1], f"only its package counts them: {INSTALL}")
     return [solids, spheres, volume]
-
-
-def _package(sandbox: Sandbox) -> dict[str, float]:
-    return script_figures(sandbox.run(), sandbox.folder, KEYS)
 
 
 def _program(sandbox: Sandbox) -> dict[str, float]:

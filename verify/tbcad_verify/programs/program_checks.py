@@ -69,15 +69,15 @@ def _answers(
     folder: Path, part: ExpectedPart, query: ProgramQuery, limits: Limits, progress: Progress
 ) -> list[Check]:
     """The checks that one program answers about one file, or why they are skipped."""
-    file, command = part.files.get(query.kind, ""), query.find()
+    file, command, names = part.files.get(query.kind, ""), query.find(), query.names(part)
     if not file or not command:
         missing = f"not installed: {query.install}"
         reason = missing if file else f"the record names no {query.kind} file"
-        return [skipped(name, reason) for name in query.names(part)]
+        return [skipped(name, reason) for name in names]
     progress(f"{query.program}: {file}")
 
     def ask() -> Sequence[Check]:
         with sandbox(command, folder, file, query.kind, limits) as private:
-            return query.ask(private, part)
+            return query.ask(private, part, names)
 
-    return guarded(query.names(part), ask)
+    return guarded(names, ask)

@@ -68,7 +68,7 @@ class ProgramQuery:
         install: the command that installs it.
         questions: name -> unit of the checks it answers, in order.
         find: returns how to start it.
-        ask: runs it; raises Unknown when there is no answer.
+        ask: runs it and makes the checks of these names; raises Unknown without an answer.
     """
 
     program: str
@@ -76,7 +76,7 @@ class ProgramQuery:
     install: str
     questions: Mapping[str, str]
     find: Callable[[], Command]
-    ask: Callable[[Sandbox, ExpectedPart], Sequence[Check]]
+    ask: Callable[[Sandbox, ExpectedPart, list[CheckName]], Sequence[Check]]
 
     def names(self, part: ExpectedPart) -> list[CheckName]:
         """Name, file and unit of every check; a part without such a file by its own name."""

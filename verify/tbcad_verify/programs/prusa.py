@@ -6,12 +6,17 @@ import math
 import re
 from pathlib import Path
 
-from tbcad_verify.programs.answers import count_check, text_of, volume_check
-from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, Sandbox, on_path
-from tbcad_verify.report.checks import Check, Unknown, at_most, informative, unknown
+from tbcad_verify.programs.answers import VOLUME, mesh_checks, text_of
+from tbcad_verify.programs.program_query import (
+    Command,
+    ExpectedPart,
+    ProgramQuery,
+    Sandbox,
+    on_path,
+)
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, informative, unknown
 
 INSTALL = "apt install prusa-slicer"
-PARTS, VOLUME = "parts", "mm^3 off"
 REPAIRS = (
     "open_edges",
     "degenerate_facets",
@@ -34,7 +39,12 @@ PROFILE = (
 )
 
 
-def ask_info(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+def find() -> Command:
+    """The program, by either of its names."""
+    return on_path("prusa-slicer", "PrusaSlicer")
+
+
+def ask_info(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
     Raises:
@@ -43,39 +53,25 @@ def ask_info(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
     lines = _lines(
         text_of(sandbox.run("--datadir", sandbox.folder / "home", "--info", sandbox.copy))
     )
-    return [
-        _manifold(sandbox.file, lines),
-        count_check(
-            ("prusa parts", sandbox.file, PARTS),
-            _required(lines, "number_of_parts"),
-            1,
-            "must be one",
-        ),
-        volume_check(
-            ("prusa volume", sandbox.file, VOLUME),
-            _required(lines, "volume"),
-            expected.volume,
-            expected.volume_error,
-        ),
-    ]
+    parts, volume = (_required(lines, key) for key in ("number_of_parts", "volume"))
+    return [_manifold(names[0], lines), *mesh_checks(names[1:], parts, volume, expected)]
 
 
-def ask_slices(sandbox: Sandbox, expected: ExpectedPart) -> list[Check]:
+def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """The print's volume is the mesh's; filament and time inform.
 
     Raises:
         Unknown: the program gives no answer.
     """
+    slices, filament, time = names
     code = sandbox.folder / "sliced.gcode"
     data = ("--datadir", sandbox.folder / "home")
     text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
     length, hours = _print(_tail(code))
     return [
-        _slices(("prusa slices", sandbox.file, "%"), length, expected.volume),
-        informative(("prusa filament", sandbox.file, "m"), length / 1e3),
-        informative(
-            ("prusa time", sandbox.file, "h"), round(hours, 1)
-        ),  # seconds differ from run to run
+        _slices(slices, length, expected.volume),
+        informative(filament, length / 1e3),
+        informative(time, round(hours, 1)),  # seconds differ from run to run
     ]
 
 
@@ -84,15 +80,15 @@ def _lines(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE)
 
 
-def _manifold(file: str, lines: list[tuple[str, str]]) -> Check:
+def _manifold(name: CheckName, lines: list[tuple[str, str]]) -> Check:
     verdicts = [value for key, value in lines if key == "manifold"]
     if not verdicts or {*verdicts} - {"yes", "no"}:
         raise Unknown("ended without error, but did not say whether the mesh is manifold")
-    repairs = {key: _sum(lines, key) for key in REPAIRS if any(name == key for name, _ in lines)}
+    repairs = {key: _sum(lines, key) for key in REPAIRS if any(one == key for one, _ in lines)}
     flaws = verdicts.count("no") + sum(map(abs, repairs.values()))
     named = ", ".join(f"{key} {count:.0f}" for key, count in repairs.items())
     detail = f"manifold: {', '.join(verdicts)}; {named or 'no repairs'}"
-    return at_most(("prusa manifold", file, "flaws"), flaws, 0, detail)
+    return at_most(name, flaws, 0, detail)
 
 
 def _required(lines: list[tuple[str, str]], key: str) -> float:
@@ -108,7 +104,7 @@ def _sum(lines: list[tuple[str, str]], key: str) -> float:
         raise Unknown(f"ended without error, but its {key} is no number") from error
 
 
-def _slices(name: tuple[str, str, str], length: float, mesh: float) -> Check:
+def _slices(name: CheckName, length: float, mesh: float) -> Check:
     if not math.isfinite(mesh) or mesh <= 0:
         return unknown(name, "the mesh's volume is unknown")
     printed = length * math.pi / 4 * FILAMENT_MM**2
@@ -136,12 +132,8 @@ def _print(code: str) -> tuple[float, float]:
 
 
 def _info(kind: str) -> ProgramQuery:
-    questions = {"prusa manifold": "flaws", "prusa parts": PARTS, "prusa volume": VOLUME}
-    return ProgramQuery("prusa", kind, INSTALL, questions, _find, ask_info)
-
-
-def _find() -> tuple[str, ...]:
-    return on_path("prusa-slicer", "PrusaSlicer")
+    questions = {"prusa manifold": "flaws", "prusa parts": "parts", "prusa volume": VOLUME}
+    return ProgramQuery("prusa", kind, INSTALL, questions, find, ask_info)
 
 
 STL = _info("stl")
@@ -151,6 +143,6 @@ SLICES = ProgramQuery(
     kind="stl",
     install=INSTALL,
     questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
-    find=_find,
+    find=find,
     ask=ask_slices,
 )

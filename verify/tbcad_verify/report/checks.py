@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -93,13 +92,11 @@ def guarded_each(
     names: Sequence[CheckName], jobs: Sequence[Callable[..., Check]], *arguments: object
 ) -> list[Check]:
     """One check for each job, called with its name and the arguments; unknown if it breaks."""
-    results = [
-        attempt(partial(job, name, *arguments)) for name, job in zip(names, jobs, strict=True)
-    ]
-    return [
-        unknown(name, reason) if check is None else check
-        for name, (check, reason) in zip(names, results, strict=True)
-    ]
+
+    def make(name: CheckName, job: Callable[..., Check]) -> list[Check]:
+        return guarded([name], lambda: [job(name, *arguments)])
+
+    return [check for pair in zip(names, jobs, strict=True) for check in make(*pair)]
 
 
 def reason_of(error: Exception) -> str:
@@ -153,11 +150,6 @@ def each_at_most(
 def short_list(names: Sequence[str]) -> str:
     """The first few names, and how many more there are."""
     return _listed(list(names[:MAX_NAMED]), len(names))
-
-
-def all_passed(checks: Sequence[Check]) -> bool:
-    """True if every check passes; unknown is not a pass."""
-    return all(check.passed is True for check in checks)
 
 
 def _limited(check: CheckName, measured: float, limit: float, good: bool, detail: str) -> Check:

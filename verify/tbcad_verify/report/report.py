@@ -17,7 +17,7 @@ from rich.console import Console
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
-from tbcad_verify.report.checks import MAX_NAMED, Check, all_passed, finite
+from tbcad_verify.report.checks import MAX_NAMED, Check, finite
 from tbcad_verify.report.table import table
 from tbcad_verify.run.results import PER_MIRROR
 from tbcad_verify.types import Floats
@@ -83,7 +83,7 @@ class Report:
     @property
     def passed(self) -> bool:
         """True if every check passed; what is unknown does not."""
-        return all_passed(self.checks + self.programs)
+        return all(check.passed is True for check in self.checks + self.programs)
 
     @property
     def verdict(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +14,12 @@ from tbcad_verify.prototype import step_files
 from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
-from tbcad_verify.report.checks import Check, Unknown, short_list
-from tbcad_verify.report.report import Report, mirror_figures
+from tbcad_verify.report.checks import Check, short_list
+from tbcad_verify.report.report import NAME, Report, mirror_figures
 from tbcad_verify.run.results import CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.step.shell_checks import shell_step_checks
-from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
@@ -73,8 +72,14 @@ def verify(
         # Reading the prototype's STEP files needs none of the stages, and takes as long as they do.
         step_reading = pool.submit(step_files.read_step_files, export, options.seconds)
         _mesh_stages(export, results, options)
-        _shell_steps(export, results, options.seconds)
-        _prototype_steps(export, results, step_reading)
+        if any(part.step for part in export.parts):
+            results.add(Results(stages=["STEP"]))
+            checks = shell_step_checks(export, results.masses, options.seconds)
+            results.add(Results(checks=checks))
+        if any(part.step for part in export.printed):
+            results.add(Results(stages=["STEP of the prototype"]))
+            checks = step_files.part_step_checks(export, results.masses, step_reading.result())
+            results.add(Results(checks=checks))
     programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
     report = Report(
@@ -87,7 +92,10 @@ def verify(
         prototype=results.prototype,
     )
     if options.write:
-        _write(report, export.folder)
+        try:
+            report.write(root)
+        except OSError as error:
+            raise BadExport(f"{root}: {NAME} cannot be written ({error.strerror})") from error
     return report
 
 
@@ -97,23 +105,6 @@ def _mesh_stages(export: Export, results: CollectedResults, options: VerifyOptio
         watch(command, stage_titles(export), results, options.seconds)
     else:
         run_stages(export.folder, results.add, options.printers)
-
-
-def _shell_steps(export: Export, results: CollectedResults, seconds: float) -> None:
-    if any(part.step for part in export.parts):
-        results.add(Results(stages=["STEP"]))
-        results.add(Results(checks=shell_step_checks(export, results.masses, seconds)))
-
-
-def _prototype_steps(
-    export: Export,
-    results: CollectedResults,
-    reading: Future[dict[str, StepFile | Unknown]],
-) -> None:
-    if any(part.step for part in export.printed):
-        results.add(Results(stages=["STEP of the prototype"]))
-        checks = step_files.part_step_checks(export, results.masses, reading.result())
-        results.add(Results(checks=checks))
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:
@@ -150,10 +141,3 @@ def _expected(
         volume,
         max(area * export.mesh_error_mm, FLOAT32_SHARE * abs(volume)),
     )
-
-
-def _write(report: Report, folder: Path) -> None:
-    try:
-        report.write(folder)
-    except OSError as error:
-        raise BadExport(f"{folder}: verify.json cannot be written ({error.strerror})") from error

@@ -17,6 +17,7 @@ from tbcad_verify.report.checks import (
     CheckName,
     at_least,
     at_most,
+    check_names,
     informative,
     short_list,
     worst_offenders,
@@ -87,7 +88,7 @@ def measure(setup: OpticalSetup) -> Coverage:
 
 def checks(setup: OpticalSetup, found: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
-    facets, spheres, seen, gap, off = ((name, files, unit) for name, unit in CHECKS.items())
+    facets, spheres, seen, gap, off = check_names(CHECKS, files)
     ids, hidden = setup.export.mirrors.ids, found.hidden
     who = worst_offenders(ids, hidden, "points", hidden > 0, ".0f")
     widest = setup.virtual_ids[int(np.argmax(found.gap))]

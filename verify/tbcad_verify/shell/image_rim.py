@@ -55,17 +55,6 @@ def rim_rays(
     return RimRays(index, d, lines, np.asarray(np.hypot(*(_miss(lines, u) - target))))
 
 
-def chosen(found: RimRays, own: NDArray[np.bool_]) -> RimRays:
-    """Some of a ring's rays."""
-    lines = found.lines
-    return RimRays(
-        found.mirror[own],
-        found.direction[:, own],
-        ReflectedRays(lines.point[:, own], lines.toward[:, own], lines.reach[own]),
-        found.error[own],
-    )
-
-
 def margins(camera: Camera, d: Floats) -> Floats:
     """(N,) pixels from where rays d (3, N) fall to the frame's nearest edge; < 0 outside."""
     depth = dot(camera.forward[:, None], d)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tbcad_verify.mesh.surfaces import distance_before_mirror
+from tbcad_verify.mesh.vectors import take
 from tbcad_verify.record.export import Camera
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
     at_least,
     at_most,
+    check_names,
     informative,
     short_list,
     unknown,
@@ -43,8 +45,8 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
             them to reach the whole object.
         files: where, for the report.
     """
-    path, clear, minimum, median, maximum, framed, double, half, nearly_all = (
-        (name, files, unit) for name, unit in CHECKS.items()
+    path, clear, minimum, median, maximum, framed, double, half, nearly_all = check_names(
+        CHECKS, files
     )
     tally = light.total([light.full_sensor(setup.sensor_scene(camera)) for camera in setup.cameras])
     rings = [(camera, _ring(setup, camera, seen)) for camera in setup.cameras]
@@ -73,7 +75,7 @@ def _ring(setup: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_r
     # A halved mirror shows the camera only what its own half reflects.
     side = np.repeat(np.sign(start[0]), image_rim.AZIMUTHS)
     own = ~setup.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
-    return image_rim.chosen(found, own)
+    return take(found, own)
 
 
 def _reach(setup: OpticalSetup, seen: Coverage | None) -> Floats:

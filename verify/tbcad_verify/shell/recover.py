@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,8 +10,8 @@ from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.merge import MIN_VERTICES, merge_splinters
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.segments import Segmentation, count_folds, measure_edges, segment_mesh
-from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
-from tbcad_verify.mesh.vectors import dot, norm
+from tbcad_verify.mesh.surfaces import reflect_directions
+from tbcad_verify.mesh.vectors import dot, joined, norm
 from tbcad_verify.types import Bools, Floats
 
 # A patch is a mirror's only if its vertices lie on one sphere or plane to within this, RMS.
@@ -69,21 +67,10 @@ def join_recoveries(parts: list[Recovery]) -> Recovery:
     )
     return Recovery(
         Segmentation(label.astype(np.int32), int(starts[-1])),
-        _joined([part.fits for part in parts]),
+        joined([part.fits for part in parts]),
         np.concatenate([part.mirror for part in parts]),
         sum(part.folds for part in parts),
     )
-
-
-def _joined(fits: list[SurfaceFits]) -> SurfaceFits:
-    surfaces = _columns([item.surfaces for item in fits])
-    return SurfaceFits(Surfaces(*surfaces), *_columns(fits)[1:])
-
-
-def _columns(items: Sequence[SurfaceFits] | Sequence[Surfaces]) -> list[Any]:
-    """Each field of several dataclasses, end to end; fields that are no arrays stay lists."""
-    columns = [[getattr(item, field.name) for item in items] for field in fields(items[0])]
-    return [np.concatenate(c, axis=-1) if isinstance(c[0], np.ndarray) else c for c in columns]
 
 
 def follows_fit(fits: SurfaceFits) -> Bools:

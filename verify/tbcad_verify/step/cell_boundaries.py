@@ -8,12 +8,12 @@ This is exact, whatever the mirrors' sizes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import chunks
+from tbcad_verify.mesh.vectors import chunks, joined
 from tbcad_verify.step.map_arcs import MapArcs, free_arcs, joined_arcs
 from tbcad_verify.step.stereographic import (
     MapCircles,
@@ -70,7 +70,7 @@ def cell_boundaries(mirrors: Surfaces, walls: Surfaces, front: bool) -> CellBoun
 
     With `front`, only those parts of them that lie on the half toward the normal.
     """
-    spread, others = _spread(mirrors, walls), joined_surfaces(mirrors, walls)
+    spread, others = _spread(mirrors, walls), joined([mirrors, walls])
     maps = surface_maps(mirrors if front else with_apex_uncovered(mirrors, others), front, spread)
     whole = np.zeros(len(maps.reach), dtype=np.bool_)
     arcs: list[MapArcs] = []
@@ -80,12 +80,6 @@ def cell_boundaries(mirrors: Surfaces, walls: Surfaces, front: bool) -> CellBoun
             arcs.append(replace(some, mirror=batch.index[row][some.mirror]))
     every = joined_arcs(arcs)
     return CellBoundaries(maps, every.take(np.argsort(every.mirror, kind="stable")), whole, spread)
-
-
-def joined_surfaces(one: Surfaces, other: Surfaces) -> Surfaces:
-    """Surfaces of both, in this order."""
-    pairs = zip(astuple(one), astuple(other), strict=True)
-    return Surfaces(*(np.concatenate(pair, axis=-1) for pair in pairs))
 
 
 def _spread(mirrors: Surfaces, walls: Surfaces) -> float:

@@ -6,11 +6,12 @@ covers; their ends are the corners. Nothing is assumed about the number of loops
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.vectors import joined, take
 from tbcad_verify.step.stereographic import MapCircles
 from tbcad_verify.types import Floats, Ints
 
@@ -44,7 +45,7 @@ class MapArcs:
 
     def take(self, index: NDArray[np.generic]) -> MapArcs:
         """The arcs with these numbers, or for which a mask holds."""
-        return MapArcs(*(getattr(self, field.name)[..., index] for field in fields(self)))
+        return take(self, index)
 
     @property
     def length(self) -> Floats:
@@ -82,13 +83,7 @@ def arc_length(bend: Floats, t: Floats) -> Floats:
 def joined_arcs(parts: list[MapArcs]) -> MapArcs:
     """All arcs of several maps in one list, which may be empty."""
     none, no = np.zeros((2, 0)), np.zeros(0, dtype=np.intp)
-    every = [MapArcs(no, no, none, none, none[0], none, none), *parts]
-    return MapArcs(
-        *(
-            np.concatenate([getattr(arcs, field.name) for arcs in every], axis=-1)
-            for field in fields(MapArcs)
-        )
-    )
+    return joined([MapArcs(no, no, none, none, none[0], none, none), *parts])
 
 
 def free_arcs(circles: MapCircles, spread: float) -> MapArcs:

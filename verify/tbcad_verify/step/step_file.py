@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.record.files import AGAIN, FileBytes, read
+from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
 from tbcad_verify.types import Floats
@@ -87,7 +87,9 @@ def load(folder: Path, name: str) -> FileBytes:
     Raises:
         BadExport: as `files.read`; it does not begin or end as ISO 10303-21 requires.
     """
-    blob = read(folder, name, MAX_STEP_BYTES, _refuse_foreign)
+    blob = read(folder, name, MAX_STEP_BYTES)
+    if not blob.data[:HEAD].tobytes().lstrip().startswith(START):
+        raise BadExport(f"{name}: does not begin with {START.decode()}: no STEP file; {AGAIN}")
     if not blob.data[-len(END) - 64 :].tobytes().rstrip().endswith(END):
         raise BadExport(f"{name}: does not end with {END.decode()}: truncated; {AGAIN}")
     return blob
@@ -185,9 +187,3 @@ def _outward(row: Row, text: Row) -> bool:
 
 def _vectors(rows: list[Row], key: str) -> Floats:
     return np.array([row.get(key, [np.nan] * 3) for row in rows], dtype=np.float64).reshape(-1, 3)
-
-
-def _refuse_foreign(name: str, size: int, head: bytes) -> None:
-    del size
-    if not head.lstrip().startswith(START):
-        raise BadExport(f"{name}: does not begin with {START.decode()}: no STEP file; {AGAIN}")

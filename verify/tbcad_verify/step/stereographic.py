@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import chunks, dot, tangent_basis
+from tbcad_verify.mesh.vectors import chunks, dot, take, tangent_basis
 from tbcad_verify.types import Floats, Ints
 
 COINCIDENT = 1e-12
@@ -46,9 +46,7 @@ class SurfaceMaps:
 
     def take(self, index: Ints) -> SurfaceMaps:
         """The maps with these numbers."""
-        return SurfaceMaps(
-            self.surfaces.take(index), self.right[:, index], self.up[:, index], self.reach[index]
-        )
+        return take(self, index)
 
 
 @dataclass(frozen=True)
