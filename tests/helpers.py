@@ -7,6 +7,8 @@ from pathlib import Path
 import lib3mf
 import numpy as np
 import trimesh
+from OCP.Bnd import Bnd_Box
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
@@ -18,6 +20,13 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.solids import meshed
+
+
+def bounds(shape: TopoDS_Shape) -> np.ndarray:
+    """Smallest and largest coordinates, mm, (2, 3)."""
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return np.array(box.Get()).reshape(2, 3)
 
 
 @dataclass(frozen=True)

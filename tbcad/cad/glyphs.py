@@ -75,12 +75,8 @@ def _face(rows: tuple[str, ...], start: float, square: float, sunk: float) -> To
     (outline,) = outer
     face = BRepBuilderAPI_MakeFace(polygon(outline))
     for hole in holes:
-        face.Add(TopoDS.Wire_s(_wire(hole)))
+        face.Add(TopoDS.Wire_s(BRepTools.OuterWire_s(polygon(hole[::-1])).Reversed()))
     return face.Face()
-
-
-def _wire(points: Floats) -> TopoDS_Shape:
-    return BRepTools.OuterWire_s(polygon(points[::-1])).Reversed()
 
 
 def _area(points: Floats) -> float:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from cadquery import Shape
 from manifold3d import Manifold, Mesh64, OpType
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_BooleanOperation,
@@ -16,7 +15,6 @@ from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_Cut,
     BRepAlgoAPI_Fuse,
 )
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeFace,
@@ -215,13 +213,6 @@ def volume_by_cut_mesh(
 def _manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
     net = meshed(shape, tolerance)
     return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
-
-
-def bounds(shape: TopoDS_Shape) -> Floats:
-    """Least and largest coordinates, mm, (2, 3)."""
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    return np.array(box.Get()).reshape(2, 3)
 
 
 def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:

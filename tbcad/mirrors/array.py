@@ -13,7 +13,7 @@ from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.spec.design import CameraSpec, Spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
@@ -179,9 +179,12 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     )
     cells, coverage = solve_radii(spec.mirrors.radius_rule, problem, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
+    sensor, hfov = spec.camera, float(np.radians(spec.camera.hfov_deg))
     return MirrorArray(
         camera_id="a",
-        camera=_camera(spec.camera, ellipsoid.pinhole, cells),
+        camera=fitted_camera(
+            ellipsoid.pinhole, cells.corners, sensor.width_px, sensor.height_px, hfov
+        ),
         ellipsoid=ellipsoid,
         u=u,
         theta0=theta0,
@@ -200,11 +203,6 @@ def _bounding_planes(u: Floats, half_width: Floats) -> Surfaces:
     """The seam x = 0 and the foot plane, so low that the equatorial mirrors stay whole."""
     foot = -float(half_width[u[:, 2] == 0].max())
     return planes(np.array([[0, 0, 0], [0, 0, foot]]), np.array([[1, 0, 0], [0, 0, 1]]))
-
-
-def _camera(sensor: CameraSpec, pinhole: Floats, cells: Cells) -> Camera:
-    hfov = float(np.radians(sensor.hfov_deg))
-    return fitted_camera(pinhole, cells.corners, sensor.width_px, sensor.height_px, hfov)
 
 
 def _cells_under_coat(cells: Cells, coating: float) -> Cells:

@@ -84,9 +84,6 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
     curvature is scaled by target / coverage, all together, until none is off. Where a step goes
     so far that spheres no longer meet it is halved: flat mirrors always close.
-
-    Raises:
-        SpecError: names the mirrors for which no radius was found.
     """
     curvature, lowest = problem.paper_curvature, problem.min_curvature
     closed, triangles = np.zeros(len(curvature)), problem.triangles

@@ -99,20 +99,15 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         point = -(hq[:, None] * np.cross(gs, line) + hs[:, None] * np.cross(line, gq)) / length**2
         line = line / length
-        start = _mean_apices(surfaces, triangles)
-        point += dot(line, start)[:, None] * line
+        mirror = (triangles < len(surfaces) - PLANES)[:, :, None]
+        mean_apex = np.mean(surfaces.apex[triangles], axis=1, where=mirror)
+        point += dot(line, mean_apex)[:, None] * line
         gradient = surfaces.gradient(p, point)
         slope = dot(line, gradient)
         value = surfaces.value(p, point)
         root = np.copysign(np.sqrt(slope**2 - 2 * surfaces.curvature[p] * value), slope)
         result: Floats = point - (2 * value / (slope + root))[:, None] * line
     return result
-
-
-def _mean_apices(surfaces: Surfaces, triangles: Ints) -> Floats:
-    """Mean of the apices of those faces of each corner that are mirrors."""
-    mirror = (triangles < len(surfaces) - PLANES)[:, :, None]
-    return np.asarray(np.mean(surfaces.apex[triangles], axis=1, where=mirror))
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:

@@ -1,5 +1,7 @@
 """The assembled prototype: groups of named, coloured solids in the frame of the shell."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
@@ -27,12 +29,16 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
     Coupons are tools and left out. What light passes through is included to be looked at, and
     transparent: the capture sphere, and what the camera sees.
     """
+    purchased = (
+        ColouredSolid(component.name, component_solid(component), METAL)
+        for component in prototype.frame.purchased
+    )
     return (
         _printed("base", prototype, ("base", "cap")),
-        _balls(prototype),
+        SolidGroup("balls", tuple(_balls(prototype))),
         _printed("stage", prototype, ("stage",)),
         _printed("frame", prototype, ("frame",)),
-        _purchased(prototype),
+        SolidGroup("bought", tuple(purchased)),
         _views(prototype),
     )
 
@@ -46,21 +52,10 @@ def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> S
     return SolidGroup(name, tuple(solids))
 
 
-def _purchased(prototype: PrototypeModel) -> SolidGroup:
-    solids = (
-        ColouredSolid(component.name, component_solid(component), METAL)
-        for component in prototype.frame.purchased
-    )
-    return SolidGroup("bought", tuple(solids))
-
-
-def _balls(prototype: PrototypeModel) -> SolidGroup:
+def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
     balls, centre = prototype.layout.balls, prototype.layout.body_centres()
-    solids = (
-        ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
-        for k in (~balls.cap).nonzero()[0].tolist()
-    )
-    return SolidGroup("balls", tuple(solids))
+    for k in (~balls.cap).nonzero()[0].tolist():
+        yield ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
 
 
 def _views(prototype: PrototypeModel) -> SolidGroup:

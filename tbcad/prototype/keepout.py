@@ -5,7 +5,7 @@ about the axis between two azimuths is nearest to a point at the azimuth nearest
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -111,7 +111,9 @@ def keep_out_volume(
     return KeepOut(
         frame=base.frame,
         capture=capture,
-        cones=_joined(to_object, to_camera),
+        cones=RoundCones(
+            *map(np.concatenate, zip(astuple(to_object), astuple(to_camera), strict=True))
+        ),
         used=np.concatenate([used, used]),
         centre=prototype.balls.body_centre[:, :2],
         radius=prototype.balls.body_radius,
@@ -150,11 +152,6 @@ def _split(triangles: Floats) -> Floats:
     middle = (triangles + np.roll(triangles, -1, axis=1)) / 2
     tips = np.stack([triangles, middle, np.roll(middle, 1, axis=1)], axis=2).reshape(-1, 3, 3)
     return np.concatenate([tips, middle])
-
-
-def _joined(a: RoundCones, b: RoundCones) -> RoundCones:
-    names = ("start", "end", "start_radius", "end_radius")
-    return RoundCones(*(np.concatenate([getattr(a, name), getattr(b, name)]) for name in names))
 
 
 def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:

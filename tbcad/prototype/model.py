@@ -29,6 +29,9 @@ from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Progress
 
+CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
+COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
+
 
 @dataclass(frozen=True)
 class PrototypeModel:
@@ -98,7 +101,12 @@ def build_prototype_model(
         *_components("frame", frame.printed, printer),
     ]
     progress("prototype: caps and coupon")
-    printed = (*_carrier(carrier), *_caps(base, layout), *static, *_coupons(base, printer))
+    printed = (
+        *(PrintedPart(part, "base", CARRIER_PURPOSE) for part in carrier),
+        *_caps(base, layout),
+        *static,
+        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in coupon_plates(base, printer)),
+    )
     return PrototypeModel(
         layout=layout,
         base=base,
@@ -126,11 +134,6 @@ def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:
     return PointMasses(np.array(mass), np.array([centroid(part.shape) for part in parts]))
 
 
-def _carrier(parts: list[PlacedSolid]) -> Iterator[PrintedPart]:
-    for part in parts:
-        yield PrintedPart(part, "base", "carrier of the balls, turns about the axis")
-
-
 def _caps(base: BaseLayout, layout: PrototypeLayout) -> Iterator[PrintedPart]:
     balls = np.flatnonzero(layout.balls.cap).tolist()
     for ball, part in zip(balls, cap_parts(base, layout), strict=True):
@@ -143,10 +146,3 @@ def _components(
 ) -> Iterator[PrintedPart]:
     for component in components:
         yield PrintedPart(placed_component(component, printer), role, component.what)
-
-
-def _coupons(base: BaseLayout, printer: PrinterSpec) -> Iterator[PrintedPart]:
-    for part in coupon_plates(base, printer):
-        yield PrintedPart(
-            part, "tool", "seats to try the fit of the balls before the base is printed"
-        )

@@ -73,7 +73,8 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     mirrors, cell, edge = cells.mirror_surfaces, outlines.cell, outlines.points
     middle = mirrors.projected(np.arange(cells.mirrors), _means(edge, cell))
     reach = norm(edge - middle[cell])
-    farthest, nearest = (_by_cell(limit, cell, reach) for limit in (np.maximum, np.minimum))
+    first = np.unique(cell, return_index=True)[1]
+    farthest, nearest = (limit.reduceat(reach, first) for limit in (np.maximum, np.minimum))
     width = np.minimum(
         _strip_width(spec.mesh.ray_error_mm, mirrors.radius, distance, middle),
         MAX_STRIP_SHARE * nearest,
@@ -99,10 +100,6 @@ def _strip_width(ray_error: float, radius: Floats, distance: Floats, points: Flo
     largest = np.abs(points).max(axis=1).astype(np.float32)
     rounding = np.spacing(largest).astype(np.float64) / 2
     return np.asarray(np.maximum(ray_error * radius / distance, np.sqrt(2 * radius * rounding)))
-
-
-def _by_cell(function: np.ufunc, cell: Ints, values: Floats) -> Floats:
-    return np.asarray(function.reduceat(values, np.unique(cell, return_index=True)[1]))
 
 
 @dataclass(frozen=True)

@@ -98,14 +98,12 @@ GRADE_COLUMNS = tuple(field.name for field in fields(Grade))
 
 def load_grades() -> dict[str, Grade]:
     """All grades by name, the best first."""
-    rows = (row for _, row in read_rows(_built_in("grades"), "grades", GRADE_COLUMNS))
-    return {row["grade"]: _grade(row) for row in rows}
-
-
-def _grade(row: Row) -> Grade:
-    grade, *deviations, standard = row.values()
-    sphericity, diameter, roughness, lot = map(float, deviations)
-    return Grade(grade, sphericity, diameter, roughness, lot, standard)
+    grades = {}
+    for _, row in read_rows(_built_in("grades"), "grades", GRADE_COLUMNS):
+        grade, *deviations, standard = row.values()
+        sphericity, diameter, roughness, lot = map(float, deviations)
+        grades[grade] = Grade(grade, sphericity, diameter, roughness, lot, standard)
+    return grades
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:

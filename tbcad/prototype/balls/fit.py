@@ -1,14 +1,32 @@
-"""What the chosen balls show in place of the mirrors."""
+"""What the chosen balls show in place of the mirrors, and what each rule to choose them costs."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import ball_poses, pixel_counts, used_outlines
-from tbcad.prototype.balls.selection import BallCandidates, Balls, coverable
+from tbcad.prototype.balls.catalogue import Catalogue
+from tbcad.prototype.balls.groups import MirrorGroups
+from tbcad.prototype.balls.selection import (
+    COVERAGE_ROUNDING_MM,
+    BallCandidates,
+    Balls,
+    ball_candidates,
+    choose_balls,
+    coverable,
+)
+from tbcad.spec.design import Spec
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
+
+SELECTION_RULES = {
+    "cover, with caps": {"snap": "cover", "caps": True},
+    "cover, balls only": {"snap": "cover", "caps": False},
+    "nearest, with caps": {"snap": "nearest", "caps": True},
+    "nearest, balls only": {"snap": "nearest", "caps": False},
+}
 
 
 @dataclass(frozen=True)
@@ -65,3 +83,36 @@ def _pixels(half: MirrorArray, outline: Floats) -> Floats:
     """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
     share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
     return share * pixel_counts(half.camera, half.ellipsoid.frame(), outline, half.azimuth)
+
+
+def ball_alternatives(
+    spec: Spec, half: MirrorArray, groups: MirrorGroups, catalogue: Catalogue
+) -> list[dict[str, Any]]:
+    """What each rule costs, for groups of camera a's mirrors: records for prototype.json.
+
+    pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
+    within the moved cells, and mirrors_below_target counts those whose coverage is less.
+    """
+    candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    return [
+        _alternative(name, candidates, spec.prototype.model_copy(update=rule), catalogue)
+        for name, rule in SELECTION_RULES.items()
+    ]
+
+
+def _alternative(
+    name: str, candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue
+) -> dict[str, Any]:
+    balls = choose_balls(candidates, spec, catalogue)
+    fit = ball_fit(candidates, balls, spec)
+    return {
+        "name": name,
+        "pixels": float(fit.pixels.sum()),
+        "pixels_kept_share": fit.kept_share,
+        "coverage_mm": float(fit.coverage.min()),
+        "mirrors_below_target": int(
+            (fit.coverage < candidates.target - COVERAGE_ROUNDING_MM).sum()
+        ),
+        "balls_mass_g": float(balls.mass_g.sum()),
+        "caps": int(balls.cap.sum()),
+    }

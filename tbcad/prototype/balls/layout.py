@@ -112,8 +112,8 @@ def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
     Raises:
         SpecError: when there is no such layout; it says what to change.
     """
-    half = _curved(design.halves[0])
-    _check_half_turn(spec)
+    half = design.halves[0]
+    _check_suitable(spec, half)
     candidates, balls = _balls(spec, half)
     groups, stop_error = candidates.groups, float(np.radians(spec.prototype.stop_error_deg))
     requests = stop_requests(groups, half.azimuth, stop_error)
@@ -134,22 +134,18 @@ def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
     )
 
 
-def _check_half_turn(spec: Spec) -> None:
+def _check_suitable(spec: Spec, half: MirrorArray) -> None:
     """One camera photographs both halves only if a half turn of the object swaps the cameras."""
-    if spec.optics.camera_mm[1] != 0:
-        raise SpecError(
-            f"a prototype needs cameras that a half turn about z swaps, but optics.camera_mm has "
-            f"y = {spec.optics.camera_mm[1]:g}: set it to 0, or build --parts shell"
-        )
-
-
-def _curved(half: MirrorArray) -> MirrorArray:
     if np.isnan(half.mirrors.radius).any():
         raise SpecError(
             "a prototype of balls needs curved mirrors, but mirrors.radius_rule is flat: set it "
             "to traced or paper"
         )
-    return half
+    if spec.optics.camera_mm[1] != 0:
+        raise SpecError(
+            f"a prototype needs cameras that a half turn about z swaps, but optics.camera_mm has "
+            f"y = {spec.optics.camera_mm[1]:g}: set it to 0, or build --parts shell"
+        )
 
 
 def _balls(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:

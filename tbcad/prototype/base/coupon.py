@@ -146,7 +146,8 @@ def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) 
         bodies += _texts(row, spec, left)
         for n, offset in enumerate(spec.coupon_offsets_mm):
             at = np.array([*_seat_middle(row, left, n, seats), float(seats.back[k])])
-            bodies.append(moved(_seat(seats, spec, k, offset), DOWN, at))
+            wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
+            bodies.append(moved(cut(wall, [seat_hollow(seats, k, offset)]), DOWN, at))
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ DOWN)
             pads.append(seats.pad[k])
     solid = one_solid(name, fused(bodies))
@@ -178,12 +179,6 @@ def _seat_middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
     """Where the axis of a row's n-th seat meets the bed, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
     return np.asarray(left + np.array([right - float(seats.boss[row.seat]), 0.0]))
-
-
-def _seat(seats: Seats, spec: BaseSpec, k: int, offset: float) -> TopoDS_Shape:
-    """A seat in its own frame."""
-    wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
-    return cut(wall, [seat_hollow(seats, k, offset)])
 
 
 def _wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.geometry.vectors import norm, unit
+from tbcad.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import distance_outside, half_plane, offset
 from tbcad.prototype.base.screws import access_radius, joint_hardware
@@ -79,12 +79,6 @@ def in_region(points: Floats, region: Floats, slack: float = 0.0) -> Bools:
     """Whether points (..., 3) are in a region (h, 4), or at most a slack (mm) outside, (...)."""
     below = points @ region[:, :3].T <= region[:, 3] + slack
     return np.asarray(below.all(axis=-1))
-
-
-def perpendiculars(axis: Floats) -> tuple[Floats, Floats]:
-    """Two vectors (..., 3) across unit axes (..., 3) and each other, both of unit length."""
-    first = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=-1)]))
-    return first, np.cross(axis, first)
 
 
 def flange_profile(base: BaseLayout) -> Floats:
@@ -195,7 +189,7 @@ class _Flanges:
         reach = 2 * float(np.abs(top).max())
         step = np.arange(-reach, reach, GRID_MM)
         across = np.stack(np.meshgrid(step, step, indexing="ij"), axis=-1).reshape(-1, 2)
-        points = self.plane.level * normal + across @ np.stack(perpendiculars(normal))
+        points = self.plane.level * normal + across @ -perpendicular_axes(normal)
         section = half_plane(points)
         near = (section >= [top[0, 0], self.base.hub.disc]) & (section <= top.max(axis=0))
         points = points[near.all(axis=1)]

@@ -153,11 +153,7 @@ def _light(spec: BaseSpec, prototype: PrototypeLayout) -> LightSpheroid:
 
 
 def _check_fronts(seats: Seats, light: LightSpheroid, frame: Floats) -> None:
-    """Refuse seats that reach into the light.
-
-    Raises:
-        SpecError: it names the ball.
-    """
+    """Refuse seats that reach into the light."""
     excess = light.min_excess(_front_corners(seats) @ frame.T)
     worst = int(excess.argmin())
     if excess[worst] < 0:

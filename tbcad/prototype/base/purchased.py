@@ -2,16 +2,12 @@
 
 from collections import Counter
 
-from tbcad.prototype.base.hub import Hub
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import M3_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.purchased.parts import SAME_SIZE_MM, Parts, load_parts, of_kind
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec
-
-# Screws that lock the shaft in the hub: set screws, or the one of the clamp.
-LOCK_SCREWS = {"set-screws": 2, "clamp": 1}
 
 
 def base_purchased_parts(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
@@ -27,8 +23,7 @@ def base_purchased_parts(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
     Raises:
         SpecError: when a part is in no list.
     """
-    counts = Counter(magnets(base)) + Counter(fasteners(base, split))
-    return dict(sorted(counts.items()))
+    return dict(Counter(magnets(base)) + Counter(fasteners(base, split)))
 
 
 def magnets(base: BaseLayout) -> dict[str, int]:
@@ -50,9 +45,8 @@ def fasteners(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
     parts = load_parts()
     counts, insert = _hub_fasteners(base, parts), _insert(base.spec, parts)
     for joint in split.joints:
-        hardware = joint_hardware(base.spec)
-        counts.update({hardware.dowel: len(joint.dowels), hardware.screw: len(joint.screws)})
-        counts[insert] += len(joint.screws)
+        hardware, screws = joint_hardware(base.spec), len(joint.screws)
+        counts.update({hardware.dowel: len(joint.dowels), hardware.screw: screws, insert: screws})
     return dict(+counts)
 
 
@@ -77,21 +71,15 @@ def _hub_fasteners(base: BaseLayout, parts: Parts) -> Counter[str]:
     counts: Counter[str] = Counter()
     if abs(hub.hole - spec.insert_hole_mm) < SAME_SIZE_MM:
         counts[_insert(spec, parts)] += len(hub.holes)
+    # A set screw reaches from the shaft to the boss's face at most; the clamp's screw from face to
+    # face.
+    across = 2 * (hub.boss**2 - ((hub.bore + hub.boss) / 2) ** 2) ** 0.5 if hub.boss else 0.0
+    screws = {"set-screws": (2, "setscrews", hub.boss - hub.bore), "clamp": (1, "screws", across)}
     if hub.lock:
-        count = LOCK_SCREWS[hub.lock]
+        count, kind, room = screws[hub.lock]
         counts[_insert(spec, parts)] += count
-        # A set screw reaches from the shaft to the boss's face at most; the clamp's screw from
-        # face to face.
-        if hub.lock == "set-screws":
-            counts[_longest_screw("setscrews", hub.boss - hub.bore, parts)] += count
-        else:
-            counts[_longest_screw("screws", _clamp_screw_length(hub), parts)] += count
+        counts[_longest_screw(kind, room, parts)] += count
     return counts
-
-
-def _clamp_screw_length(hub: Hub) -> float:
-    """Length of the clamp's screw hole, mm."""
-    return float(2 * (hub.boss**2 - ((hub.bore + hub.boss) / 2) ** 2) ** 0.5)
 
 
 def _longest_screw(kind: str, room: float, parts: Parts) -> str:

@@ -185,11 +185,7 @@ def _with_clear_paths(seats: Seats) -> Seats:
 
 
 def _with_clear_pads(seats: Seats) -> Seats:
-    """The seats with their pads turned away from the insertion paths of the other balls.
-
-    Raises:
-        SpecError: when a pad is in the path of another ball however it is turned.
-    """
+    """The seats with their pads turned away from the insertion paths of the other balls."""
     tries = [replace(seats, pad_azimuth=np.full(len(seats), one)) for one in PAD_AZIMUTHS.tolist()]
     room = np.stack([insertion_clearance(one).min(axis=1) for one in tries])
     if (blocked := room.max(axis=0) < OFF_PATH_MM).any():

@@ -80,10 +80,9 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
     labels = number_solids(base, split)
     labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
     bosses = _at_seats(seats, [seat_solids.boss_solid(seats, k) for k in range(len(seats))])
-    return [
-        *(_wall(base), *_struts(base, split), *hub_solids.hub_bodies(base.hub)),
-        *(*bosses, *labels),
-    ]
+    low, high = base.sector
+    wall = revolved_polygon(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
+    return [wall, *_struts(base, split), *hub_solids.hub_bodies(base.hub), *bosses, *labels]
 
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
@@ -97,11 +96,6 @@ def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
 def _at_seats(seats: Seats, shapes: list[TopoDS_Shape]) -> list[TopoDS_Shape]:
     """Shapes, one in the own frame of each seat, moved to their places."""
     return [seat_solids.moved_to_seat(shape, seats, k) for k, shape in enumerate(shapes)]
-
-
-def _wall(base: BaseLayout) -> TopoDS_Shape:
-    low, high = base.sector
-    return revolved_polygon(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
 
 
 def _struts(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from tbcad.geometry.rotations import even_angles
-from tbcad.geometry.vectors import norm
-from tbcad.prototype.base.joints import flange_top, perpendiculars
+from tbcad.geometry.vectors import norm, perpendicular_axes
+from tbcad.prototype.base.joints import flange_top
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import at_azimuths
 from tbcad.types import Floats
@@ -41,7 +41,7 @@ class RoundBodies:
 
     def rims(self) -> Floats:
         """Corners of polygons round both ends of each, (m, 2, RIM_CORNERS, 3)."""
-        first, second = perpendiculars(self.axis)
+        first, second = np.moveaxis(-perpendicular_axes(self.axis), 1, 0)
         angle = even_angles(RIM_CORNERS)
         circle = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
         circle *= (self.radius / np.cos(np.pi / RIM_CORNERS))[:, None, None]

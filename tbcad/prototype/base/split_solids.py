@@ -17,14 +17,13 @@ from tbcad.cad.solids import (
     revolved_polygon,
     volume_by_cut_mesh,
 )
-from tbcad.geometry.vectors import unit
+from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (
     ACCESS_MM,
     LABEL_MM,
     Joint,
     flange_profile,
-    perpendiculars,
 )
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import access_radius, joint_hardware
@@ -59,7 +58,7 @@ def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
 
 def _square(normal: Floats, level: float) -> TopoDS_Shape:
     """A square across a unit normal, larger than any base."""
-    one, two = perpendiculars(normal)
+    one, two = -perpendicular_axes(normal)
     corners = np.stack([-one - two, one - two, one + two, two - one]) * FAR_MM / 2
     return polygon(level * normal + corners)
 
@@ -147,13 +146,9 @@ def piece_holes(base: BaseLayout, split: BaseSplit, n: int) -> list[TopoDS_Shape
         hole
         for joint in split.joints
         for side in (-1, 1)
-        if _is_bounded_by(split.pieces[n], -side * joint.plane.row)
+        if (np.abs(split.pieces[n] + side * joint.plane.row).max(axis=1) < SAME_PLANE).any()
         for hole in _side_holes(base, joint, side)
     ]
-
-
-def _is_bounded_by(piece: Floats, row: Floats) -> bool:
-    return bool((np.abs(piece - row).max(axis=1) < SAME_PLANE).any())
 
 
 def _side_holes(base: BaseLayout, joint: Joint, side: int) -> list[TopoDS_Shape]:

@@ -4,16 +4,21 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tbcad.cad.brep import Solid
 from tbcad.formats.csv_table import write_table
 from tbcad.formats.glb import write_glb
+from tbcad.formats.step import write_step
 from tbcad.formats.step_assembly import write_assembly
+from tbcad.formats.stl import write_stl
+from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import assembly_groups
-from tbcad.prototype.balls.alternatives import ball_alternatives
+from tbcad.prototype.balls.fit import ball_alternatives
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
-from tbcad.prototype.files.part_files import part_record, write_part
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
+from tbcad.prototype.printing.parts import PrintedPart, part_mesh
 from tbcad.prototype.stage.layout import led_poses
+from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Progress
 
@@ -35,7 +40,7 @@ def export_prototype(
     built, spec = build_prototype_model(design, progress), design.spec
     progress("prototype: files")
     for part in built.printed:
-        write_part(folder, part, spec.mesh.structure_error_mm, spec.step.pcurves)
+        _write_part(folder, part, spec)
     _write_tables(built, design, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
@@ -43,6 +48,19 @@ def export_prototype(
     write_glb(folder / GLB, "prototype", groups)
     text = json.dumps(document(built, design), indent=1, allow_nan=False) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8")
+
+
+def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> None:
+    """STEP as assembled, STL and 3MF on the printer's bed."""
+    names, mesh = _file_names(part), part_mesh(part, spec.mesh.structure_error_mm)
+    solid = Solid(part.name, part.solid.shape, ())
+    write_step(folder / names["step"], solid, spec.step.pcurves)
+    write_stl(folder / names["stl"], mesh)
+    write_3mf(folder / names["3mf"], part.name, mesh)
+
+
+def _file_names(part: PrintedPart) -> dict[str, str]:
+    return {kind: f"{part.name}.{kind}" for kind in ("step", "stl", "3mf")}
 
 
 def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
@@ -62,7 +80,7 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
             design.spec, layout.half, layout.groups, layout.balls.catalogue
         ),
         "seats": _seats(built),
-        "parts": [part_record(part) for part in built.printed],
+        "parts": [_part_record(part) for part in built.printed],
         "leds": [
             {
                 "name": name,
@@ -84,6 +102,20 @@ def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
         "drive": bom_csv.drive_record(
             built.balance, built.drive, spec.motion, layout.stops.range, built.base.hub.disc
         ),
+    }
+
+
+def _part_record(part: PrintedPart) -> dict[str, Any]:
+    """Record of a part for prototype.json; y = x @ axes + origin is a point on the bed."""
+    return {
+        "name": part.name,
+        "what": part.what,
+        **_file_names(part),
+        "role": part.role,
+        "ball": part.ball + 1 if part.ball >= 0 else None,
+        "quantity": 1,
+        "axes": (part.solid.axes + 0.0).tolist(),
+        "origin_mm": (part.solid.origin + 0.0).tolist(),
     }
 
 

@@ -108,7 +108,7 @@ def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Brack
 
 def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: PurchasedPart) -> Bracket:
     """A clamp round the post, with a channel for the wires below."""
-    low, radius, up = spec.floor_mm, stage.post + COLLAR_WALL_MM, axes[2]
+    low, radius, up = spec.floor_mm, stage.sizes.post + COLLAR_WALL_MM, axes[2]
     ear, top = radius + EAR_LENGTH_MM, low + COLLAR_HEIGHT_MM
     # Screws on the diagonals clear the collar, and beside the ears these.
     beside_collar = (radius + M5_HEAD_MM / 2 + HEAD_TO_COLLAR_MM) / np.sqrt(2)
@@ -119,16 +119,20 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
     added = (
         box(np.array([-half, -half, low]), np.array([end, half, stage.foot]), axes),
         Cylinder(base, up, radius, COLLAR_HEIGHT_MM),
-        box(np.array([stage.post + EAR_ROOT_MM, -EAR_MM, low]), np.array([ear, EAR_MM, top]), axes),
+        box(
+            np.array([stage.sizes.post + EAR_ROOT_MM, -EAR_MM, low]),
+            np.array([ear, EAR_MM, top]),
+            axes,
+        ),
     )
     holes = screw * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
     places = [np.array([*hole, low]) @ axes for hole in holes]
-    wire = min(stage.post - WIRE_WALL_MM, MAX_WIRE_MM)
+    wire = min(stage.sizes.post - WIRE_WALL_MM, MAX_WIRE_MM)
     width = CHANNEL_WIDTH_MM / 2
     height = min(CHANNEL_HEIGHT_MM, spec.flange_mm - CHANNEL_ROOF_MM)
     channel = np.array([-width, -half - THROUGH_MM, low - THROUGH_MM])
     removed = (
-        Cylinder(middle, up, stage.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
+        Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
         *_clamp(axes, stage, ear, top, insert),
         *drilled_holes(places, spec.flange_mm * up, M5_HOLE_MM),

@@ -96,7 +96,9 @@ def bearing_head(
     edge = axes @ hub_point(base, plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
-    added = [_plate(base, plate), *_flange(spec, base, plate, axes, (face, low, top))]
+    corner = np.array([plate.front, plate.high, plate.half])
+    body = box(np.array([plate.back, plate.low, -plate.half]), corner, base.frame)
+    added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
     removed = _motor_holes(spec, base, drive, plate)
     removed += _screws(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))
     if shaft_parts:
@@ -152,11 +154,6 @@ def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts
     shaft = choose_part(parts, "shafts", key, hint, diameter_mm=bore, length_mm=length)
     rear = base.hub.front - shaft["length_mm"] + collar["width_mm"] + COLLAR_GAP_MM
     return ShaftParts(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
-
-
-def _plate(base: BaseLayout, plate: HeadPlate) -> Primitive:
-    low = np.array([plate.back, plate.low, -plate.half])
-    return box(low, np.array([plate.front, plate.high, plate.half]), base.frame)
 
 
 def _flange(

@@ -221,26 +221,14 @@ def _screws(
 def _check_clearances(
     components: tuple[Component, ...], keep_out: KeepOut, clearance: float
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Smallest distances of all static parts to light and to what the base sweeps.
-
-    Raises:
-        SpecError: when one is less than the clearance.
-    """
+    """Smallest distances of all static parts to light and to what the base sweeps."""
     static = {component.name: component.added for component in components if not component.rotates}
-    swept = {
-        name: min_distance(keep_out.to_swept, bodies)
-        for name, bodies in static.items()
-        if name not in MAY_BE_SWEPT
-    }
-    light = {
-        name: min_distance(keep_out.to_light, bodies)
-        for name, bodies in static.items()
-        if name not in MAY_BE_LIT
-    }
-    for obstacle, distances in (
-        ("light of the balls", light),
-        ("balls and base as they swing", swept),
-    ):
+    light, swept = (
+        {name: min_distance(to, bodies) for name, bodies in static.items() if name not in exempt}
+        for to, exempt in ((keep_out.to_light, MAY_BE_LIT), (keep_out.to_swept, MAY_BE_SWEPT))
+    )
+    obstacles = ("light of the balls", "balls and base as they swing")
+    for obstacle, distances in zip(obstacles, (light, swept), strict=True):
         name, distance = min(distances.items(), key=lambda item: item[1])
         if distance < clearance:
             raise SpecError(

@@ -1,6 +1,5 @@
 """Purchased parts: one CSV file for each kind in this folder."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -105,8 +104,9 @@ def _part(where: str, kind: str, row: Row) -> PurchasedPart:
 
 def of_kind(parts: Parts, kind: str, **sizes: float) -> list[PurchasedPart]:
     """Parts of one kind, of those only the ones with the sizes given by name, such as thread_mm."""
-    return [part for part in parts.values() if part.kind == kind and _has(part, sizes.items())]
-
-
-def _has(part: PurchasedPart, sizes: Iterable[tuple[str, float]]) -> bool:
-    return all(abs(part[name] - value) < SAME_SIZE_MM for name, value in sizes)
+    return [
+        part
+        for part in parts.values()
+        if part.kind == kind
+        and all(abs(part[name] - value) < SAME_SIZE_MM for name, value in sizes.items())
+    ]

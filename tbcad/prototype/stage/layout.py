@@ -49,12 +49,8 @@ class StageLayout:
     """The object stage; the axis of the post is z through the origin.
 
     Attributes:
-        top: z of the disc's upper face, mm.
-        plate: z of the crown's upper face, below the disc, mm.
-        joint: z of the post's upper end, mm.
-        foot: z of its lower end, mm.
-        post: radius of the post, mm.
-        wire: radius of the crown's bore for the wires, mm.
+        sizes: of crown and post.
+        foot: z of the post's lower end, mm.
         led: of the pockets, from the lists.
         leds: centres of the domes, mm, (l, 3).
         pockets: z of the pockets' floors, mm, (l,).
@@ -63,12 +59,8 @@ class StageLayout:
         swept: smallest distance to what the base sweeps, mm.
     """
 
-    top: float
-    plate: float
-    joint: float
+    sizes: CrownSizes
     foot: float
-    post: float
-    wire: float
     led: PurchasedPart
     leds: Floats
     pockets: Floats
@@ -115,12 +107,8 @@ def stage_layout(
     )
     light, swept = _check_clearances(components, keep_out, spec.frame.clearance_mm)
     return StageLayout(
-        top=stage.top_mm,
-        plate=plate,
-        joint=joint,
+        sizes=sizes,
         foot=foot,
-        post=post,
-        wire=sizes.wire,
         led=led,
         leds=leds,
         pockets=pockets,
@@ -196,11 +184,7 @@ def _foot(spec: PrototypeSpec, joint: float) -> float:
 def _check_clearances(
     components: tuple[Component, ...], keep_out: KeepOut, clearance: float
 ) -> tuple[float, float]:
-    """Smallest distances to light outside the sphere and to what the base sweeps.
-
-    Raises:
-        SpecError: when one is too small.
-    """
+    """Smallest distances to light outside the sphere and to what the base sweeps."""
     bodies = [body for component in components for body in component.added]
     light = min_distance(keep_out.to_light_outside_sphere, bodies, -1.0)
     swept = min_distance(keep_out.to_swept, bodies)

@@ -10,8 +10,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
-from tbcad.prototype.balls.alternatives import ball_alternatives
-from tbcad.prototype.balls.fit import ball_fit
+from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,

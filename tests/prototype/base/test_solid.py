@@ -15,7 +15,6 @@ from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
 from tbcad.cad.solids import (
-    bounds,
     centroid,
     cut,
     cylinder,
@@ -43,7 +42,7 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
-from tests.helpers import as_trimesh
+from tests.helpers import as_trimesh, bounds
 
 UP = np.array([0.0, 0.0, 1.0])
 SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))

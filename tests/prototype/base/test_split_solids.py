@@ -14,7 +14,7 @@ from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_mesh
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import bounds, faces, meshed, plane_faces, solids, volume, volume_by_meshes
+from tbcad.cad.solids import faces, meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -28,7 +28,7 @@ from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
-from tests.helpers import as_trimesh
+from tests.helpers import as_trimesh, bounds
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))
 Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction

@@ -141,7 +141,7 @@ class TestSolids:
     def test_the_clamp_holds_the_post(
         self, solids: dict[str, PlacedSolid], stage: StageLayout
     ) -> None:
-        radius = stage.post + FRAME.post_play_mm / 2
+        radius = stage.sizes.post + FRAME.post_play_mm / 2
         bores = [
             (point, way)
             for point, way, size in cylinders(solids["stage_foot"].shape)

@@ -83,7 +83,7 @@ class TestStage:
     def test_it_is_clear_of_light_and_base(self, stage: StageLayout) -> None:
         assert stage.light > -GRAZING_MM
         assert stage.swept > FrameSpec().clearance_mm
-        assert stage.post == 10.0
+        assert stage.sizes.post == 10.0
 
     def test_a_stage_without_leds(
         self, spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut

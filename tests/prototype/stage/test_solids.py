@@ -53,7 +53,7 @@ class TestSolids:
 
     def test_volume_of_the_post(self, solids: dict[str, PlacedSolid], stage: StageLayout) -> None:
         wall = StageSpec().wall_mm
-        tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (stage.joint - stage.foot)
+        tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (stage.sizes.joint - stage.foot)
         # The set screw's hole is nearly as long as the wall is thick.
         hole = np.pi * 1.4**2 * wall
         assert solids["stage_post"].volume == pytest.approx(tube - hole, abs=0.1 * hole)
@@ -82,7 +82,7 @@ class TestSolids:
         self, stage: StageLayout, crown: trimesh.Trimesh
     ) -> None:
         """A way of points in the open: down from the pocket, along the groove, down the bore."""
-        groove = stage.plate - 0.8
+        groove = stage.sizes.plate - 0.8
         end = crown.bounds[0, 2] - 1
         steps = np.linspace(0, 1, 40)[:, None]
         for place, floor in zip(stage.leds, stage.pockets, strict=True):
