@@ -68,6 +68,7 @@ class TestThreads:
 
         def work(unit: int) -> None:
             begun.append(unit)
+            time.sleep(0.01)
             raise KeyError(unit)
 
         with pytest.raises(KeyError):
