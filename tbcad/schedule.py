@@ -40,10 +40,6 @@ _SCHEMES = ("tcp", "tls", "ws", "wss")
 _PACKAGES = ("numpy", "scipy", "numba")  # packages whose version may change a figure
 
 
-def ignore_progress(_: object) -> None:
-    """Report nothing."""
-
-
 def cores() -> int:
     """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -55,7 +51,7 @@ def run_units(
     work: Callable[[Unit], Result],
     units: Sequence[Unit],
     scheduler: str | None = None,
-    progress: Callable[[Unit], None] = ignore_progress,
+    progress: Callable[[Unit], None] = lambda _: None,
     workers: int | None = None,
     patience: float = PATIENCE,
 ) -> list[Result]:
@@ -78,9 +74,11 @@ def run_units(
     if scheduler is None:
         return _in_threads(work, units, progress, workers or cores())
     with _quiet(), _scheduler_errors(scheduler), _cluster(scheduler, patience) as client:
+        from cloudpickle import dumps
+
         # The work is sent once, as a task of its own: if all that hold it die, it is made again.
         on_worker = partial(_on_worker, work, expected=versions(), scheduler=scheduler)
-        shared = client.submit(pickle.loads, _pickled(on_worker), pure=False)
+        shared = client.submit(pickle.loads, dumps(on_worker), pure=False)
         futures = [client.submit(call, shared, unit, pure=False, retries=RETRIES) for unit in units]
         # However this ends, by an interrupt too: the client goes, and what is not done is dropped.
         return _gathered(
@@ -165,13 +163,6 @@ def _on_worker(
                 f"allowed is {expected[name]} as here: install the same there"
             )
     return work(unit)
-
-
-def _pickled(work: object) -> bytes:
-    from cloudpickle import dumps
-
-    result: bytes = dumps(work)
-    return result
 
 
 @contextmanager

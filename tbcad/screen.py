@@ -1,10 +1,18 @@
 """Progress of a long command: a bar on a terminal, plain lines elsewhere."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+PIPED_WIDTH = 160
+
+
+def report_console() -> Console:
+    """Where results are printed; piped, a table needs no terminal's width."""
+    return Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
 
 
 class Stages:

@@ -1,6 +1,5 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,16 +8,14 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.options import Exports, Force, OutReplaced, Settings
 from tbcad.errors import InputError
-from tbcad.screen import Stages, stages
+from tbcad.screen import Stages, report_console, stages
 
 if TYPE_CHECKING:
-    from tbcad_verify.report.report import Report
-
     from tbcad.spec.design import Spec
 
 # With mirrors and manifest; both together take one more: waiting for the shells in parallel.
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
-VERIFY_STAGES, PIPED_WIDTH = 9, 160
+VERIFY_STAGES = 9
 
 
 @app.command()
@@ -103,13 +100,13 @@ def build(
         typer.echo(f"{out}: built, not verified: run tbcad verify {out}")
         return 0
     typer.echo(f"{out}: {' and '.join(chosen)} as STEP, STL and 3MF; mirrors.csv, design.json")
-    _show(built.report)
+    built.report.show(report_console())
     return 0 if built.passed else 1
 
 
 def _with_margin(spec: "Spec", process: str, share: float, screen: Stages) -> "Spec":
+    from tbcad.tolerance.margin import spec_for_process
     from tbcad.tolerance.process.process import load_process
-    from tbcad.tolerance.process_design import spec_for_process
 
     screen.stage(f"margin for {process}")
     return spec_for_process(spec, load_process(process), share, screen.detail)
@@ -151,15 +148,8 @@ def verify_command(
     options = VerifyOptions(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
     with stages(VERIFY_STAGES) as screen:
         report = verify(folder, options, progress=screen.stage)
-    _show(report)
+    report.show(report_console())
     return 0 if report.passed else 1
-
-
-def _show(report: "Report") -> None:
-    from rich.console import Console
-
-    # Piped, a table needs no terminal's width.
-    report.show(Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH))
 
 
 @app.command()

@@ -1,6 +1,5 @@
 """The studies of the paper: heavy libraries are imported inside the commands."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,13 +16,11 @@ from tbcad.cli.options import (
     Scheduler,
     Settings,
 )
-from tbcad.screen import stages
+from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
     from tbcad.simulate.study.study import Study
     from tbcad.spec.design import Spec
-
-PIPED_WIDTH = 160
 
 study = typer.Typer(
     no_args_is_help=True,
@@ -226,14 +223,12 @@ def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
 
 
 def _show(result: "Study") -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table("quantity", "tbcad", "the paper", "where in the paper", box=None)
     for quantity, unit, ours, paper, where in result.summary.rows:
         table.add_row(str(quantity), _shown(ours, unit), _shown(paper, unit), str(where))
-    # Piped, a table needs no terminal's width.
-    (Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)).print(table)
+    report_console().print(table)
 
 
 def _shown(value: str | int | float | None, unit: str | int | float | None) -> str:

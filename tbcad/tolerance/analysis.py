@@ -14,7 +14,7 @@ from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
-from tbcad.tolerance.margin import Margin, WorstCoverageOfDesign, check_yield, margin
+from tbcad.tolerance.margin import Margin, check_yield, margin
 from tbcad.tolerance.montecarlo.builds import (
     AnyResult,
     Case,
@@ -35,8 +35,7 @@ from tbcad.tolerance.montecarlo.sensitivity import (
 )
 from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
-from tbcad.tolerance.prototype.builds import PrototypeCase
-from tbcad.tolerance.prototype.windows import prototype_model
+from tbcad.tolerance.prototype.windows import PrototypeCase, prototype_model
 from tbcad.types import Floats, Progress
 
 # Simulated builds in each step of a search; the process itself has as many as asked for.
@@ -166,7 +165,7 @@ def analyse(
         InputError: mirrors are planar, or the scheduler cannot be reached.
     """
     _refuse_planar(export)
-    errors = _errors(export, process)
+    errors = process_errors(process, export.spec.mirrors.coating_um)
     simulator = _Simulator(export, options, edge_models(export.reflectors))
     progress(f"{options.builds} simulated builds by {process.name}")
     result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
@@ -197,10 +196,6 @@ def _refuse_planar(export: Exported) -> None:
         )
 
 
-def _errors(export: Exported, process: Process) -> Errors:
-    return process_errors(process, export.spec.mirrors.coating_um)
-
-
 @dataclass(frozen=True)
 class _Simulator:
     """Simulates builds of one export, all with the same seed and scheduler."""
@@ -213,15 +208,9 @@ class _Simulator:
         """Result of as many builds as asked for."""
         return simulate(case, self.options.builds, self._run_batches)
 
-    def worst_coverage(self, errors: Errors) -> Floats:
-        """Minimum coverage of the builds of a search."""
-        return self._worst(self.edge_models, errors)
-
-    def worst_coverage_of_design(self, design: MirrorDesign, errors: Errors) -> Floats:
-        """The same of another design."""
-        return self._worst(edge_models(reflectors(design)), errors)
-
-    def _worst(self, models: EdgeModels, errors: Errors) -> Floats:
+    def worst_coverage(self, errors: Errors, design: MirrorDesign | None = None) -> Floats:
+        """Minimum coverage of the builds of a search, of the export or of another design."""
+        models = edge_models(reflectors(design)) if design else self.edge_models
         case = MonteCarloCase(models, errors, self.options.seed)
         return simulate(case, SEARCH_BUILDS, self._run_batches).worst
 
@@ -232,15 +221,12 @@ class _Simulator:
 def _single_errors(
     simulator: _Simulator, errors: Errors, worst: WorstCoverage, detail: Progress
 ) -> tuple[SingleErrorEffect, ...]:
-    def effect(kind: str) -> SingleErrorEffect:
-        def reported(errors: Errors) -> Floats:
+    wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
+    effects = []
+    for kind in present_kinds(errors):
+        if kind in shell_error_shapes(0):
             detail(kind)
-            return worst(errors)
-
-        wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
-        return one_at_a_time(errors, kind, wanted, target, reported)
-
-    effects = [effect(kind) for kind in present_kinds(errors) if kind in shell_error_shapes(0)]
+            effects.append(one_at_a_time(errors, kind, wanted, target, worst))
     return tuple(sorted(effects, key=lambda one: -one.loss))
 
 
@@ -249,7 +235,8 @@ def _process_option(
 ) -> ProcessOption:
     export, process = simulator.export, load_process(name)
     detail(name)
-    estimate = estimate_yield(worst(_errors(export, process)), export.capture_mm)
+    errors = process_errors(process, export.spec.mirrors.coating_um)
+    estimate = estimate_yield(worst(errors), export.capture_mm)
     needed = _margin(simulator, process, (), lambda text: detail(f"{name}: {text}"))
     return ProcessOption(name, estimate, needed)
 
@@ -261,9 +248,9 @@ def _margin(
     for option in known:
         if load_process(option.name) == process:
             return option.margin
-    export, wanted = simulator.export, simulator.options.wanted_yield
-    worst: WorstCoverageOfDesign = simulator.worst_coverage_of_design
-    return margin(export.spec, _errors(export, process), wanted, worst, detail)
+    spec, wanted = simulator.export.spec, simulator.options.wanted_yield
+    errors = process_errors(process, spec.mirrors.coating_um)
+    return margin(spec, errors, wanted, simulator.worst_coverage, detail)
 
 
 def _sharpness(

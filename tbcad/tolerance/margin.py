@@ -1,22 +1,30 @@
-"""The margin on the design's target that a process needs."""
+"""The margin on the design's target that a process needs, and the design that has it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 
+from tbcad import schedule
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.simulate.study.sweep import spec_with
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.tolerance.montecarlo.builds import coverage_at_yield
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, coverage_at_yield, simulate
 from tbcad.tolerance.montecarlo.draws import Errors
+from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.process.process import Process, process_errors
 from tbcad.types import Floats, Progress
 
-WorstCoverageOfDesign = Callable[[MirrorDesign, Errors], Floats]
+WorstCoverageOfDesign = Callable[[Errors, MirrorDesign], Floats]
 """Minimum coverage, mm, (s,), of builds of a design with some errors."""
 
 MAX_TRIES = 6
 STEP_MM = 0.01  # margins are rounded up to a multiple of it
+# Simulated builds that the margin of a design is computed from, and their seed.
+BUILDS = 400
+SEED = 1
 LARGEST_MARGIN_MM = 20.0  # as in the design's keys
 
 
@@ -68,7 +76,7 @@ def margin(
     for _ in range(MAX_TRIES):
         progress(f"margin {tried:.2f} mm")
         try:
-            seen = worst(design(with_margin(spec, tried)), errors)
+            seen = worst(errors, design(with_margin(spec, tried)))
         except SpecError as error:
             return Margin(None, share, f"mirrors of margin {tried:.2f} mm: {error}")
         share = float((seen >= target).mean())
@@ -83,7 +91,41 @@ def margin(
     return Margin(None, share, f"not found in {MAX_TRIES} tries")
 
 
+def spec_for_process(
+    spec: Spec, process: Process, wanted_yield: float, progress: Progress = lambda _: None
+) -> Spec:
+    """The same design but for the minimum margin with which a process reaches a yield.
+
+    Args:
+        spec: the design.
+        process: how it is made.
+        wanted_yield: share of the builds that are to be good.
+        progress: called with each margin that is tried.
+
+    Raises:
+        InputError: no margin is enough, or the radii do not follow a target.
+    """
+    check_yield(wanted_yield)
+    if spec.mirrors.radius_rule != "traced":
+        raise InputError(
+            f"--for-process sets mirrors.margin_mm, which radii of rule "
+            f"{spec.mirrors.radius_rule} do not follow: use --radius-rule traced"
+        )
+    errors = process_errors(process, spec.mirrors.coating_um)
+    needed = margin(spec, errors, wanted_yield, _worst_coverage, progress)
+    if needed.mm is None:
+        raise InputError(
+            f"process {process.name} does not make {wanted_yield:.1%} of the builds good with any "
+            f"margin ({needed.reason}): choose a more exact one, or see tbcad tolerance"
+        )
+    return with_margin(spec, needed.mm)
+
+
+def _worst_coverage(errors: Errors, design: MirrorDesign) -> Floats:
+    case = MonteCarloCase(edge_models(reflectors(design)), errors, SEED)
+    return simulate(case, BUILDS, schedule.run_units).worst
+
+
 def with_margin(spec: Spec, mm: float) -> Spec:
     """The spec with another margin."""
-    mirrors = spec.mirrors.model_copy(update={"margin_mm": round(mm, 6), "radius_rule": "traced"})
-    return spec.model_copy(update={"mirrors": mirrors})
+    return spec_with(spec, mirrors={"margin_mm": round(mm, 6), "radius_rule": "traced"})

@@ -2,13 +2,14 @@
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.tables import Record, Table
-from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis, ProcessOption
+from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis
 from tbcad.tolerance.montecarlo.builds import CoverageResult, YieldEstimate, estimate_yield
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
@@ -144,9 +145,8 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
 
 def _result_dict(result: CoverageResult, target: float) -> dict[str, Any]:
     offset, met = result.offset, np.isfinite(result.offset)
-    estimate = estimate_yield(result.worst, target)
     return {
-        "yield": {"share": estimate.share, "low": estimate.low, "high": estimate.high},
+        "yield": asdict(estimate_yield(result.worst, target)),
         "worst_camera_mm": {f"{q:g}": float(np.quantile(result.worst, q)) for q in QUANTILES},
         "pointing_mm": {
             "rms": _rms(offset),
@@ -221,20 +221,19 @@ def _error_record(effect: SingleErrorEffect, key: str, process: Process) -> Reco
 
 
 def _process_table(analysis: Analysis) -> Table:
-    records = [_process_record(option) for option in analysis.process_options]
+    records: list[Record] = [
+        {
+            "process": option.name,
+            "builds": SEARCH_BUILDS,
+            "yield": option.estimate.share,
+            "yield_low": option.estimate.low,
+            "yield_high": option.estimate.high,
+            "margin_needed_mm": option.margin.mm,
+            "reason": option.margin.reason,
+        }
+        for option in analysis.process_options
+    ]
     return Table.of_records("tolerance-processes", records)
-
-
-def _process_record(option: ProcessOption) -> Record:
-    return {
-        "process": option.name,
-        "builds": SEARCH_BUILDS,
-        "yield": option.estimate.share,
-        "yield_low": option.estimate.low,
-        "yield_high": option.estimate.high,
-        "margin_needed_mm": option.margin.mm,
-        "reason": option.margin.reason,
-    }
 
 
 def _cameras_table(analysis: Analysis) -> Table:

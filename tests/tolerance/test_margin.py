@@ -41,9 +41,9 @@ def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def losing(loss: Loss) -> Callable[[MirrorDesign, Errors], np.ndarray]:
+def losing(loss: Loss) -> Callable[[Errors, MirrorDesign], np.ndarray]:
     """Coverage of builds that see the target and the margin but for what they lose."""
-    return lambda made, _: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
+    return lambda _, made: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
 
 
 def steady(loss: float | np.ndarray) -> Loss:
@@ -95,7 +95,7 @@ class TestMadeUpLosses:
         wanted = float(generator.uniform(0.2, 0.999))
         told: list[float] = []
 
-        def worst(_: MirrorDesign, __: Errors) -> np.ndarray:
+        def worst(_: Errors, __: MirrorDesign) -> np.ndarray:
             seen = TARGET + generator.normal(0.3, 0.5, 50)
             told.append(float((seen >= TARGET).mean()))
             return seen
@@ -154,7 +154,7 @@ class TestRealDesigns:
     """Made anew with the margin that was found, and with builds of the same numbers."""
 
     @staticmethod
-    def worst(made: MirrorDesign, errors: Errors) -> np.ndarray:
+    def worst(errors: Errors, made: MirrorDesign) -> np.ndarray:
         models = edge_models(reflectors(made))
         return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
@@ -168,7 +168,7 @@ class TestRealDesigns:
 
         def share(mm: float) -> float:
             options = [f"n={n}", f"mirrors.margin_mm={mm:.2f}"]
-            return float((self.worst(design(load_spec(None, options)), made) >= TARGET).mean())
+            return float((self.worst(made, design(load_spec(None, options))) >= TARGET).mean())
 
         assert share(found.mm) == found.share >= wanted
         assert share(found.mm - 2 * STEP_MM) < wanted

@@ -10,11 +10,11 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance import process_design
+from tbcad.tolerance import margin as margin_module
+from tbcad.tolerance.margin import spec_for_process
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tbcad.tolerance.process.process import load_process, process_errors
-from tbcad.tolerance.process_design import spec_for_process
 
 SMALL = ["n=4", "mirrors.margin_mm=0"]
 BUILDS = 60
@@ -22,7 +22,7 @@ BUILDS = 60
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process_design, "BUILDS", BUILDS)
+    monkeypatch.setattr(margin_module, "BUILDS", BUILDS)
 
 
 def test_the_margin_is_enough_and_a_little_less_is_not() -> None:
@@ -35,7 +35,7 @@ def test_the_margin_is_enough_and_a_little_less_is_not() -> None:
         tried = load_spec(None, ["n=4", f"mirrors.margin_mm={margin}"])
         models = edge_models(reflectors(design(tried)))
         worst = simulate(
-            MonteCarloCase(models, process_errors(process), process_design.SEED), BUILDS
+            MonteCarloCase(models, process_errors(process), margin_module.SEED), BUILDS
         ).worst
         shares.append((worst >= 60).mean())
     assert shares[0] >= wanted > shares[1]

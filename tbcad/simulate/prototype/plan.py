@@ -98,7 +98,7 @@ class Plan:
     stop: Ints
 
     def __len__(self) -> int:
-        """Finite of balls."""
+        """Number of balls."""
         return len(self.radius)
 
     @property
@@ -117,13 +117,14 @@ def read_plan(exported: Exported) -> Plan:
     document = read_json(record, _Document, SCHEMA, MISSING)
     balls = np.array([[*one.model_dump().values()] for one in read_csv(table, _Ball, MISSING)])
     pictures = read_csv(plan_file, _Picture, MISSING)
-    _check_frame(record, exported, document)
+    frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
+    _check_frame(record, exported, frame)
     _check_balls(table, balls)
     _check_pictures(plan_file, pictures, len(balls))
     angle = _angles(plan_file, pictures)
     ball, stop = _served(plan_file, pictures, len(exported.reflectors[0]))
     plan = Plan(
-        frame=_frame(document),
+        frame=frame,
         apex=balls[:, 3:6],
         normal=balls[:, 6:9],
         radius=balls[:, 1],
@@ -138,13 +139,8 @@ def read_plan(exported: Exported) -> Plan:
     return plan
 
 
-def _frame(document: _Document) -> Floats:
-    frame = document.frame
-    return np.array([frame.axis, frame.zero, frame.third])
-
-
-def _check_frame(path: Path, exported: Exported, document: _Document) -> None:
-    frame, (a, b) = _frame(document), exported.reflectors
+def _check_frame(path: Path, exported: Exported, frame: Floats) -> None:
+    a, b = exported.reflectors
     pinhole = a.camera.pinhole
     offset = norm(pinhole) * frame[0] - pinhole
     if np.abs(frame @ frame.T - np.eye(3)).max() > ROUNDING or np.linalg.det(frame) < 0:
@@ -232,7 +228,8 @@ def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Ex
     said = np.zeros(plan.ball.shape)
     for one in pictures:
         said[int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1] = one.error_deg
-    u = np.stack([one.u * turn for one, turn in zip(exported.reflectors, _turns(), strict=True)])
+    a, b = exported.reflectors
+    u = np.stack([a.u, b.u * HALF_TURN])
     apex = rotated(plan.apex[plan.ball], plan.frame[0], plan.angle[plan.stop])
     apart = norm(apex / norm(apex)[..., None] - u)
     off = np.abs(np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1))) - said)
@@ -242,7 +239,3 @@ def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Ex
             f"{path}: {_name(int(half), int(mirror))} has error_deg {said[half, mirror]:g}, but "
             f"its ball stands {off[half, mirror]:.3g} degrees off that: {REBUILD}"
         )
-
-
-def _turns() -> tuple[Floats, Floats]:
-    return np.ones(3), HALF_TURN

@@ -129,20 +129,13 @@ def _reflector(
 
 
 def _surfaces(path: Path, mirrors: list[_Mirror]) -> tuple[Floats, Surfaces]:
-    columns = np.array(
-        [
-            (
-                *(one.ux, one.uy, one.uz, one.px, one.py, one.pz, one.nx, one.ny, one.nz),
-                1 / one.radius_mm if one.radius_mm else 0,
-            )
-            for one in mirrors
-        ]
-    )
-    u, apex, normal, curvature = np.split(columns, [3, 6, 9], axis=1)
+    numbers = [one.model_dump(exclude={"camera", "radius_mm"}).values() for one in mirrors]
+    u, apex, normal = np.split(np.array([[*row] for row in numbers]), 3, axis=1)
+    curvature = np.array([1 / one.radius_mm if one.radius_mm else 0.0 for one in mirrors])
     for name, vectors in (("u", u), ("n", normal)):
         if np.abs(norm(vectors) - 1).max() > ROUNDING:
             raise InputError(f"{path}: mirrors have {name} of another length than 1: {REBUILD}")
-    return u, Surfaces(apex, normal, curvature[:, 0])
+    return u, Surfaces(apex, normal, curvature)
 
 
 def _view(path: Path, camera: _Camera) -> Camera:

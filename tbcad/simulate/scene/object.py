@@ -105,8 +105,7 @@ def built_in_object(capture_mm: float) -> SceneObject:
 def rainbow(hue: Floats) -> Floats:
     """Red, green, blue (..., 3) of hues (...) in turns, bright and of nearly even weight."""
     phase = 2 * np.pi * (hue[..., None] - np.array([0, 1, 2]) / 3)
-    result: Floats = 0.55 + 0.4 * np.cos(phase)
-    return result
+    return np.asarray(0.55 + 0.4 * np.cos(phase))
 
 
 def pattern(points: Floats) -> Floats:
@@ -115,8 +114,7 @@ def pattern(points: Floats) -> Floats:
     mixed = (cube * np.array([73_856_093, 19_349_663, 83_492_791])).sum(axis=-1)
     hue = (mixed % 17) / 17
     weight = 0.55 + 0.45 * (cube.sum(axis=-1) % 2)
-    result: Floats = rainbow(hue) * weight[..., None]
-    return result
+    return np.asarray(rainbow(hue) * weight[..., None])
 
 
 def _knot(t: Floats) -> Floats:
@@ -192,8 +190,7 @@ def _fitted(points: Floats, faces: Ints, capture_mm: float) -> Floats:
         return points
     centre, _ = trimesh.nsphere.minimum_nsphere(used)
     reach = np.linalg.norm(used - centre, axis=1).max()
-    result: Floats = (points - centre) * (capture_mm / 2 / reach)
-    return result
+    return np.asarray((points - centre) * (capture_mm / 2 / reach))
 
 
 def _colours(mesh: Any, faces: Ints) -> dict[str, Any]:

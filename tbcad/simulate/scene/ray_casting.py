@@ -139,5 +139,4 @@ def _texels(picture: Bytes, uv: Floats) -> Floats:
     rows, columns = (row % height, (row + 1) % height), (column % width, (column + 1) % width)
     upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
     lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
-    result: Floats = (upper * (1 - down) + lower * down) / 255
-    return result
+    return np.asarray((upper * (1 - down) + lower * down) / 255)

@@ -62,8 +62,7 @@ def pixel_directions(view: Camera, rows: range, shift: Shift = (0.0, 0.0)) -> Fl
         shift: from the pixels' centres, in pixels: to the right and down.
     """
     columns, lines = _lattice(view, rows, shift)
-    result: Floats = columns + lines[:, None]
-    return result
+    return np.asarray(columns + lines[:, None])
 
 
 def unit_directions(

@@ -159,5 +159,4 @@ def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal = bare.gradient(owner, corners.mean(axis=1))
     size = np.linalg.norm(area, axis=1) * np.linalg.norm(normal, axis=1)
-    along: NDArray[np.bool_] = np.abs((area * normal).sum(axis=1)) > MIN_FACET_COSINE * size
-    return along
+    return np.asarray(np.abs((area * normal).sum(axis=1)) > MIN_FACET_COSINE * size)

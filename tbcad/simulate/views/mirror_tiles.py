@@ -82,8 +82,7 @@ def _widths(apex: Floats) -> Floats:
     have fewer, and farther neighbours count for them.
     """
     distance, _ = cKDTree(apex).query(apex, k=min(NEIGHBOURS + 1, len(apex)))
-    result: Floats = np.asarray(distance).reshape(len(apex), -1)[:, -1]
-    return result
+    return np.reshape(distance, (len(apex), -1))[:, -1]
 
 
 def _tile(frame: Frame, index: int) -> MirrorTile | None:

@@ -59,8 +59,7 @@ def lens_pinholes() -> Floats:
     reach = int(np.sqrt(LATTICE_RADIUS2))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
     inside = x**2 + y**2 <= LATTICE_RADIUS2
-    places: Floats = np.stack([x[inside], y[inside]], axis=1) / np.sqrt(LATTICE_RADIUS2)
-    return places
+    return np.asarray(np.stack([x[inside], y[inside]], axis=1) / np.sqrt(LATTICE_RADIUS2))
 
 
 def lens_rays(

@@ -42,19 +42,16 @@ class CoverageResult:
     @property
     def worst(self) -> Floats:
         """Minimum coverage of each build, mm, (s,)."""
-        result: Floats = self.coverage.min(axis=1)
-        return result
+        return np.asarray(self.coverage.min(axis=1))
 
     @property
     def worst_camera(self) -> Ints:
         """Number of the virtual camera with the minimum coverage of each build, (s,)."""
-        result: Ints = np.argmin(self.coverage, axis=1)
-        return result
+        return np.asarray(np.argmin(self.coverage, axis=1))
 
     def quantiles(self, shares: Sequence[float]) -> Floats:
         """Coverage, mm, (k, v), that k shares of the builds do not reach at each camera."""
-        result: Floats = np.quantile(self.coverage, shares, axis=0)
-        return result
+        return np.asarray(np.quantile(self.coverage, shares, axis=0))
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,7 @@ class Error:
         """Random errors of a shape."""
         normal = self.distribution == "normal"
         deviation = generator.standard_normal(shape) if normal else generator.uniform(-1, 1, shape)
-        result: Floats = self.mean + self.spread * deviation
-        return result
+        return np.asarray(self.mean + self.spread * deviation)
 
 
 NO_ERROR = Error()
@@ -189,10 +188,6 @@ def _draw_kind(error: Error, seed: int, builds: Sequence[int], stream: int, shap
     drawn = np.full((len(builds), *shape), float(error.mean))
     if error.spread != 0:
         for row, build in enumerate(builds):
-            drawn[row] = error.sample(_generator(seed, build, stream), *shape)
+            key = np.random.SeedSequence(seed, spawn_key=(build, stream))
+            drawn[row] = error.sample(np.random.Generator(np.random.Philox(key)), *shape)
     return drawn
-
-
-def _generator(seed: int, build: int, stream: int) -> np.random.Generator:
-    key = np.random.SeedSequence(seed, spawn_key=(build, stream))
-    return np.random.Generator(np.random.Philox(key))

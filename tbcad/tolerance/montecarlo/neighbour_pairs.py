@@ -72,5 +72,4 @@ def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, i: int, j: int
     faces = faces[(faces != i) & (faces != j)]
     apart = surfaces.apex[faces][:, None] - surfaces.apex[[i, j if j < m else i]]
     distance = np.linalg.norm(apart, axis=2).sum(axis=1)
-    result: Ints = faces[np.argsort(np.where(faces < m, distance, 0.0), kind="stable")]
-    return result
+    return np.asarray(faces[np.argsort(np.where(faces < m, distance, 0.0), kind="stable")])

@@ -57,8 +57,7 @@ def _pixel_rays(half: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Float
     designed = (half.apex - half.view.pinhole) @ half.view.axes.T
     right, down, forward = designed[..., None].swapaxes(0, 1)
     focal = draws.focal[:, None, None] * forward
-    result: Floats = axes[2] + axes[0] * right / focal + axes[1] * down / focal
-    return result
+    return np.asarray(axes[2] + axes[0] * right / focal + axes[1] * down / focal)
 
 
 def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:

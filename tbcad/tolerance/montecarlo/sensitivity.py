@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
-from tbcad.tolerance.montecarlo.draws import NO_ERROR, Error, Errors
+from tbcad.tolerance.montecarlo.draws import NO_ERROR, Errors
 from tbcad.types import Floats
 
 WorstCoverage = Callable[[Errors], Floats]
@@ -51,12 +51,12 @@ def only_kind(errors: Errors, kind: str) -> Errors:
 
 def scaled(errors: Errors, factor: float) -> Errors:
     """Errors, spread and mean, multiplied."""
-    kinds = present_kinds(errors)
-    return replace(errors, **{kind: _scaled(getattr(errors, kind), factor) for kind in kinds})
-
-
-def _scaled(error: Error, factor: float) -> Error:
-    return replace(error, spread=error.spread * factor, mean=error.mean * factor)
+    kinds = {kind: getattr(errors, kind) for kind in present_kinds(errors)}
+    grown = {
+        kind: replace(error, spread=error.spread * factor, mean=error.mean * factor)
+        for kind, error in kinds.items()
+    }
+    return replace(errors, **grown)
 
 
 def one_at_a_time(

@@ -18,7 +18,6 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.simulate.study.viewpoints import view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -63,7 +62,6 @@ def sharpness(
     reference: ReferenceViews,
     residual: float,
     seed: int = 1,
-    method: Method = "nearest",
     progress: Progress = lambda _: None,
 ) -> Sharpness:
     """Views of builds with errors, against the truth.
@@ -75,18 +73,17 @@ def sharpness(
         reference: the views.
         residual: of a mirror's direction after calibration, per axis, radians.
         seed: of the residuals.
-        method: how views are made.
         progress: called with each build.
     """
     designed = _light_field(cameras, scene, reference.capture_mm)
-    rows = [_ssim(designed, scene, reference, method)]
+    rows = [_ssim(designed, scene, reference)]
     for k in range(len(builds[0])):
         progress(f"build {k + 1} of {len(builds[0])}")
         a, b = (built_reflector(at, draws, k) for at, draws in zip(cameras, builds, strict=True))
         built = _light_field((a, b), scene, reference.capture_mm)
         calibrated = _with_residual(built, residual, (seed, k))
         for light_field in (_with_rays_of(designed, built), calibrated):
-            rows.append(_ssim(light_field, scene, reference, method))
+            rows.append(_ssim(light_field, scene, reference))
     table = np.array(rows)
     return Sharpness(table[0], table[1::2], table[2::2])
 
@@ -103,8 +100,7 @@ class BuiltReflector(SubstitutedReflector):
         box = super().boxes()
         border = np.repeat(box[:, 1::2] - box[:, 0::2], 2, axis=1) * [-1, 1, -1, 1]
         size = np.repeat([self.camera.width_px, self.camera.height_px], 2)
-        wider: Ints = np.clip(box + border, 0, size)
-        return wider
+        return np.asarray(np.clip(box + border, 0, size))
 
 
 def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflector:
@@ -172,8 +168,8 @@ def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> d
     return {**frame.planes, "direction": unit.astype(np.float32)}
 
 
-def _ssim(source: LightField, scene: Scene, reference: ReferenceViews, method: Method) -> Floats:
+def _ssim(source: LightField, scene: Scene, reference: ReferenceViews) -> Floats:
     """SSIM of each view, (v,)."""
     tiles, views = MirrorTiles(source), reference.views
-    quality = view_quality(tiles, scene, views, reference.truths, method, lambda _: None)
+    quality = view_quality(tiles, scene, views, reference.truths, "nearest", lambda _: None)
     return quality[:, 1]

@@ -20,6 +20,7 @@ from tbcad.optics.windows import cell_windows
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
+from tbcad.tolerance.montecarlo.builds import CoverageResult
 from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC
@@ -75,8 +76,7 @@ class PrototypeModel:
     @property
     def is_cap(self) -> Bools:
         """Which balls are made instead of purchased, (k,)."""
-        caps: Bools = self.plan.body_radius < self.plan.radius
-        return caps
+        return np.asarray(self.plan.body_radius < self.plan.radius)
 
 
 def prototype_model(reflectors: tuple[Reflector, Reflector], plan: Plan) -> PrototypeModel:
@@ -102,6 +102,29 @@ def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
     outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
     outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
     return RunWindows(run.ball, run.stop, side, first, middle, outward, halved)
+
+
+@dataclass(frozen=True)
+class PrototypeCase:
+    """Simulates builds of the prototype; it can be sent to another process.
+
+    Attributes:
+        model: the prototype as designed.
+        errors: of the process.
+        seed: of all builds.
+        calibrated: whether camera and balls are known, so that every window is moved to its ball.
+    """
+
+    model: PrototypeModel
+    errors: Errors
+    seed: int
+    calibrated: bool = False
+
+    def __call__(self, builds: range) -> CoverageResult:
+        """Result of the builds of these numbers."""
+        stops = len(self.model.plan.angle)
+        draws = draw_prototypes(self.errors, self.seed, builds, self.model.is_cap, stops)
+        return CoverageResult(*coverage_and_offsets(self.model, draws, self.calibrated))
 
 
 @dataclass(frozen=True)
@@ -142,8 +165,7 @@ def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int
 def _lens(model: PrototypeModel, tilt: Floats, focal: float) -> Floats:
     """A longer focal length makes pictures larger: a pixel's ray is nearer to the axis."""
     nearer = np.array([[1 / focal], [1 / focal], [1.0]])
-    lens: Floats = nearer * Rotation.from_rotvec(tilt).apply(model.axes)
-    return lens
+    return np.asarray(nearer * Rotation.from_rotvec(tilt).apply(model.axes))
 
 
 def calibrated_pose(model: PrototypeModel, half: int, pose: RunPose) -> RunPose:
@@ -161,8 +183,7 @@ def _shortest_rotations(start: Floats, end: Floats) -> Floats:
     """Matrices (m, 3, 3) that turn unit vectors (m, 3), as rows, onto others the shortest way."""
     axis = np.cross(start, end)
     skew = np.cross(np.eye(3), axis[:, None])  # row x becomes x cross axis
-    rotation: Floats = np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None]
-    return rotation
+    return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
 
 
 def coverage_and_offsets(

@@ -17,10 +17,14 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import CoverageResult, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.prototype.builds import PrototypeCase
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.rays import highlights
-from tbcad.tolerance.prototype.windows import PrototypeModel, coverage_and_offsets, prototype_model
+from tbcad.tolerance.prototype.windows import (
+    PrototypeCase,
+    PrototypeModel,
+    coverage_and_offsets,
+    prototype_model,
+)
 from tests.prototype_exports import plan_of
 
 OPTIONS = ["n=6", "prototype.k=5"]
