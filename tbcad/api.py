@@ -151,7 +151,6 @@ def _spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> 
 
 
 def _texts(settings: Settings) -> list[str]:
-    """Settings as "key=value" texts."""
     if isinstance(settings, Mapping):
         return [f"{key}={value}" for key, value in settings.items()]
     return list(settings)

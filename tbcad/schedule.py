@@ -81,9 +81,8 @@ def run_units(
         shared = client.submit(pickle.loads, dumps(on_worker), pure=False)
         futures = [client.submit(call, shared, unit, pure=False, retries=RETRIES) for unit in units]
         # However this ends, by an interrupt too: the client goes, and what is not done is dropped.
-        return _gathered(
-            client, futures, units, progress, _WorkerCheck(client, scheduler, patience)
-        )
+        check = _worker_check(client, scheduler, patience)
+        return _gathered(client, futures, units, progress, check)
 
 
 def _in_threads(
@@ -239,24 +238,22 @@ def _check_greeting(address: str) -> None:
                 raise ValueError(address)
 
 
-class _WorkerCheck:
-    """Raises an InputError once a scheduler is gone, or has had no workers for some time."""
+def _worker_check(client: Any, address: str, patience: float) -> Callable[[], None]:
+    """A check that raises an InputError once a scheduler is gone, or has long had no workers."""
+    seen = monotonic()
 
-    def __init__(self, client: Any, address: str, patience: float) -> None:
-        """Begin to wait now."""
-        self._client, self._address, self._patience = client, address, patience
-        self._seen = monotonic()
-
-    def __call__(self) -> None:
-        """Check."""
+    def check() -> None:
+        nonlocal seen
         try:
-            workers = self._client.nthreads()
+            workers = client.nthreads()
         except (OSError, TimeoutError):
-            raise _gone(self._address) from None
+            raise _gone(address) from None
         if workers:
-            self._seen = monotonic()
-        elif monotonic() - self._seen > self._patience:
-            raise _no_workers(self._address, self._patience)
+            seen = monotonic()
+        elif monotonic() - seen > patience:
+            raise _no_workers(address, patience)
+
+    return check
 
 
 def _no_workers(address: str, patience: float) -> InputError:

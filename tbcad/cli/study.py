@@ -200,7 +200,6 @@ def _run(
     out: Path,
     work: "Callable[[Spec, Callable[[str], None]], Study]",
 ) -> int:
-    """Make a study of a design."""
     from tbcad.spec.load import load_spec
 
     spec = load_spec(design, list(settings or []))

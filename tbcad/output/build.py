@@ -1,7 +1,6 @@
 """An export: the record, what was asked for, and the manifest."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 from tbcad.mirrors.array import MirrorDesign
@@ -41,17 +40,10 @@ def write_export(
     else:
         shell_envelope(design)  # refuses flanges that do not fit before anything is built
         with in_background(write_shells, design, folder):
-            with _suggesting_shell_alone():
+            try:
                 export_prototype(design, folder, progress)
+            except SpecError as error:
+                raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
             progress("shells")
     progress("manifest")
     write_manifest(folder)
-
-
-@contextmanager
-def _suggesting_shell_alone() -> Iterator[None]:
-    """Add to an error of the prototype that it can be left out."""
-    try:
-        yield
-    except SpecError as error:
-        raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None

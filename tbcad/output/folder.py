@@ -200,7 +200,10 @@ def _finish(out: Path, new: Path, force: bool) -> None:
         shutil.copymode(target, new)
     _sync(new)
     with _locked(target.parent):
-        _swap(new, target)
+        if not target.exists():
+            new.rename(target)
+        elif not _exchange(new, target):
+            _move_both(new, target)
     _sync_entry(target.parent)
 
 
@@ -218,13 +221,6 @@ def _sync_entry(path: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _swap(new: Path, target: Path) -> None:
-    if not target.exists():
-        new.rename(target)
-    elif not _exchange(new, target):
-        _move_both(new, target)
 
 
 def _exchange(one: Path, other: Path) -> bool:

@@ -72,23 +72,6 @@ class MergePlan:
     ball: Ints
 
 
-@dataclass(frozen=True)
-class MergedPixels:
-    """n pixels of the merged picture.
-
-    Attributes:
-        mirror: that each belongs to, from 1; 0 for none, (n,).
-        hits: what it meets; only the ball in place of its mirror is a ball here.
-        front: whether the object itself is in front of that, (n,).
-        direct: its colours there, (n, 3).
-    """
-
-    mirror: Ints
-    hits: BallHits
-    front: Bools
-    direct: Colours
-
-
 def merge_run(
     run: PrototypeRun,
     scene: Scene,
@@ -182,19 +165,19 @@ def _pixels_of(mirror: NDArray[np.uint16], box: Ints, number: int) -> Ints:
 
 
 def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> Band:
-    pixels = _merged_pixels(plan, rows, CENTRE)
-    hits, shape = pixels.hits, (len(rows), plan.run.reflector.camera.width_px)
+    mirror, hits, front, _ = _merged_pixels(plan, rows, CENTRE)
+    shape = (len(rows), plan.run.reflector.camera.width_px)
     if picture is None:
         colour = _traced(plan, rows)
     else:
-        shown = (hits.ball > 0) | pixels.front
+        shown = (hits.ball > 0) | front
         colour = picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None]
     rays = ReflectedRays(
-        pixels.mirror.astype(np.int32).reshape(shape),
+        mirror.astype(np.int32).reshape(shape),
         hits.origin.reshape(*shape, 3),
         hits.direction.reshape(*shape, 3),
     )
-    removed = (hits.ball == 0) | pixels.front
+    removed = (hits.ball == 0) | front
     return Band(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
 
 
@@ -202,14 +185,21 @@ def _traced(plan: MergePlan, rows: range) -> Bytes:
     """Colours (n, 3) along the rotated directions themselves."""
     total = np.zeros((len(rows) * plan.run.reflector.camera.width_px, 3), dtype=np.float32)
     for shift in subpixel_shifts(plan.samples):
-        pixels = _merged_pixels(plan, rows, shift)
-        reflected = reflected_colours(plan.scene, pixels.hits)
-        total += np.where(pixels.front[:, None], pixels.direct, reflected)
+        _, hits, front, direct = _merged_pixels(plan, rows, shift)
+        total += np.where(front[:, None], direct, reflected_colours(plan.scene, hits))
     return to_bytes(total / np.float32(plan.samples**2))
 
 
-def _merged_pixels(plan: MergePlan, rows: range, shift: Shift) -> MergedPixels:
-    """The pixels of a band, each rotated with its mirror's window."""
+def _merged_pixels(
+    plan: MergePlan, rows: range, shift: Shift
+) -> tuple[Ints, BallHits, Bools, Colours]:
+    """The n pixels of a band, each rotated with its mirror's window.
+
+    Returns:
+        The mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
+        ball in place of its mirror is a ball; whether the object itself is in front of that, (n,);
+        and its colours there, (n, 3).
+    """
     run, camera = plan.run, plan.run.camera
     mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)
     straight = unit(pixel_directions(run.reflector.camera, rows, shift).reshape(-1, 3))
@@ -218,4 +208,4 @@ def _merged_pixels(plan: MergePlan, rows: range, shift: Shift) -> MergedPixels:
     inside = np.isfinite(image_points(camera, direction)[:, 0])
     ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
     front, direct = object_in_front(plan.scene, camera.pinhole, direction, hits.distance)
-    return MergedPixels(mirror, replace(hits, ball=ball), front & inside, direct)
+    return mirror, replace(hits, ball=ball), front & inside, direct

@@ -14,13 +14,11 @@ class Claim:
         where: figure, table or section.
         text: what is claimed.
         value: the figure.
-        unit: its unit, empty for a number.
     """
 
     where: str
     text: str
     value: float
-    unit: str
 
 
 @cache
@@ -28,7 +26,7 @@ def claims() -> dict[str, Claim]:
     """All claims known, by their key."""
     text = (files("tbcad.simulate.study") / "paper.csv").read_text(encoding="utf-8")
     return {
-        row["key"]: Claim(row["where"], row["claim"], float(row["value"]), row["unit"])
+        row["key"]: Claim(row["where"], row["claim"], float(row["value"]))
         for row in csv.DictReader(text.splitlines())
     }
 

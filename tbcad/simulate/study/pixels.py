@@ -31,10 +31,6 @@ class Sensor:
         """As the command takes it."""
         return f"{self.width_px}x{self.height_px}"
 
-    def times(self, factor: int) -> "Sensor":
-        """A sensor with as many pixels more along either side."""
-        return Sensor(self.width_px * factor, self.height_px * factor)
-
 
 @dataclass(frozen=True)
 class PixelCounts:

@@ -83,8 +83,8 @@ def parse_ratio(text: str) -> Ratio:
 
 def default_sensors(spec: Spec) -> tuple[Sensor, ...]:
     """The design's sensor and its multiples up to four times the sides."""
-    one = Sensor(spec.camera.width_px, spec.camera.height_px)
-    return tuple(one.times(k) for k in MULTIPLES)
+    width, height = spec.camera.width_px, spec.camera.height_px
+    return tuple(Sensor(k * width, k * height) for k in MULTIPLES)
 
 
 def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> tuple[float, int]:
@@ -166,12 +166,8 @@ def _counted(cameras: int, counts: PixelCounts) -> Record:
     return dict(zip(COUNTED, figures, strict=True))
 
 
-def _of_sensor(table: Table, sensor: Sensor) -> Table:
-    return table.where(**asdict(sensor))
-
-
 def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
-    counted = _of_sensor(counts, sensor)
+    counted = counts.where(**asdict(sensor))
     cameras, pixels = counted.numbers("virtual_cameras"), counted.numbers(KINDS[kind])
     n, place = balance(counted.numbers("n"), cameras, pixels, ratio)
     inside, nearest = not np.isnan(n), counted.records()[place]
@@ -209,10 +205,10 @@ def _balance_figure(record: Record) -> Figure:
 
 
 def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
-    first = _of_sensor(counts, sensors[0])
+    first = counts.where(**asdict(sensors[0]))
     series = [Series("virtual cameras", first.numbers("n"), first.numbers("virtual_cameras"), "k-")]
     for k, sensor in enumerate(sensors):
-        counted = _of_sensor(counts, sensor)
+        counted = counts.where(**asdict(sensor))
         label = f"seeing pixels of one, {sensor}"
         pixels = counted.numbers("seeing_average_px")
         series.append(Series(label, counted.numbers("n"), pixels, f"C{k}.-"))

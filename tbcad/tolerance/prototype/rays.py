@@ -57,7 +57,8 @@ def minimum_miss_distances(
     result, image = np.zeros(len(radius)), np.empty((2, 2))
     for i in range(len(radius)):
         axis = vector(highlight[i])
-        right = _square_to(axis, _true_direction(outward[i], lens[i]))
+        toward = _true_direction(outward[i], lens[i])
+        right = unit(plus_scaled(toward, -dot(axis, toward), axis))
         down = cross(axis, right)
         minimum, crossings = inf, 0
         for e in range(first[i], first[i + 1]):
@@ -133,12 +134,6 @@ def _true_direction(direction: Floats, lens: Floats) -> Vector:
     return unit(
         (dot(d, vector(lens[:, 0])), dot(d, vector(lens[:, 1])), dot(d, vector(lens[:, 2])))
     )
-
-
-@compiled
-def _square_to(axis: Vector, direction: Vector) -> Vector:
-    """Unit vector square to an axis, on the side of a direction."""
-    return unit(plus_scaled(direction, -dot(axis, direction), axis))
 
 
 @compiled
