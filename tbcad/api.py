@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.spec.design import Spec
-from tbcad.spec.load import load_spec
+from tbcad.spec.load import load_spec, option_texts
 from tbcad.types import Progress
 
 if TYPE_CHECKING:
@@ -146,14 +146,8 @@ def _spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> 
         if settings or n is not None:
             raise InputError("n and settings go with a design file: give them to load_spec")
         return spec
-    options = _texts(settings) + ([f"optics.n={n}"] if n is not None else [])
+    options = option_texts(settings) + ([f"optics.n={n}"] if n is not None else [])
     return load_spec(None if spec is None else Path(spec), options)
-
-
-def _texts(settings: Settings) -> list[str]:
-    if isinstance(settings, Mapping):
-        return [f"{key}={value}" for key, value in settings.items()]
-    return list(settings)
 
 
 def build(
@@ -384,7 +378,7 @@ def analyse(
     from tbcad.tolerance.process.process import load_process
 
     asked = options or ToleranceOptions()
-    made_by = load_process(process, list(_texts(settings)))
+    made_by = load_process(process, option_texts(settings))
     progress("record of the export")
     export = read_export(Path(exports))
     subject = load_or_built_in(

@@ -1,17 +1,14 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.options import Exports, Force, OutReplaced, Settings
 from tbcad.errors import InputError
-from tbcad.screen import Stages, report_console, stages
-
-if TYPE_CHECKING:
-    from tbcad.spec.design import Spec
+from tbcad.screen import report_console, stages
 
 # With mirrors and manifest; both together take one more: waiting for the shells in parallel.
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
@@ -84,7 +81,11 @@ def build(
     check_replaceable(out, force)
     with stages(BUILD_STAGES[chosen] + VERIFY_STAGES * verify + bool(for_process)) as screen:
         if for_process is not None:
-            spec = _with_margin(spec, for_process, share, screen)
+            from tbcad.tolerance.margin import spec_for_process
+            from tbcad.tolerance.process.process import load_process
+
+            screen.stage(f"margin for {for_process}")
+            spec = spec_for_process(spec, load_process(for_process), share, screen.detail)
         built = build_files(
             spec,
             out,
@@ -102,14 +103,6 @@ def build(
     typer.echo(f"{out}: {' and '.join(chosen)} as STEP, STL and 3MF; mirrors.csv, design.json")
     built.report.show(report_console())
     return 0 if built.passed else 1
-
-
-def _with_margin(spec: "Spec", process: str, share: float, screen: Stages) -> "Spec":
-    from tbcad.tolerance.margin import spec_for_process
-    from tbcad.tolerance.process.process import load_process
-
-    screen.stage(f"margin for {process}")
-    return spec_for_process(spec, load_process(process), share, screen.detail)
 
 
 @app.command("verify")

@@ -26,7 +26,7 @@ def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = 
         SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
     table = {} if path is None else read_toml(path, str(path), "design")
-    options = [_option(text) for text in _texts(overrides)]
+    options = [_option(text) for text in option_texts(overrides)]
     for key, value in options:
         _put(table, key.split("."), value)
     try:
@@ -41,7 +41,8 @@ def spec_dict(spec: Spec) -> Table:
     return spec.model_dump(mode="json", by_alias=True)
 
 
-def _texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:
+def option_texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:
+    """Return options as "key=value" texts."""
     if isinstance(overrides, Mapping):
         return [f"{key}={value}" for key, value in overrides.items()]
     return list(overrides)

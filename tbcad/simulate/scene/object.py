@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.geometry.vectors import unit
 from tbcad.types import Bytes, Floats, Ints
 
 Paint = Literal["own", "pattern", "plain"]
@@ -126,10 +127,8 @@ def _knot(t: Floats) -> Floats:
 def _ring(t: Floats, s: Floats) -> Floats:
     """Unit vectors (k, j, 3) across the knot at t (k,), around it at s (j,)."""
     step = 1e-4
-    along = _knot(t + step) - _knot(t - step)
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    across = np.cross(along, [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across, axis=1)[:, None]
+    along = unit(_knot(t + step) - _knot(t - step))
+    across = unit(np.cross(along, [0.0, 0.0, 1.0]))
     other = np.cross(along, across)
     cosine, sine = np.cos(s)[None, :, None], np.sin(s)[None, :, None]
     return np.asarray(cosine * across[:, None] + sine * other[:, None])

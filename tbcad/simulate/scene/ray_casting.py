@@ -93,7 +93,8 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     u, v = hits["u"][hit], hits["v"][hit]
     weight = np.column_stack([1 - u - v, u, v]).astype(np.float64)
     depth[rows] = hits["tfar"][hit]
-    colour[rows] = 255 * shaded_colours(scene, facet, weight)
+    light = (scene.shade[scene.subject.faces[facet]] * weight).sum(axis=1)
+    colour[rows] = 255 * (_albedo(scene.subject, facet, weight) * light[:, None])
     return RayHits(colour, depth)
 
 
@@ -114,14 +115,8 @@ def depth_along_rays(scene: Scene) -> Callable[[Floats, Floats], Floats]:
     return depth
 
 
-def shaded_colours(scene: Scene, facet: Ints, weight: Floats) -> Floats:
-    """Colours (n, 3), 0 to 1, at barycentric weights (n, 3) on facets (n,)."""
-    subject = scene.subject
-    light = (scene.shade[subject.faces[facet]] * weight).sum(axis=1)
-    return np.asarray(_albedo(subject, facet, weight) * light[:, None])
-
-
 def _albedo(subject: SceneObject, facet: Ints, weight: Floats) -> Floats:
+    """Colours (n, 3), 0 to 1, at barycentric weights (n, 3) on facets (n,)."""
     if subject.patterned:
         corners = subject.points[subject.faces[facet]]
         return pattern(np.einsum("nk,nkx->nx", weight, corners))

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import REBUILD
+from tbcad.geometry.vectors import unit
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.ray_casting import embree_scene
@@ -118,8 +119,7 @@ def fitted_surfaces(nominal: Surfaces, corners: Floats, owner: Ints) -> Surfaces
 def _frames(normal: Floats) -> Floats:
     """Rows (m, 3, 3): two unit vectors across each normal (m, 3), and the normal."""
     shortest = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    across = np.cross(normal, shortest)
-    across /= np.linalg.norm(across, axis=1)[:, None]
+    across = unit(np.cross(normal, shortest))
     return np.stack([across, np.cross(normal, across), normal], axis=1)
 
 

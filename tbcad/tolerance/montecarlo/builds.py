@@ -101,8 +101,7 @@ class MonteCarloCase:
         draws = draw(self.errors, self.seed, builds, len(self.edge_models[0]))
         diameter, pixels = coverage(self.edge_models, draws)
         rays = [pointing(half, drawn) for half, drawn in zip(self.edge_models, draws, strict=True)]
-        angle = np.concatenate([ray.angle for ray in rays], axis=1)
-        offset = np.concatenate([ray.offset for ray in rays], axis=1)
+        angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
         return ShellResult(diameter, offset, pixels, angle)
 
 

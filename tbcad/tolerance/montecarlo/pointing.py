@@ -1,7 +1,5 @@
 """Pointing errors of uncalibrated builds: rays that are assumed to be the designed ones."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -19,26 +17,15 @@ from tbcad.tolerance.montecarlo.edge_model import (
 from tbcad.types import Floats
 
 
-@dataclass(frozen=True)
-class Pointing:
-    """Errors of the ray of each mirror's centre pixel, in s builds.
+def pointing(half: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
+    """Errors of the ray of each mirror's centre pixel, for s builds of one half.
 
-    The centre pixel shows the apex, and its designed ray goes through the object's centre.
+    The centre pixel shows the apex, and its designed ray goes through the object's centre. A pixel
+    is a fixed place on the sensor: moved and tilted cameras and wrong focal lengths count.
 
-    Attributes:
-        angle: between the designed and the built ray after the mirror, radians, (s, m).
-        offset: distance of the built ray from the object's centre, mm, (s, m).
-    """
-
-    angle: Floats
-    offset: Floats
-
-
-def pointing(half: EdgeModel, draws: ShellDraws) -> Pointing:
-    """Errors of the rays of one half's centre pixels, for s builds.
-
-    A pixel is a fixed place on the sensor: moved and tilted cameras and wrong focal lengths count.
-    NaN where the ray misses the mirror's sphere.
+    Returns:
+        Angle between the designed and the built ray after the mirror, radians, and distance of the
+        built ray from the object's centre, mm, (s, m) each; NaN where it misses the sphere.
     """
     pinhole, middle, scale, *axes = np.moveaxis(view_tables(half, draws)[:, :, None], 1, 0)
     ray = _pixel_rays(half, draws, axes)
@@ -49,7 +36,7 @@ def pointing(half: EdgeModel, draws: ShellDraws) -> Pointing:
     designed = reflected_rays(half.view.pinhole, half.apex, unit(half.normal))
     shells = map(Rotation.from_rotvec, draws.shell_tilt)
     built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
-    return Pointing(np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset)
+    return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
 
 
 def _pixel_rays(half: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:

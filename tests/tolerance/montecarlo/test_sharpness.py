@@ -154,7 +154,7 @@ class TestActual:
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
             rays = reflect_pixels(built.camera.pinhole, way[None], built.mirrors, mirror)
             missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
-            offset = pointing(edge_model(at), drawn).offset[0]
+            offset = pointing(edge_model(at), drawn)[1][0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
             assert missed.min() > 0.01
 
