@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.assessment import assess, checks, to_row
+from tbcad_verify.printing.assessment import assess, print_check, to_row
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import overhang_area, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
@@ -174,11 +174,11 @@ def test_a_good_part() -> None:
     found = assess("b.stl", shape(box(20, 10, 5)), fdm())
     assert found.problems == ()
     assert found.mass_g == pytest.approx(1.24)
-    (info,) = checks([found], required=False)
+    info = print_check(found, required=False)
     assert (info.name, info.file, info.unit) == ("print fdm", "b.stl", "problems")
     assert (info.measured, info.limit, info.passed) == (0, None, True)
     assert info.detail == "fits: -z down, 1 g PLA"
-    (failing,) = checks([found], required=True)
+    failing = print_check(found, required=True)
     assert (failing.measured, failing.limit, failing.passed) == (0, 0, True)
 
 
@@ -200,10 +200,10 @@ def test_every_problem_is_named_with_figure_and_limit() -> None:
     assert hole == "smallest hole 1 mm, 1.5 required, at (0.0, 0.0, 0.2)"
     assert "mm too large: " in size
     assert size.endswith("the bed is 145 x 145 x 175 less 0.2 at the rim")
-    (info,) = checks([found], required=False)
+    info = print_check(found, required=False)
     assert info.passed
     assert info.measured == 6
-    (failing,) = checks([found], required=True)
+    failing = print_check(found, required=True)
     assert failing.passed is False
     assert failing.detail == info.detail == "; ".join(found.problems)
 
@@ -252,5 +252,5 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     assert row["wall_mm"] is None
     assert row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
-    (check,) = checks([assess("lid.stl", shape(lid), fdm())], required=True)
+    check = print_check(assess("lid.stl", shape(lid), fdm()), required=True)
     assert check.passed is False

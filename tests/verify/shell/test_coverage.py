@@ -15,14 +15,13 @@ from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell import coverage, seam
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
-    Patches,
     minimum_miss_distance,
     reflect_on_facets,
     reflect_on_fits,
     trace_outline,
     winding_numbers,
 )
-from tbcad_verify.shell.recover import follows_fit, recover
+from tbcad_verify.shell.recover import recover
 
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import PIN, Cells, Design, export, poses, unit
@@ -35,10 +34,7 @@ def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float,
     found = recover(mesh, pinhole, 30)
     assert found.mirror.sum() == 1
     owner = np.where(found.mirror, 0, -1)
-    patches = Patches(
-        found.segments.label, owner, found.fits.surfaces, follows_fit(found.fits), coat
-    )
-    outline = trace_outline(mesh, patches, np.array([True]), ONE.halved)
+    outline = trace_outline(mesh, found, owner, coat, np.array([True]), ONE.halved)
     seen = prepare_for_rays(
         pinhole, found.fits.surfaces.take(np.flatnonzero(found.mirror)).coated(coat)
     )

@@ -50,7 +50,9 @@ def build_scene(mesh: Mesh) -> RayScene:
     TriangleMesh(scene, mesh.points.astype(np.float32), mesh.faces)
     one = np.ones((1, 3), dtype=np.float32)
     scene.run(one, one)  # the first call commits; later ones may come from any thread
-    return RayScene(scene, _planes(mesh))
+    normal = unit(mesh.area)
+    offset = dot(normal, np.take(mesh.points, mesh.faces[:, 0], axis=0).T)
+    return RayScene(scene, np.ascontiguousarray(np.vstack([normal, offset]).T))
 
 
 def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
@@ -88,9 +90,3 @@ def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Re
     """Results in the items' order, whatever the threads do."""
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(work, items))
-
-
-def _planes(mesh: Mesh) -> Floats:
-    normal = unit(mesh.area)
-    offset = dot(normal, np.take(mesh.points, mesh.faces[:, 0], axis=0).T)
-    return np.ascontiguousarray(np.vstack([normal, offset]).T)

@@ -73,16 +73,6 @@ def uncut_edge_length(measures: PartMeasures, profile: Profile) -> float | None:
     return float(measures.inner_edges.length[distance > profile.tolerance_mm].sum())
 
 
-def checks(prints: Sequence[PrintAssessment], required: bool) -> list[Check]:
-    """One check for each part and profile.
-
-    Args:
-        prints: assessed.
-        required: whether the user asked for these printers: then a problem fails, else it informs.
-    """
-    return [_check(one, required) for one in prints]
-
-
 def to_row(one: PrintAssessment) -> dict[str, Any]:
     """All figures as JSON holds them, rounded to 9 digits; null for what was not found."""
     measures, pose, overhang = one.measures, one.placement.pose, one.placement.overhang
@@ -127,7 +117,13 @@ def print_name(part: str, profile: Profile) -> CheckName:
     return f"print {profile.name}", part, UNIT
 
 
-def _check(one: PrintAssessment, required: bool) -> Check:
+def print_check(one: PrintAssessment, required: bool) -> Check:
+    """The check of one part on one machine.
+
+    Args:
+        one: assessed.
+        required: whether the user asked for this printer: then a problem fails, else it informs.
+    """
     name = print_name(one.part, one.profile)
     count, detail = float(len(one.problems)), "; ".join(one.problems)
     if required:

@@ -73,7 +73,9 @@ def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
     links = np.concatenate([half, edges.half[_flat(edges)]])
     links = np.stack([links // 3, mesh.twin[links] // 3])
     hollow = _bending(_joined(len(mesh.faces), links, np.arange(len(mesh.faces))), half // 3)
-    axis = _axes(mesh, half, bend, _label(hollow, len(mesh.faces)), hollow.count)
+    label = np.full(len(mesh.faces), -1, dtype=np.int32)
+    label[hollow.facet] = hollow.group
+    axis = _axes(mesh, half, bend, label, hollow.count)
     upright = np.abs(dot(_normals(mesh, hollow), axis[:, hollow.group])) < UPRIGHT_COS
     return _round(mesh, _joined(len(mesh.faces), links, hollow.facet[upright]))
 
@@ -105,13 +107,6 @@ def _bending(patches: FacetPatches, bent: Ints) -> FacetPatches:
     mine = enough[patches.group]
     number = (np.cumsum(enough) - 1).astype(np.int32)
     return FacetPatches(patches.facet[mine], number[patches.group[mine]], int(enough.sum()))
-
-
-def _label(patches: FacetPatches, size: int) -> Groups:
-    """(size,) the patch of every facet; -1 for none."""
-    label = np.full(size, -1, dtype=np.int32)
-    label[patches.facet] = patches.group
-    return label
 
 
 def _axes(mesh: Mesh, half: Ints, bend: Floats, label: Groups, count: int) -> Floats:
@@ -156,16 +151,12 @@ def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
     centre = np.where(radius > 0, centre, 0.0)
     spoke = flat - centre[:, group]
     off = np.abs(np.hypot(*spoke) - radius[group])
-    good = _every(off < ROUND * radius[group], group, patches.count)
+    uneven = group[~(off < ROUND * radius[group])]
+    good = np.bincount(uneven, minlength=patches.count) == 0
     good &= widest_gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
     low, high = _extent(dot(axis[:, group], corner), group, patches.count)
     middle = centre[0] * sides[0] + centre[1] * sides[1] + (low + high) / 2 * axis
     return RoundHoles(2 * radius[good], middle[:, good], axis[:, good], (high - low)[good])
-
-
-def _every(good: Bools, group: Groups, count: int) -> Bools:
-    """(G,) whether all members are good."""
-    return np.asarray(np.bincount(group[~good], minlength=count) == 0)
 
 
 def _extent(along: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:

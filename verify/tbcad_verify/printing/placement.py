@@ -71,9 +71,10 @@ def place(measures: PartMeasures, profile: Profile) -> BedPlacement:
     the file's; else the one that comes nearest to fitting, tilted ones included. Tilts between
     those tried are not searched.
     """
-    poses = _poses(measures.hull, measures.hull.down, profile)
+    hull = measures.hull
+    poses = [_pose(hull, down, profile) for down in hull.down.T]
     if not any(pose.fits for pose in poses):
-        poses += _poses(measures.hull, measures.hull.tilted, profile)
+        poses += [_pose(hull, down, profile) for down in hull.tilted.T]
     fitting = [pose for pose in poses if pose.fits]
     if not fitting:
         pose = min(poses, key=lambda pose: pose.excess)
@@ -100,10 +101,6 @@ def pose_text(pose: Pose) -> str:
     degrees = math.degrees(pose.turn)
     turned = f" turned {degrees:.1f} deg" if degrees > 0.05 else ""
     return f"{down} down{turned}"
-
-
-def _poses(hull: PartHull, directions: Floats, profile: Profile) -> list[Pose]:
-    return [_pose(hull, down, profile) for down in directions.T]
 
 
 def _pose(hull: PartHull, down: Floats, profile: Profile) -> Pose:

@@ -6,14 +6,13 @@ outline by bisection of angles about the direction of the mirror's apex.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
-from tbcad_verify.mesh.vectors import dot, tangent_basis, unit
+from tbcad_verify.mesh.vectors import chunks, dot, tangent_basis, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Bools, Floats, Ints
@@ -117,21 +116,17 @@ def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
 
     Beyond the seam and below the foot there is no mirror.
     """
-    chunks = [d[:, k : k + CHUNK] for k in range(0, d.shape[1], CHUNK)]
-    if not chunks:
-        return np.zeros(0, dtype=np.int64)
-    return np.concatenate(in_threads(lambda part: _first(shell, part), chunks))
+    parts = chunks(d.shape[1], CHUNK)
+    first = in_threads(lambda part: _first(shell, d[:, part]), parts)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *first])
 
 
 def sampled_pixels(camera: Camera) -> tuple[Floats, int]:
     """Every k-th pixel of every k-th row, (3, N) directions with 1 along `forward`; and k."""
     step = max(1, int(np.sqrt(camera.width * camera.height / PIXELS)))
-    return np.concatenate(list(_rows(camera, step)), axis=1), step
-
-
-def _rows(camera: Camera, step: int) -> Iterator[Floats]:
-    for row in range(step // 2, camera.height, step):
-        yield pixel_rows(camera, row, row + 1)[:, step // 2 :: step]
+    rows = range(step // 2, camera.height, step)
+    directions = [pixel_rows(camera, row, row + 1)[:, step // 2 :: step] for row in rows]
+    return np.concatenate(directions, axis=1), step
 
 
 def _first(shell: MirrorSpheres, d: Floats) -> Ints:

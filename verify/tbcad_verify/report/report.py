@@ -138,12 +138,8 @@ def _check_row(check: Check) -> dict[str, Any]:
         "limit": check.limit,
         "unit": check.unit,
     }
-    return row | {"detail": check.detail} if check.detail and not _needs_no_detail(check) else row
-
-
-def _needs_no_detail(check: Check) -> bool:
-    """Whether a check passed against a limit, and so needs no words."""
-    return check.passed is True and check.limit is not None
+    decided = check.passed is True and check.limit is not None  # and so needs no words
+    return row | {"detail": check.detail} if check.detail and not decided else row
 
 
 def _mirror_rows(mirrors: MirrorFigures) -> list[dict[str, Any]]:

@@ -14,8 +14,7 @@ from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_f
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
-from tbcad_verify.printing.assessment import assess, print_name, to_row
-from tbcad_verify.printing.assessment import checks as printing_checks
+from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
 from tbcad_verify.printing.part_measures import measure
 from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart
@@ -173,7 +172,7 @@ def _assess_printing(
         )
         prints = [assess(stl, shape, profile) for profile in profiles]
         sink(Results(printing=[to_row(one) for one in prints]))
-        return printing_checks(prints, required)
+        return [print_check(one, required) for one in prints]
 
     sink(Results(checks=guarded([print_name(stl, profile) for profile in profiles], work)))
 

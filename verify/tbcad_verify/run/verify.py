@@ -71,7 +71,11 @@ def verify(
     with ThreadPoolExecutor(1) as pool:
         # Reading the prototype's STEP files needs none of the stages, and takes as long as they do.
         step_reading = pool.submit(step_files.read_step_files, export, options.seconds)
-        _mesh_stages(export, results, options)
+        if options.apart:
+            command = worker_command(root, options.printers)
+            watch(command, stage_titles(export), results, options.seconds)
+        else:
+            run_stages(root, results.add, options.printers)
         if any(part.step for part in export.parts):
             results.add(Results(stages=["STEP"]))
             checks = shell_step_checks(export, results.masses, options.seconds)
@@ -97,14 +101,6 @@ def verify(
         except OSError as error:
             raise BadExport(f"{root}: {NAME} cannot be written ({error.strerror})") from error
     return report
-
-
-def _mesh_stages(export: Export, results: CollectedResults, options: VerifyOptions) -> None:
-    if options.apart:
-        command = worker_command(export.folder, options.printers)
-        watch(command, stage_titles(export), results, options.seconds)
-    else:
-        run_stages(export.folder, results.add, options.printers)
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:

@@ -67,8 +67,11 @@ class Coverage:
 def measure(setup: OpticalSetup) -> Coverage:
     """Trace every mirror's outline from its camera."""
     cameras, virtual, u = setup.cameras, setup.virtual, setup.u
-    patches = setup.patches()
-    outlines = [trace_outline(setup.mesh, patches, setup.mine(c), virtual.halved) for c in cameras]
+    owner, coat = setup.owner(), setup.export.coating_mm
+    outlines = [
+        trace_outline(setup.mesh, setup.recovery, owner, coat, setup.mine(c), virtual.halved)
+        for c in cameras
+    ]
     pairs = list(zip(cameras, outlines, strict=True))
     fitted = [reflect_on_fits(outline, setup.seen(camera)) for camera, outline in pairs]
     facet = [reflect_on_facets(o, camera.pinhole, setup.scene.planes) for camera, o in pairs]

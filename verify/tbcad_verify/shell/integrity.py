@@ -60,7 +60,8 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
         if parsed.get(name, _found(export, name)) != listed
     ]
     unlisted = sorted({*parsed} - {*export.manifest} - OWN_FILES)
-    unread = sorted({*filter(_is_part, export.manifest)} - export.part_files)
+    parts = {name for name in export.manifest if PurePosixPath(name).suffix.lower() in PART_KINDS}
+    unread = sorted(parts - export.part_files)
     others = sorted(listing(export.folder) - {*export.manifest} - OWN_FILES)
     manifest, other_files = MANIFEST
     return [
@@ -122,10 +123,6 @@ def fold_check(file: str, folds: int) -> Check:
     """No facet lies back to back with its neighbour."""
     (name,) = check_names(FOLDS, file)
     return at_most(name, folds, 0, "the surface is folded onto itself")
-
-
-def _is_part(name: str) -> bool:
-    return PurePosixPath(name).suffix.lower() in PART_KINDS
 
 
 def _found(export: Export, name: str) -> tuple[int, str] | None:

@@ -116,6 +116,9 @@ def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     second, stopped = _second(sensor, lines, miss, distance, useful)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
+    way = distance_before_mirror(sensor.seen, np.take(d, clear, axis=1), lines.reach[clear])
+    nearest = np.full(sensor.mirrors, np.inf)
+    np.minimum.at(nearest, on_object, way)
     some = clear[(first * sensor.camera.width + on[clear]) % SAMPLED == 0]
     return PixelTally(
         np.bincount(on_object, minlength=sensor.mirrors),
@@ -123,7 +126,7 @@ def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
         np.unique(second[stopped]).astype(np.int64),
         on.size,
         int((sensor.other[second] & ~stopped).sum()),
-        _nearest_on_the_way(sensor, on_object, np.take(d, clear, axis=1), lines.reach[clear]),
+        nearest,
         _spread(sensor, facet[some], *(np.take(x, some, axis=1) for x in (d, lines.toward, miss))),
     )
 
@@ -146,14 +149,6 @@ def _second(
     depth = np.sqrt(np.maximum(sensor.radius_mm**2 - distance[hit] ** 2, 0))
     stopped[hit] = at < norm(np.take(miss, hit, axis=1) - begin) - depth
     return second, stopped
-
-
-def _nearest_on_the_way(
-    sensor: SensorScene, mirror: NDArray[np.int32], d: Floats, reach: Floats
-) -> Floats:
-    minimum = np.full(sensor.mirrors, np.inf)
-    np.minimum.at(minimum, mirror, distance_before_mirror(sensor.seen, d, reach))
-    return minimum
 
 
 def _spread(

@@ -14,8 +14,7 @@ from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
-from tbcad_verify.shell.outline import Patches
-from tbcad_verify.shell.recover import Recovery, follows_fit, join_recoveries
+from tbcad_verify.shell.recover import Recovery, join_recoveries
 from tbcad_verify.types import Floats
 
 
@@ -77,17 +76,6 @@ class OpticalSetup:
         """(K,) recorded mirror of each patch; -1 for none."""
         return owners(self.match.segment, self.recovery.segments.count)
 
-    def patches(self) -> Patches:
-        """Facets, patches and mirrors, as outlines need them."""
-        fits = self.recovery.fits
-        return Patches(
-            self.recovery.segments.label,
-            self.owner(),
-            fits.surfaces,
-            follows_fit(fits),
-            self.export.coating_mm,
-        )
-
     def sensor_scene(self, camera: Camera) -> SensorScene:
         """What one camera sees, as the trace of the full sensor needs it."""
         owner, mine = self.owner(), self.mine(camera)
@@ -104,20 +92,14 @@ class OpticalSetup:
             self.export.coating_mm,
         )
 
-    def name(self, facet: int) -> str:
-        """The mirror or part that a facet belongs to; facet -1 is none."""
-        if facet < 0:
-            return "nothing"
-        patch = int(self.recovery.segments.label[facet])
-        mirror = int(self.owner()[patch])
-        if mirror >= 0:
-            return self.export.mirrors.ids[mirror]
-        return f"{self.export.parts[int(self.part[patch])].name} (no mirror)"
-
     def names(self, facets: NDArray[np.integer]) -> list[str]:
-        """The mirrors and parts that facets belong to, each once."""
-        patches = np.unique(self.recovery.segments.label[facets[facets >= 0]], return_index=True)[1]
-        found = {self.name(int(facet)) for facet in facets[facets >= 0][patches].tolist()}
+        """The mirrors and parts that facets belong to, each once; facet -1 is none."""
+        patches = np.unique(self.recovery.segments.label[facets[facets >= 0]])
+        owner, ids, parts = self.owner(), self.export.mirrors.ids, self.export.parts
+        found = {
+            ids[owner[k]] if owner[k] >= 0 else f"{parts[self.part[k]].name} (no mirror)"
+            for k in patches.tolist()
+        }
         return sorted(found | ({"nothing"} if (facets < 0).any() else set()))
 
 

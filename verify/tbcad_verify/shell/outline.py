@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import (
@@ -23,7 +24,8 @@ from tbcad_verify.mesh.surfaces import (
 )
 from tbcad_verify.mesh.vectors import dot, norm
 from tbcad_verify.record.poses import VirtualCameras
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.shell.recover import Recovery, follows_fit
+from tbcad_verify.types import Bools, Floats, Ints
 
 SAMPLES = np.linspace(0.0, 1.0, 4)
 SEAM_MM = 1e-6
@@ -51,49 +53,39 @@ class Outline:
     seam: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Patches:
-    """Which facet belongs to what.
-
-    Attributes:
-        label: (F,) patch of each facet.
-        owner: (K,) recorded mirror of each patch, -1 for none.
-        surfaces: (K) fitted, as meshed.
-        smooth: (K,) true where the fitted surface is what the patch is.
-        coating_mm: the coat on mirrors that the mesh does not show.
-    """
-
-    label: NDArray[np.int32]
-    owner: Ints
-    surfaces: Surfaces
-    smooth: NDArray[np.bool_]
-    coating_mm: float
-
-
 def trace_outline(
-    mesh: Mesh, patches: Patches, selected: NDArray[np.bool_], halved: NDArray[np.bool_]
+    mesh: Mesh,
+    recovery: Recovery,
+    owner: Ints,
+    coating_mm: float,
+    selected: NDArray[np.bool_],
+    halved: NDArray[np.bool_],
 ) -> Outline:
     """Sample the outlines of selected mirrors.
 
     Args:
         mesh: all parts.
-        patches: of that mesh.
+        recovery: patches of that mesh, K.
+        owner: (K,) recorded mirror of each patch, -1 for none.
+        coating_mm: the coat on mirrors that the mesh does not show.
         selected: (M,) true for mirrors of the camera in question.
         halved: (M,) true for mirrors that the seam cuts.
     """
-    half, beyond = _outline_edges(mesh, patches, selected)
+    label = recovery.segments.label
+    half, beyond = _outline_edges(mesh, label, owner, selected)
     corner = mesh.faces.reshape(-1)
     facet, k = np.divmod(half, 3)
     start, end, far = (mesh.points[corner[3 * facet + (k + j) % 3]].T for j in range(3))
     on_mesh = _spread(start[..., None] + (end - start)[..., None] * SAMPLES)
     many = SAMPLES.size
     height = np.repeat(_height(start, end, far), many)
-    mirror = patches.owner[patches.label[facet]]
+    mirror = owner[label[facet]]
     seam = halved[mirror] & (np.abs(start[0]) < SEAM_MM) & (np.abs(end[0]) < SEAM_MM)
     middle = np.repeat((start + end + far) / 3, many, axis=1)
-    point = _onto_coats(
-        patches, np.repeat(patches.label[facet], many), np.repeat(beyond, many), on_mesh
-    )
+    sides = np.repeat(label[facet], many), np.repeat(beyond, many)
+    point = on_mesh
+    if coating_mm > 0:
+        point = _onto_coats(recovery.fits, owner >= 0, coating_mm, sides, on_mesh)
     return Outline(
         np.repeat(mirror, many),
         np.repeat(facet, many),
@@ -157,14 +149,16 @@ def winding_numbers(
     return np.bincount(virtual.index[edge_mirror], angle, virtual.count) / (2 * np.pi)
 
 
-def _outline_edges(mesh: Mesh, patches: Patches, selected: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+def _outline_edges(
+    mesh: Mesh, label: NDArray[np.int32], owner: Ints, selected: NDArray[np.bool_]
+) -> tuple[Ints, Ints]:
     """Half-edges inside selected mirrors' outlines, and the patch beyond each (-1: none)."""
-    owner = patches.owner[patches.label]
-    facets = np.flatnonzero((owner >= 0) & selected[owner])
+    mirror = owner[label]
+    facets = np.flatnonzero((mirror >= 0) & selected[mirror])
     half = (3 * facets[:, None] + np.arange(3)).ravel()
     twin = mesh.twin[half]
-    beyond = np.where(twin >= 0, patches.label[twin // 3], -1)
-    edge = beyond != patches.label[half // 3]
+    beyond = np.where(twin >= 0, label[twin // 3], -1)
+    edge = beyond != label[half // 3]
     return half[edge], beyond[edge].astype(np.intp)
 
 
@@ -183,15 +177,20 @@ def _nudge(height: Floats) -> Floats:
     return np.clip(2e-4 / np.maximum(height / 3, 1e-12), 0.02, 0.5)
 
 
-def _onto_coats(patches: Patches, inside: NDArray[np.int32], beyond: Ints, x: Floats) -> Floats:
+def _onto_coats(
+    fits: SurfaceFits,
+    coated: Bools,
+    coat: float,
+    sides: tuple[NDArray[np.integer], Ints],
+    x: Floats,
+) -> Floats:
     """Move edge points to where the coated surfaces of both sides meet; walls have no coat."""
-    if patches.coating_mm == 0:
-        return x
-    coat = patches.coating_mm
-    own = patches.surfaces.take(inside).coated(coat)
-    both = (beyond >= 0) & patches.smooth[beyond]
-    other = patches.surfaces.take(np.where(both, beyond, inside))
-    other = _mixed(patches.owner[np.where(both, beyond, inside)] >= 0, other.coated(coat), other)
+    inside, beyond = sides
+    own = fits.surfaces.take(inside).coated(coat)
+    both = (beyond >= 0) & follows_fit(fits)[beyond]
+    facing = np.where(both, beyond, inside)
+    other = fits.surfaces.take(facing)
+    other = _mixed(coated[facing], other.coated(coat), other)
     for _ in range(NEWTON):
         x = x - _least_step(own, other, both, x)
     return x

@@ -6,8 +6,6 @@ is the back of the union, a piece of its own, and not the mirror.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -19,21 +17,12 @@ CLOSED = 1e-8  # of the spread: maximum distance of one corner in two arcs
 RAY = np.array([0.8137159, 0.5812531])  # not a direction of symmetry of any design
 
 
-@dataclass(frozen=True)
-class ArcLoops:
-    """Loops that N arcs, in ascending order of mirror, form.
+def arc_loops(arcs: MapArcs, spread: float) -> tuple[Ints, Bools]:
+    """Follow N arcs, in ascending order of mirror, from end to start.
 
-    Attributes:
-        label: (N,) number of the arc's loop.
-        loose: (N,) the arc ends where no other of its cell begins.
+    Returns:
+        (N,) number of each arc's loop, and whether it ends where no other of its cell begins.
     """
-
-    label: Ints
-    loose: Bools
-
-
-def arc_loops(arcs: MapArcs, spread: float) -> ArcLoops:
-    """Follow arcs, in ascending order of mirror, from end to start."""
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
     index, other = _partners(arcs.mirror, arcs.mirror)
     gap = np.abs(start[:, other] - end[:, index]).max(axis=0)
@@ -42,7 +31,7 @@ def arc_loops(arcs: MapArcs, spread: float) -> ArcLoops:
     count = len(arcs.mirror)
     graph = coo_array((np.ones(count, dtype=np.int8), (index[best], other[best])), (count, count))
     label = connected_components(graph, directed=False)[1].astype(np.intp)
-    return ArcLoops(label, ~(gap[best] <= CLOSED * spread))
+    return label, ~(gap[best] <= CLOSED * spread)
 
 
 def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
@@ -55,7 +44,7 @@ def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
 
 def front_pieces(arcs: MapArcs, spread: float) -> MapArcs:
     """Of each mirror only the piece nearest to its apex: its outer loop, and the holes in it."""
-    label = arc_loops(arcs, spread).label
+    label, _ = arc_loops(arcs, spread)
     outer = np.bincount(label, _swept(arcs))[label] > 0
     distance = np.hypot(*arcs.point(np.clip(0, *arcs.s)))
     order = np.lexsort((distance, arcs.mirror))

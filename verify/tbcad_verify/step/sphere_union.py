@@ -101,7 +101,9 @@ def closed_form_cells(
     planes = Surfaces(across * (wall[:, 3] / length), across, np.zeros(len(wall)))
     mirrors = Surfaces(point.T.copy(), normal.T.copy(), curvature.astype(np.float64))
     boundaries = cell_boundaries(mirrors, planes, front)
-    arcs = front_pieces(_merged(boundaries), boundaries.spread) if front else _merged(boundaries)
+    # Shorter arcs are only rounding at corners of four cells or more.
+    arcs = boundaries.arcs.take(boundaries.arcs.length > SAME_CORNER * boundaries.spread)
+    arcs = front_pieces(arcs, boundaries.spread) if front else arcs
     return _measured(replace(boundaries, arcs=arcs), len(point) + len(wall))
 
 
@@ -126,11 +128,6 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
 
 
-def _merged(boundaries: CellBoundaries) -> MapArcs:
-    """Without the arcs that are only rounding at corners of four cells or more."""
-    return boundaries.arcs.take(boundaries.arcs.length > SAME_CORNER * boundaries.spread)
-
-
 def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
     """All figures of the cells; `horizon` is the number of the horizon."""
     count, arcs = len(boundaries.whole), boundaries.arcs
@@ -138,7 +135,8 @@ def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:
     area, vector_area, first, volume = _integrals(boundaries)
     passed, circles = _far_points(arcs)
     corners = _count(arcs.mirror, count) - _count(passed, count)
-    wrong = arc_loops(arcs, boundaries.spread).loose | (arcs.circle == horizon)
+    _, loose = arc_loops(arcs, boundaries.spread)
+    wrong = loose | (arcs.circle == horizon)
     return ClosedFormCells(
         area=area,
         vector_area=vector_area.T,
