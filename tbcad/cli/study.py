@@ -1,6 +1,7 @@
 """The studies of the paper: heavy libraries are imported inside the commands."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -73,14 +74,9 @@ def resolution_command(
     ns = n_range(first, last)
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
-    return _run(
-        design,
-        settings,
-        out,
-        lambda spec, progress: resolution(
-            spec, ns, given or default_sensors(spec), wanted, progress, scheduler
-        ),
-    )
+    spec = _spec(design, settings)
+    counted = given or default_sensors(spec)
+    return _write(out, partial(resolution, spec, ns, counted, wanted, scheduler=scheduler))
 
 
 @study.command("capture-area")
@@ -97,9 +93,8 @@ def capture_area_command(
     from tbcad.simulate.study.sweep import n_range
 
     ns = n_range(first, last)
-    return _run(
-        design, settings, out, lambda spec, progress: capture_area(spec, ns, progress, scheduler)
-    )
+    spec = _spec(design, settings)
+    return _write(out, partial(capture_area, spec, ns, scheduler=scheduler))
 
 
 @study.command("elevation")
@@ -109,7 +104,7 @@ def elevation_command(
     """Correlate the mirrors' radii with their polar angle (Fig. 7b)."""
     from tbcad.simulate.study.elevation import elevation
 
-    return _run(design, settings, out, elevation)
+    return _write(out, partial(elevation, _spec(design, settings)))
 
 
 @study.command("depth-of-field")
@@ -125,9 +120,7 @@ def depth_command(
     from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 
     optics = LensOptions(blur_px, pixel_um, wide_open).checked()
-    return _run(
-        design, settings, out, lambda spec, progress: depth_of_field(spec, optics, progress)
-    )
+    return _write(out, partial(depth_of_field, _spec(design, settings), optics))
 
 
 @study.command("ssim")
@@ -151,19 +144,10 @@ def ssim_command(
 
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
-    return _run(
-        design,
-        settings,
-        out,
-        lambda spec, progress: ssim(
-            spec,
-            load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint),
-            given or default_sensors(spec),
-            places,
-            method,
-            progress,
-        ),
-    )
+    spec = _spec(design, settings)
+    subject = load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint)
+    simulated = given or default_sensors(spec)
+    return _write(out, partial(ssim, spec, subject, simulated, places, method))
 
 
 @study.command("prototype")
@@ -188,22 +172,13 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
-    return _write(
-        out,
-        lambda progress: prototype_vs_shell(export, subject, places, method, samples, progress),
-    )
+    return _write(out, partial(prototype_vs_shell, export, subject, places, method, samples))
 
 
-def _run(
-    design: Path | None,
-    settings: list[str] | None,
-    out: Path,
-    work: "Callable[[Spec, Callable[[str], None]], Study]",
-) -> int:
+def _spec(design: Path | None, settings: list[str] | None) -> "Spec":
     from tbcad.spec.load import load_spec
 
-    spec = load_spec(design, list(settings or []))
-    return _write(out, lambda progress: work(spec, progress))
+    return load_spec(design, settings or ())
 
 
 def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
