@@ -319,8 +319,7 @@ def photograph(
 
     progress("object and scene")
     export = read_export(Path(exports))
-    path = None if object_file is None else Path(object_file)
-    subject = load_or_built_in(path, export.capture_mm, fit, paint)
+    subject = load_or_built_in(object_file, export.capture_mm, fit, paint)
     taken = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
     facts = {
         "object": subject.name,
@@ -381,7 +380,5 @@ def analyse(
     made_by = load_process(process, option_texts(settings))
     progress("record of the export")
     export = read_export(Path(exports))
-    subject = load_or_built_in(
-        None if object_file is None else Path(object_file), export.capture_mm
-    )
+    subject = load_or_built_in(object_file, export.capture_mm)
     return analyse_export(export, made_by, subject, asked, progress, detail)

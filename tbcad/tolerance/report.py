@@ -13,7 +13,7 @@ from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis
 from tbcad.tolerance.montecarlo.builds import CoverageResult, YieldEstimate, estimate_yield
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
-from tbcad.tolerance.process.process import ErrorSpec, Process, process_dict
+from tbcad.tolerance.process.process import ErrorSpec, Process
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
@@ -119,7 +119,7 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "summary": summary_text(analysis),
-        "process": process_dict(analysis.process),
+        "process": analysis.process.model_dump(mode="json", by_alias=True),
         "builds": len(analysis.result),
         "seed": analysis.options.seed,
         "target_mm": analysis.target,

@@ -93,7 +93,13 @@ class LightField:
             InputError: it cannot be read, or is no light field of this schema.
         """
         file = path / NAME if path.is_dir() else path
-        with _opened(file) as store:
+        if not file.is_file():
+            raise InputError(f"{file} is no file: name a folder that tbcad capture wrote")
+        try:
+            store = h5py.File(file, "r")
+        except OSError as error:
+            raise InputError(f"{file} is no light field: {error}: capture again") from error
+        with store:
             yield _read(file, store)
 
     @staticmethod
@@ -154,18 +160,6 @@ def light_field_in_memory(
             reflector.camera, reflector.u, reflector.mirrors, reflector.boxes(), planes
         )
     return LightField(frames, capture_mm, dict(facts))
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[h5py.File]:
-    if not file.is_file():
-        raise InputError(f"{file} is no file: name a folder that tbcad capture wrote")
-    try:
-        store = h5py.File(file, "r")
-    except OSError as error:
-        raise InputError(f"{file} is no light field: {error}: capture again") from error
-    with store:
-        yield store
 
 
 def _read(file: Path, store: h5py.File) -> LightField:

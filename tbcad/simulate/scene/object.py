@@ -83,10 +83,12 @@ def load_object(
 
 
 def load_or_built_in(
-    path: Path | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
+    path: Path | str | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
 ) -> SceneObject:
     """The object of a file, as `load` reads it, or without one the built-in one."""
-    return load_object(path, capture_mm, fit, paint) if path else built_in_object(capture_mm)
+    if path is None:
+        return built_in_object(capture_mm)
+    return load_object(Path(path), capture_mm, fit, paint)
 
 
 def built_in_object(capture_mm: float) -> SceneObject:

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import Errors, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
@@ -121,12 +121,10 @@ def simulate(
         run_batches: applies a case to batches in order: threads, processes or a cluster.
         first: number of the first build.
     """
-    results: list[AnyResult] = run_batches(case, _batches(range(first, first + builds)))
+    numbers = range(first, first + builds)
+    batches = [numbers[part] for part in chunks(builds, BUILDS_PER_BATCH)]
+    results: list[AnyResult] = run_batches(case, batches)
     return joined_results(results)
-
-
-def _batches(builds: range) -> list[range]:
-    return [builds[k : k + BUILDS_PER_BATCH] for k in range(0, len(builds), BUILDS_PER_BATCH)]
 
 
 def joined_results(results: Sequence[AnyResult]) -> AnyResult:

@@ -166,11 +166,6 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
         raise validation_error(error, Process, name, {key for key, _ in options}) from None
 
 
-def process_dict(process: Process) -> Table:
-    """Return the process as plain JSON values, keys in the order of the model."""
-    return process.model_dump(mode="json", by_alias=True)
-
-
 def process_errors(process: Process, known_coating_um: float = 0.0) -> Errors:
     """Return the errors of a process in mm, radians and shares.
 

@@ -21,7 +21,6 @@ from tbcad.tolerance.process.process import (
     Process,
     ball_radius_error,
     load_process,
-    process_dict,
     process_errors,
 )
 
@@ -105,7 +104,8 @@ class TestBuiltIn:
     def test_plain_dict_is_json_and_leads_back(self) -> None:
         for name in BUILT_IN:
             process = load_process(name)
-            assert Process.model_validate(json.loads(json.dumps(process_dict(process)))) == process
+            text = process.model_dump_json(by_alias=True)
+            assert Process.model_validate(json.loads(text)) == process
 
 
 class TestErrors:
