@@ -10,12 +10,11 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
-from tbcad_verify.mesh.lines import wrapped
+from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
-    axis,
     ball_views,
     gcode,
     pinhole_cells,
@@ -139,7 +138,7 @@ def test_turns_about_the_axis(context: PrototypeContext) -> None:
         found = context.base_rotation(np.radians(np.full(5, angle))).apply(x.T).T
         wanted = np.stack([turned(one, angle) for one in x.T], axis=1)
         np.testing.assert_allclose(found, wanted, atol=1e-12)
-        before, after = (axis.polar_and_azimuth(context.frame, d) for d in (x, found))
+        before, after = (polar_and_azimuth(context.frame, d) for d in (x, found))
         np.testing.assert_allclose(before[0], after[0], atol=1e-12)
         np.testing.assert_allclose(
             wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
@@ -159,7 +158,7 @@ def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> N
         d = points.T - context.pinhole[:, None]
         chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
         first, second = pinhole_cells.tangent_basis(chief)
-        angle = axis.angles_between(chief, d)
+        angle = angles_between(chief, d)
         turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
         low = (
             np.floor(turn / (2 * np.pi) * pinhole_cells.OUTLINE_DIRECTIONS).astype(int)

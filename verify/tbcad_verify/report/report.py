@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 
 from tbcad_verify.programs import is_skipped
@@ -19,39 +18,11 @@ from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.report.checks import MAX_NAMED, Check, finite
 from tbcad_verify.report.table import table
-from tbcad_verify.run.results import PER_MIRROR
 from tbcad_verify.types import Floats
 
 DIGITS = 9
 NAME = "verify.json"
 NO_SHELL = "no shell in this export"
-
-
-@dataclass(frozen=True)
-class MirrorFigures:
-    """What was measured of each recorded mirror, M of them.
-
-    Attributes:
-        ids: names.
-        virtual: (M,) virtual camera of each mirror; halves of one mirror share it.
-        columns: (M,) each, by the name it has in verify.json; NaN is unknown.
-    """
-
-    ids: tuple[str, ...]
-    virtual: NDArray[np.intp]
-    columns: Mapping[str, Floats]
-
-
-def mirror_figures(mirrors: Mirrors, columns: Mapping[str, Floats]) -> MirrorFigures:
-    """Figures from the columns that the stages could make; the others are unknown.
-
-    Args:
-        mirrors: as recorded.
-        columns: of `PER_MIRROR`, (M,) each.
-    """
-    blank = np.full(len(mirrors), np.nan)
-    every = {name: columns.get(name, blank) for name in PER_MIRROR}
-    return MirrorFigures(mirrors.ids, virtual_cameras(mirrors).index, every)
 
 
 @dataclass(frozen=True)
@@ -61,7 +32,8 @@ class Report:
     Attributes:
         target_mm: diameter that every virtual camera must see.
         checks: in the order they were made.
-        mirrors: figures of each recorded mirror.
+        mirrors: M, as recorded.
+        measured: (M,) figures of each mirror, by the name they have in verify.json; NaN is unknown.
         programs: answers of other programs on this computer; empty unless they were asked.
         printing: a row for each part on each printer.
         shell: whether there is a shell; without one, the mirrors are requirements only.
@@ -70,7 +42,8 @@ class Report:
 
     target_mm: float
     checks: tuple[Check, ...]
-    mirrors: MirrorFigures
+    mirrors: Mirrors
+    measured: Mapping[str, Floats]
     programs: tuple[Check, ...] = ()
     printing: tuple[dict[str, Any], ...] = ()
     shell: bool = True
@@ -100,7 +73,7 @@ class Report:
             "target_mm": self.target_mm,
             "checks": [_check_row(check) for check in self.checks],
             "printing": list(self.printing),
-            "mirrors": _mirror_rows(self.mirrors),
+            "mirrors": _mirror_rows(self),
         }
         if self.prototype is not None:
             document["prototype"] = self.prototype
@@ -142,12 +115,12 @@ def _check_row(check: Check) -> dict[str, Any]:
     return row | {"detail": check.detail} if check.detail and not decided else row
 
 
-def _mirror_rows(mirrors: MirrorFigures) -> list[dict[str, Any]]:
-    order = sorted(range(len(mirrors.ids)), key=mirrors.ids.__getitem__)
+def _mirror_rows(report: Report) -> list[dict[str, Any]]:
+    ids = report.mirrors.ids
     return [
-        {"id": mirrors.ids[k]}
-        | {name: _rounded(finite(column[k])) for name, column in mirrors.columns.items()}
-        for k in order
+        {"id": ids[k]}
+        | {name: _rounded(finite(column[k])) for name, column in report.measured.items()}
+        for k in sorted(range(len(ids)), key=ids.__getitem__)
     ]
 
 
@@ -168,9 +141,9 @@ def _pass_line(report: Report) -> str:
 
 
 def _shell_line(report: Report) -> str:
-    mirrors, columns = report.mirrors, report.mirrors.columns
+    mirrors, columns = report.mirrors, report.measured
     return (
-        f"{len(mirrors.ids)} mirrors, {_virtual_cameras(mirrors)} virtual cameras see "
+        f"{len(mirrors)} mirrors, {virtual_cameras(mirrors).count} virtual cameras see "
         f"{report.target_mm:g} mm or more (facets {np.min(columns['coverage_facet_mm']):.2f}, "
         f"spheres {np.min(columns['coverage_fitted_mm']):.2f}); nothing blocked; centres within "
         f"{np.max(columns['centre_error_mm']) * 1e3:.2f} and radii within "
@@ -200,21 +173,16 @@ def _fail_line(report: Report) -> str:
 
 def _short_of_target(report: Report) -> list[str]:
     """How many virtual cameras see too little, and the worst of them."""
-    mirrors, target = report.mirrors, report.target_mm
-    coverage = np.fmin(mirrors.columns["coverage_facet_mm"], mirrors.columns["coverage_fitted_mm"])
-    _, first = np.unique(mirrors.virtual, return_index=True)  # a halved mirror is named once
+    ids, target = report.mirrors.ids, report.target_mm
+    measured = report.measured
+    coverage = np.fmin(measured["coverage_facet_mm"], measured["coverage_fitted_mm"])
+    virtual = virtual_cameras(report.mirrors)
+    _, first = np.unique(virtual.index, return_index=True)  # a halved mirror is named once
     short = first[coverage[first] < target]
     if not short.size:
         return []
     worst = short[np.argsort(coverage[short], kind="stable")][:MAX_NAMED].tolist()
     return [
-        f"{short.size} of {_virtual_cameras(mirrors)} virtual cameras fall short of {target:g} mm",
-        *(
-            f"{mirrors.ids[k]} sees {coverage[k]:.2f} mm, {target - coverage[k]:.2f} short"
-            for k in worst
-        ),
+        f"{short.size} of {virtual.count} virtual cameras fall short of {target:g} mm",
+        *(f"{ids[k]} sees {coverage[k]:.2f} mm, {target - coverage[k]:.2f} short" for k in worst),
     ]
-
-
-def _virtual_cameras(mirrors: MirrorFigures) -> int:
-    return np.unique(mirrors.virtual).size

@@ -7,6 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
@@ -15,8 +17,8 @@ from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, short_list
-from tbcad_verify.report.report import NAME, Report, mirror_figures
-from tbcad_verify.run.results import CollectedResults, Results
+from tbcad_verify.report.report import NAME, Report
+from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.step.shell_checks import shell_step_checks
@@ -86,10 +88,12 @@ def verify(
             results.add(Results(checks=checks))
     programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
+    blank = np.full(len(export.mirrors), np.nan)
     report = Report(
         export.target_mm,
         tuple(results.checks),
-        mirror_figures(export.mirrors, results.mirrors),
+        export.mirrors,
+        {name: results.mirrors.get(name, blank) for name in PER_MIRROR},
         tuple(programs),
         tuple(results.printing),
         shell=bool(export.parts),
