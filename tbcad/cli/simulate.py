@@ -72,7 +72,9 @@ def capture(
     from tbcad.api import photograph, write_photographs
     from tbcad.output.folder import check_replaceable
 
-    geometry = _geometry(mesh, prototype)
+    if mesh and prototype:
+        raise InputError("--mesh and --prototype exclude each other: leave one out")
+    geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, force)
     with stages(3) as screen:
         taken = photograph(
@@ -84,12 +86,6 @@ def capture(
         typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
     typer.echo(f"{out}: {taken.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
     return 0
-
-
-def _geometry(mesh: bool, prototype: bool) -> "Geometry":
-    if mesh and prototype:
-        raise InputError("--mesh and --prototype exclude each other: leave one out")
-    return "mesh" if mesh else "prototype" if prototype else "spheres"
 
 
 @app.command()

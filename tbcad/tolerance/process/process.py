@@ -199,7 +199,12 @@ def _built_in(name: str) -> Table:
 
 def _own(path: Path) -> Table:
     if not path.is_file():
-        raise _no_process(str(path))
+        close = get_close_matches(str(path).lower(), BUILT_IN, 1)
+        hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
+        raise SpecError(
+            f"process {short_text(str(path))} is neither built in ({', '.join(BUILT_IN)}) nor a "
+            f"file: {hint}"
+        )
     table = read_toml(path, str(path), "process")
     base = table.pop("based_on", None)
     if base is None:
@@ -209,15 +214,6 @@ def _own(path: Path) -> Table:
             f"{path}: based_on is {short_text(base)}, allowed is {' or '.join(BUILT_IN)}: change it"
         )
     return {**_built_in(base), "name": path.stem, **table}
-
-
-def _no_process(which: str) -> SpecError:
-    close = get_close_matches(which.lower(), BUILT_IN, 1)
-    hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
-    return SpecError(
-        f"process {short_text(which)} is neither built in ({', '.join(BUILT_IN)}) nor a file: "
-        f"{hint}"
-    )
 
 
 def _option(text: str) -> tuple[str, object]:
