@@ -3,6 +3,7 @@
 Layout and solids share them: clearances are measured on the primitives that solids are made of.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -72,11 +73,15 @@ def cylinder_between(start: Floats, end: Floats, radius: float) -> Cylinder:
     return Cylinder(start, unit(end - start), radius, float(norm(end - start)))
 
 
+def rectangle(low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Floats:
+    """Corners (4, 2) of the rectangle between two of its corners."""
+    return np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+
+
 def box(low: Floats, high: Floats, axes: Floats) -> Prism:
     """The box between two points (3,) whose coordinates are along the rows of axes (3, 3)."""
-    (x0, y0, z0), (x1, y1, z1) = low, high
-    corners = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
-    return Prism(corners @ axes, (z1 - z0) * axes[2])
+    corners = np.column_stack([rectangle(low, high), np.full(4, low[2])])
+    return Prism(corners @ axes, (high[2] - low[2]) * axes[2])
 
 
 def slot(

@@ -10,7 +10,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from tbcad.geometry.primitives import Primitive, enclosing_triangles
+from tbcad.geometry.primitives import Primitive, enclosing_triangles, rectangle
 from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm
@@ -160,14 +160,10 @@ def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     ribs = np.vstack([base.outline, base.inner[::-1]])
     bosses = [_boss(base, k) for k in range(len(base.seats))]
     hub = base.hub
-    discs = [_rectangle(hub.back, hub.front, hub.disc)]
-    discs += [_rectangle(hub.face, hub.back, hub.boss)] if hub.boss else []
+    discs = [rectangle((hub.back, 0.0), (hub.front, hub.disc))]
+    discs += [rectangle((hub.face, 0.0), (hub.back, hub.boss))] if hub.boss else []
     turning = [SweptSection(polygon, low, high) for polygon in (wall, ribs, *base.rings, *bosses)]
     return (*turning, *(SweptSection(polygon, -np.pi, np.pi) for polygon in discs))
-
-
-def _rectangle(low: float, high: float, radius: float) -> Floats:
-    return np.array([[low, 0.0], [high, 0.0], [high, radius], [low, radius]])
 
 
 def _boss(base: BaseLayout, k: int) -> Floats:

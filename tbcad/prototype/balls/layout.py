@@ -19,7 +19,6 @@ from tbcad.prototype.balls.groups import MirrorGroups, group_mirrors, max_groups
 from tbcad.prototype.balls.placement import (
     Placement,
     PlacementProblem,
-    greedy_placement,
     min_swing_placement,
 )
 from tbcad.prototype.balls.selection import BallCandidates, Balls, ball_candidates, choose_balls
@@ -54,7 +53,6 @@ class PrototypeLayout:
         fit: how well they replace the mirrors.
         problem: limits of their azimuths.
         placement: azimuths of the balls on the base, swing.
-        greedy_placement: a plain layout of the same balls, for comparison.
         stops: the plan of rotation.
         twin: mirror of camera b, by number, whose direction mirror i shows when the object is
             turned by 180 degrees about z, (m,).
@@ -67,7 +65,6 @@ class PrototypeLayout:
     fit: BallFit
     problem: PlacementProblem
     placement: Placement
-    greedy_placement: Placement
     stops: StopPlan
     twin: Ints
 
@@ -128,7 +125,6 @@ def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
         fit=ball_fit(candidates, balls, spec.prototype),
         problem=problem,
         placement=replace(placement, azimuth=azimuth, outermost=problem.outermost(azimuth)),
-        greedy_placement=greedy_placement(problem),
         stops=plan_stops(groups, half.polar, requests, azimuth),
         twin=_twins(half),
     )

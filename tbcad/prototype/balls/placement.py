@@ -147,7 +147,12 @@ def min_swing_placement(problem: PlacementProblem) -> Placement:
     """
     solution = _min_swing(problem, greedy_placement(problem))
     if solution is None:
-        raise SpecError(_no_placement_message(problem))
+        raise SpecError(
+            f"found no place for {len(problem)} balls on one base within a swing of "
+            f"{np.degrees(problem.max_swing):.0f} degrees, clear of each other, the post and the "
+            "camera: make prototype.k, prototype.ball_wall_mm, prototype.largest_ball_mm or "
+            "prototype.post_diameter_mm smaller, or prototype.max_swing_deg larger"
+        )
     azimuth, bound = solution
     closer = _solved(problem, problem.half_swing(azimuth) + SLACK, outermost=True)
     options = [azimuth] if closer is None else [azimuth, closer[0]]
@@ -173,15 +178,6 @@ def _min_swing(problem: PlacementProblem, greedy: Placement) -> tuple[Floats, fl
 def _placement(problem: PlacementProblem, azimuth: Floats, bound: float) -> Placement:
     swing = 2 * problem.half_swing(azimuth)
     return Placement(azimuth, swing, bound, problem.outermost(azimuth))
-
-
-def _no_placement_message(problem: PlacementProblem) -> str:
-    return (
-        f"found no place for {len(problem)} balls on one base within a swing of "
-        f"{np.degrees(problem.max_swing):.0f} degrees, clear of each other, the post and the "
-        "camera: make prototype.k, prototype.ball_wall_mm, prototype.largest_ball_mm or "
-        "prototype.post_diameter_mm smaller, or prototype.max_swing_deg larger"
-    )
 
 
 def _solved(

@@ -13,6 +13,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.checks import check_mesh, check_pads
 from tbcad.cad.glyphs import ROWS, relief, text_width
 from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, revolved_polygon
+from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import seat_hollow
 from tbcad.prototype.base.seats import Seats
@@ -170,8 +171,7 @@ def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
 
 def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) -> TopoDS_Shape:
     """A bar on the bed between two corners (x, y)."""
-    (a, b), (c, d) = low, high
-    corners = np.array([[a, b, 0], [c, b, 0], [c, d, 0], [a, d, 0]], dtype=float)
+    corners = np.column_stack([rectangle(low, high), np.zeros(4)])
     return prism(polygon(corners), np.array([0, 0, BAR_HEIGHT * spec.floor_mm]))
 
 

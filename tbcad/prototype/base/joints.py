@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tbcad.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import distance_outside, half_plane, offset
-from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.screws import joint_hardware
 from tbcad.types import Bools, Floats
 
 GRID_MM = 2.0  # of places tried for holes
@@ -106,7 +106,7 @@ def plan_joint(base: BaseLayout, cut: Cut, others: Sequence[Cut]) -> Joint | Non
         others: all other cuts.
     """
     spec, flanges = base.spec, _Flanges(base, *cut, others)
-    head = access_radius(joint_hardware(spec))
+    head = joint_hardware(spec).access_radius
     places = flanges.places(max(spec.dowel_mm / 2, spec.insert_hole_mm / 2))
     below, above = (flanges.accessible(places, side, head, ACCESS_MM) for side in (-1, 1))
     dowels = _farthest_two(places)

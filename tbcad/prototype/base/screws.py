@@ -15,12 +15,15 @@ KEY_PLAY_MM = 0.55  # round a screw's head
 
 @dataclass(frozen=True)
 class JointHardware:
-    """Purchased parts of joints: names, and what their holes need, mm."""
+    """Purchased parts of joints: names, and what their holes need, mm.
+
+    The access radius is that of what is kept clear over a screw's head.
+    """
 
     dowel: str
     dowel_depth: float
     screw: str
-    head: float
+    access_radius: float
 
 
 def joint_hardware(spec: BaseSpec) -> JointHardware:
@@ -50,7 +53,7 @@ def joint_hardware(spec: BaseSpec) -> JointHardware:
     dowel = max(dowels, key=lambda part: part["length_mm"])
     screw = min(screws, key=lambda part: part["length_mm"])
     depth = dowel["length_mm"] / 2 + BEYOND_DOWEL_MM
-    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"])
+    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"] / 2 + KEY_PLAY_MM)
 
 
 def _check_insert(spec: BaseSpec) -> None:
@@ -60,8 +63,3 @@ def _check_insert(spec: BaseSpec) -> None:
             f"flanges of {spec.joint_mm:g} mm are too thin for inserts: make "
             f"prototype.base.joint_mm at least {minimum:g}"
         )
-
-
-def access_radius(hardware: JointHardware) -> float:
-    """Radius of what is kept clear over a screw's head, mm."""
-    return hardware.head / 2 + KEY_PLAY_MM

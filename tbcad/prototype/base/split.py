@@ -103,7 +103,7 @@ class _SplitSearch:
 
     def __post_init__(self) -> None:
         self.bodies = bosses_and_hub(self.base)
-        self.points = base_points(self.base, self.bodies)
+        self.wall, self.hull, self.flange_tops = base_points(self.base, self.bodies)
         self.normals = _half_sphere(NORMALS)
 
     def splits(self, count: int) -> Iterator[BaseSplit]:
@@ -182,17 +182,17 @@ class _SplitSearch:
 
     def _corners(self, piece: Floats) -> Floats:
         """Points round a piece and its flanges, at most a step outside of it, (c, 3)."""
-        reach, tops = STEP_MM + ROUNDING_MM, self.points.flange_tops
+        reach, tops = STEP_MM + ROUNDING_MM, self.flange_tops
         from_planes = np.abs(tops @ piece[:, :3].T - piece[:, 3])
         flange = in_region(tops, piece, reach)
         flange &= (from_planes <= self.base.spec.joint_mm + reach).any(axis=1)
-        hull = self.points.hull[in_region(self.points.hull, piece, reach)]
+        hull = self.hull[in_region(self.hull, piece, reach)]
         points = np.vstack([hull, tops[flange]])
         return points[ConvexHull(points).vertices]
 
     def _is_one_part(self, piece: Floats) -> bool:
         """Whether a piece of the wall hangs together, and is no sliver."""
-        inside = in_region(self.points.wall, piece)
+        inside = in_region(self.wall, piece)
         return bool(inside.sum() > inside.size / SLIVER) and label(inside)[1] == 1
 
 

@@ -60,23 +60,13 @@ def bosses_and_hub(base: BaseLayout) -> RoundBodies:
     )
 
 
-@dataclass(frozen=True)
-class BasePoints:
-    """Points of the base, mm.
+def base_points(base: BaseLayout, bodies: RoundBodies) -> tuple[Floats, Floats, Floats]:
+    """Points of a base with its bosses and hub, mm.
 
-    Attributes:
-        wall: in the middle of the wall, a grid over azimuth and meridian, (a, p, 3).
-        hull: round all of the base, (c, 3).
-        flange_tops: on the outer faces that flanges could have, (t, 3).
+    Returns:
+        Points in the middle of the wall, a grid over azimuth and meridian, (a, p, 3), points round
+        all of the base, (c, 3), and points on the outer faces that flanges could have, (t, 3).
     """
-
-    wall: Floats
-    hull: Floats
-    flange_tops: Floats
-
-
-def base_points(base: BaseLayout, bodies: RoundBodies) -> BasePoints:
-    """Points of a base with its bosses and hub."""
     low, high = base.sector
     azimuth = np.linspace(low, high, int(np.ceil((high - low) / AZIMUTH_STEP)) + 1)
     parts = [
@@ -85,7 +75,7 @@ def base_points(base: BaseLayout, bodies: RoundBodies) -> BasePoints:
         *(at_azimuths(ring, azimuth) for ring in base.rings),
         bodies.rims(),
     ]
-    return BasePoints(
+    return (
         at_azimuths(_dense(base.middle), azimuth),
         np.vstack([part.reshape(-1, 3) for part in parts]),
         at_azimuths(_dense(flange_top(base)), azimuth).reshape(-1, 3),

@@ -26,7 +26,7 @@ from tbcad.prototype.base.joints import (
     flange_profile,
 )
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
@@ -160,7 +160,7 @@ def _side_holes(base: BaseLayout, joint: Joint, side: int) -> list[TopoDS_Shape]
         if head == side:
             start = at + (spec.joint_mm - RECESS_MM) * out
             holes.append(_hole(at, out, SCREW_MM, spec.joint_mm + THROUGH_MM))
-            holes.append(cylinder(start, out, access_radius(hardware), ACCESS_MM))
+            holes.append(cylinder(start, out, hardware.access_radius, ACCESS_MM))
         else:
             holes.append(_hole(at, out, spec.insert_hole_mm, spec.insert_depth_mm))
     return holes

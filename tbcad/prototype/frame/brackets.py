@@ -48,11 +48,6 @@ def level_prism(corners: Floats, low: float, high: float, axes: Floats) -> Prism
     return Prism(at @ axes, (high - low) * axes[1])
 
 
-def rectangle(low: Sequence[float], high: Sequence[float]) -> Floats:
-    """Corners (4, 2) of the rectangle between two of its corners."""
-    return np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-
-
 def webs(corners: Floats, inner: float, thickness: float, axes: Floats) -> list[Primitive]:
     """Two webs of a polygon (n, 2) of (level, up), from inner outward to either side."""
     return [

@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Cylinder, Primitive, box, cylinder_between, slot
+from tbcad.geometry.primitives import (
+    Component,
+    Cylinder,
+    Primitive,
+    box,
+    cylinder_between,
+    rectangle,
+    slot,
+)
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.prototype.frame.brackets import (
@@ -14,7 +22,6 @@ from tbcad.prototype.frame.brackets import (
     Bracket,
     drilled_holes,
     level_prism,
-    rectangle,
     webs,
 )
 from tbcad.prototype.purchased.parts import PurchasedPart

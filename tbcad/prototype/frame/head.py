@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, slot
+from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, rectangle, slot
 from tbcad.geometry.rotations import bolt_circle
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
@@ -20,7 +20,6 @@ from tbcad.prototype.frame.brackets import (
     choose_part,
     drilled_holes,
     level_prism,
-    rectangle,
     webs,
 )
 from tbcad.prototype.frame.purchased import (

@@ -73,22 +73,17 @@ def placed_on_bed(
     orientations = [fitting_orientation(corners, down, printer) for down in downs]
     fitting = [orientation for orientation in orientations if orientation is not None]
     if not fitting:
-        raise SpecError(_too_large(name, corners, downs, printer))
+        bed = size_text(min_bed(corners, downs, printer))
+        raise SpecError(
+            f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
+            "prototype.largest_ball_mm or prototype.k smaller"
+        )
     best = min(fitting, key=lambda orientation: round(_overhang(coarse, orientation), 3))
     placed = coarse.vertices @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
     solid = one_solid(name, moved(shape, axes, np.zeros(3)))
     return PlacedSolid(name, solid, axes.T @ best, origin)
-
-
-def _too_large(name: str, corners: Floats, downs: Sequence[Floats], printer: PrinterSpec) -> str:
-    """What to say of a part that does not fit: the smallest bed that would do."""
-    bed = size_text(min_bed(corners, downs, printer))
-    return (
-        f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
-        "prototype.largest_ball_mm or prototype.k smaller"
-    )
 
 
 def _overhang(mesh: Mesh, orientation: Floats) -> float:

@@ -53,7 +53,6 @@ class StageLayout:
         foot: z of the post's lower end, mm.
         led: of the pockets, from the lists.
         leds: centres of the domes, mm, (l, 3).
-        pockets: z of the pockets' floors, mm, (l,).
         components: disc, crown and post, to be printed.
         light: smallest distance of all to the light outside the capture sphere, mm.
         swept: smallest distance to what the base sweeps, mm.
@@ -63,7 +62,6 @@ class StageLayout:
     foot: float
     led: PurchasedPart
     leds: Floats
-    pockets: Floats
     components: tuple[Component, ...]
     light: float
     swept: float
@@ -111,7 +109,6 @@ def stage_layout(
         foot=foot,
         led=led,
         leds=leds,
-        pockets=pockets,
         components=components,
         light=light,
         swept=swept,

@@ -12,6 +12,7 @@ from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.placement import greedy_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
@@ -179,7 +180,7 @@ class TestPlaces:
 
     def test_swing_is_the_minimum_and_less_than_greedy(self, prototype: PrototypeLayout) -> None:
         assert prototype.placement.swing_bound == pytest.approx(prototype.placement.swing, abs=1e-3)
-        assert prototype.placement.swing < prototype.greedy_placement.swing - DEGREE
+        assert prototype.placement.swing < greedy_placement(prototype.problem).swing - DEGREE
         assert prototype.placement.swing / DEGREE < 205
 
     def test_outermost_is_that_of_the_edges(self, prototype: PrototypeLayout) -> None:
@@ -226,7 +227,10 @@ class TestStops:
         points, _ = min_stabbing_points(angle - requests.tolerance, angle + requests.tolerance)
         assert len(points) == len(prototype.stops)
         other = plan_stops(
-            prototype.groups, prototype.half.polar, requests, prototype.greedy_placement.azimuth
+            prototype.groups,
+            prototype.half.polar,
+            requests,
+            greedy_placement(prototype.problem).azimuth,
         )
         assert len(prototype.stops) <= len(other)
 

@@ -12,7 +12,7 @@ from tbcad.prototype.base.joints import flange_profile
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.profile import distance_outside
 from tbcad.prototype.base.purchased import base_purchased_parts, fasteners, magnets
-from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.bed import min_bed, shortfall, usable_size
 from tbcad.prototype.purchased.parts import load_parts
@@ -131,7 +131,7 @@ class TestJoints:
 
     def test_heads_are_reached_from_outside(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         base, plan = cut
-        free = access_radius(joint_hardware(base.spec))
+        free = joint_hardware(base.spec).access_radius
         assert free > 5.5 / 2
         for joint in plan.joints:
             for place, side in zip(joint.screws, joint.heads, strict=True):

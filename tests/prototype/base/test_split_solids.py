@@ -21,7 +21,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.screws import access_radius, joint_hardware
+from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.base.split_solids import piece_holes
@@ -123,7 +123,7 @@ class TestSmall:
             assert on_axis(sides[-head], place, normal) == pytest.approx([used.insert_hole_mm / 2])
             radii = on_axis(sides[head], place, normal)
             assert radii[0] == pytest.approx(SCREW_MM / 2)
-            assert radii[-1] <= access_radius(size) + 1e-9
+            assert radii[-1] <= size.access_radius + 1e-9
 
     def test_holes_go_as_deep_as_they_must(self, small: Cut) -> None:
         """Straight from the plane into the material, until the mesh is met."""
@@ -206,7 +206,7 @@ def hole_volume(base: BaseLayout, joint: Joint) -> float:
 
 def heads_volume(base: BaseLayout, joint: Joint) -> float:
     """At most all of what is kept clear for the heads."""
-    return float(len(joint.screws) * np.pi * access_radius(joint_hardware(base.spec)) ** 2 * 25.2)
+    return float(len(joint.screws) * np.pi * joint_hardware(base.spec).access_radius ** 2 * 25.2)
 
 
 def cylinders(part: PlacedSolid) -> list[Cylinder]:

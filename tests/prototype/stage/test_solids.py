@@ -85,7 +85,8 @@ class TestSolids:
         groove = stage.sizes.plate - 0.8
         end = crown.bounds[0, 2] - 1
         steps = np.linspace(0, 1, 40)[:, None]
-        for place, floor in zip(stage.leds, stage.pockets, strict=True):
+        for place in stage.leds:
+            floor = place[2] - (stage.led["height_mm"] - stage.led["diameter_mm"] / 2)
             corners = np.array(
                 [
                     [*place[:2], floor + 0.5],
