@@ -9,8 +9,11 @@ import numpy as np
 import trimesh
 from OCP.Bnd import Bnd_Box
 from OCP.BRepBndLib import BRepBndLib
+from manifold3d import Manifold, Mesh64
+from OCP.BRep import BRep_Tool
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
+from OCP.Geom import Geom_CylindricalSurface
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
@@ -19,7 +22,7 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from tbcad.cad.solids import meshed
+from tbcad.cad.solids import faces, meshed
 
 
 def bounds(shape: TopoDS_Shape) -> np.ndarray:
@@ -82,6 +85,26 @@ def as_trimesh(shape: TopoDS_Shape, tolerance: float = 0.02) -> trimesh.Trimesh:
     """A shape meshed to a chord error, mm."""
     mesh = meshed(shape, tolerance)
     return trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+
+
+def manifold(shape: TopoDS_Shape, tolerance: float = 0.005) -> Manifold:
+    """A shape for booleans of meshes."""
+    mesh = meshed(shape, tolerance)
+    return Manifold(Mesh64(mesh.vertices, mesh.triangles.astype(np.uint64)))
+
+
+def cylinders(shape: TopoDS_Shape) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """A point on the axis, its direction and the radius of each round face."""
+    found = []
+    for face in faces(shape):
+        surface = BRep_Tool.Surface_s(face)
+        if isinstance(surface, Geom_CylindricalSurface):
+            axis = surface.Cylinder().Axis()
+            point, direction = (
+                np.array([at.X(), at.Y(), at.Z()]) for at in (axis.Location(), axis.Direction())
+            )
+            found.append((point, direction, surface.Radius()))
+    return found
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:

@@ -46,6 +46,7 @@ def test_examples_in_docstrings(name: str) -> None:
     assert tried.attempted > 0
 
 
+@pytest.mark.slow
 def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     example = re.search(r"<!-- test: example -->\n```python\n(.*?)```", text, re.DOTALL)

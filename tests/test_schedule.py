@@ -68,7 +68,7 @@ class TestThreads:
 
         def work(unit: int) -> None:
             begun.append(unit)
-            time.sleep(0.01)
+            time.sleep(0.01)  # or all are done before the first is heard of
             raise KeyError(unit)
 
         with pytest.raises(KeyError):

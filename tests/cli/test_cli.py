@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.cli import run
+from tbcad.doctor import Finding
 from tbcad.version import __version__
 from tests.exported_files import contents, read_csv
 
@@ -47,6 +48,7 @@ def test_build_without_verification(export: Path) -> None:
     assert document["spec"]["mesh"]["chord_error_mm"] == 0.05
 
 
+@pytest.mark.slow
 def test_build_verifies_and_verify_agrees(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -65,6 +67,7 @@ def test_build_verifies_and_verify_agrees(
     assert (out / "verify.json").read_bytes() == verified
 
 
+@pytest.mark.slow
 def test_build_with_prototype_is_verified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -81,6 +84,7 @@ def test_build_with_prototype_is_verified(
     assert names >= {"coverage, spheres", "coverage, balls", "light paths, balls", "ball centres"}
 
 
+@pytest.mark.slow
 def test_failed_verification_keeps_the_files_and_names_mirrors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,8 +219,13 @@ def test_help_and_refusals_do_not_load_the_kernel(words: list[str]) -> None:
     assert done.returncode == 0
 
 
-def test_doctor_shows_every_finding(capsys: pytest.CaptureFixture[str]) -> None:
-    code = run(["doctor"])
+@pytest.mark.parametrize(("ok", "code"), [(True, 0), (False, 1)])
+def test_doctor_shows_every_finding(
+    ok: bool, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    findings = [Finding("CAD kernel", True, "here"), Finding("disk", ok, "?", "" if ok else "tidy")]
+    monkeypatch.setattr("tbcad.doctor.diagnose", lambda: findings)
+    assert run(["doctor"]) == code
     shown = capsys.readouterr().out
-    assert "CAD kernel" in shown
-    assert code == (1 if "NO" in shown.split() else 0)
+    assert all(finding.name in shown for finding in findings)
+    assert ("NO" in shown.split()) is not ok

@@ -24,7 +24,7 @@ from tbcad_verify.run.child import Limits
 from tbcad.cli import run
 from tests.exported_files import read_csv
 
-pytestmark = pytest.mark.clients
+pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
 SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
 PROGRAMS = {

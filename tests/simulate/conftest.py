@@ -13,6 +13,7 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tests.prototype_exports import write_export
 
 CAPTURE_MM = 60.0
@@ -37,6 +38,11 @@ def knot() -> Scene:
 def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField:
     photographs = [(at, photograph(at.camera, exact_tracer(at), knot)) for at in cameras]
     return light_field_in_memory(photographs, CAPTURE_MM)
+
+
+@pytest.fixture(scope="session")
+def tiles(light_field: LightField) -> MirrorTiles:
+    return MirrorTiles(light_field)
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,7 @@ from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.pointing import pointing
+from tbcad.tolerance.montecarlo.sensitivity import scaled
 from tests.tolerance.exact_builds import (
     bisected_coverage,
     traced_coverage,
@@ -245,13 +246,6 @@ def test_random_paper_builds_against_slow_tracing(paper_design: MirrorDesign) ->
     assert np.abs(found - slow).max() < 1e-6
 
 
-def scaled(errors: Errors, share: float) -> Errors:
-    kinds = {
-        name: replace(error, spread=share * error.spread) for name, error in vars(errors).items()
-    }
-    return Errors(**kinds)
-
-
 @pytest.mark.parametrize("mirror", [3, 30, 55])
 def test_uneven_scale_against_brute_force(
     halves: EdgeModels, small_design: MirrorDesign, mirror: int
@@ -279,6 +273,7 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.parametrize(("errors", "builds"), [(COARSE, range(20)), (POSED, range(20, 24))])
+@pytest.mark.slow
 def test_random_builds_against_the_verification_of_their_meshes(
     halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, builds: range
 ) -> None:

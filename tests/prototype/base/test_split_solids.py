@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 from manifold3d import Manifold, Mesh64
-from OCP.BRep import BRep_Tool
 from OCP.BRepCheck import BRepCheck_Analyzer
-from OCP.Geom import Geom_CylindricalSurface
 
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_mesh
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import faces, meshed, plane_faces, solids, volume, volume_by_meshes
+from tbcad.cad.solids import meshed, plane_faces, solids, volume, volume_by_meshes
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -28,10 +26,10 @@ from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
-from tests.helpers import as_trimesh, bounds
+from tests.helpers import as_trimesh, bounds, cylinders
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))
-Cylinder = tuple[float, np.ndarray, np.ndarray]  # radius, a point, direction
+Cylinders = list[tuple[np.ndarray, np.ndarray, float]]
 Cut = tuple[BaseLayout, PrinterSpec, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
@@ -84,6 +82,7 @@ def check_pads(cut: Cut) -> None:
             assert area[near] == pytest.approx([np.pi * pad**2], rel=1e-6)
 
 
+@pytest.mark.slow
 class TestSmall:
     def test_pieces(self, small: Cut) -> None:
         check_pieces(small)
@@ -112,8 +111,8 @@ class TestSmall:
         axes = base.axes
         press, slip = used.dowel_mm + used.dowel_press_mm, used.dowel_mm + used.dowel_slip_mm
         sides = {
-            -1: cylinders(parts[piece_at(plan, joint, -1)]),
-            1: cylinders(parts[piece_at(plan, joint, 1)]),
+            -1: cylinders(parts[piece_at(plan, joint, -1)].shape),
+            1: cylinders(parts[piece_at(plan, joint, 1)].shape),
         }
         normal = joint.plane.normal @ axes
         for place in joint.dowels @ axes:
@@ -209,25 +208,12 @@ def heads_volume(base: BaseLayout, joint: Joint) -> float:
     return float(len(joint.screws) * np.pi * joint_hardware(base.spec).access_radius ** 2 * 25.2)
 
 
-def cylinders(part: PlacedSolid) -> list[Cylinder]:
-    """Radius, a point and the direction of each cylindrical face."""
-    cylinders = []
-    for face in faces(part.shape):
-        surface = BRep_Tool.Surface_s(face)
-        if isinstance(surface, Geom_CylindricalSurface):
-            at, along = surface.Location(), surface.Axis().Direction()
-            point = np.array([at.X(), at.Y(), at.Z()])
-            direction = np.array([along.X(), along.Y(), along.Z()])
-            cylinders.append((surface.Radius(), point, direction))
-    return cylinders
-
-
-def on_axis(cylinders: list[Cylinder], at: np.ndarray, along: np.ndarray) -> list[float]:
+def on_axis(round_faces: Cylinders, at: np.ndarray, along: np.ndarray) -> list[float]:
     """Radii, each once, of the cylinders about a line, the smallest first."""
     return sorted(
         {
             round(radius, 9)
-            for radius, point, direction in cylinders
+            for point, direction, radius in round_faces
             if abs(abs(direction @ along) - 1) < 1e-12 and norm(np.cross(point - at, along)) < 1e-9
         }
     )

@@ -17,6 +17,7 @@ from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, contents, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
 
+pytestmark = pytest.mark.slow
 MESH_ERROR_MM = 0.1
 OPTIONS = [
     *("n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5"),

@@ -9,8 +9,7 @@ import pytest
 
 from tbcad.geometry.primitives import Cylinder
 from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.brackets import choose_part, frame_axes
@@ -18,7 +17,6 @@ from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purcha
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
-from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import PrototypeSpec
@@ -44,9 +42,10 @@ class Surroundings:
     stage: StageLayout
 
     @classmethod
-    def of(cls, spec: Spec, design: MirrorDesign, drive_name: str) -> "Surroundings":
+    def of(
+        cls, section: PrototypeSpec, prototype: PrototypeLayout, drive_name: str
+    ) -> "Surroundings":
         """With the base's hub for a drive."""
-        section, prototype = spec.prototype, prototype_layout(spec, design)
         base = base_layout(section.base.model_copy(update={"drive": drive_name}), prototype)
         keep_out = keep_out_volume(prototype, base, CAPTURE, 0.0)
         stage = stage_layout(section, prototype, keep_out, PARTS)
@@ -123,8 +122,10 @@ class TestFrame:
         assert min(frame.swept.values()) >= SMALL.prototype.frame.clearance_mm
         assert min(frame.light.values()) >= 30
 
-    def test_the_paper_design_is_clear_with_all_defaults(self, paper_design: MirrorDesign) -> None:
-        whole = Surroundings.of(load_spec(None), paper_design, "nema17-belt")
+    def test_the_paper_design_is_clear_with_all_defaults(
+        self, paper_prototype: PrototypeLayout
+    ) -> None:
+        whole = Surroundings.of(load_spec(None).prototype, paper_prototype, "nema17-belt")
         found = whole.frame(drive("nema17-belt", 2))
         assert min(found.swept.values()) > 3
         assert min(found.light.values()) > 3
@@ -157,8 +158,8 @@ class TestFrame:
         assert away[~np.eye(len(away), dtype=bool)].min() > 15
 
     @pytest.mark.parametrize("number", [0, 1, 2])
-    def test_a_motor_on_the_axis(self, small_design: MirrorDesign, number: int) -> None:
-        direct = Surroundings.of(SMALL, small_design, "nema17-direct")
+    def test_a_motor_on_the_axis(self, small_prototype: PrototypeLayout, number: int) -> None:
+        direct = Surroundings.of(SMALL.prototype, small_prototype, "nema17-direct")
         found = direct.frame(drive("nema17-direct", number))
         assert not any(item.name.startswith("bearing") for item in found.purchased)
         (motor,) = (item for item in found.purchased if item.name == "motor")

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, Mesh64
-from OCP.BRep import BRep_Tool
-from OCP.Geom import Geom_CylindricalSurface
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial import cKDTree
 
-from tbcad.cad.solids import faces, meshed, volume
+from tbcad.cad.solids import meshed, volume
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -24,7 +21,7 @@ from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
-from tests.helpers import as_trimesh
+from tests.helpers import as_trimesh, cylinders, manifold
 from tests.prototype.conftest import SMALL
 
 PRINTER = PrinterSpec()
@@ -52,19 +49,6 @@ def solids(frame: FrameLayout) -> dict[str, PlacedSolid]:
 @pytest.fixture(scope="module")
 def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
     return purchased_solids(frame)
-
-
-def cylinders(shape: TopoDS_Shape) -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """A point on the axis, its direction and the radius of each round face."""
-    found = []
-    for face in faces(shape):
-        surface = BRep_Tool.Surface_s(face)
-        if isinstance(surface, Geom_CylindricalSurface):
-            axis = surface.Cylinder().Axis()
-            at, way = axis.Location(), axis.Direction()
-            point = np.array([at.X(), at.Y(), at.Z()])
-            found.append((point, np.array([way.X(), way.Y(), way.Z()]), surface.Radius()))
-    return found
 
 
 class TestSolids:
@@ -256,11 +240,6 @@ class TestClearance:
             for other in names[:i]:
                 shared = (bodies[one] ^ bodies[other]).volume()
                 assert shared < allowed({one, other}), (one, other, shared)
-
-
-def manifold(shape: TopoDS_Shape) -> Manifold:
-    net = meshed(shape, 0.005)
-    return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
 
 
 def allowed(pair: set[str]) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,24 +41,28 @@ CAPTURE = 30.0
 UP = np.array([0.0, 0.0, 1.0])
 
 
+@pytest.fixture(scope="module")
 def stage_with(
-    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut, **changed: object
-) -> StageLayout:
-    sections = {
-        "post_diameter_mm": changed.pop("post", 20.0),
-        "stage": StageSpec.model_validate(changed),
-        "frame": FrameSpec(),
-    }
-    return stage_layout(spec.model_copy(update=sections), small_prototype, keep_out, PARTS)
+    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> Callable[..., StageLayout]:
+    """A stage with other keys; floor_mm is the frame's."""
+
+    def of(keep_out: KeepOut = keep_out, **changed: Any) -> StageLayout:
+        sections = {
+            "post_diameter_mm": changed.pop("post", 20.0),
+            "frame": FrameSpec(floor_mm=changed.pop("floor_mm", FrameSpec().floor_mm)),
+            "stage": StageSpec.model_validate(changed),
+        }
+        return stage_layout(spec.model_copy(update=sections), small_prototype, keep_out, PARTS)
+
+    return of
 
 
 @pytest.fixture(scope="module")
-def refusal(
-    spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
-) -> Callable[..., str]:
-    def refused(keep_out: KeepOut = keep_out, **changed: object) -> str:
+def refusal(stage_with: Callable[..., StageLayout]) -> Callable[..., str]:
+    def refused(**changed: Any) -> str:
         with pytest.raises(SpecError) as caught:
-            stage_with(spec, small_prototype, keep_out, **changed)
+            stage_with(**changed)
         return str(caught.value)
 
     return refused
@@ -85,10 +90,8 @@ class TestStage:
         assert stage.swept > FrameSpec().clearance_mm
         assert stage.sizes.post == 10.0
 
-    def test_a_stage_without_leds(
-        self, spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
-    ) -> None:
-        bare = stage_with(spec, small_prototype, keep_out, leds_mm=[])
+    def test_a_stage_without_leds(self, stage_with: Callable[..., StageLayout]) -> None:
+        bare = stage_with(leds_mm=[])
         assert led_poses(bare) == []
         names = [component.name for component in bare.components]
         assert names == ["stage_disc", "stage_crown", "stage_post"]
@@ -121,9 +124,9 @@ class TestStage:
         self, refusal: Callable[..., str], keep_out: KeepOut
     ) -> None:
         below = replace(keep_out, used=keep_out.used + np.pi)
-        assert "mm inside the light of the balls" in refusal(below)
+        assert "mm inside the light of the balls" in refusal(keep_out=below)
         disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
-        message = refusal(replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),)))
+        message = refusal(keep_out=replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),)))
         assert "the base comes within" in message
         assert "prototype.post_diameter_mm or prototype.k smaller" in message
 
@@ -152,12 +155,8 @@ class TestStage:
         places = [(x, y, -15.0) for x, y, _ in StageSpec().leds_mm]
         assert "nearly in one plane" in refusal(leds_mm=places)
 
-    def test_a_floor_too_high_is_refused(
-        self, spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepOut
-    ) -> None:
-        high = spec.model_copy(update={"frame": FrameSpec(floor_mm=-60.0)})
-        with pytest.raises(SpecError, match=r"make prototype\.frame\.floor_mm"):
-            stage_layout(high, small_prototype, keep_out, PARTS)
+    def test_a_floor_too_high_is_refused(self, refusal: Callable[..., str]) -> None:
+        assert "make prototype.frame.floor_mm" in refusal(floor_mm=-60.0)
 
     def test_three_leds_are_refused_by_the_spec(self) -> None:
         with pytest.raises(ValidationError, match="4 to 12 places"):

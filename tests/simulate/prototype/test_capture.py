@@ -45,13 +45,8 @@ def runs(layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Runs:
 
 
 @pytest.fixture(scope="module")
-def scene(knot: Scene) -> Scene:
-    return knot
-
-
-@pytest.fixture(scope="module")
-def merged(runs: Runs, scene: Scene) -> LightField:
-    return merged_light_field(runs, scene)
+def merged(runs: Runs, knot: Scene) -> LightField:
+    return merged_light_field(runs, knot)
 
 
 def merged_light_field(runs: Runs, scene: Scene, resample: Resample = "photograph") -> LightField:
@@ -166,33 +161,33 @@ class TestGeometry:
 
 
 class TestPhotographs:
-    def test_the_second_run_sees_the_object_turned(self, runs: Runs, scene: Scene) -> None:
+    def test_the_second_run_sees_the_object_turned(self, runs: Runs, knot: Scene) -> None:
         """Camera a before an object that was really turned takes the same photograph."""
-        subject = replace(scene.subject, points=scene.subject.points * HALF_TURN)
-        turned = replace(prepared_scene(subject), shade=scene.shade)
-        second, first = stop_photograph(runs[1], scene, 3), stop_photograph(runs[0], turned, 3)
+        subject = replace(knot.subject, points=knot.subject.points * HALF_TURN)
+        turned = replace(prepared_scene(subject), shade=knot.shade)
+        second, first = stop_photograph(runs[1], knot, 3), stop_photograph(runs[0], turned, 3)
         assert second.any()
         assert (np.abs(second.astype(int) - first) > 1).any(axis=2).mean() < 1e-3
-        straight = stop_photograph(runs[0], scene, 3)
+        straight = stop_photograph(runs[0], knot, 3)
         assert (np.abs(second.astype(int) - straight) > 1).any(axis=2).mean() > 1e-2
 
-    def test_resampling_is_bilinear(self, runs: Runs, scene: Scene) -> None:
-        whole = stop_photograph(runs[0], scene, 2, samples=2).astype(float)
+    def test_resampling_is_bilinear(self, runs: Runs, knot: Scene) -> None:
+        whole = stop_photograph(runs[0], knot, 2, samples=2).astype(float)
         row, column = np.argwhere(whole.sum(axis=2) > 0)[::7].T
         row, column = np.minimum(row, 308), np.minimum(column, 414)
         places = np.column_stack([column, row]).astype(float)
-        assert (resampled_photograph(runs[0], scene, 2, 2, places) == whole[row, column]).all()
+        assert (resampled_photograph(runs[0], knot, 2, 2, places) == whole[row, column]).all()
         right, under = whole[row, column + 1], whole[row + 1, column]
         middle = 0.75 * whole[row, column] + 0.25 * right
-        found = resampled_photograph(runs[0], scene, 2, 2, places + np.array([0.25, 0]))
+        found = resampled_photograph(runs[0], knot, 2, 2, places + np.array([0.25, 0]))
         assert np.abs(found - middle).max() <= 0.5
-        found = resampled_photograph(runs[0], scene, 2, 2, places + np.array([0, 0.5]))
+        found = resampled_photograph(runs[0], knot, 2, 2, places + np.array([0, 0.5]))
         assert np.abs(found - (whole[row, column] + under) / 2).max() <= 0.5
 
-    def test_resampling_at_the_last_pixel(self, runs: Runs, scene: Scene) -> None:
+    def test_resampling_at_the_last_pixel(self, runs: Runs, knot: Scene) -> None:
         last = np.array([[415.0, 309.0]])
-        whole = stop_photograph(runs[0], scene, 0)
-        assert (resampled_photograph(runs[0], scene, 0, 1, last) == whole[-1, -1]).all()
+        whole = stop_photograph(runs[0], knot, 0)
+        assert (resampled_photograph(runs[0], knot, 0, 1, last) == whole[-1, -1]).all()
 
 
 class TestMerged:
@@ -259,9 +254,9 @@ class TestMerged:
         assert kept / shell == pytest.approx(layout.fit.kept_share, abs=0.01)
 
     def test_photographs_are_close_to_exact_rays(
-        self, merged: LightField, runs: Runs, scene: Scene
+        self, merged: LightField, runs: Runs, knot: Scene
     ) -> None:
-        sharp = merged_light_field(runs, scene, "exact")
+        sharp = merged_light_field(runs, knot, "exact")
         for camera, frame in merged.frames.items():
             other = sharp.frames[camera]
             for name in RAYS:
@@ -271,12 +266,12 @@ class TestMerged:
             moved = np.roll(other.image(), 1, axis=1).astype(float) - other.image()
             assert psnr > 10 * np.log10(255**2 / (moved**2).mean()) + 2
 
-    def test_windows_that_leave_the_photograph(self, runs: Runs, scene: Scene) -> None:
+    def test_windows_that_leave_the_photograph(self, runs: Runs, knot: Scene) -> None:
         """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
         wide = runs[0].camera
         narrow = replace(runs[0], camera=replace(wide, hfov=0.8 * wide.hfov))
         for resample in ("exact", "photograph"):
-            bands = list(merge_run(narrow, scene, resample))  # type: ignore[arg-type]
+            bands = list(merge_run(narrow, knot, resample))  # type: ignore[arg-type]
             mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
             place = narrow.camera.project(origin[mirror > 0])
             assert (place >= -1e-6).all()
@@ -286,32 +281,32 @@ class TestMerged:
             assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
             assert not np.concatenate([band.colour for band in bands])[lost].any()
 
-    def test_more_samples_smooth(self, runs: Runs, scene: Scene) -> None:
+    def test_more_samples_smooth(self, runs: Runs, knot: Scene) -> None:
         for resample in ("exact", "photograph"):
             one, many = (
-                np.concatenate([b.colour for b in merge_run(runs[0], scene, resample, n)])
+                np.concatenate([b.colour for b in merge_run(runs[0], knot, resample, n)])
                 for n in (1, 3)
             )
             rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
             assert rough[1] < 0.95 * rough[0]
 
     def test_same_bytes_on_one_thread(
-        self, merged: LightField, runs: Runs, scene: Scene, monkeypatch: pytest.MonkeyPatch
+        self, merged: LightField, runs: Runs, knot: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(tbcad.simulate.parallel, "THREADS", 1)
-        again = merged_light_field(runs, scene)
+        again = merged_light_field(runs, knot)
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
                 assert (plane == again.frames[camera].planes[name]).all()
 
     def test_written_as_a_file(
-        self, merged: LightField, runs: Runs, scene: Scene, tmp_path: Path
+        self, merged: LightField, runs: Runs, knot: Scene, tmp_path: Path
     ) -> None:
         with create_light_field(
             tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}
         ) as store:
             for run in runs:
-                write_camera(store, ball_reflector(run), merge_run(run, scene))
+                write_camera(store, ball_reflector(run), merge_run(run, knot))
         with LightField.open(tmp_path / "field.h5") as found:
             for run in runs:
                 frame, other = (
@@ -323,9 +318,9 @@ class TestMerged:
                 assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
                 assert frame.u == pytest.approx(unit(run.ball_surfaces.apex))
 
-    def test_progress(self, runs: Runs, scene: Scene) -> None:
+    def test_progress(self, runs: Runs, knot: Scene) -> None:
         messages: list[str] = []
-        list(merge_run(runs[0], scene, progress=messages.append))
+        list(merge_run(runs[0], knot, progress=messages.append))
         assert messages[0] == f"stop 1 of {len(runs[0])}"
         assert any(one.startswith("row ") for one in messages)
 

@@ -17,11 +17,6 @@ from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 CAPTURE_MM = 60.0
 
 
-@pytest.fixture(scope="module")
-def tiles(light_field: LightField) -> MirrorTiles:
-    return MirrorTiles(light_field)
-
-
 def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Origins, directions and colours of all captured rays."""
     parts = []

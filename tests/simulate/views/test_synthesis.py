@@ -22,11 +22,6 @@ from tbcad.simulate.views.two_plane import two_plane_along
 SIZE = (160, 120)
 
 
-@pytest.fixture(scope="module")
-def tiles(light_field: LightField) -> MirrorTiles:
-    return MirrorTiles(light_field)
-
-
 def view_from(azimuth: float, elevation: float, distance: float = 640.0) -> Camera:
     return camera_around_object(np.radians(azimuth), np.radians(elevation), distance, 60.0, SIZE)
 

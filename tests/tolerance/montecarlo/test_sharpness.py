@@ -1,5 +1,6 @@
 """Pictures of builds that are off: where their mirrors are, and what calibration gives back."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -176,44 +177,36 @@ def test_boxes_hold_all_pixels(cameras: Cameras) -> None:
     assert lost > 0
 
 
+@pytest.fixture(scope="module")
+def found(cameras: Cameras, scene: Scene, reference: ReferenceViews) -> Callable[..., Sharpness]:
+    """Sharpness of two builds with errors, and with what calibration leaves of them, rad."""
+
+    def of(errors: Errors, residual: float = 0.0) -> Sharpness:
+        return sharpness(cameras, builds(cameras, errors, 2), scene, reference, residual)
+
+    return of
+
+
 class TestSharpness:
-    @staticmethod
-    def found(
-        cameras: Cameras,
-        scene: Scene,
-        reference: ReferenceViews,
-        errors: Errors,
-        left: float = 0.0,
-    ) -> Sharpness:
-        return sharpness(cameras, builds(cameras, errors, 2), scene, reference, left)
-
-    def test_without_errors_all_are_the_designed_one(
-        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
-    ) -> None:
+    def test_without_errors_all_are_the_designed_one(self, found: Callable[..., Sharpness]) -> None:
         """But for rounding in the last digit of a ray that decides between two pixels."""
-        found = self.found(cameras, scene, reference, Errors())
-        assert found.designed.shape == (2,)
-        assert found.uncalibrated.shape == found.calibrated.shape == (2, 2)
-        for table in (found.uncalibrated, found.calibrated):
-            assert table == pytest.approx(np.tile(found.designed, (2, 1)), abs=1e-4)
-        assert 0.5 < found.designed.min() < found.designed.max() < 1
+        same = found(Errors())
+        assert same.designed.shape == (2,)
+        assert same.uncalibrated.shape == same.calibrated.shape == (2, 2)
+        for table in (same.uncalibrated, same.calibrated):
+            assert table == pytest.approx(np.tile(same.designed, (2, 1)), abs=1e-4)
+        assert 0.5 < same.designed.min() < same.designed.max() < 1
 
-    def test_calibration_gives_back_what_errors_cost(
-        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
-    ) -> None:
-        found = self.found(cameras, scene, reference, LARGE, 0.5e-3)
-        assert (found.uncalibrated < found.calibrated).all()
-        assert not np.array_equal(found.calibrated[0], found.calibrated[1])
-        assert (found.uncalibrated < found.designed).all()
-        lost = found.designed - found.uncalibrated
-        assert (np.abs(found.calibrated - found.designed) < lost / 2).all()
+    def test_calibration_gives_back_what_errors_cost(self, found: Callable[..., Sharpness]) -> None:
+        large = found(LARGE, 0.5e-3)
+        assert (large.uncalibrated < large.calibrated).all()
+        assert not np.array_equal(large.calibrated[0], large.calibrated[1])
+        assert (large.uncalibrated < large.designed).all()
+        lost = large.designed - large.uncalibrated
+        assert (np.abs(large.calibrated - large.designed) < lost / 2).all()
 
-    def test_what_calibration_leaves_counts(
-        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
-    ) -> None:
-        exactly, roughly = (
-            self.found(cameras, scene, reference, Errors(), left) for left in (0.0, 0.02)
-        )
+    def test_what_calibration_leaves_counts(self, found: Callable[..., Sharpness]) -> None:
+        exactly, roughly = (found(Errors(), residual) for residual in (0.0, 0.02))
         assert (roughly.calibrated < exactly.calibrated - 0.01).all()
         assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
 

@@ -221,10 +221,6 @@ class TestOwnFile:
     def test_that_is_no_toml(self, file: Path, data: bytes, said: str) -> None:
         assert said in refused(file, data)
 
-    def test_byte_order_mark_and_carriage_returns_are_taken(self, file: Path) -> None:
-        file.write_bytes(b"\xef\xbb\xbf" + table(1, 0).replace("\n", "\r\n").encode())
-        assert load_process(str(file)).name == "even"
-
     def test_that_is_not_there(self, tmp_path: Path) -> None:
         assert "process 'SLA' is neither built in (fdm" in refusal("SLA")
         assert refusal("slaa").endswith("did you mean sla?")

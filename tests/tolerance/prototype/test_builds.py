@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.reflection import sphere_miss_distances
 from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
@@ -27,7 +27,6 @@ from tbcad.tolerance.prototype.windows import (
 )
 from tests.prototype_exports import plan_of
 
-OPTIONS = ["n=6", "prototype.k=5"]
 SPREAD = {
     "ball_radius": Error(0.05),
     "sphere_radius": Error(0.1),
@@ -48,13 +47,8 @@ Runs = tuple[PrototypeRun, PrototypeRun]
 
 
 @pytest.fixture(scope="module")
-def little() -> MirrorDesign:
-    return design(load_spec(None, OPTIONS))
-
-
-@pytest.fixture(scope="module")
-def layout(little: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(little.spec, little)
+def layout(small_design: MirrorDesign) -> PrototypeLayout:
+    return prototype_layout(load_spec(None, ["n=6", "prototype.k=5"]), small_design)
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +57,13 @@ def plan(layout: PrototypeLayout) -> Plan:
 
 
 @pytest.fixture(scope="module")
-def model(little: MirrorDesign, plan: Plan) -> PrototypeModel:
-    return prototype_model(reflectors(little), plan)
+def model(small_design: MirrorDesign, plan: Plan) -> PrototypeModel:
+    return prototype_model(reflectors(small_design), plan)
 
 
 @pytest.fixture(scope="module")
-def runs(little: MirrorDesign, plan: Plan) -> Runs:
-    return prototype_runs(reflectors(little), plan)
+def runs(small_design: MirrorDesign, plan: Plan) -> Runs:
+    return prototype_runs(reflectors(small_design), plan)
 
 
 def draws_of(model: PrototypeModel, count: int, **errors: Error) -> PrototypeDraws:
@@ -277,9 +271,9 @@ class TestMonteCarlo:
 
 
 def test_windows_left_in_their_places_see_less(
-    little: MirrorDesign, plan: Plan, model: PrototypeModel
+    small_design: MirrorDesign, plan: Plan, model: PrototypeModel
 ) -> None:
     """Balls then stand aside of their windows' middles though nothing is off."""
-    fixed = prototype_model(reflectors(little), replace(plan, moved=False))
+    fixed = prototype_model(reflectors(small_design), replace(plan, moved=False))
     apart, together = (coverage_of(one, draws_of(one, 1)) for one in (fixed, model))
     assert np.median(apart) < np.median(together) - 10

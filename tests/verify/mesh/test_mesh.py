@@ -40,16 +40,27 @@ def test_volume_far_from_the_origin_keeps_its_digits() -> None:
     assert found(BOX.triangles + 4096).volume == pytest.approx(30, rel=1e-12)
 
 
-def test_a_hole_leaves_three_open_edges() -> None:
-    box = found(BOX.triangles[1:])
-    assert box.open_edges == 3
-    assert box.status != "NoError"
+TURNED = BOX.triangles.copy()
+TURNED[0] = TURNED[0][::-1]
+LINES = np.array([[[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]])
 
 
-def test_one_facet_turned() -> None:
-    triangles = BOX.triangles.copy()
-    triangles[0] = triangles[0][::-1]
-    assert found(triangles).turned_edges == 3
+@pytest.mark.parametrize(
+    ("triangles", "name", "count"),
+    [
+        (BOX.triangles[1:], "open_edges", 3),
+        (TURNED, "turned_edges", 3),
+        (np.vstack([BOX.triangles, BOX.triangles + 10]), "components", 2),
+        (np.vstack([BOX.triangles, BOX.triangles + np.array([2, 3, 0])]), "crowded_edges", 1),
+        (np.vstack([BOX.triangles[:1], BOX.triangles[:1, ::-1]]), "duplicate", 3),
+        (LINES, "degenerate", 2),
+    ],
+    ids=["a hole", "a facet turned", "two pieces", "they touch", "a facet and its back", "no area"],
+)
+def test_faults_are_counted(triangles: np.ndarray, name: str, count: int) -> None:
+    topology = found(triangles)
+    assert getattr(topology, name) == count
+    assert (topology.status != "NoError") or name != "open_edges"
 
 
 def test_inside_out() -> None:
@@ -62,25 +73,6 @@ def test_stored_normals_that_lie_are_counted() -> None:
     assert examine_topology(mesh_from_facets(lying), lying).stored_normals == 12
     silent = Facets(one.name, 0 * one.normals, one.corners)
     assert examine_topology(mesh_from_facets(silent), silent).stored_normals == 0
-
-
-def test_two_boxes_are_two_pieces() -> None:
-    assert found(np.vstack([BOX.triangles, BOX.triangles + 10])).components == 2
-
-
-def test_an_edge_of_four_facets() -> None:
-    touching = found(np.vstack([BOX.triangles, BOX.triangles + np.array([2, 3, 0])]))
-    assert touching.crowded_edges == 1
-
-
-def test_a_facet_and_its_back_are_doubled() -> None:
-    triangle = BOX.triangles[:1]
-    assert found(np.vstack([triangle, triangle[:, ::-1]])).duplicate == 3
-
-
-def test_facets_without_area() -> None:
-    line = np.array([[[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]])
-    assert found(line).degenerate == 2
 
 
 def test_corners_merge_only_when_equal() -> None:

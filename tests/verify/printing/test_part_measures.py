@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Unknown
 
@@ -148,12 +150,15 @@ def test_holes_through(corners: int) -> None:
     assert found.middle[:, found.diameter.argmin()] == pytest.approx([3, 6.5, 2.5], abs=1e-4)
 
 
-def test_a_blind_hole() -> None:
-    import manifold3d
+def drilled(drill: manifold3d.Manifold) -> PartMeasures:
+    """A block of 20 x 20 x 10 about the origin without the drill."""
+    solid = (manifold3d.Manifold.cube([20, 20, 10], True) - drill).to_mesh()
+    return shape(trimesh.Trimesh(solid.vert_properties[:, :3], solid.tri_verts, process=False))
 
+
+def test_a_blind_hole() -> None:
     drill = manifold3d.Manifold.cylinder(10, 1.5, 1.5, 48).translate([1, 2, 6])
-    solid = (manifold3d.Manifold.cube([20, 20, 10], True) - drill.translate([0, 0, -4])).to_mesh()
-    found = shape(trimesh.Trimesh(solid.vert_properties[:, :3], solid.tri_verts, process=False))
+    found = drilled(drill.translate([0, 0, -4]))
     assert found.holes.diameter == pytest.approx([3], abs=1e-4)
     assert found.holes.middle[:, 0] == pytest.approx([1, 2, 3.5], abs=1e-4)
     assert found.holes.depth == pytest.approx([3], abs=1e-4)
@@ -161,12 +166,9 @@ def test_a_blind_hole() -> None:
 
 def test_a_hole_with_a_round_bottom() -> None:
     """Its wall runs into the bottom without an edge; the wall alone is measured."""
-    import manifold3d
-
     ball = manifold3d.Manifold.sphere(1.5, 48)
     drill = manifold3d.Manifold.hull(ball + ball.translate([0, 0, 20])).translate([1, 2, 1])
-    solid = (manifold3d.Manifold.cube([20, 20, 10], True) - drill).to_mesh()
-    found = shape(trimesh.Trimesh(solid.vert_properties[:, :3], solid.tri_verts, process=False))
+    found = drilled(drill)
     assert found.holes.diameter == pytest.approx([3], abs=0.01)
     assert found.holes.depth == pytest.approx(
         [4], abs=0.3

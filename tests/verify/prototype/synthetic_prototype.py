@@ -183,19 +183,10 @@ def cap(spec: SyntheticPrototype, ball: Ball) -> Any:
 def lathe(line: np.ndarray, top: float, bottom: float, at: np.ndarray, z: np.ndarray) -> Any:
     """A line of (out, up) turned about z, closed by a point at either end; 60 corners round."""
     x = unit(np.cross(z, [0.31, 0.83, 0.46]))
-    turn = 2 * np.pi * np.arange(60) / 60
-    round_ = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
-    rings = [out * round_ + up * z for out, up in line]
-    points = np.vstack([[top * z], *rings, [bottom * z]]) + at
-    faces, last = [], len(points) - 1
-    for k in range(60):
-        m = (k + 1) % 60
-        faces += [(0, 1 + k, 1 + m), (last, last - 60 + m, last - 60 + k)]
-        for ring in range(len(line) - 1):
-            a, b = 1 + 60 * ring, 61 + 60 * ring
-            faces += [(a + k, b + k, b + m), (a + k, b + m, a + m)]
-    mesh = manifold3d.Mesh64(points, np.array(faces, dtype=np.uint64))
-    return manifold3d.Manifold(mesh)
+    profile = np.vstack([[0, bottom], line[::-1], [0, top]])
+    mesh = trimesh.creation.revolve(profile, sections=60)
+    points = mesh.vertices @ np.stack([x, np.cross(z, x), z]) + at
+    return manifold3d.Manifold(manifold3d.Mesh64(points, mesh.faces.astype(np.uint64)))
 
 
 def box(low: Any, high: Any) -> Any:

@@ -360,6 +360,12 @@ def recorded(export: Export, camera: str) -> Floats:
     return export.mirrors.cell_area_mm2[export.mirrors.camera == camera]
 
 
+def spheres(export: Export) -> tuple[Floats, Floats]:
+    """Centres and radii of camera a's mirrors."""
+    mine = export.mirrors.camera == "a"
+    return export.mirrors.columns("cx", 3).T[mine], export.mirrors.radius_mm[mine]
+
+
 @pytest.mark.parametrize("name", list(LINES))
 @pytest.mark.parametrize("camera", ["a", "b"])
 def test_area_as_recorded(name: str, camera: str) -> None:
@@ -437,9 +443,7 @@ def gauss_bonnet(it: ClosedFormCells, centre: Floats, radius: Floats) -> Floats:
 def test_gauss_and_bonnet(name: str) -> None:
     export = as_export(made(name))
     it = cells_of_export(export, "a")
-    mine = export.mirrors.camera == "a"
-    centre = export.mirrors.columns("cx", 3).T[mine]
-    radius = export.mirrors.radius_mm[mine]
+    centre, radius = spheres(export)
     np.testing.assert_allclose(gauss_bonnet(it, centre, radius), it.area, rtol=1e-8)
 
 
@@ -447,9 +451,7 @@ def test_samples_on_a_real_cell() -> None:
     """Corners and points of edges lie on their mirror, in no other ball, beyond no wall."""
     export = as_export(made("n=18"))
     it = cells_of_export(export, "a")
-    mine = export.mirrors.camera == "a"
-    centre = export.mirrors.columns("cx", 3).T[mine]
-    radius = export.mirrors.radius_mm[mine]
+    centre, radius = spheres(export)
     x = it.rim.points[:, :2].reshape(-1, 3)
     depth = np.linalg.norm(x[:, None] - centre, axis=2) - radius
     assert np.abs(depth[np.arange(len(x)), np.repeat(it.rim.mirror, 2)]).max() < 1e-11
