@@ -7,10 +7,10 @@ from pathlib import Path
 import lib3mf
 import numpy as np
 import trimesh
-from OCP.Bnd import Bnd_Box
-from OCP.BRepBndLib import BRepBndLib
 from manifold3d import Manifold, Mesh64
+from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.Geom import Geom_CylindricalSurface

@@ -12,7 +12,6 @@ from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
