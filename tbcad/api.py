@@ -6,7 +6,6 @@ bad input is refused before they are loaded.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -73,17 +72,12 @@ class Design(MirrorDesign):
             InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
         """
         from tbcad.cad.part import as_part
+        from tbcad.prototype.model import build_prototype_model
 
         return {
             printed.name: as_part(printed.name, printed.solid.shape)
-            for printed in self._prototype.printed
+            for printed in build_prototype_model(self).printed
         }
-
-    @cached_property
-    def _prototype(self) -> Any:
-        from tbcad.prototype.model import build_prototype_model
-
-        return build_prototype_model(self)
 
 
 @dataclass(frozen=True)

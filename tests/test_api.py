@@ -64,6 +64,23 @@ def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert len(repr(value)) < 250
 
 
+@pytest.mark.slow
+def test_printed_parts_are_valid_and_assembled() -> None:
+    """The post stands on the axis of the object, below it; the carrier is above the base plate."""
+    settings = {"prototype.k": "4", "prototype.frame.clearance_mm": "1.5"}
+    design = tbcad.design(n=6, settings=settings)
+    parts = design.printed_parts()
+    assert {"carrier", "bearing_head", "camera_bracket"} <= set(parts)
+    assert all(part.is_valid and part.volume > 0 for part in parts.values())
+    assert parts["carrier"].label == "carrier"
+    floor = design.spec.prototype.frame.floor_mm
+    assert all(
+        floor - 1e-6 < part.bounding_box().min.Z
+        for name, part in parts.items()
+        if not name.startswith("coupon")
+    )
+
+
 def test_python_m_tbcad_is_the_command() -> None:
     run = subprocess.run(
         [sys.executable, "-m", "tbcad", "--version"], capture_output=True, text=True, check=False
