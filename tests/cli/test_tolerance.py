@@ -70,6 +70,7 @@ def written(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 class TestWritten:
     def test_files(self, written: Path) -> None:
         assert {path.name for path in written.iterdir()} == FILES

@@ -107,7 +107,6 @@ def test_hopeless_targets_name_the_mirrors() -> None:
     b=st.floats(70, 160),
     capture=st.floats(10, 60),
 )
-@pytest.mark.slow
 def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
     n: int, x: float, y: float, z: float, b: float, capture: float
 ) -> None:

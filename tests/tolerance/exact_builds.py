@@ -100,19 +100,21 @@ def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.nd
         recover(one, cameras[part.camera].pinhole, record.target_mm / 2)
         for one, part in zip(meshes, record.parts, strict=True)
     ]
-    return _least(set_up(record, meshes, found))
+    return _minimum_coverage(set_up(record, meshes, found))
 
 
-def _least(bench: OpticalSetup) -> np.ndarray:
+def _minimum_coverage(setup: OpticalSetup) -> np.ndarray:
     """Minimum coverage by tbcad_verify.shell.coverage, without the check of the seam gaps."""
-    patches, virtual = bench.patches(), bench.virtual
-    mine = [bench.mine(camera) for camera in bench.cameras]
-    outlines = [trace_outline(bench.mesh, patches, one, virtual.halved) for one in mine]
-    lines = [
-        reflect_on_fits(outline, bench.seen(camera))
-        for outline, camera in zip(outlines, bench.cameras, strict=True)
+    virtual, owner, coat = setup.virtual, setup.owner(), setup.export.coating_mm
+    outlines = [
+        trace_outline(setup.mesh, setup.recovery, owner, coat, setup.mine(camera), virtual.halved)
+        for camera in setup.cameras
     ]
-    assert (bench.match.segment >= 0).all()
+    lines = [
+        reflect_on_fits(outline, setup.seen(camera))
+        for outline, camera in zip(outlines, setup.cameras, strict=True)
+    ]
+    assert (setup.match.segment >= 0).all()
     pairs = zip(outlines, lines, strict=True)
     return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 

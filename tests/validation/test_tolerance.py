@@ -273,7 +273,6 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.parametrize(("errors", "builds"), [(COARSE, range(20)), (POSED, range(20, 24))])
-@pytest.mark.slow
 def test_random_builds_against_the_verification_of_their_meshes(
     halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, builds: range
 ) -> None:

@@ -59,6 +59,7 @@ def rims(base: BaseLayout) -> np.ndarray:
     return (seats.centre[:, None] + ends)[:, :, None] + around[:, None]
 
 
+@pytest.mark.slow
 class TestPlanes:
     def test_a_base_that_fits_stays_whole(
         self, small_prototype: PrototypeLayout, paper_prototype: PrototypeLayout

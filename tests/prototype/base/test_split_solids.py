@@ -82,7 +82,6 @@ def check_pads(cut: Cut) -> None:
             assert area[near] == pytest.approx([np.pi * pad**2], rel=1e-6)
 
 
-@pytest.mark.slow
 class TestSmall:
     def test_pieces(self, small: Cut) -> None:
         check_pieces(small)
