@@ -269,13 +269,13 @@ def capture(
     """
     from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 
-    taken = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
+    photographs = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
     if out is not None:
-        write_photographs(taken, Path(out), force, progress)
+        write_photographs(photographs, Path(out), force, progress)
         return LightField.read(Path(out))
     progress("photographs and light field")
-    bands = ((reflector, bands()) for reflector, bands in taken.cameras)
-    return light_field_in_memory(bands, taken.capture_mm, taken.facts)
+    bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
+    return light_field_in_memory(bands, photographs.capture_mm, photographs.facts)
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ def photograph(
     progress("object and scene")
     export = read_export(Path(exports))
     subject = load_or_built_in(object_file, export.capture_mm, fit, paint)
-    taken = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
+    cameras = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
     facts = {
         "object": subject.name,
         "design": export.spec.name,
@@ -322,11 +322,11 @@ def photograph(
         "geometry": geometry,
         "samples": samples,
     }
-    return Photographs(taken, subject, export.capture_mm, facts)
+    return Photographs(cameras, subject, export.capture_mm, facts)
 
 
 def write_photographs(
-    taken: Photographs, out: Path, force: bool, progress: Progress
+    photographs: Photographs, out: Path, force: bool, progress: Progress
 ) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
     from tbcad.output.folder import replacing
@@ -335,7 +335,13 @@ def write_photographs(
 
     progress("photographs and light field")
     with replacing(out, force) as folder:
-        record = write_capture(folder, taken.cameras, taken.subject, taken.capture_mm, taken.facts)
+        record = write_capture(
+            folder,
+            photographs.cameras,
+            photographs.subject,
+            photographs.capture_mm,
+            photographs.facts,
+        )
         write_manifest(folder)
     return record
 

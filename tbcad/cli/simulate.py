@@ -77,14 +77,14 @@ def capture(
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, force)
     with stages(3) as screen:
-        taken = photograph(
+        photographs = photograph(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
         )
-        record = write_photographs(taken, out, force, screen.stage)
+        record = write_photographs(photographs, out, force, screen.stage)
     for camera, counts in record["cameras"].items():
         seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
         typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
-    typer.echo(f"{out}: {taken.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
+    typer.echo(f"{out}: {photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
     return 0
 
 

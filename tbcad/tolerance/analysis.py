@@ -137,6 +137,13 @@ class Analysis:
     sharpness: Sharpness
     prototype: PrototypeYield | None
 
+    def __repr__(self) -> str:
+        """Return process, number of builds and yield."""
+        builds = len(self.result.worst)
+        return (
+            f"<Analysis of {self.process.name}: yield {self.estimate.share:.1%} of {builds} builds>"
+        )
+
     @property
     def estimate(self) -> YieldEstimate:
         """Share of good builds."""

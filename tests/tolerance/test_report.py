@@ -97,6 +97,9 @@ class TestWords:
         said, worst = summary_text(analysis), analysis.result.worst
         share = estimate_yield(worst, TARGET)
         assert 0 < share.share < 1
+        assert (
+            repr(analysis) == f"<Analysis of sla: yield {share.share:.1%} of {len(worst)} builds>"
+        )
         assert percent(r"^Built by sla \(.*?\), ", said) == pytest.approx(
             100 * share.share, abs=0.05
         )
