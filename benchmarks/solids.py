@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import manifold3d
@@ -16,8 +17,7 @@ from tbcad.cad.brep import Solid
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
 from tbcad.optics.cells import cells_of
 from tbcad.optics.power_diagram import bounded_triangulation
-from tbcad.shell.envelope import closing_envelope
-from tbcad.shell.solid import shell_solid
+from tbcad.shell.files import camera_solid, shell_envelope
 from tbcad.spec.load import load_spec
 
 SEGMENTS = 64
@@ -66,17 +66,12 @@ def shells(made: MirrorDesign) -> list[Solid]:
     """
     half = made.halves[0]
     every, faces = numbered_directions(made.spec.optics.n)
-    triangles, boundary = bounded_triangulation(
-        faces, every, (every[:, 0] >= 0) & (every[:, 2] >= 0)
-    )
-    cells = cells_of(half.modelled_cells.surfaces, boundary, triangles)
-    closing = closing_envelope(made.spec.shell, cells, half.ellipsoid)
-    return [
-        shell_solid(
-            f"shell_{one.camera_id}", one.ids, cells, closing, mirrored=one.camera_id == "b"
-        )
-        for one in made.halves
-    ]
+    upper = (every[:, 0] >= 0) & (every[:, 2] >= 0)
+    triangles = bounded_triangulation(faces, every, upper)
+    first = replace(half, modelled_cells=cells_of(half.modelled_cells.surfaces, triangles))
+    design = replace(made, halves=(first, made.halves[1]))
+    envelope = shell_envelope(design)
+    return [camera_solid(design, one, envelope) for one in design.halves]
 
 
 def spheres(half: MirrorArray) -> list[tuple[list[float], float]]:

@@ -110,7 +110,7 @@ def _cells(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     curvature = half.mirrors.curvature / (1 + radius * half.mirrors.curvature)
     walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
     spheres = Surfaces(apex, half.mirrors.normal, curvature)
-    return cells_of(spheres.joined(walls), half.cells.boundary, half.cells.triangles)
+    return cells_of(spheres.joined(walls), half.cells.triangles)
 
 
 def _measured(record: Export) -> np.ndarray:
