@@ -80,7 +80,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file to write (default: results/NAME.json)")
     options = parser.parse_args()
     out = options.out or RESULTS / ("simulation.json" if options.export else "all.json")
-    record = {**circumstances(options.rounds), "rows": []}
+    about, finished = circumstances(options.rounds), list[dict[str, object]]()
+    out.parent.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if options.export:
@@ -90,9 +91,10 @@ def main() -> None:
         for part in parts:
             sys.stdout.writelines(f"{row}\n" for row in part)
             sys.stdout.flush()
-            record["rows"] += [asdict(row) for row in part]
-    out.parent.mkdir(exist_ok=True)
-    out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+            finished += [asdict(row) for row in part]
+            # After each part: a run that is stopped keeps what it has measured.
+            text = json.dumps({**about, "rows": finished}, indent=1) + "\n"
+            out.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
