@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.scene.object import SceneObject
+    from tbcad.simulate.scene.object import Paint, SceneObject
     from tbcad.tolerance.analysis import Analysis, ToleranceOptions
 
 Settings = Mapping[str, str] | Sequence[str]
@@ -240,7 +240,7 @@ def capture(
     out: Path | str | None = None,
     geometry: "Geometry" = "spheres",
     fit: bool = False,
-    paint: Literal["own", "pattern", "plain"] = "own",
+    paint: "Paint" = "own",
     samples: int = 1,
     force: bool = False,
     progress: Progress = silent,
@@ -300,7 +300,7 @@ def photograph(
     object_file: Path | str | None,
     geometry: "Geometry",
     fit: bool,
-    paint: Literal["own", "pattern", "plain"],
+    paint: "Paint",
     samples: int,
     progress: Progress,
     detail: Progress,
