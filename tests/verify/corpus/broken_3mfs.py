@@ -86,6 +86,36 @@ def liar(folder: Path) -> Sequence[str]:
     return ()
 
 
+def assembled(transform: str, copies: int = 1) -> Callable[[str], str]:
+    """The mesh is right; what is built is another object, which places it."""
+    component = f'<component objectid="1" transform="{transform}"/>' * copies
+
+    def how(model: str) -> str:
+        whole = f'<object id="2" type="model"><components>{component}</components></object>'
+        model = model.replace("</resources>", whole + "</resources>")
+        return model.replace('<item objectid="1"', '<item objectid="2"')
+
+    return how
+
+
+def lattice(model: str) -> str:
+    """Beams between the mesh's corners, which slicers that know them print."""
+    beams = (
+        '<b:beamlattice minlength="0.1" radius="1" clippingmode="none"><b:beams>'
+        '<b:beam v1="0" v2="1"/></b:beams></b:beamlattice>'
+    )
+    return model.replace("</mesh>", f"{beams}</mesh>")
+
+
+def typed(kind: str) -> Callable[[str], str]:
+    return swapped('type="model"', f'type="{kind}"')
+
+
+def second(found: dict[str, bytes]) -> dict[str, bytes]:
+    """Another model beside the first."""
+    return {**found, "3D/other.model": found[MODEL]}
+
+
 def renamed(data: bytes) -> bytes:
     """The directory has the model's name, the member itself another; some programs read that."""
     return data.replace(b"3D/3dmodel.model", b"3D/3dmodel.modem", 1)
@@ -121,4 +151,48 @@ THREEMFS: tuple[Mutation, ...] = (
     refused("3MF placed mirrored", "3MF", text(placed("-1 0 0 0 1 0 0 0 1 0 0 0")), NAME, PLACE),
     refused("3MF with nothing to print", "3MF", text(nothing), NAME, PLACE),
     refused("3MF printed twice", "3MF", text(twice), NAME, PLACE),
+    *(
+        refused(f"3MF of a component {what}", "3MF", text(assembled(move, copies)), NAME, "object")
+        for what, move, copies in (
+            ("as it is", "1 0 0 0 1 0 0 0 1 0 0 0", 1),
+            ("in inches", "25.4 0 0 0 25.4 0 0 0 25.4 0 0 0", 1),
+            ("mirrored", "-1 0 0 0 1 0 0 0 1 0 0 0", 1),
+            ("moved", "1 0 0 0 1 0 0 0 1 10 0 0", 1),
+            ("twice", "1 0 0 0 1 0 0 0 1 0 0 0", 2),
+        )
+    ),
+    *(
+        refused(f"3MF of type {kind}", "3MF", text(typed(kind)), NAME, f'type="{kind}"')
+        for kind in ("support", "surface", "solidsupport", "other")
+    ),
+    refused("3MF with a beam lattice", "3MF", text(lattice), NAME, "beamlattice"),
+    refused("3MF with a second model", "3MF", members(second), NAME, "3D/other.model"),
+    refused(
+        "3MF with a colour on a facet",
+        "3MF",
+        text(first_triangle(lambda t: t.replace("/>", 'pid="1"/>'))),
+        NAME,
+        "with v1, v2, v3 only",
+    ),
+    refused(
+        "3MF with a comment",
+        "3MF",
+        text(swapped("<vertices>", "<vertices><!-- -->")),
+        NAME,
+        "comments",
+    ),
+    refused(
+        "3MF that asks for an extension",
+        "3MF",
+        text(swapped("<model ", '<model requiredextensions="b" ')),
+        NAME,
+        "requiredextensions",
+    ),
+    refused(
+        "3MF with an object that is not built",
+        "3MF",
+        text(swapped("</resources>", '<object id="2"><mesh/></object></resources>')),
+        NAME,
+        "resources must hold object",
+    ),
 )
