@@ -10,6 +10,7 @@ import csv
 import hashlib
 import io
 import json
+import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -18,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+PAPER = Path(__file__).parents[2] / "designs" / "turtleback.toml"
+MANIFEST_SCHEMA = "tbcad-manifest/1"
 PIN = np.array([100.0, 0.0, -100.0])
 B = 100.0
 FOOT = -12.0
@@ -363,16 +366,7 @@ def document(design: Design) -> dict[str, Any]:
     ]
     return {
         "schema": "tbcad-design/2",
-        "spec": {
-            "optics": {
-                "n": design.n,
-                "capture_diameter_mm": design.target,
-                "camera_mm": [100.0, 0.0, -100.0],
-                "semi_minor_mm": B,
-            },
-            "camera": sensor,
-            "mirrors": {"coating_um": 1000 * design.coating},
-        },
+        "spec": spec(design, sensor),
         "target_mm": design.target,
         "coating_mm": design.coating,
         "foot_z_mm": FOOT,
@@ -380,6 +374,20 @@ def document(design: Design) -> dict[str, Any]:
         "parts": [{"name": f"shell_{c}", "camera": c, "stl": f"shell_{c}.stl"} for c in ("a", "b")],
         "mirrors": "mirrors.csv",
     }
+
+
+def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
+    """Every key of the paper's design, and the values of this one."""
+    value = tomllib.loads(PAPER.read_text(encoding="utf-8"))
+    value["optics"] = {
+        "n": design.n,
+        "capture_diameter_mm": design.target,
+        "camera_mm": [100.0, 0.0, -100.0],
+        "semi_minor_mm": B,
+    }
+    value["camera"] = sensor
+    value["mirrors"]["coating_um"] = 1000 * design.coating
+    return value
 
 
 def write(folder: Path, files: dict[str, bytes]) -> Path:
@@ -398,7 +406,7 @@ def sign(folder: Path, names: Iterable[str] | None = None) -> Path:
     ):
         data = (folder / name).read_bytes()
         entries[name] = {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
-    (folder / "manifest.json").write_text(json.dumps({"files": entries}))
+    (folder / "manifest.json").write_text(json.dumps({"schema": MANIFEST_SCHEMA, "files": entries}))
     return folder
 
 

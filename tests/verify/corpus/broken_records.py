@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tests.verify.corpus.mutation import Mutation, fails, refused
 from tests.verify.corpus.record_changes import (
     JSON,
+    MANIFEST,
     TABLE,
     angle,
     apex,
@@ -20,8 +23,10 @@ from tests.verify.corpus.record_changes import (
     first_part,
     foot,
     half,
+    json_file,
     leave_out,
     lines,
+    loose,
     mirror,
     mirrors,
     no_meshes,
@@ -29,6 +34,8 @@ from tests.verify.corpus.record_changes import (
     other_design,
     pixels,
     radius,
+    second_column,
+    second_key,
     shift_camera,
     shift_one,
     skew,
@@ -76,7 +83,7 @@ RECORDS: tuple[Mutation, ...] = (
     fails("cameras turned by 30 degrees", JSON, design(turn(30)), "frame margin"),
     fails("another view angle", JSON, design(angle(0.99, False)), "requirements", "hfov"),
     fails("a view angle half as wide, spec too", JSON, design(angle(0.5, True)), "frame margin"),
-    fails("a sensor of 16 x 12 pixels, spec too", JSON, design(pixels), "pixels, minimum"),
+    fails("a sensor of 16 x 16 pixels, spec too", JSON, design(pixels), "pixels, minimum"),
     fails("a coat that is not there", JSON, design(coat), "radius error", "0.0200 mm"),
     fails("a coat that is not there, by STEP", JSON, design(coat), "step surfaces", "0.02 mm"),
     fails("a target not met", JSON, target(beyond_the_worst, True), "coverage, spheres"),
@@ -90,8 +97,37 @@ RECORDS: tuple[Mutation, ...] = (
     ),
     fails("the foot 10 um higher", JSON, design(foot), "step cells"),
     fails("another n in the spec", JSON, design(subdivision), "directions", "without a mirror"),
-    Mutation(
-        "a spec that asks nothing", JSON, design(nothing_asked), 1, ("requirements",), (), True
+    fails("a mesh error of 5 mm", JSON, design(loose(5.0)), "requirements", "mesh error"),
+    refused(
+        "a mesh error of 50 mm",
+        JSON,
+        design(loose(50.0)),
+        "spec.mesh.structure_error_mm is 50.0, allowed is a number from 0.002 to 5",
+    ),
+    refused("a spec that asks nothing", JSON, design(nothing_asked), "spec.optics is missing"),
+    refused(
+        "a second column of the same name",
+        TABLE,
+        as_text(TABLE, second_column),
+        "column radius_mm is there twice",
+    ),
+    refused(
+        "a second target", JSON, as_text(JSON, second_key("target_mm", "1.0")), "key target_mm is"
+    ),
+    replace(
+        refused(
+            "a second list of files",
+            MANIFEST,
+            as_text(MANIFEST, second_key("files", "{}")),
+            "key files is there twice",
+        ),
+        signed=False,
+    ),
+    refused(
+        "a manifest of another program",
+        MANIFEST,
+        json_file(MANIFEST, lambda m: m.update(schema="x")),
+        "schema is x, this version verifies tbcad-manifest/1",
     ),
     fails("a part forgotten", JSON, design(no_meshes), "mirrors found", "missing: b0001"),
     fails("no STEP in the record", JSON, design(without("step")), "manifest", "shell_a.step"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.verify.corpus.mutation import Mutation, fails
-from tests.verify.corpus.record_changes import JSON, TABLE, Design, Row, design, mirror
+from tests.verify.corpus.record_changes import TABLE, Row, mirror
 
 
 def coverage(one: Row) -> None:
@@ -11,12 +11,6 @@ def coverage(one: Row) -> None:
     one["coverage_mm"] *= 1.05
 
 
-def loose(value: Design) -> None:
-    """A mesh error of 5 mm in the spec, which widens what STEP and mesh may differ by."""
-    value["spec"]["mesh"]["structure_error_mm"] = 5.0
-
-
 HOLES: tuple[Mutation, ...] = (
     fails("a mirror's recorded coverage", TABLE, mirror(coverage), "figures"),
-    fails("a mesh error of 5 mm", JSON, design(loose), "requirements"),
 )

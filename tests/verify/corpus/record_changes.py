@@ -17,7 +17,7 @@ from tests.verify.corpus.patches import balls
 
 Design = dict[str, Any]
 Row = dict[str, Any]
-JSON, TABLE = "design.json", "mirrors.csv"
+JSON, TABLE, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
 
 
 def mirrors(how: Callable[[list[Row], str], object], named: int = 1) -> Job:
@@ -124,6 +124,26 @@ def figure(key: str) -> Callable[[Row], None]:
     return how
 
 
+def loose(mesh_error_mm: float) -> Callable[[Design], None]:
+    """A mesh error in the spec, which would widen what STEP and mesh may differ by."""
+
+    def how(value: Design) -> None:
+        value["spec"]["mesh"]["structure_error_mm"] = mesh_error_mm
+
+    return how
+
+
+def second_column(data: bytes) -> bytes:
+    """Radii once more, of which another program may read the last."""
+    head, *rows = data.splitlines()
+    return b"\n".join([head + b",radius_mm", *(row + b",99.0" for row in rows)]) + b"\n"
+
+
+def second_key(key: str, value: str) -> Callable[[bytes], bytes]:
+    """A key of a JSON object once more, before the others."""
+    return lambda data: data.replace(b"{", f'{{"{key}": {value},'.encode(), 1)
+
+
 def cell(one: Row) -> None:
     """A cell's area wrong by a ten thousandth."""
     one["cell_area_mm2"] *= 1.0001
@@ -178,7 +198,7 @@ def angle(share: float, echo: bool) -> Callable[[Design], None]:
 def pixels(value: Design) -> None:
     """A sensor so coarse that some mirrors have no pixel."""
     for owner in (*value["cameras"], value["spec"]["camera"]):
-        owner["width_px"], owner["height_px"] = 16, 12
+        owner["width_px"], owner["height_px"] = 16, 16
 
 
 def coat(value: Design) -> None:

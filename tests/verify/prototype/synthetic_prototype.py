@@ -384,6 +384,7 @@ def export(folder: Path, spec: SyntheticPrototype) -> Path:
     record = poses(design)
     mirrors = rows(design, record)
     found = document(design)
+    found["spec"]["prototype"]["picture"] = "moved" if spec.moved else "fixed"
     files: dict[str, bytes] = {"mirrors.csv": table(mirrors)}
     if spec.shell:
         a = solid(Cells(design, record))

@@ -311,7 +311,7 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
         ),
     )
     mesh = {"chord_error_mm": 0.01, "structure_error_mm": 0.02}
-    edit_json(folder / "design.json", lambda design: design["spec"].update(mesh=mesh))
+    edit_json(folder / "design.json", lambda design: design["spec"]["mesh"].update(mesh))
     return sign(folder)
 
 

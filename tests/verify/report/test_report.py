@@ -26,7 +26,6 @@ from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
 
-from tests.exported_files import edit_json
 from tests.verify.corpus.broken_meshes import MESHES
 from tests.verify.corpus.broken_records import RECORDS
 from tests.verify.corpus.trial import HERE, attempt
@@ -248,14 +247,6 @@ def test_everything_optical_is_unknown_without_a_setup(
     names = {check.name for check in report.checks if check.passed is None}
     assert {"mirrors found", "coverage, facets", "light paths"} <= names
     assert "watertight" not in names
-
-
-def test_a_spec_without_its_keys_is_unknown(export_folder: Path) -> None:
-    edit_json(export_folder / "design.json", lambda design: design["spec"].pop("optics"))
-    report = verify(sign(export_folder), options=IN_PROCESS)
-    unknown = {check.name for check in report.checks if check.passed is None}
-    assert unknown == {"requirements", "poses", "figures", "directions"}
-    assert not report.passed
 
 
 @pytest.mark.parametrize(("n", "upper"), [(1, 8), (4, 89), (18, 1657)])

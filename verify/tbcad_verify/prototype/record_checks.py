@@ -20,6 +20,7 @@ from tbcad_verify.report.checks import (
 )
 from tbcad_verify.types import Bools, Floats
 
+PAD_UM = 10.0  # largest error of a ball's centre that its pads may cause
 TOLERANCE = 1e-9  # mm, radians, and of unit vectors
 CHECKS = (
     ("prototype requirements", RECORD, "unlike the design"),
@@ -42,9 +43,8 @@ def _requirements(name: CheckName, context: PrototypeContext) -> Check:
         "seats": _off_unit(np.array([seat.axis for seat in prototype.seats])),
         "pads": _off_unit(np.array([seat.normals for seat in prototype.seats])),
     }
-    spec = export.spec.get("prototype")
-    if isinstance(spec, dict) and "picture" in spec:
-        errors["picture"] = float((spec["picture"] == "moved") != prototype.moved)
+    errors["picture"] = float(export.spec.prototype.picture != prototype.picture)
+    errors["target_pad_um"] = float(prototype.pad_um > PAD_UM)
     wrong = sorted(what for what, error in errors.items() if not error <= TOLERANCE)
     return at_most(name, len(wrong), 0, f"not as designed: {short_list(wrong)}")
 

@@ -12,6 +12,7 @@ from tbcad_verify.mesh.segments import half_edge_vectors
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import distance_to_facets
+from tbcad_verify.prototype.record_checks import PAD_UM
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -84,7 +85,7 @@ def checks(
 ) -> list[Check]:
     """Centres against the record, contacts against the pads, balls against the base."""
     centre, pads, clear, clearance = names
-    error, limit = centre_errors(context, seats), context.prototype.pad_um
+    error, limit = centre_errors(context, seats), PAD_UM
     missing = [f"ball {k}: {seat.reason}" for k, seat in enumerate(seats, 1) if seat.reason]
     margin = np.array([seat.margin for seat in seats])
     gap = np.array([seat.clear for seat in seats])

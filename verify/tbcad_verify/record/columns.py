@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, Va
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, FileBytes
-from tbcad_verify.record.validation import allowed, array, fault
+from tbcad_verify.record.validation import allowed, array, fault, shown
 from tbcad_verify.types import Floats, Ints
 
 FIRST_ROW = 2  # its line in the file, below the header line
@@ -61,6 +61,9 @@ class Columns(BaseModel):
         if tuple(header[: len(names)] if cls.may_be_wider else header) != names:
             start = ",".join(names[:5])
             raise BadExport(f"{blob.name}: the first line must be {start}...; {AGAIN}")
+        twice = sorted({name for name in header if header.count(name) > 1})
+        if twice:
+            raise BadExport(f"{blob.name}: column {shown(twice[0])} is there twice; {AGAIN}")
         for line, row in enumerate(rows, FIRST_ROW):
             if len(row) != len(header):
                 raise BadExport(

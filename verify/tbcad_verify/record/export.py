@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -18,6 +18,7 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.prototype import RECORD, Printed, Prototype, read_prototype
+from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, Spec
 from tbcad_verify.record.validation import (
     Name,
     PartFiles,
@@ -28,7 +29,7 @@ from tbcad_verify.record.validation import (
 )
 from tbcad_verify.types import Floats
 
-SCHEMA = "tbcad-design/2"
+SCHEMA, MANIFEST_SCHEMA = "tbcad-design/2", "tbcad-manifest/1"
 DESIGN, MIRRORS, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
 TEXTS = (DESIGN, MIRRORS, MANIFEST)
 MOST = 1000  # cameras or parts
@@ -95,7 +96,7 @@ class Part(PartFiles):
 class Design(Strict):
     """design.json: see `Export`."""
 
-    spec: dict[str, Any]
+    spec: Spec
     target_mm: float = Field(ge=1e-3, le=1e6)
     coating_mm: float = Field(ge=0, le=1e3)
     foot_z_mm: float = Field(ge=-1e6, le=1e6)
@@ -143,7 +144,7 @@ class Export:
 
     Attributes:
         folder: resolved path.
-        spec: the resolved design, as written.
+        spec: the resolved design.
         target_mm: diameter that every virtual camera must see.
         coating_mm: thickness of the reflecting coat over the meshed surface.
         foot_z_mm: height of the foot plane.
@@ -156,7 +157,7 @@ class Export:
     """
 
     folder: Path
-    spec: Mapping[str, Any]
+    spec: Spec
     target_mm: float
     coating_mm: float
     foot_z_mm: float
@@ -184,16 +185,12 @@ class Export:
     @property
     def semi_minor_mm(self) -> float:
         """Semi-minor axis of the ellipsoid."""
-        return float(self.spec["optics"]["semi_minor_mm"])
+        return self.spec.optics.semi_minor_mm
 
     @property
     def mesh_error_mm(self) -> float:
-        """Largest distance from mesh to exact surface the spec allows, mm; NaN if not given."""
-        mesh = self.spec.get("mesh")
-        keys = ("chord_error_mm", "structure_error_mm")
-        values = [mesh.get(key) for key in keys] if isinstance(mesh, dict) else [None]
-        good = all(isinstance(value, int | float) for value in values)
-        return float(max(values)) if good else math.nan  # type: ignore[type-var, arg-type]
+        """Largest distance from mesh to exact surface that is allowed, mm."""
+        return min(self.spec.mesh.largest_mm, LARGEST_MESH_ERROR_MM)
 
 
 def read_export(folder: Path) -> Export:
@@ -205,11 +202,11 @@ def read_export(folder: Path) -> Export:
     root = open_folder(folder)
     texts = {name: read(root, name, MAX_TEXT_BYTES) for name in TEXTS}
     design = validated(DESIGN, Design, parse_json(texts[DESIGN], SCHEMA))
-    manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST])).digests()
+    manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST], MANIFEST_SCHEMA))
     cameras = {camera.id: camera for camera in design.cameras}
     digests = {name: blob.digest for name, blob in texts.items()}
     prototype = None
-    if RECORD in manifest or (root / RECORD).exists():
+    if RECORD in manifest.files or (root / RECORD).exists():
         prototype = read_prototype(root, cameras)
         digests |= prototype.digests
     _check_parts(design, prototype)
@@ -222,7 +219,7 @@ def read_export(folder: Path) -> Export:
         cameras=cameras,
         parts=tuple(design.parts),
         mirrors=Mirrors.read(texts[MIRRORS]),
-        manifest=manifest,
+        manifest=manifest.digests(),
         digests=digests,
         prototype=prototype,
     )

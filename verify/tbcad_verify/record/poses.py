@@ -14,6 +14,7 @@ from tbcad_verify.mesh.lines import axis_frame, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -90,7 +91,7 @@ def figure_errors(export: Export) -> Floats:
     Source: DESIGN.md section 2.
     """
     mirrors = export.mirrors
-    vertices = geodesic(int(export.spec["optics"]["n"]))
+    vertices = geodesic(export.spec.optics.n)
     errors = np.full(len(mirrors), np.inf)
     for camera in export.cameras.values():
         rows = np.flatnonzero(mirrors.camera == camera.id)
@@ -109,7 +110,7 @@ def missing_directions(export: Export) -> tuple[list[str], int]:
     """
     misplaced: list[str] = []
     missing = 0
-    vertices = geodesic(int(export.spec["optics"]["n"]))
+    vertices = geodesic(export.spec.optics.n)
     for camera in export.cameras.values():
         side = np.sign(camera.pinhole[0])
         expected = vertices[:, (vertices[2] > -ON_SEAM) & (side * vertices[0] > -ON_SEAM)]
@@ -122,23 +123,25 @@ def missing_directions(export: Export) -> tuple[list[str], int]:
 
 def contradictions(export: Export) -> list[str]:
     """Names of what the record has otherwise than the spec that it carries."""
-    optics, sensor = export.spec["optics"], export.spec["camera"]
+    optics, sensor = export.spec.optics, export.spec.camera
     pairs = {
-        "target_mm": (export.target_mm, optics["capture_diameter_mm"]),
-        "coating_mm": (export.coating_mm, export.spec["mirrors"]["coating_um"] / 1000),
+        "target_mm": (export.target_mm, optics.capture_diameter_mm),
+        "coating_mm": (export.coating_mm, export.spec.mirrors.coating_um / 1000),
     }
     for camera in export.cameras.values():
-        mirrored = camera.pinhole * np.sign([camera.pinhole[0] * optics["camera_mm"][0], 1, 1])
+        mirrored = camera.pinhole * np.sign([camera.pinhole[0] * optics.camera_mm[0], 1, 1])
         pairs |= {
-            f"camera {camera.id} pinhole {k}": (mirrored[k], optics["camera_mm"][k])
-            for k in range(3)
+            f"camera {camera.id} pinhole {k}": (mirrored[k], optics.camera_mm[k]) for k in range(3)
         }
         pairs |= {
-            f"camera {camera.id} width": (camera.width, sensor["width_px"]),
-            f"camera {camera.id} height": (camera.height, sensor["height_px"]),
-            f"camera {camera.id} hfov": (np.degrees(camera.hfov), sensor["hfov_deg"]),
+            f"camera {camera.id} width": (camera.width, sensor.width_px),
+            f"camera {camera.id} height": (camera.height, sensor.height_px),
+            f"camera {camera.id} hfov": (np.degrees(camera.hfov), sensor.hfov_deg),
         }
-    return sorted(name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC)
+    wrong = [name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC]
+    if export.spec.mesh.largest_mm > LARGEST_MESH_ERROR_MM:
+        wrong.append(f"a mesh error of more than {LARGEST_MESH_ERROR_MM:g} mm in the spec")
+    return sorted(wrong)
 
 
 def geodesic(n: int) -> Floats:

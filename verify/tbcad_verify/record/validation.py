@@ -108,23 +108,25 @@ class PartFiles(Strict):
     threemf: FileOrNone = Field("", alias="3mf")
 
 
-def parse_json(blob: FileBytes, schema: str = "") -> dict[str, Any]:
+def parse_json(blob: FileBytes, schema: str) -> dict[str, Any]:
     """The JSON object in a file.
 
     Args:
         blob: the file.
-        schema: that the object must name; empty: none.
+        schema: that the object must name.
 
     Raises:
-        BadExport: broken JSON, NaN or infinities, no object, or another schema.
+        BadExport: broken JSON, NaN or infinities, a key twice, no object, or another schema.
     """
     try:
-        value = json.loads(blob.text(), parse_constant=_refuse_constant)
+        value = json.loads(
+            blob.text(), parse_constant=_refuse_constant, object_pairs_hook=_refuse_doubles
+        )
     except (ValueError, RecursionError) as error:
         raise BadExport(f"{blob.name}: broken JSON ({error}); {AGAIN}") from error
     if not isinstance(value, dict):
         raise BadExport(f"{blob.name}: must be a JSON object; {AGAIN}")
-    if schema and value.get("schema") != schema:
+    if value.get("schema") != schema:
         raise BadExport(
             f"{blob.name}: schema is {shown(value.get('schema'))}, this version verifies {schema}; "
             f"{AGAIN} of this version"
@@ -233,6 +235,16 @@ def _list_words(node: dict[str, Any]) -> str:
     count = f"{least}" if least == most else f"{least} to {most}" if most else f"{least} or more"
     inner = node.get("items") or (node.get("prefixItems") or [{}])[0]
     return f"a list of {count}, each {_words(inner)}"
+
+
+def _refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The object; programs differ in which of two values with the same key they take."""
+    value = dict(pairs)
+    if len(value) != len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"key {shown(twice)} is there twice")
+    return value
 
 
 def _refuse_constant(constant: str) -> float:

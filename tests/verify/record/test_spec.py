@@ -1,0 +1,80 @@
+"""The verification knows the same keys of a design as tbcad, with the same ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+from tbcad_verify.record.spec import Spec
+
+from tbcad.spec.design import Spec as DesignSpec
+from tests.verify.corpus.mutation import refused
+from tests.verify.corpus.record_changes import JSON, design
+
+LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minItems", "maxItems")
+# Chosen by a build, so that an export has numbers; checked in words instead of ranges by tbcad.
+CHOSEN = {"prototype.k", "prototype.base.pad_angle_deg", "prototype.base.hold", "camera.hfov_deg"}
+IN_WORDS = {"prototype.stage.leds_mm", "prototype.catalogues", "schema"}
+
+
+def keys(model: type[BaseModel]) -> dict[str, Any]:
+    """What is said of every key, by its path."""
+    whole = model.model_json_schema()
+
+    def walk(node: dict[str, Any], path: str) -> Iterator[tuple[str, Any]]:
+        if "$ref" in node:
+            node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+        if "properties" not in node:
+            yield path, node
+        for key, inner in node.get("properties", {}).items():
+            yield from walk(inner, f"{path}.{key}".strip("."))
+
+    return dict(walk(whole, ""))
+
+
+def allowed(node: dict[str, Any]) -> list[object]:
+    """Limits and choices, those of a list's items too."""
+    inner = [*node.get("prefixItems", ()), *([node["items"]] if node.get("items") else ())]
+    unique = [allowed(one) for one in inner]
+    return [
+        [node[limit] for limit in LIMITS if limit in node],
+        sorted(node.get("enum", ())),
+        node.get("pattern"),
+        unique[:1] if unique[1:] == unique[:-1] else unique,
+    ]
+
+
+OURS, THEIRS = keys(Spec), keys(DesignSpec)
+
+
+def test_the_keys_are_those_of_a_design() -> None:
+    assert OURS.keys() == THEIRS.keys()
+    assert OURS.keys() >= CHOSEN | IN_WORDS
+
+
+@pytest.mark.parametrize("key", sorted(OURS.keys() - CHOSEN - IN_WORDS))
+def test_ranges_are_those_of_a_design(key: str) -> None:
+    assert allowed(OURS[key]) == allowed(THEIRS[key])
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("optics", "n", 61),
+        ("camera", "hfov_deg", "fit"),
+        ("shell", "wall_mm", 0.3),
+        ("mesh", "chord_error_mm", 1.5),
+        ("mirrors", "radius_rule", "round"),
+        ("prototype", "grade", "G1"),
+    ],
+)
+def test_a_value_outside_its_range_is_refused(
+    export_folder: Any, section: str, key: str, value: object
+) -> None:
+    from tests.verify.record.test_bad_input import test_broken_export_is_refused
+
+    change = design(lambda found: found["spec"][section].update({key: value}))
+    mutation = refused(key, JSON, change, f"spec.{section}.{key} is {value}, allowed is")
+    test_broken_export_is_refused(export_folder, mutation)

@@ -1,0 +1,220 @@
+"""The spec of an export: every key of the design that it was built from, with the allowed range.
+
+A key outside its range is refused: a build never writes one. Keys that are not listed are ignored.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tbcad_verify.record.validation import Strict
+
+LARGEST_MESH_ERROR_MM = 0.5  # that a spec may ask for and still pass
+
+Side = Annotated[float, Field(ge=20, le=2000)]
+Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
+Place = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+
+class OpticsSpec(Strict):
+    """Where the mirrors, the cameras and the object are."""
+
+    n: int = Field(ge=1, le=60)
+    capture_diameter_mm: float = Field(gt=0, le=1000)
+    camera_mm: tuple[
+        Annotated[float, Field(gt=0, le=10_000)],
+        Annotated[float, Field(ge=-10_000, le=10_000)],
+        Annotated[float, Field(ge=-10_000, lt=0)],
+    ] = Field(strict=False)
+    semi_minor_mm: float = Field(ge=1, le=5000)
+
+
+class CameraSpec(Strict):
+    """The sensor and lens of both cameras."""
+
+    width_px: int = Field(ge=16, le=32768)
+    height_px: int = Field(ge=16, le=32768)
+    hfov_deg: float = Field(ge=1, le=170)
+
+
+class MirrorsSpec(Strict):
+    """How the mirrors are curved."""
+
+    radius_rule: Literal["traced", "paper", "flat"]
+    margin_mm: float = Field(ge=0, le=20)
+    max_radius_widths: float = Field(ge=5, le=1000)
+    coating_um: float = Field(ge=0, le=500)
+
+
+class FlangeSpec(Strict):
+    """A flange with its bolt and dowel holes."""
+
+    width_mm: float = Field(ge=4, le=100)
+    thickness_mm: float = Field(ge=1, le=50)
+    bolt_hole_mm: float = Field(ge=1, le=30)
+    bolts: int = Field(ge=2, le=60)
+    dowel_hole_mm: float = Field(ge=1, le=30)
+    dowels: int = Field(ge=0, le=10)
+
+
+class ShellSpec(Strict):
+    """The body behind the mirrors."""
+
+    wall_mm: float = Field(ge=0.4, le=50)
+    seam_flange: FlangeSpec
+    foot_flange: FlangeSpec
+
+
+class MeshSpec(Strict):
+    """How fine the STL and 3MF are."""
+
+    ray_error_mm: float = Field(ge=0.01, le=10)
+    chord_error_mm: float = Field(ge=0.0002, le=1)
+    structure_error_mm: float = Field(ge=0.002, le=5)
+
+    @property
+    def largest_mm(self) -> float:
+        """Largest distance from mesh to exact surface, mm."""
+        return max(self.chord_error_mm, self.structure_error_mm)
+
+
+class StepSpec(Strict):
+    """How the STEP is written."""
+
+    pcurves: bool
+
+
+class PrinterSpec(Strict):
+    """The printer and its material, for all printed parts of the prototype."""
+
+    bed_mm: Annotated[list[Side], Field(min_length=3, max_length=3)]
+    bed_margin_mm: float = Field(ge=0, le=50)
+    density_g_cm3: float = Field(gt=0, le=20)
+
+
+class BaseSpec(Strict):
+    """The carrier with its seats, its hub, and how it is printed."""
+
+    thickness_mm: float = Field(ge=1.2, le=30)
+    ribs: int = Field(ge=2, le=12)
+    rings: int = Field(ge=1, le=8)
+    rib_mm: float = Field(ge=1.2, le=30)
+    rib_height_mm: float = Field(ge=1, le=50)
+    light_clearance_mm: float = Field(ge=0, le=20)
+    clearance_mm: float = Field(ge=0.1, le=5)
+    pad_mm: float = Field(ge=0.5, le=20)
+    # "auto" stands only where no prototype was built: a prototype's record has what was chosen.
+    pad_angle_deg: Annotated[float, Field(ge=20, le=70)] | Literal["auto"]
+    cup_wall_mm: float = Field(ge=0.8, le=20)
+    floor_mm: float = Field(ge=0.6, le=20)
+    hold: Literal["magnet", "glue", "auto"]
+    magnets_mm: Annotated[
+        list[Annotated[float, Field(ge=1, le=50)]], Field(min_length=1, max_length=20)
+    ]
+    magnet_height_mm: float = Field(ge=0.5, le=20)
+    magnet_gap_mm: float = Field(ge=0.1, le=5)
+    magnet_play_mm: float = Field(ge=0, le=1)
+    digit_mm: float = Field(ge=3, le=30)
+    relief_mm: float = Field(ge=0.2, le=3)
+    drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
+    shaft_mm: float = Field(ge=3, le=25)
+    lock: Literal["set-screws", "clamp"]
+    insert_hole_mm: float = Field(ge=2, le=10)
+    insert_depth_mm: float = Field(ge=2, le=20)
+    joint_mm: float = Field(ge=4, le=30)
+    joint_height_mm: float = Field(ge=8, le=50)
+    screw_pitch_mm: float = Field(ge=12, le=500)
+    dowel_mm: float = Field(ge=1, le=10)
+    dowel_press_mm: float = Field(ge=-0.5, le=1)
+    dowel_slip_mm: float = Field(ge=0, le=1)
+    coupon_offsets_mm: Annotated[
+        list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=1, max_length=9)
+    ]
+
+
+class MotionSpec(Strict):
+    """How the base is driven from stop to stop: motion, trigger and controller."""
+
+    axis: Literal["X", "A"]
+    trigger: Literal["coolant", "pause"]
+    home_deg: float = Field(ge=-180, le=180)
+    approach_deg: float = Field(ge=0, le=30)
+    feed_deg_min: float = Field(ge=1, le=100000)
+    acceleration_deg_s2: float = Field(gt=0, le=10000)
+    settle_s: float = Field(ge=0, le=60)
+    trigger_s: float = Field(gt=0, le=60)
+    exposure_s: float = Field(ge=0, le=600)
+    microsteps: int = Field(ge=1, le=256)
+    safety: float = Field(ge=1, le=10)
+
+
+class StageSpec(Strict):
+    """The stage that carries the object, with LEDs at known places for calibration."""
+
+    top_mm: float = Field(ge=-1000, le=1000)
+    disc_mm: float = Field(ge=4, le=500)
+    led: Literal["LED-3", "LED-5"]
+    leds_mm: Annotated[list[Place], Field(max_length=12)]
+    led_wall_mm: float = Field(ge=0.8, le=20)
+    wire_mm: float = Field(ge=1, le=10)
+    wall_mm: float = Field(ge=1, le=20)
+
+
+class FrameSpec(Strict):
+    """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
+
+    floor_mm: float = Field(ge=-3000, le=-10)
+    clearance_mm: float = Field(ge=0.5, le=50)
+    flange_mm: float = Field(ge=3, le=30)
+    web_mm: float = Field(ge=3, le=30)
+    uprights_mm: float = Field(ge=70, le=300)
+    bearing_fit_mm: float = Field(ge=-0.5, le=0.5)
+    belt_travel_mm: float = Field(ge=0, le=40)
+    camera_screw_mm: float = Field(ge=10, le=1000)
+    camera_travel_mm: float = Field(ge=0, le=200)
+    post_play_mm: float = Field(ge=0, le=2)
+
+
+class PrototypeSpec(Strict):
+    """The prototype: balls that stand in for mirrors, and the base that carries them."""
+
+    k: Annotated[int, Field(ge=1, le=1000)] | Literal["auto"]
+    radius_weight_deg: float = Field(ge=0, le=100)
+    auto_direction_max_deg: float = Field(gt=0, le=90)
+    auto_direction_median_deg: float = Field(gt=0, le=90)
+    auto_lost_percent: float = Field(ge=0, le=100)
+    catalogues: Annotated[list[str], Field(min_length=1)]
+    grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
+    largest_ball_mm: float = Field(gt=0, le=1000)
+    snap: Literal["cover", "nearest"]
+    picture: Literal["moved", "fixed"]
+    caps: bool
+    cap_rim_mm: float = Field(ge=0, le=50)
+    ball_wall_mm: float = Field(ge=0, le=50)
+    light_margin_mm: float = Field(ge=0, le=20)
+    post_diameter_mm: float = Field(ge=0, le=200)
+    camera_diameter_mm: float = Field(ge=0, le=500)
+    camera_length_mm: float = Field(ge=0, le=1000)
+    max_swing_deg: float = Field(gt=0, le=360)
+    stop_error_deg: float = Field(gt=0, le=20)
+    base: BaseSpec
+    motion: MotionSpec
+    stage: StageSpec
+    frame: FrameSpec
+
+
+class Spec(Strict):
+    """The resolved design."""
+
+    name: str = Field(pattern="^[A-Za-z0-9][A-Za-z0-9 ._-]{0,79}$")
+    schema_version: Literal[2] = Field(alias="schema")
+    optics: OpticsSpec
+    camera: CameraSpec
+    mirrors: MirrorsSpec
+    shell: ShellSpec
+    mesh: MeshSpec
+    step: StepSpec
+    printer: PrinterSpec
+    prototype: PrototypeSpec
