@@ -30,6 +30,20 @@ def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
         return [Path(temporary, name).replace(folder / name) for name in contents]
 
 
+def refuse_existing(file: Path, force: bool) -> None:
+    """Refuse, before any work, to replace a file that the user has not given up.
+
+    Args:
+        file: to write.
+        force: whether it may be replaced.
+
+    Raises:
+        InputError: it exists.
+    """
+    if file.exists() and not force:
+        raise InputError(f"{file} exists: choose another name, or replace it with --force")
+
+
 @contextmanager
 def write_errors_as_input_errors(folder: Path) -> Iterator[None]:
     """Raise errors of the file system as an InputError that names the folder."""

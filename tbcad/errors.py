@@ -1,4 +1,4 @@
-"""The one error a user can cause."""
+"""The one error that a user can cause, and the one warning."""
 
 
 def one_line(text: str) -> str:
@@ -10,6 +10,14 @@ def one_line(text: str) -> str:
 
 class InputError(Exception):
     """Bad input: its text is one line for the screen; commands end with exit code 2."""
+
+    def __init__(self, text: str) -> None:
+        """Keep the text, made one line: parts of it may come from a file or a path."""
+        super().__init__(one_line(text))
+
+
+class PlausibilityWarning(UserWarning):
+    """Input that is allowed but unlikely to be meant; commands show it in one line and go on."""
 
     def __init__(self, text: str) -> None:
         """Keep the text, made one line: parts of it may come from a file or a path."""

@@ -1,6 +1,9 @@
 """The command `tbcad`: thin; heavy libraries are imported inside the commands."""
 
 import sys
+import warnings
+from collections.abc import Callable
+from functools import partial
 
 import typer
 
@@ -9,17 +12,35 @@ from tbcad.cli import simulate as _simulate  # noqa: F401 - adds its commands
 from tbcad.cli import study as _study  # noqa: F401 - adds its commands
 from tbcad.cli import tolerance as _tolerance  # noqa: F401 - adds its command
 from tbcad.cli.app import app
-from tbcad.errors import InputError
+from tbcad.cli.usage_errors import usage_error_text
+from tbcad.errors import InputError, PlausibilityWarning
 
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code; bad input is told in one line on stderr."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", PlausibilityWarning)
+        warnings.showwarning = partial(_show_warning, warnings.showwarning)
+        return _run(arguments)
+
+
+def _show_warning(
+    others: Callable[..., None], message: Warning | str, category: type[Warning], *where: object
+) -> None:
+    """Show a warning of ours in one line; Python shows others with their place in the code."""
+    if issubclass(category, PlausibilityWarning):
+        sys.stderr.write(f"tbcad: warning: {message}\n")
+    else:
+        others(message, category, *where)
+
+
+def _run(arguments: list[str]) -> int:
     try:
-        return int(app(arguments, standalone_mode=False) or 0)
+        return int(app(arguments, prog_name="tbcad", standalone_mode=False) or 0)
     except typer.Exit as stop:
         return stop.exit_code
     except (InputError, typer.TyperException) as error:
-        text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
+        text = str(error) if isinstance(error, InputError) else usage_error_text(error)
         sys.stderr.write(f"tbcad: {text}\n")
         return 2
     except (KeyboardInterrupt, typer.Abort):

@@ -12,6 +12,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
     "made, verified on the files written. Start with **tbcad build --out exports**.",
 )

@@ -1,25 +1,31 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import Exports, Force, OutReplaced, Settings
+from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
 from tbcad.errors import InputError
 from tbcad.screen import report_console, stages
+
+if TYPE_CHECKING:
+    from tbcad.tolerance.process.process import Process
 
 # With mirrors and manifest; both together take one more: waiting for the shells in parallel.
 BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
 VERIFY_STAGES = 9
+DEFAULT_YIELD = 0.99
 
 
 @app.command()
 def build(
     design: Annotated[
         Path | None,
-        typer.Argument(help="Design file (TOML); by default the design of the paper."),
+        typer.Argument(
+            metavar="DESIGN", help="Design file (TOML); by default the design of the paper."
+        ),
     ] = None,
     n: Annotated[
         str | None,
@@ -53,12 +59,13 @@ def build(
         ),
     ] = None,
     share: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--yield",
-            help="With --for-process: share of simulated builds that must reach the target.",
+            help="With --for-process: share of simulated builds that must reach the target; by "
+            f"default {DEFAULT_YIELD:g}.",
         ),
-    ] = 0.99,
+    ] = None,
     verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True,
     force: Force = False,
 ) -> int:
@@ -77,15 +84,16 @@ def build(
     options += [f"optics.n={n}"] if n is not None else []
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
+    process = _process(for_process, share)
+    wanted_yield = DEFAULT_YIELD if share is None else share
     chosen = asked or default_parts(spec)
     check_replaceable(out, force)
     with stages(BUILD_STAGES[chosen] + VERIFY_STAGES * verify + bool(for_process)) as screen:
-        if for_process is not None:
+        if process is not None:
             from tbcad.tolerance.margin import spec_for_process
-            from tbcad.tolerance.process.process import load_process
 
             screen.stage(f"margin for {for_process}")
-            spec = spec_for_process(spec, load_process(for_process), share, screen.detail)
+            spec = spec_for_process(spec, process, wanted_yield, screen.detail)
         built = build_files(
             spec,
             out,
@@ -96,13 +104,30 @@ def build(
             detail=screen.detail,
         )
     if for_process is not None:
-        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {share:.1%} by {for_process}")
+        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {wanted_yield:.1%} by {for_process}")
     if built.report is None:
         typer.echo(f"{out}: built, not verified: run tbcad verify {out}")
         return 0
     typer.echo(f"{out}: {' and '.join(chosen)} as STEP, STL and 3MF; mirrors.csv, design.json")
     built.report.show(report_console())
     return 0 if built.passed else 1
+
+
+def _process(name: str | None, wanted_yield: float | None) -> "Process | None":
+    """The process whose margin is wanted, read and checked before anything takes long."""
+    if name is None and wanted_yield is None:
+        return None
+    from tbcad.tolerance.margin import check_yield
+    from tbcad.tolerance.process.process import load_process
+
+    if name is None:
+        raise InputError(
+            f"--yield {wanted_yield:g} is of no use without --for-process: name a process, or "
+            "leave --yield out"
+        )
+    if wanted_yield is not None:
+        check_yield(wanted_yield)
+    return load_process(name)
 
 
 @app.command("verify")
@@ -149,7 +174,8 @@ def verify_command(
 def picture(
     folder: Exports,
     out: Annotated[
-        Path | None, typer.Option(help="PNG file to write; by default named after the subject.")
+        Path | None,
+        typer.Option("--out", "-o", help="PNG file to write; by default named after the subject."),
     ] = None,
     of: Annotated[
         str,
@@ -158,12 +184,13 @@ def picture(
             "base, seat or exploded (the prototype)."
         ),
     ] = "shell",
+    force: ForceFile = False,
 ) -> int:
     """Draw the shells or the prototype from the files of an export."""
     from tbcad.report.drawing import picture as draw
 
     file = out or Path(f"{of}.png")
-    draw(folder, file, of)
+    draw(folder, file, of, force)
     typer.echo(f"{file}: written")
     return 0
 

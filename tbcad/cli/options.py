@@ -5,22 +5,29 @@ from typing import Annotated, Literal
 
 import typer
 
-Exports = Annotated[Path, typer.Argument(help="Folder written by tbcad build.")]
+Exports = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad build.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."),
 ]
-Out = Annotated[Path, typer.Option(help="Folder for the files; other files in it stay.")]
-OutReplaced = Annotated[
-    Path, typer.Option(help="Folder for all files; replaced as a whole or not at all.")
+Out = Annotated[
+    Path, typer.Option("--out", "-o", help="Folder for the files; other files in it stay.")
 ]
+OutReplaced = Annotated[
+    Path,
+    typer.Option("--out", "-o", help="Folder for all files; replaced as a whole or not at all."),
+]
+OutPicture = Annotated[Path, typer.Option("--out", "-o", help="PNG file to write.")]
 Force = Annotated[
     bool,
     typer.Option(
         "--force", help="Keep files in the folder that tbcad did not write, instead of refusing."
     ),
 ]
-Capture = Annotated[Path, typer.Argument(help="Folder written by tbcad capture.")]
+ForceFile = Annotated[
+    bool, typer.Option("--force", help="Replace files that exist, instead of refusing.")
+]
+Capture = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad capture.")]
 Azimuth = Annotated[float, typer.Option(help="Azimuth of the camera about z, from x, degrees.")]
 Elevation = Annotated[float, typer.Option(help="Elevation of the camera, 0 to 90 degrees.")]
 Distance = Annotated[
@@ -50,11 +57,16 @@ ObjectFile = Annotated[
         "colours or a texture; by default a built-in knot.",
     ),
 ]
-MethodOption = Annotated[
-    Literal["nearest", "blend"],
+METHODS = (
+    "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
+    "virtual cameras that see the same point"
+)
+MethodOption = Annotated[Literal["nearest", "blend"], typer.Option(help=f"{METHODS}.")]
+MethodOfView = Annotated[
+    Literal["nearest", "blend"] | None,
     typer.Option(
-        help="nearest: the colour of the nearest captured ray, as in the paper; blend: the mean "
-        "of several virtual cameras that see the same point."
+        help=f"{METHODS}. By default blend, but nearest where the virtual cameras are so far apart "
+        "that their pictures of one point differ."
     ),
 ]
 Scheduler = Annotated[

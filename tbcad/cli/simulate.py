@@ -13,10 +13,12 @@ from tbcad.cli.options import (
     Elevation,
     Exports,
     Force,
+    ForceFile,
     Fov,
     Height,
-    MethodOption,
+    MethodOfView,
     ObjectFile,
+    OutPicture,
     OutReplaced,
     PaintOption,
     Width,
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import Scene
+    from tbcad.simulate.views.method import MethodChoice
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.simulate.views.synthesis import Method
     from tbcad.types import Bytes
 
 MOST_SAMPLES = 8
@@ -94,8 +99,8 @@ def view(
     azimuth: Azimuth = 0.0,
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
-    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("view.png"),
-    method: MethodOption = "nearest",
+    out: OutPicture = Path("view.png"),
+    method: MethodOfView = None,
     surface: Annotated[
         Literal["plane", "object"],
         typer.Option(
@@ -106,6 +111,7 @@ def view(
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
+    force: ForceFile = False,
 ) -> int:
     """Synthesise the view of a camera anywhere around the object from a light field.
 
@@ -114,13 +120,12 @@ def view(
     """
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.image_files import check_image_path
     from tbcad.simulate.scene.ground_truth import pinhole_picture
     from tbcad.simulate.scene.ray_casting import depth_along_rays
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import synthesise
 
-    check_image_path(out)
+    _check_pictures(capture_folder, out, force)
     with stages(3) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
@@ -131,10 +136,13 @@ def view(
                 raise InputError(f"{capture_folder} has no object: use --surface plane")
             depth = depth_along_rays(scene)
         screen.stage("view")
-        picture = synthesise(MirrorTiles(source), at, method, depth).image
+        tiles = MirrorTiles(source)
+        chosen = _method(tiles, method, surface)
+        picture = synthesise(tiles, at, chosen.method, depth).image
         screen.stage("truth")
         truth = None if scene is None else to_bytes(pinhole_picture(scene, at))
-    _show(out, picture, truth, (method, "ray-traced"))
+    typer.echo(f"method {chosen.method}: {chosen.reason}")
+    _show(out, picture, truth, (chosen.method, "ray-traced"))
     return 0
 
 
@@ -151,7 +159,7 @@ def refocus(
             help="Position of the focal plane: mm from the centre of the object toward the camera."
         ),
     ] = 0.0,
-    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("refocus.png"),
+    out: OutPicture = Path("refocus.png"),
     sweep: Annotated[
         Path | None,
         typer.Option(
@@ -167,6 +175,7 @@ def refocus(
     truth_samples: Annotated[
         int, typer.Option(min=1, max=100_000, help="Rays per pixel of the ray-traced lens.")
     ] = 256,
+    force: ForceFile = False,
 ) -> int:
     """Refocus a light field: the picture of a large lens, as the mean of 69 pinhole views.
 
@@ -180,9 +189,9 @@ def refocus(
     from tbcad.simulate.views.refocus import Focus, refocus_sweep
     from tbcad.simulate.views.refocus import refocus as refocused
 
-    check_image_path(out)
+    _check_pictures(capture_folder, out, force)
     if sweep is not None:
-        check_image_path(sweep, ANIMATED_SUFFIXES)
+        check_image_path(sweep, force, ANIMATED_SUFFIXES)
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
@@ -202,6 +211,39 @@ def refocus(
     if sweep is not None:
         typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
     return 0
+
+
+def _method(
+    tiles: "MirrorTiles", asked: "Method | None", surface: Literal["plane", "object"]
+) -> "MethodChoice":
+    from tbcad.simulate.views.method import MethodChoice, suitable_method
+
+    if asked is not None:
+        return MethodChoice(asked, "as --method says")
+    if surface == "object":
+        return MethodChoice("blend", "--surface object is for a blend")
+    return suitable_method(tiles)
+
+
+def _check_pictures(capture: Path, out: Path, force: bool) -> None:
+    """Refuse, before any work, pictures that cannot be written or that exist."""
+    from tbcad.simulate.image_files import check_image_path
+
+    compared = _compared_files(out) if _has_object(capture) else []
+    for file in (out, *compared):
+        check_image_path(file, force)
+
+
+def _compared_files(out: Path) -> list[Path]:
+    """The ground truth and the comparison that are written beside a picture."""
+    return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
+
+
+def _has_object(capture: Path) -> bool:
+    """Whether a capture is simulated: real photographs come without the object."""
+    from tbcad.simulate.capture.files import OBJECT
+
+    return (capture / OBJECT).is_file()
 
 
 def _viewpoint(
@@ -225,10 +267,10 @@ def _viewpoint(
 
 def _scene(folder: Path) -> "Scene | None":
     """The object of a simulated capture; None where there is none, as with real photographs."""
-    from tbcad.simulate.capture.files import OBJECT, read_object
+    from tbcad.simulate.capture.files import read_object
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    if not (folder / OBJECT).is_file():
+    if not _has_object(folder):
         return None
     return prepared_scene(read_object(folder))
 
@@ -242,7 +284,7 @@ def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, 
         write_images({out: picture})
         typer.echo(f"{out}: written, without ground truth: the capture names no object")
         return
-    files = [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
+    files = _compared_files(out)
     sheet = side_by_side(
         {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
     )

@@ -10,6 +10,7 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.options import (
     Distance,
+    Exports,
     MethodOption,
     ObjectFile,
     Out,
@@ -152,7 +153,7 @@ def ssim_command(
 
 @study.command("prototype")
 def prototype_command(
-    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    folder: Exports,
     out: Out = STUDIES,
     object_file: ObjectFile = None,
     paint: PaintOption = "own",

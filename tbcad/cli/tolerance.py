@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import Exports, ObjectFile, Scheduler
+from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
 from tbcad.screen import stages
 
 
@@ -37,14 +37,16 @@ def tolerance(
     ] = 0.5,
     object_file: ObjectFile = None,
     scheduler: Scheduler = None,
-    out: Annotated[Path, typer.Option(help="Folder for the files; other files in it stay.")] = Path(
-        "tolerance"
-    ),
+    out: Out = Path("tolerance"),
 ) -> int:
     """Simulate many builds with random errors: how many reach the target, and what limits them.
 
     Writes tolerance.json, tables, notes and plots.
     """
+    from tbcad.tolerance.process.process import load_process
+
+    changes = list(settings or [])
+    load_process(process, changes)  # refused before the heavy libraries are loaded
     from tbcad.api import analyse
     from tbcad.simulate.study.study import check_study_folder, write_study
     from tbcad.tolerance.analysis import ToleranceOptions
@@ -57,7 +59,7 @@ def tolerance(
             folder,
             process,
             object_file,
-            settings=list(settings or []),
+            settings=changes,
             options=options,
             progress=screen.stage,
             detail=screen.detail,

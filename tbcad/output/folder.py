@@ -18,7 +18,8 @@ from pathlib import Path
 
 from tbcad.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
-from tbcad.output.foreign_files import foreign_files, is_file, keep_files
+from tbcad.output.foreign_files import foreign_files, keep_files
+from tbcad.output.manifest import is_file
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)

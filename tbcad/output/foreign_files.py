@@ -2,36 +2,11 @@
 
 import os
 import shutil
-import stat
 from itertools import chain, count
 from pathlib import Path
-from typing import Annotated
-
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, VERDICT, fingerprint
-
-_MAX_MANIFEST_BYTES = 4_000_000
-_MAX_FILES = 10_000
-
-
-def _plain_name(name: str) -> str:
-    if name in ("", ".", "..") or {"/", "\\", "\0"} & {*name}:
-        raise ValueError("not the name of a file in the folder")
-    return name
-
-
-class _Entry(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    size: int = Field(ge=0)
-
-
-class _Manifest(BaseModel):
-    schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")
-    files: dict[Annotated[str, AfterValidator(_plain_name)], _Entry] = Field(max_length=_MAX_FILES)
+from tbcad.output.manifest import MANIFEST, VERDICT, is_file, is_listed, read_manifest
 
 
 def foreign_files(folder: Path) -> list[Path]:
@@ -43,13 +18,13 @@ def foreign_files(folder: Path) -> list[Path]:
     Raises:
         OSError: the folder cannot be read.
     """
-    manifest = _read_manifest(folder / MANIFEST)
+    manifest = read_manifest(folder)
     own = {MANIFEST, VERDICT} if manifest else set()
     listed = manifest.files if manifest else {}
     return [
         path
         for path in sorted(folder.iterdir())
-        if not (is_file(path) and (path.name in own or _is_listed(path, listed.get(path.name))))
+        if not (is_file(path) and (path.name in own or is_listed(path, listed.get(path.name))))
     ]
 
 
@@ -68,30 +43,6 @@ def keep_files(paths: list[Path], into: Path) -> None:
             )
         else:
             _link_or_copy(path, to)
-
-
-def is_file(path: Path) -> bool:
-    """Tell a plain file from folders, links and devices."""
-    return stat.S_ISREG(path.lstat().st_mode)
-
-
-def _is_listed(path: Path, entry: _Entry | None) -> bool:
-    # The size first: it settles most without reading the file.
-    return (
-        entry is not None
-        and entry.size == path.lstat().st_size
-        and entry.model_dump() == fingerprint(path)
-    )
-
-
-def _read_manifest(path: Path) -> _Manifest | None:
-    """Return a manifest that tbcad can have written, None for any other file."""
-    try:
-        if not is_file(path) or path.lstat().st_size > _MAX_MANIFEST_BYTES:
-            return None
-        return _Manifest.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
-        return None
 
 
 def _free_name(name: str, folder: Path) -> str:

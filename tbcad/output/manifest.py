@@ -3,14 +3,43 @@
 import hashlib
 import json
 import platform
+import stat
 from importlib.metadata import version
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad.version import __version__
 
 MANIFEST, VERDICT = "manifest.json", "verify.json"
 SCHEMA = "tbcad-manifest/1"
 LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh")
+
+_MAX_MANIFEST_BYTES = 4_000_000
+_MAX_FILES = 10_000
+
+
+def _plain_name(name: str) -> str:
+    if name in ("", ".", "..") or {"/", "\\", "\0"} & {*name}:
+        raise ValueError("not the name of a file in the folder")
+    return name
+
+
+class Entry(BaseModel):
+    """A file as it was written."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    size: int = Field(ge=0)
+
+
+class Manifest(BaseModel):
+    """What is read of manifest.json: the files by name."""
+
+    schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")
+    files: dict[Annotated[str, AfterValidator(_plain_name)], Entry] = Field(max_length=_MAX_FILES)
 
 
 def write_manifest(folder: Path) -> None:
@@ -31,3 +60,29 @@ def fingerprint(path: Path) -> dict[str, str | int]:
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")
     return {"sha256": digest.hexdigest(), "size": path.stat().st_size}
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """Return the manifest of a folder if tbcad can have written it, None for any other file."""
+    path = folder / MANIFEST
+    try:
+        if not is_file(path) or path.lstat().st_size > _MAX_MANIFEST_BYTES:
+            return None
+        return Manifest.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def is_listed(path: Path, entry: Entry | None) -> bool:
+    """Tell whether a file is as its entry in the manifest says; no entry is no."""
+    # The size first: it settles most without reading the file.
+    return (
+        entry is not None
+        and entry.size == path.lstat().st_size
+        and entry.model_dump() == fingerprint(path)
+    )
+
+
+def is_file(path: Path) -> bool:
+    """Tell a plain file from folders, links and devices."""
+    return stat.S_ISREG(path.lstat().st_mode)

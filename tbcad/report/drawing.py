@@ -7,37 +7,37 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tbcad.atomic_files import refuse_existing
 from tbcad.errors import InputError
+from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 
 SHELL = "shell"
 PROTOTYPE = ("rig", "base", "seat", "exploded")
 SUBJECTS = (SHELL, *PROTOTYPE)
 SHELL_FILES = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
+MESH_SUFFIXES = (".stl", ".glb")
 
 
-def picture(folder: Path, file: Path, subject: str = SHELL) -> None:
+def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
     """Draw a subject of an export to a PNG file, which is replaced as a whole.
 
     Args:
         folder: an export.
         file: picture to write.
         subject: one of SUBJECTS.
+        force: whether a picture that exists may be replaced.
 
     Raises:
-        InputError: when the export or a screen is missing, or drawing fails.
+        InputError: when the export or a screen is missing, a file of the export is not as it was
+            written, the picture exists, or drawing fails.
     """
     if subject not in SUBJECTS:
         raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
-    required = SHELL_FILES if subject == SHELL else PROTOTYPE_FILES
-    missing = [name for name in required if not (folder / name).is_file()]
-    if missing:
-        raise InputError(
-            f"{folder}: {missing[0]} is missing: name a folder that tbcad build wrote with its "
-            f"{'shell' if subject == SHELL else 'prototype'}"
-        )
+    _check_files(folder, subject)
     if file.suffix.lower() != ".png" or not file.parent.is_dir():
         raise InputError(f"{file}: name a .png file in a folder that exists")
+    refuse_existing(file, force)
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".tbcad-picture-") as place:
         drawn = Path(place) / "picture.png"
         done = subprocess.run(
@@ -47,6 +47,31 @@ def picture(folder: Path, file: Path, subject: str = SHELL) -> None:
             last = (done.stderr.strip() or "the process crashed").splitlines()[-1]
             raise InputError(f"drawing failed ({last[:200]}): see tbcad doctor")
         drawn.replace(file)
+
+
+def _check_files(folder: Path, subject: str) -> None:
+    """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
+    part = "shell" if subject == SHELL else "prototype"
+    manifest = read_manifest(folder)
+    listed = manifest.files if manifest else {}
+    required = SHELL_FILES if subject == SHELL else PROTOTYPE_FILES
+    needed = [*required, *(name for name in listed if part == "prototype" and _is_drawn(name))]
+    for name in (MANIFEST, *needed):
+        if not (folder / name).is_file():
+            raise InputError(
+                f"{folder}: {name} is missing: name a folder that tbcad build wrote with its {part}"
+            )
+    altered = [name for name in needed if not is_listed(folder / name, listed.get(name))]
+    if altered:
+        raise InputError(
+            f"{folder / altered[0]} is not as tbcad wrote it (cut off, or changed since): "
+            "build the export again"
+        )
+
+
+def _is_drawn(name: str) -> bool:
+    """Whether a file may be a mesh of the prototype."""
+    return name.endswith(MESH_SUFFIXES) and name not in SHELL_FILES
 
 
 def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:

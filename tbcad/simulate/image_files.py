@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from tbcad.atomic_files import replace_files
+from tbcad.atomic_files import refuse_existing, replace_files
 from tbcad.errors import InputError
 from tbcad.types import Bytes
 
@@ -19,11 +19,18 @@ FRAME_MS = 120
 PNG_COMPRESSION = 3
 
 
-def check_image_path(file: Path, suffixes: Sequence[str] = STILL_SUFFIXES) -> None:
+def check_image_path(
+    file: Path, force: bool = False, suffixes: Sequence[str] = STILL_SUFFIXES
+) -> None:
     """Refuse a file that could not be written, before long work.
 
+    Args:
+        file: to write.
+        force: whether a file that exists may be replaced.
+        suffixes: that its name may have.
+
     Raises:
-        InputError: another kind of file, or its folder does not exist.
+        InputError: another kind of file, its folder does not exist, or the file exists.
     """
     if file.suffix.lower() not in suffixes:
         raise InputError(f"{file}: name a file that ends in {' or '.join(suffixes)}")
@@ -31,6 +38,7 @@ def check_image_path(file: Path, suffixes: Sequence[str] = STILL_SUFFIXES) -> No
         raise InputError(f"{file}: its folder does not exist: make it, or choose another")
     if file.is_dir():
         raise InputError(f"{file} is a folder: choose another name")
+    refuse_existing(file, force)
 
 
 def write_images(images: Mapping[Path, Bytes]) -> None:

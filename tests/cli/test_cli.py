@@ -120,6 +120,8 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
         (["build", "no-such-design.toml"], ["no-such-design.toml"]),
         (["build", "--wrong-option"], ["--wrong-option"]),
         (["bulid"], ["bulid", "build"]),
+        (["build", "--yield", "0.95"], ["--yield 0.95", "--for-process", "leave --yield out"]),
+        (["build", "--for-process", "cnc", "--yield", "95"], ["--yield 95", "below 1"]),
         (["verify"], ["FOLDER"]),
         (["verify", "no-such-folder"], ["no-such-folder"]),
         (["picture", "no-such-folder"], ["no-such-folder"]),
@@ -139,6 +141,37 @@ def test_bad_input_is_one_line(
     for word in words:
         assert word.lower() in line.lower()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = [", ["not valid TOML", "correct that line"]),
+        ('based_on = "slaa"', ["based_on is 'slaa'", "sla or cnc"]),
+        ('based_on = "sla"\nball_grade = "G7"', ["ball_grade is 'G7'", "G10"]),
+    ],
+    ids=["TOML", "base", "grade"],
+)
+@pytest.mark.parametrize(
+    "command", [["build", "--for-process"], ["tolerance", "no-such-folder", "--process"]]
+)
+def test_a_broken_process_is_found_before_anything_begins(
+    command: list[str],
+    text: str,
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Before stages, a missing export, and a folder that cannot be replaced."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(text)
+    out = ["--out", "mine.toml/out"]
+    assert run([*command, "mine.toml", *out]) == 2
+    shown = capsys.readouterr()
+    assert shown.err.startswith("tbcad: mine.toml: ")
+    assert shown.err.count("\n") == 1
+    assert all(word in shown.err for word in words)
 
 
 def test_foreign_files_are_refused_and_kept_on_force(

@@ -99,6 +99,87 @@ def test_view(
     assert "PSNR" in capsys.readouterr().out
 
 
+def test_pictures_that_exist_are_replaced_on_force_only(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The comparison and the animation too, which are written beside the picture."""
+    out, small = tmp_path / "view.png", ["--width", "64", "--height", "48"]
+    view = ["view", str(captured), "-o", str(out), *small]
+    sweep = ["--sweep", str(tmp_path / "f.gif"), "--frames", "2", "--truth-samples", "1"]
+    refocus = ["refocus", str(captured), "-o", str(tmp_path / "f.png"), *small, *sweep]
+    for command, names in (
+        (view, ("view.png", "view-truth.png", "view-beside.png")),
+        (refocus, ("f.png", "f-truth.png", "f-beside.png", "f.gif")),
+    ):
+        for name in names:
+            (tmp_path / name).write_text("mine")
+            assert run(command) == 2
+            assert f"{tmp_path / name} exists: " in (line := capsys.readouterr().err)
+            assert "--force" in line
+            assert contents(tmp_path) == {name: b"mine"}
+            (tmp_path / name).unlink()
+    for command in (view, refocus):
+        assert run(command) == 0
+        assert run(command) == 2
+        before = contents(tmp_path)
+        (tmp_path / command[3]).write_text("older")
+        assert run([*command, "--force"]) == 0
+        assert contents(tmp_path) == before
+
+
+def test_method_follows_the_capture_and_says_why(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With so few pixels the virtual cameras are near enough to each other for a blend."""
+    view = ["view", str(captured), "--width", "64", "--height", "48", "--force"]
+    view += ["--out", str(tmp_path / "v.png")]
+    for more, expected in (
+        ([], "method blend: neighbouring virtual cameras"),
+        (["--surface", "object"], "method blend: --surface object"),
+        (["--method", "blend"], "method blend: as --method says"),
+        (["--method", "nearest"], "method nearest: as --method says"),
+    ):
+        assert run([*view, *more]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert sum(line.startswith("method ") for line in lines) == 1
+        assert any(line.startswith(expected) for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "more", "warned"),
+    [(0.04, [], "metres"), (1.5, [], "inches"), (0.04, ["--fit"], ""), (20, [], "")],
+)
+def test_an_object_in_another_unit_is_warned_of(
+    record: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    size_mm: float,
+    more: list[str],
+    warned: str,
+) -> None:
+    trimesh.creation.box([size_mm] * 3).export(tmp_path / "box.stl")
+    arguments = ["capture", str(record), "--object", str(tmp_path / "box.stl"), *more]
+    assert run([*arguments, "--out", str(tmp_path / "out")]) == 0
+    lines = [one for one in capsys.readouterr().err.splitlines() if "warning" in one]
+    assert len(lines) == bool(warned)
+    if warned:
+        assert lines[0].startswith(f"tbcad: warning: box.stl is {size_mm:g} mm large")
+        assert warned in lines[0]
+        assert "--fit" in lines[0]
+
+
+def test_a_lens_wider_than_its_distance_is_warned_of(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["refocus", str(captured), "--width", "32", "--height", "24", "--force"]
+    arguments += ["--truth-samples", "1", "--out", str(tmp_path / "f.png"), "--elevation", "60"]
+    for aperture, warnings in (("3000", 1), ("300", 0)):
+        assert run([*arguments, "--aperture", aperture]) == 0
+        said = capsys.readouterr().err
+        assert said.count("tbcad: warning: --aperture 3000 is more than --distance 640") == warnings
+        assert said.count("warning") == warnings
+
+
 def test_view_without_an_object_has_no_truth(captured: Path, tmp_path: Path) -> None:
     alone = tmp_path / "alone"
     alone.mkdir()

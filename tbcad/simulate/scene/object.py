@@ -8,6 +8,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import unit
+from tbcad.simulate.plausibility import warn_of_small_object
 from tbcad.types import Bytes, Floats, Ints
 
 Paint = Literal["own", "pattern", "plain"]
@@ -66,6 +67,9 @@ def load_object(
 
     Raises:
         InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
+
+    Warns:
+        PlausibilityWarning: it is so small that its unit is likely to be another one.
     """
     mesh = _read(path)
     points = np.asarray(mesh.vertices, dtype=np.float64)
@@ -180,6 +184,7 @@ def _check_size(path: Path, subject: SceneObject, capture_mm: float) -> None:
             f"{size[2]:.4g} mm and reaches {reach / 2:.4g} mm from the origin, allowed is "
             f"{capture_mm / 2:g}: move or scale it, or use --fit"
         )
+    warn_of_small_object(path.name, float(size.max()), capture_mm)
 
 
 def _fitted(points: Floats, faces: Ints, capture_mm: float) -> Floats:

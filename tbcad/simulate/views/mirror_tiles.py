@@ -64,6 +64,21 @@ class MirrorTiles:
         self.width = np.concatenate([_widths(frame.mirrors.apex) for frame in frames])
         self._mirrors = [(frame, i) for frame in frames for i in range(len(frame.u))]
 
+    @property
+    def camera_spacing(self) -> float:
+        """Angle between neighbouring virtual cameras, spread evenly over the hemisphere, rad."""
+        return float(np.sqrt(2 * np.pi / len(self.u) * 2 / np.sqrt(3)))
+
+    @property
+    def pixel_pitch(self) -> float:
+        """Distance of neighbouring pixels at the capture sphere, mm.
+
+        Each mirror's share of the sensor is taken as spread evenly over the capture sphere.
+        """
+        cameras = [frame.camera for frame in self.source.frames.values()]
+        pixels = sum(camera.width_px * camera.height_px for camera in cameras)
+        return float(self.source.capture_mm / np.sqrt(pixels / len(self.u)))
+
     def of(self, mirrors: Ints) -> list[MirrorTile]:
         """Tiles of some mirrors, without those that have no pixels."""
         tiles = map(self._tile, mirrors.tolist())

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import in_batches
+from tbcad.simulate.plausibility import warn_of_wide_lens
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import (
@@ -39,19 +40,21 @@ class Focus:
     plane_mm: float
 
     def check(self, view: Camera, capture_mm: float) -> None:
-        """Refuse what cannot be.
+        """Refuse what cannot be, and warn of what is unlikely.
 
         Raises:
             InputError: no aperture, or the plane that is to be sharp is not near the object.
         """
         if not 0 < self.aperture_mm < np.inf:
             raise InputError(f"--aperture {self.aperture_mm:g} is no diameter: give mm above 0")
-        limit = min(capture_mm, float(np.linalg.norm(view.pinhole)) - 1)
+        distance = float(np.linalg.norm(view.pinhole))
+        limit = min(capture_mm, distance - 1)
         if not -limit <= self.plane_mm <= limit:
             raise InputError(
                 f"--focus {self.plane_mm:g} is far from the object: allowed is "
                 f"{-limit:g} to {limit:g} mm from its middle, toward the camera"
             )
+        warn_of_wide_lens(self.aperture_mm, distance)
 
 
 def lens_pinholes() -> Floats:

@@ -119,11 +119,7 @@ def search_radius(tiles: MirrorTiles) -> float:
     neighbouring pixels, their mirror's share of the sensor evenly spread over the capture sphere.
     """
     capture = tiles.source.capture_mm
-    angle = np.sqrt(2 * np.pi / len(tiles.u) * 2 / np.sqrt(3))
-    cameras = [frame.camera for frame in tiles.source.frames.values()]
-    pixels = sum(camera.width_px * camera.height_px for camera in cameras)
-    pixel = capture / np.sqrt(pixels / len(tiles.u))
-    return float(angle * capture / 2 / np.sqrt(3) + pixel)
+    return float(tiles.camera_spacing * capture / 2 / np.sqrt(3) + tiles.pixel_pitch)
 
 
 def horizon_search_radius(tiles: MirrorTiles) -> float:
