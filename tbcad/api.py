@@ -88,12 +88,14 @@ class Build:
         folder: that holds all files.
         design: the mirrors.
         parts: what was built: "shell", "prototype" or both.
+        note: why the prototype was left out; empty when it was not.
         report: the verification of the files; None when it was not asked for.
     """
 
     folder: Path
     design: Design
     parts: tuple[str, ...]
+    note: str
     report: "Report | None"
 
     def __repr__(self) -> str:
@@ -161,7 +163,7 @@ def build(
     Args:
         spec: a spec, a design file (TOML), or None for the design of the paper.
         out: folder to write.
-        parts: "shell", "prototype" or both; None: both, but no prototype of planar mirrors.
+        parts: "shell", "prototype" or both; None: both, but no prototype where none can be made.
         verify: verify the files before they replace those of an earlier build.
         force: keep files in the folder that tbcad did not write, instead of refusing.
         progress: called with the name of each stage.
@@ -170,35 +172,20 @@ def build(
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    from tbcad.output.folder import check_replaceable
+    from tbcad.output.build import write_export
+    from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.parts import default_parts
 
-    chosen = _spec(spec, None, ())
+    chosen, out = _spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
-    folder = Path(out)
-    check_replaceable(folder, force)
-    return _built(chosen, folder, asked, verify, force, progress, detail)
-
-
-def _built(
-    spec: Spec,
-    out: Path,
-    parts: tuple[str, ...],
-    verified: bool,
-    force: bool,
-    progress: Progress,
-    detail: Progress,
-) -> Build:
-    """The stages of a build; the files are read back before they replace the old ones."""
-    from tbcad.output.build import write_export
-    from tbcad.output.folder import replacing
-
+    check_replaceable(out, force)
     progress("mirrors: radii and cells")
-    mirrors = design(spec, detail=detail)
+    mirrors = design(chosen, detail=detail)
     with replacing(out, force) as folder:
-        write_export(mirrors, folder, parts, progress)
-        report = verify(folder, progress=progress) if verified else None
-    return Build(out, mirrors, parts, report)
+        export = write_export(mirrors, folder, asked, progress, optional_prototype=parts is None)
+        # The files are read back before they replace the old ones.
+        report = _verify(folder, progress=progress) if verify else None
+    return Build(out, Design(export.spec, mirrors.halves), export.parts, export.note, report)
 
 
 def verify(
@@ -231,6 +218,9 @@ def verify(
         return verify_files(Path(exports), stage, options or VerifyOptions())
     except BadExport as error:
         raise InputError(str(error)) from None
+
+
+_verify = verify  # the parameter of build has the same name
 
 
 def capture(

@@ -52,8 +52,10 @@ def test_the_papers_design_tells_what_each_key_allows(key: str) -> None:
     assert len(comment.split()) > 3
     kind = KEYS[key].annotation
     if kind in (int, float):
-        limits = allowed_text(kind, KEYS[key].metadata).split(maxsplit=3 if kind is int else 2)[-1]
+        allowed, *words = allowed_text(kind, KEYS[key].metadata).split(", or ")
+        limits = allowed.split(maxsplit=3 if kind is int else 2)[-1]
         assert limits in re.sub(r"\s+", " ", comment)
+        assert all(f'"{word}"' in comment for word in words)
 
 
 @pytest.mark.parametrize("path", sorted(DESIGNS.glob("*.toml")), ids=lambda path: path.stem)

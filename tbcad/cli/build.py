@@ -97,7 +97,7 @@ def build(
         built = build_files(
             spec,
             out,
-            parts=chosen,
+            parts=asked,
             verify=verify,
             force=force,
             progress=screen.stage,
@@ -108,7 +108,9 @@ def build(
     if built.report is None:
         typer.echo(f"{out}: built, not verified: run tbcad verify {out}")
         return 0
-    typer.echo(f"{out}: {' and '.join(chosen)} as STEP, STL and 3MF; mirrors.csv, design.json")
+    if built.note:
+        typer.echo(built.note)
+    typer.echo(f"{out}: {' and '.join(built.parts)} as STEP, STL and 3MF; mirrors.csv, design.json")
     built.report.show(report_console())
     return 0 if built.passed else 1
 

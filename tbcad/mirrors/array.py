@@ -8,17 +8,18 @@ from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.radii import RadiusProblem, solve_radii
 from tbcad.optics import flat
-from tbcad.optics.camera import Camera, fitted_camera
+from tbcad.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic
 from tbcad.optics.power_diagram import bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.spec.design import Spec
+from tbcad.spec.design import FIT, MAX_HFOV, CameraSpec, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
 # Directions that differ by less than rounding have equal heights or azimuths.
 DIRECTION_DIGITS = 9
+HFOV_DIGITS = 12
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class MirrorDesign:
     """The mirrors of both cameras.
 
     Attributes:
-        spec: that they follow from.
+        spec: that they follow from, with the angle of view that was chosen.
         halves: camera a's mirrors (x >= 0) and camera b's (x <= 0).
     """
 
@@ -126,7 +127,9 @@ def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
         SpecError: when the spec's mirrors cannot be made; it names them.
     """
     half = _half_a(spec, progress)
-    return MirrorDesign(spec, (half, half.mirrored()))
+    hfov = round(float(np.degrees(half.camera.hfov)), HFOV_DIGITS)
+    camera = spec.camera.model_copy(update={"hfov_deg": hfov})
+    return MirrorDesign(spec.model_copy(update={"camera": camera}), (half, half.mirrored()))
 
 
 def numbering_order(u: Floats) -> Ints:
@@ -179,12 +182,9 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     )
     cells, coverage = solve_radii(spec.mirrors.radius_rule, problem, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
-    sensor, hfov = spec.camera, float(np.radians(spec.camera.hfov_deg))
     return MirrorArray(
         camera_id="a",
-        camera=fitted_camera(
-            ellipsoid.pinhole, cells.corners, sensor.width_px, sensor.height_px, hfov
-        ),
+        camera=_camera(spec.camera, ellipsoid.pinhole, cells.corners),
         ellipsoid=ellipsoid,
         u=u,
         theta0=theta0,
@@ -197,6 +197,18 @@ def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
         area=cell_areas(cells),
         coverage=coverage,
     )
+
+
+def _camera(sensor: CameraSpec, pinhole: Floats, corners: Floats) -> Camera:
+    """The camera in front of the corners (k, 3) of all cells, mm."""
+    width, height, hfov = sensor.width_px, sensor.height_px, sensor.hfov_deg
+    if hfov == FIT and (hfov := fitting_view_angle_deg(pinhole, corners, width, height)) > MAX_HFOV:
+        raise SpecError(
+            f"no lens takes in all mirrors: camera.hfov_deg would have to be {hfov:.0f}, allowed "
+            f"is up to {MAX_HFOV:g}: bring optics.camera_mm farther from the origin, or make "
+            "optics.semi_minor_mm smaller"
+        )
+    return fitted_camera(pinhole, corners, width, height, float(np.radians(hfov)))
 
 
 def _bounding_planes(u: Floats, half_width: Floats) -> Surfaces:

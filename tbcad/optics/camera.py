@@ -12,6 +12,10 @@ from tbcad.types import Floats
 MAX_FILL = 1e3
 # Digits beyond are noise of the search: a symmetric array gets a symmetric camera.
 TILT_DIGITS = 8
+RIGHT_ANGLE = np.pi / 2
+# A fitting frame is filled to this share of its width and height: 2 % of them stay free on each
+# side for the errors of a lens and of its mounting.
+FITTED_FILL = 0.96
 
 
 @dataclass(frozen=True)
@@ -119,3 +123,13 @@ def fitted_camera(
     )
     forward, right = axes(np.round(optimum.x, TILT_DIGITS) + 0.0)
     return Camera(pinhole, forward, right, width_px, height_px, hfov)
+
+
+def fitting_view_angle_deg(pinhole: Floats, points: Floats, width_px: int, height_px: int) -> float:
+    """The smallest view angle in whole degrees whose frame holds points (k, 3) with a border.
+
+    Arguments as of `fitted_camera`. 180 degrees when no frame holds them.
+    """
+    camera = fitted_camera(pinhole, points, width_px, height_px, RIGHT_ANGLE)
+    half_width = camera.half_sizes[0] * camera.fill(points) / FITTED_FILL
+    return float(np.ceil(np.degrees(2 * np.arctan(half_width))))

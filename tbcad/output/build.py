@@ -1,8 +1,10 @@
 """An export: the record, what was asked for, and the manifest."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tbcad.cad.brep import InvalidSolidError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.background import in_background
@@ -10,8 +12,24 @@ from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shells
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
+
+
+@dataclass(frozen=True)
+class Export:
+    """What was written.
+
+    Attributes:
+        spec: the design's, with a value for every key that was chosen on the way.
+        parts: some of PARTS.
+        note: why a part was left out; empty when none was.
+    """
+
+    spec: Spec
+    parts: tuple[str, ...]
+    note: str = ""
 
 
 def write_export(
@@ -19,7 +37,9 @@ def write_export(
     folder: Path,
     parts: Sequence[str] = PARTS,
     progress: Progress = lambda _: None,
-) -> None:
+    *,
+    optional_prototype: bool = False,
+) -> Export:
     """Write an export into an empty folder.
 
     Args:
@@ -27,23 +47,36 @@ def write_export(
         folder: to write into.
         parts: some of PARTS.
         progress: called with each stage.
+        optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    write_record(folder, design, SHELL in parts)
     if PROTOTYPE not in parts:
         write_shells(design, folder, progress)
+        export = Export(design.spec, (SHELL,))
     elif SHELL not in parts:
-        export_prototype(design, folder, progress)
+        export = Export(export_prototype(design, folder, progress), (PROTOTYPE,))
     else:
         shell_envelope(design)  # refuses flanges that do not fit before anything is built
         with in_background(write_shells, design, folder):
-            try:
-                export_prototype(design, folder, progress)
-            except SpecError as error:
-                raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
+            export = _prototype_beside_shells(design, folder, progress, optional_prototype)
             progress("shells")
+    write_record(folder, replace(design, spec=export.spec), SHELL in parts)
     progress("manifest")
     write_manifest(folder)
+    return export
+
+
+def _prototype_beside_shells(
+    design: MirrorDesign, folder: Path, progress: Progress, optional: bool
+) -> Export:
+    try:
+        return Export(export_prototype(design, folder, progress), PARTS)
+    except (SpecError, InvalidSolidError) as error:
+        if optional:
+            return Export(design.spec, (SHELL,), f"no prototype: {error}")
+        if isinstance(error, SpecError):
+            raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
+        raise

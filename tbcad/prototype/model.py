@@ -3,32 +3,36 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
+from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.solids import centroid
 from tbcad.geometry.primitives import Component
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.arrangement import Arrangement, arrangements, balance_and_drive
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
-from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.purchased import base_purchased_parts
 from tbcad.prototype.base.solid import carrier_parts
-from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.base.split import BaseSplit
+from tbcad.prototype.drive.balance import BaseBalance, PointMasses
+from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
-from tbcad.prototype.keepout import keep_out_volume
 from tbcad.prototype.printing.component_solids import placed_component
 from tbcad.prototype.printing.parts import PrintedPart, Role
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.prototype.purchased.parts import Parts, load_parts
-from tbcad.prototype.stage.layout import StageLayout, stage_layout
+from tbcad.prototype.purchased.parts import Parts
+from tbcad.prototype.stage.layout import StageLayout
+from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Progress
 
+MAX_MODELS = 3  # arrangements whose solids are tried
 CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
 COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
 
@@ -38,6 +42,7 @@ class PrototypeModel:
     """All of the prototype.
 
     Attributes:
+        spec: of the design, with a value for every key.
         layout: balls, their places, the plan of the stops.
         base: layout of the carrier.
         split: how the carrier is cut to fit the bed.
@@ -50,6 +55,7 @@ class PrototypeModel:
         capture_radius: of the capture sphere, mm.
     """
 
+    spec: Spec
     layout: PrototypeLayout
     base: BaseLayout
     split: BaseSplit
@@ -74,28 +80,34 @@ class PrototypeModel:
 def build_prototype_model(
     design: MirrorDesign, progress: Progress = lambda _: None
 ) -> PrototypeModel:
-    """Lay out the prototype of a design, choose its drive and build its solids.
+    """Arrange the prototype of a design and build its solids.
+
+    Where the solids of the preferred arrangement fail, the next ones are tried.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    spec, printer, parts = design.spec.prototype, design.spec.printer, load_parts()
-    capture_radius = design.spec.optics.capture_diameter_mm / 2
     progress("prototype: balls, their places, stops")
-    layout = prototype_layout(design.spec, design)
-    base = base_layout(spec.base, layout)
+    errors: list[Exception] = []
+    for arrangement in islice(arrangements(design), MAX_MODELS):
+        try:
+            return _model(arrangement, progress)
+        except (SpecError, InvalidSolidError) as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
+    spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
+    printer, parts = spec.printer, arrangement.parts
     progress("prototype: base")
-    split = split_base(base, printer)
-    carrier = carrier_parts(base, split, printer)
-    density = printer.density_g_cm3
-    balance = sum_masses(base.frame, ball_masses(layout, density), _masses(carrier, density))
-    drive = _drive(layout, balance, spec, parts)
+    carrier = carrier_parts(base, arrangement.split, printer)
+    masses = _masses(carrier, printer.density_g_cm3)
+    balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
-    approach = float(np.radians(spec.motion.approach_deg))
-    keep_out = keep_out_volume(layout, base, capture_radius, approach)
-    stage = stage_layout(spec, layout, keep_out, parts)
-    frame = frame_layout(spec, layout, base, stage, drive, keep_out, parts)
+    stage, keep_out = arrangement.stage, arrangement.keep_out
+    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     static = [
         *_components("stage", stage.components, printer),
         *_components("frame", frame.printed, printer),
@@ -108,25 +120,18 @@ def build_prototype_model(
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in coupon_plates(base, printer)),
     )
     return PrototypeModel(
+        spec=spec,
         layout=layout,
         base=base,
-        split=split,
+        split=arrangement.split,
         stage=stage,
         frame=frame,
         printed=printed,
         balance=balance,
         drive=drive,
         parts=parts,
-        capture_radius=capture_radius,
+        capture_radius=spec.optics.capture_diameter_mm / 2,
     )
-
-
-def _drive(
-    layout: PrototypeLayout, balance: BaseBalance, spec: PrototypeSpec, parts: Parts
-) -> Drive:
-    acceleration = float(np.radians(spec.motion.acceleration_deg_s2))
-    torque = balance.required_torque(*layout.stops.range, acceleration, spec.motion.safety)
-    return choose_drive(spec.base.drive, torque, load_drives(parts))
 
 
 def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:

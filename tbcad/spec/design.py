@@ -7,15 +7,18 @@ at length and equals the defaults, which are the design of the paper.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import PrototypeSpec
-from tbcad.spec.section import Section, as_tuple
+from tbcad.spec.section import OrWord, Reason, Section, as_tuple
+from tbcad.spec.sizes import with_sizes
 
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
+FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
+MAX_HFOV = 170  # degrees
 
 
 def _current(value: object) -> object:
@@ -43,7 +46,7 @@ RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
 class OpticsSpec(Section):
     """Where the mirrors, the cameras and the object are."""
 
-    n: int = Field(18, ge=1, le=60)
+    n: Annotated[int, Reason("at n = 1 no camera sees a mirror whole")] = Field(18, ge=2, le=60)
     """Subdivision of the icosahedron: the number of mirrors grows with its square."""
     capture_diameter_mm: float = Field(60.0, gt=0, le=1000)
     """Diameter of the capture sphere, which every virtual camera must see whole."""
@@ -60,8 +63,9 @@ class CameraSpec(Section):
     """Columns of the sensor."""
     height_px: int = Field(1552, ge=16, le=32_768)
     """Rows of the sensor."""
-    hfov_deg: float = Field(89.0, ge=1, le=170)
-    """Angle of view across the columns."""
+    hfov_deg: Annotated[float, OrWord(FIT)] = Field(FIT, ge=1, le=MAX_HFOV)
+    """Angle of view across the columns; fit: the smallest whole number of degrees that leaves a
+    border round the mirrors, 89 for the paper's design."""
 
 
 class MirrorsSpec(Section):
@@ -166,6 +170,8 @@ class Spec(Section):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         _check_capture_sphere(self.optics)
+        # Not an assignment: the design is frozen from here on.
+        self.__dict__["prototype"] = with_sizes(self.prototype, self.optics)
         if self.mesh.structure_error_mm > self.shell.wall_mm / 2:
             raise ValueError(
                 f"mesh.structure_error_mm {self.mesh.structure_error_mm:g} is more than half of "

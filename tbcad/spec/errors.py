@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from tbcad.errors import InputError, one_line
+from tbcad.spec.section import OrWord, Reason
 
 _MAX_VALUE_LENGTH = 60
 _MIN_LIKENESS = 0.6
@@ -48,6 +49,12 @@ def section_of(field: FieldInfo) -> type[BaseModel] | None:
 
 def allowed_text(kind: Any, limits: Iterable[object] = ()) -> str:
     """Return what a type and its limits allow, as text: "a number above 0 to 90"."""
+    limits = list(limits)
+    words = "".join(f", or {limit.word}" for limit in limits if isinstance(limit, OrWord))
+    return _allowed_value(kind, limits) + words
+
+
+def _allowed_value(kind: Any, limits: Iterable[object]) -> str:
     if get_origin(kind) is tuple:
         return "[" + ", ".join(_allowed_item(item) for item in get_args(kind)) + "]"
     if get_origin(kind) is Literal:
@@ -130,4 +137,5 @@ def _wrong_value(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
     entry = "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
     value = "missing" if first["type"] == "missing" else short_text(first["input"])
     permitted = allowed_text(field.annotation, field.metadata)
-    return f"{key}{entry} is {value}, allowed is {permitted}: change it"
+    reasons = "".join(f" ({one.text})" for one in field.metadata if isinstance(one, Reason))
+    return f"{key}{entry} is {value}, allowed is {permitted}{reasons}: change it"

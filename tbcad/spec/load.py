@@ -38,7 +38,8 @@ def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = 
 
 def spec_dict(spec: Spec) -> Table:
     """Return the design as plain JSON values, keys in the order of the spec."""
-    return spec.model_dump(mode="json", by_alias=True)
+    # Without warnings: a key may hold a word in place of a value of its type.
+    return spec.model_dump(mode="json", by_alias=True, warnings=False)
 
 
 def option_texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:

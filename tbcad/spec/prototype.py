@@ -1,11 +1,11 @@
 """The section [prototype] of the design: steel balls on a base that turns, and its sections."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field
 
 from tbcad.spec.errors import short_text
-from tbcad.spec.section import Section, as_tuple
+from tbcad.spec.section import AUTO, OR_AUTO, Section, as_tuple
 
 MOST_BALLS = 1000
 LEAST_LEDS, MOST_LEDS = 4, 12
@@ -17,6 +17,11 @@ Snap: TypeAlias = Literal["cover", "nearest"]
 Picture: TypeAlias = Literal["moved", "fixed"]
 Drive: TypeAlias = Literal["nema17-belt", "nema17-direct", "stage-60"]
 Hold: TypeAlias = Literal["magnet", "glue"]
+HOLDS: tuple[Hold, ...] = get_args(Hold)
+# Tried in turn: flatter pads set a seat deeper, out of the light.
+PAD_ANGLES_DEG = (50.0, 40.0, 30.0)
+# Tried in turn: a longer boss sets the frame farther back from what the base sweeps.
+HUB_BOSSES_MM = (20.0, 35.0, 50.0, 65.0)
 Lock: TypeAlias = Literal["set-screws", "clamp"]
 Magnets: TypeAlias = Annotated[
     tuple[Annotated[float, Field(ge=1, le=50)], ...],
@@ -85,14 +90,16 @@ class BaseSpec(Section):
     """Gap between a ball and its cup everywhere but at the pads."""
     pad_mm: float = Field(3.0, ge=0.5, le=20)
     """Diameter of the three pads that carry a ball; smaller for balls of less than 4.5 pads."""
-    pad_angle_deg: float = Field(50.0, ge=20, le=70)
-    """Angle between a pad's normal and the axis of its seat."""
+    pad_angle_deg: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=70)
+    """Angle between a pad's normal and the axis of its seat; auto: the first of 50, 40 and 30 whose
+    seats stay out of the light."""
     cup_wall_mm: float = Field(2.5, ge=0.8, le=20)
     """Wall round a cup."""
     floor_mm: float = Field(2.0, ge=0.6, le=20)
     """Wall below a cup's pocket."""
-    hold: Hold = "magnet"
-    """How a ball is held on its pads: by a magnet below it, or by glue in a well."""
+    hold: Annotated[Hold, OR_AUTO] = AUTO
+    """How a ball is held on its pads: by a magnet below it, or by glue in a well; auto: magnets
+    where they fit."""
     magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
     """Diameters of the disc magnets on sale; each ball gets the largest that fits."""
     magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
@@ -109,6 +116,9 @@ class BaseSpec(Section):
     """Drive of the base, which decides the holes in its hub."""
     shaft_mm: float = Field(8.0, ge=3, le=25)
     """Diameter of the shaft's bore."""
+    hub_boss_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=100)
+    """Length of the hub's boss behind its disc, with a drive on a shaft; auto: the first of 20, 35,
+    50 and 65 with which the base clears the frame."""
     lock: Lock = "set-screws"
     """How the shaft is locked in the hub."""
     insert_hole_mm: float = Field(4.0, ge=2, le=10)
@@ -129,6 +139,21 @@ class BaseSpec(Section):
     """Play on the diameter of a dowel in the hole on the other side."""
     coupon_offsets_mm: Offsets = (-0.1, 0.0, 0.1)
     """Distances by which the coupon's pads are moved away from the ball."""
+
+    @property
+    def pad_angles_deg(self) -> tuple[float, ...]:
+        """Angles of the pads that the key permits, the preferred one first."""
+        return PAD_ANGLES_DEG if self.pad_angle_deg == AUTO else (self.pad_angle_deg,)
+
+    @property
+    def hub_bosses_mm(self) -> tuple[float, ...]:
+        """Lengths of the hub's boss that the key permits, the preferred one first."""
+        return HUB_BOSSES_MM if self.hub_boss_mm == AUTO else (self.hub_boss_mm,)
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """Ways to hold a ball that the key permits, the preferred one first."""
+        return HOLDS if self.hold == AUTO else (self.hold,)
 
 
 class MotionSpec(Section):
@@ -164,18 +189,13 @@ class MotionSpec(Section):
 class StageSpec(Section):
     """The stage that carries the object, with LEDs at known places for calibration."""
 
-    top_mm: float = Field(-20.0, ge=-1000, le=1000)
+    top_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-1000, le=1000)
     """Height of the disc that carries the object; it must be inside the capture sphere."""
-    disc_mm: float = Field(17.0, ge=4, le=500)
+    disc_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=4, le=500)
     """Diameter of that disc, which is turned by 180 degrees for the other half."""
     led: Led = "LED-3"
     """LEDs in the pockets."""
-    leds_mm: Places = (
-        (10.6, 7.5, -19.0),
-        (3.4, -12.6, -17.0),
-        (-3.4, 12.6, -13.5),
-        (-10.6, -7.5, -7.0),
-    )
+    leds_mm: Annotated[Places, OR_AUTO] = AUTO
     """Centres of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
     led_wall_mm: float = Field(2.0, ge=0.8, le=20)
     """Wall round an LED's pocket."""
@@ -189,7 +209,7 @@ class StageSpec(Section):
 class FrameSpec(Section):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
-    floor_mm: float = Field(-230.0, ge=-3000, le=-10)
+    floor_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-3000, le=-10)
     """Height of the base plate's upper face."""
     clearance_mm: float = Field(3.0, ge=0.5, le=50)
     """Minimum distance of all static parts from the light and from what the base sweeps."""
@@ -214,13 +234,13 @@ class FrameSpec(Section):
 class PrototypeSpec(Section):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
-    k: Annotated[int | Literal["auto"], BeforeValidator(_count)] = 16
-    """Number of balls, or auto: the smallest number that keeps the limits below."""
+    k: Annotated[int | Literal["auto"], BeforeValidator(_count)] = "auto"
+    """Number of balls, or auto: the smallest number within the limits below that has room."""
     radius_weight_deg: float = Field(0.25, ge=0, le=100)
     """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm."""
-    auto_direction_max_deg: float = Field(3.5, gt=0, le=90)
+    auto_direction_max_deg: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=90)
     """With k auto: largest error of direction of any mirror."""
-    auto_direction_median_deg: float = Field(1.5, gt=0, le=90)
+    auto_direction_median_deg: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=90)
     """With k auto: largest median error of direction."""
     auto_lost_percent: float = Field(25.0, ge=0, le=100)
     """With k auto: largest share of the shell's pixels that the balls lose."""
@@ -228,7 +248,7 @@ class PrototypeSpec(Section):
     """Lists of balls on sale: metric, inch, or CSV files."""
     grade: GradeName = "G40"
     """Grade of the balls by ISO 3290-1; only sizes sold in it are used."""
-    largest_ball_mm: float = Field(60.0, gt=0, le=1000)
+    largest_ball_mm: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=1000)
     """Largest ball to buy, however large the lists go."""
     snap: Snap = "cover"
     """Which stock ball a group gets: the largest that shows all, or the nearest in radius."""
@@ -238,13 +258,13 @@ class PrototypeSpec(Section):
     """Give groups beyond the largest ball a made cap of their own radius."""
     cap_rim_mm: float = Field(2.0, ge=0, le=50)
     """Width of the rim round the part of a cap in use."""
-    ball_wall_mm: float = Field(3.0, ge=0, le=50)
+    ball_wall_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=50)
     """Minimum distance between two balls, and between a ball and the post or the camera."""
     light_margin_mm: float = Field(0.5, ge=0, le=20)
     """Minimum distance of a ball from the light of another."""
-    post_diameter_mm: float = Field(20.0, ge=0, le=200)
+    post_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=200)
     """Post straight below the object, which no ball may reach; 0: none, the hub is hollow."""
-    camera_diameter_mm: float = Field(60.0, ge=0, le=500)
+    camera_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=500)
     """Body of the camera behind its pinhole, which no ball may reach; 0: none."""
     camera_length_mm: float = Field(100.0, ge=0, le=1000)
     """Length of that body, from the pinhole back."""

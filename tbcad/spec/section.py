@@ -1,6 +1,15 @@
 """A table of the design: what all of its sections have in common."""
 
-from pydantic import BaseModel, ConfigDict
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    ValidatorFunctionWrapHandler,
+)
+from pydantic_core import CoreSchema, core_schema
 
 
 class Section(BaseModel):
@@ -9,6 +18,40 @@ class Section(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+
+@dataclass(frozen=True)
+class OrWord:
+    """Annotation of a key that may hold a word instead of a value of its type.
+
+    The key keeps the type of its values: before they are used, tbcad puts one in the word's place.
+
+    Attributes:
+        word: for instance "auto".
+    """
+
+    word: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Let the word through; check everything else as the type does."""
+        return core_schema.no_info_wrap_validator_function(self._checked, handler(source))
+
+    def _checked(self, value: object, check: ValidatorFunctionWrapHandler) -> object:
+        return value if value == self.word else check(value)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Annotation of a key: why its values end where they do, for the error message."""
+
+    text: str
+
+
+AUTO: Final[Any] = "auto"
+"""Value of a key whose value tbcad chooses."""
+OR_AUTO = OrWord(AUTO)
 
 
 def as_tuple(value: object) -> object:

@@ -1,5 +1,6 @@
 """The prototype in numbers: balls, their places on the base, its swing and its stops."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +37,9 @@ from tbcad.types import Floats, Ints
 
 # Length of the post in semi-major axes: it reaches down beyond all balls.
 POST_LENGTHS = 3
+# With k auto: the largest number whose limits are examined, more than any base had room for, and
+# the number of larger ones tried than the smallest within the limits.
+MANY_BALLS, MORE_BALLS = 40, 4
 
 
 @dataclass(frozen=True)
@@ -103,15 +107,20 @@ class PrototypeLayout:
         return float(np.ptp(self.placement.azimuth))
 
 
-def prototype_layout(spec: Spec, design: MirrorDesign) -> PrototypeLayout:
+def prototype_layout(spec: Spec, design: MirrorDesign, count: int | None = None) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
+
+    Args:
+        spec: the design.
+        design: its mirrors.
+        count: number of balls; None: the first that the spec permits.
 
     Raises:
         SpecError: when there is no such layout; it says what to change.
     """
     half = design.halves[0]
-    _check_suitable(spec, half)
-    candidates, balls = _balls(spec, half)
+    k = next(ball_counts(spec, design)) if count is None else count
+    candidates, balls = _balls_for_groups(spec, half, k, _catalogue(spec.prototype))
     groups, stop_error = candidates.groups, float(np.radians(spec.prototype.stop_error_deg))
     requests = stop_requests(groups, half.azimuth, stop_error)
     problem = _placement_problem(spec, half, balls, requests)
@@ -144,25 +153,41 @@ def _check_suitable(spec: Spec, half: MirrorArray) -> None:
         )
 
 
-def _balls(spec: Spec, half: MirrorArray) -> tuple[BallCandidates, Balls]:
-    """Groups and their balls, as many as the spec gives or the fewest within its limits."""
-    limits = spec.prototype
-    catalogue = load_catalogue(limits.catalogues)
-    catalogue = catalogue.available(limits.grade, limits.largest_ball_mm)
-    if limits.k != "auto":
-        return _balls_for_groups(spec, half, limits.k, catalogue)
-    distinct = max_groups(half.polar, half.mirrors.radius, limits.radius_weight_deg)
-    max_k = min(distinct, MOST_BALLS)
-    for k in range(1, max_k + 1):
+def ball_counts(spec: Spec, design: MirrorDesign) -> Iterator[int]:
+    """Numbers of balls that the spec permits, in the order in which layouts are tried.
+
+    With prototype.k auto: the smallest number within the limits auto_..., a few more, then fewer.
+
+    Raises:
+        SpecError: no prototype of balls suits the mirrors.
+    """
+    half = design.halves[0]
+    _check_suitable(spec, half)
+    if isinstance(spec.prototype.k, int):
+        yield spec.prototype.k
+        return
+    distinct = max_groups(half.polar, half.mirrors.radius, spec.prototype.radius_weight_deg)
+    most = min(distinct, MOST_BALLS)
+    smallest = _smallest_count(spec, half, most)
+    if smallest is not None:
+        yield from range(smallest, min(smallest + MORE_BALLS, most) + 1)
+    yield from range(min((smallest or MANY_BALLS + 1) - 1, most), 0, -1)
+
+
+def _smallest_count(spec: Spec, half: MirrorArray, most: int) -> int | None:
+    """The smallest number of balls within the limits of the spec, None when there is none."""
+    limits, catalogue = spec.prototype, _catalogue(spec.prototype)
+    for k in range(1, min(most, MANY_BALLS) + 1):
         if _directions_within_limits(limits, half, k):
-            candidates, balls = _balls_for_groups(spec, half, k, catalogue)
-            lost = 1 - ball_fit(candidates, balls, limits).kept_share
-            if 100 * lost <= limits.auto_lost_percent:
-                return candidates, balls
-    raise SpecError(
-        f"no number of balls up to {max_k} keeps prototype.auto_direction_max_deg, "
-        "auto_direction_median_deg and auto_lost_percent: raise these, or set prototype.k"
-    )
+            fit = ball_fit(*_balls_for_groups(spec, half, k, catalogue), limits)
+            if 100 * (1 - fit.kept_share) <= limits.auto_lost_percent:
+                return k
+    return None
+
+
+def _catalogue(spec: PrototypeSpec) -> Catalogue:
+    """Balls that can be bought for a prototype."""
+    return load_catalogue(spec.catalogues).available(spec.grade, spec.largest_ball_mm)
 
 
 def _groups(spec: PrototypeSpec, half: MirrorArray, k: int) -> MirrorGroups:

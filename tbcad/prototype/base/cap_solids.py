@@ -59,7 +59,7 @@ def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
     largest = float(np.sqrt(base.seats.radius[k] ** 2 - flat**2)) - WEB_MM
     radii = [(size + spec.magnet_play_mm) / 2 for size in spec.magnets_mm]
     fitting = [radius for radius in radii if radius <= largest]
-    if spec.hold == "glue" or not fitting or depth + flat < spec.magnet_height_mm + FRONT_MM:
+    if spec.holds[0] == "glue" or not fitting or depth + flat < spec.magnet_height_mm + FRONT_MM:
         return 0.0, 0.0
     return max(fitting), spec.magnet_height_mm
 

@@ -12,7 +12,6 @@ MIN_WALL_MM = 1.5  # between the shaft's bore and the holes
 SCREW_MM = 3.4  # clearance hole of an M3 screw (ISO 273, medium)
 SLIT_MM = 2.0  # width of the clamp's slit
 DISC_MM = 10.0  # thickness of the disc
-BOSS_MM = 20.0  # length of the boss
 DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
 MIN_DISC_RADIUS_MM = 30.0  # with a boss
 BELOW_HEAD_MM = 6.0  # material below a counterbore
@@ -94,7 +93,7 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
     else:
         boss, disc, thickness = 0.0, outer, max(DISC_MM, pattern.head[1] + BELOW_HEAD_MM)
     back = front - thickness
-    face = back - BOSS_MM if pattern.boss else back
+    face = back - spec.hub_bosses_mm[0] if pattern.boss else back
     return Hub(
         front=front,
         back=back,

@@ -12,7 +12,7 @@ from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
+from tbcad.spec.prototype import BaseSpec, Hold
 from tbcad.types import Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads
@@ -102,13 +102,14 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
     Raises:
         SpecError: when a pad, pocket or magnet does not fit; it says what to change.
     """
-    radius, tilt = prototype.balls.body_radius, float(np.radians(spec.pad_angle_deg))
+    hold, pad_angle = spec.holds[0], spec.pad_angles_deg[0]
+    radius, tilt = prototype.balls.body_radius, float(np.radians(pad_angle))
     pad = np.minimum(spec.pad_mm, MAX_PAD * radius) / 2
     cup = radius + spec.clearance_mm
     front = radius * np.cos(tilt) - pad * np.sin(tilt) - LIP_MM
-    _check_cups(spec, radius, pad, front)
-    magnet, pocket = _pockets(spec, radius, pad, tilt)
-    magnet_height = spec.magnet_height_mm if spec.hold == "magnet" else 0.0
+    _check_cups(spec, radius, pad, front, pad_angle)
+    magnet, pocket = _pockets(spec, hold, radius, pad, tilt)
+    magnet_height = spec.magnet_height_mm if hold == "magnet" else 0.0
     bottom = radius + spec.magnet_gap_mm + magnet_height
     seats = Seats(
         centre=prototype.body_centres(),
@@ -136,11 +137,13 @@ def _axes(prototype: PrototypeLayout) -> Floats:
     return np.stack([np.cross(against, back), against, back], axis=1)
 
 
-def _check_cups(spec: BaseSpec, radius: Floats, pad: Floats, front: Floats) -> None:
+def _check_cups(
+    spec: BaseSpec, radius: Floats, pad: Floats, front: Floats, pad_angle: float
+) -> None:
     if (closed := front < 0).any():
         raise SpecError(
             f"the cup of ball {_first_ball(closed)} would close round it: make "
-            f"prototype.base.pad_angle_deg less than {spec.pad_angle_deg:g} or "
+            f"prototype.base.pad_angle_deg less than {pad_angle:g} or "
             f"prototype.base.pad_mm less than {spec.pad_mm:g}"
         )
     # The pads stand out of the cup up to their edges.
@@ -153,10 +156,12 @@ def _check_cups(spec: BaseSpec, radius: Floats, pad: Floats, front: Floats) -> N
         )
 
 
-def _pockets(spec: BaseSpec, radius: Floats, pad: Floats, tilt: float) -> tuple[Floats, Floats]:
+def _pockets(
+    spec: BaseSpec, hold: Hold, radius: Floats, pad: Floats, tilt: float
+) -> tuple[Floats, Floats]:
     """Magnets and radii of pockets, both (k,)."""
     room = radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
-    if spec.hold == "glue":
+    if hold == "glue":
         return np.zeros_like(radius), room / 2
     sizes = np.array(sorted(spec.magnets_mm))
     fitting = (sizes + spec.magnet_play_mm) / 2 <= room[:, None]

@@ -30,24 +30,29 @@ BALLS_FILE = "balls.csv"
 
 def export_prototype(
     design: MirrorDesign, folder: Path, progress: Progress = lambda _: None
-) -> None:
+) -> Spec:
     """Build the prototype and write all of its files into a folder.
+
+    Returns:
+        The design's spec with what was chosen for the prototype.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    built, spec = build_prototype_model(design, progress), design.spec
+    built = build_prototype_model(design, progress)
+    spec = built.spec
     progress("prototype: files")
     for part in built.printed:
         _write_part(folder, part, spec)
-    _write_tables(built, design, folder)
+    _write_tables(built, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
     write_assembly(folder / STEP, "prototype", groups)
     write_glb(folder / GLB, "prototype", groups)
-    text = json.dumps(document(built, design), indent=1, allow_nan=False) + "\n"
+    text = json.dumps(document(built), indent=1, allow_nan=False) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8")
+    return spec
 
 
 def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> None:
@@ -63,21 +68,21 @@ def _file_names(part: PrintedPart) -> dict[str, str]:
     return {kind: f"{part.name}.{kind}" for kind in ("step", "stl", "3mf")}
 
 
-def document(built: PrototypeModel, design: MirrorDesign) -> dict[str, Any]:
+def document(built: PrototypeModel) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers."""
-    layout, spec = built.layout, design.spec.prototype
+    layout, spec = built.layout, built.spec.prototype
     axis, zero, third = (layout.half.ellipsoid.frame() + 0.0).tolist()
     return {
         "schema": SCHEMA,
         "camera": layout.half.camera_id,
-        "target_mm": design.spec.optics.capture_diameter_mm,
+        "target_mm": built.spec.optics.capture_diameter_mm,
         "picture": spec.picture,
         "target_pad_um": PAD_UM,
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
         "alternatives": ball_alternatives(
-            design.spec, layout.half, layout.groups, layout.balls.catalogue
+            built.spec, layout.half, layout.groups, layout.balls.catalogue
         ),
         "seats": _seats(built),
         "parts": [_part_record(part) for part in built.printed],
@@ -141,14 +146,14 @@ def _seats(built: PrototypeModel) -> list[dict[str, Any]]:
     ]
 
 
-def _write_tables(built: PrototypeModel, design: MirrorDesign, folder: Path) -> None:
-    layout, motion = built.layout, design.spec.prototype.motion
+def _write_tables(built: PrototypeModel, folder: Path) -> None:
+    layout, motion = built.layout, built.spec.prototype.motion
     printed = (
         bom_csv.PrintedItem(part.name, part.what, part.solid.volume)
         for part in built.printed
         if part.role != "cap"
     )
-    density = design.spec.printer.density_g_cm3
+    density = built.spec.printer.density_g_cm3
     bill = bom_csv.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts)
     for name, columns, rows in (
         (BALLS_FILE, balls_csv.COLUMNS, balls_csv.ball_rows(layout)),

@@ -1,0 +1,222 @@
+"""The arrangement of a prototype: all its layouts, without solids, and what the spec leaves open.
+
+Number of balls, angle of the pads and hold are chosen together: the first combination, in the order
+of preference, in which balls, seats, base, stage and frame have room.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.prototype.balls.layout import PrototypeLayout, ball_counts, prototype_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.mass import carrier_masses
+from tbcad.prototype.base.split import BaseSplit, split_base
+from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
+from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.frame.layout import FrameLayout, frame_layout
+from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.purchased.parts import Parts, load_parts
+from tbcad.prototype.stage.layout import StageLayout, stage_layout
+from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
+from tbcad.spec.section import AUTO
+from tbcad.types import Progress
+
+OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
+"""Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """All layouts of a prototype.
+
+    Attributes:
+        spec: with a value for every key.
+        layout: balls, their places, the plan of the stops.
+        base: layout of the carrier.
+        split: how the carrier is cut to fit the bed.
+        balance: of what turns with the base, with an estimate of the carrier's mass.
+        drive: that turns it.
+        keep_out: what static parts must keep out of.
+        stage: layout of the object stage.
+        frame: layout of what holds stage, base and camera.
+        parts: lists of purchased parts.
+    """
+
+    spec: Spec
+    layout: PrototypeLayout
+    base: BaseLayout
+    split: BaseSplit
+    balance: BaseBalance
+    drive: Drive
+    keep_out: KeepOut
+    stage: StageLayout
+    frame: FrameLayout
+    parts: Parts
+
+
+def arrangements(
+    design: MirrorDesign, progress: Progress = lambda _: None
+) -> Iterator[Arrangement]:
+    """Every arrangement that has room, the preferred first.
+
+    Args:
+        design: the mirrors.
+        progress: called with what is tried.
+
+    Raises:
+        SpecError: at the end, when there was none; it names the cause in the preferred one, and
+            what was tried.
+    """
+    tried: list[int] = []
+    first_error: SpecError | None = None
+    found = False
+    for spec, outcome in _attempts(design, progress):
+        tried.append(int(spec.prototype.k))
+        if isinstance(outcome, Arrangement):
+            found = True
+            yield outcome
+        elif first_error is None:
+            first_error = outcome
+    if not found and first_error is not None:
+        raise SpecError(f"{first_error}{_remedy(design, tried)}") from None
+
+
+def arrange(design: MirrorDesign, progress: Progress = lambda _: None) -> Arrangement:
+    """The preferred arrangement; raises as `arrangements`."""
+    return next(arrangements(design, progress))
+
+
+def balance_and_drive(
+    layout: PrototypeLayout, base: BaseLayout, carrier: PointMasses, spec: Spec, parts: Parts
+) -> tuple[BaseBalance, Drive]:
+    """The balance of balls and carrier, and the drive that turns them.
+
+    Raises:
+        SpecError: no drive is strong enough.
+    """
+    motion = spec.prototype.motion
+    balance = sum_masses(base.frame, ball_masses(layout, spec.printer.density_g_cm3), carrier)
+    torque = balance.required_torque(
+        *layout.stops.range, float(np.radians(motion.acceleration_deg_s2)), motion.safety
+    )
+    return balance, choose_drive(spec.prototype.base.drive, torque, load_drives(parts))
+
+
+Outcome = tuple[Spec, Arrangement | SpecError]
+"""What was tried, and its arrangement or why it has none."""
+
+
+def _attempts(design: MirrorDesign, progress: Progress) -> Iterator[Outcome]:
+    """Outcomes for every number of balls."""
+    parts = load_parts()
+    for k in ball_counts(design.spec, design):
+        spec = _with(design.spec, k=k)
+        progress(f"{k} balls, their places, stops")
+        try:
+            layout = prototype_layout(spec, design, k)
+        except SpecError as error:
+            yield spec, error
+        else:
+            yield from _base_attempts(spec, layout, parts)
+
+
+def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterator[Outcome]:
+    """Outcomes for balls in their places; glue is tried only where no magnets fit."""
+    section = spec.prototype.base
+    for hold in section.holds:
+        seated = False
+        for angle in section.pad_angles_deg:
+            chosen = _with_base(spec, hold=hold, pad_angle_deg=angle)
+            try:
+                base_layout(chosen.prototype.base, layout)
+            except SpecError as error:
+                yield chosen, error
+            else:
+                seated = True
+                yield from _frame_attempts(chosen, layout, parts)
+        if seated:
+            return
+
+
+def _frame_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterator[Outcome]:
+    """Outcomes for a base whose seats have room."""
+    for boss in spec.prototype.base.hub_bosses_mm:
+        chosen = _with_base(spec, hub_boss_mm=boss)
+        base = base_layout(chosen.prototype.base, layout)
+        keep_out = _keep_out(chosen, layout, base)
+        try:
+            stage = stage_layout(chosen.prototype, layout, keep_out, parts)
+        except SpecError as error:  # whatever the boss
+            yield chosen, error
+            return
+        try:
+            yield chosen, _arranged(chosen, layout, base, keep_out, stage, parts)
+        except SpecError as error:
+            yield chosen, error
+
+
+def _with(spec: Spec, **values: object) -> Spec:
+    prototype = spec.prototype.model_copy(update=values)
+    return spec.model_copy(update={"prototype": prototype})
+
+
+def _with_base(spec: Spec, **values: object) -> Spec:
+    return _with(spec, base=spec.prototype.base.model_copy(update=values))
+
+
+def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
+    approach = float(np.radians(spec.prototype.motion.approach_deg))
+    return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
+
+
+def _arranged(
+    spec: Spec,
+    layout: PrototypeLayout,
+    base: BaseLayout,
+    keep_out: KeepOut,
+    stage: StageLayout,
+    parts: Parts,
+) -> Arrangement:
+    carrier = carrier_masses(base, spec.printer.density_g_cm3)
+    balance, drive = balance_and_drive(layout, base, carrier, spec, parts)
+    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
+    return Arrangement(
+        spec=spec,
+        layout=layout,
+        base=base,
+        split=split_base(base, spec.printer),
+        balance=balance,
+        drive=drive,
+        keep_out=keep_out,
+        stage=stage,
+        frame=frame,
+        parts=parts,
+    )
+
+
+def _remedy(design: MirrorDesign, tried: list[int]) -> str:
+    """What else was tried, as the end of an error message.
+
+    Where the spec fixes keys that could be open: an arrangement without that, if there is one.
+    """
+    fixed = {key: value for key, value in _open_keys(design.spec).items() if value != AUTO}
+    if not fixed:
+        return f" (tried: {', '.join(map(str, dict.fromkeys(tried)))} balls)"
+    free = _with_base(_with(design.spec, k=AUTO), **dict.fromkeys(OPEN_BASE_KEYS, AUTO))
+    try:
+        chosen = _open_keys(arrange(MirrorDesign(free, design.halves)).spec)
+    except SpecError:
+        return ""
+    return "; tried: there is room with " + ", ".join(
+        f"prototype.{key} auto (which becomes {chosen[key]})" for key in fixed
+    )
+
+
+def _open_keys(spec: Spec) -> dict[str, object]:
+    """Values of the keys that may be open."""
+    base = spec.prototype.base
+    return {"k": spec.prototype.k} | {f"base.{key}": getattr(base, key) for key in OPEN_BASE_KEYS}

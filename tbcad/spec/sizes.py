@@ -1,0 +1,116 @@
+"""Lengths of the prototype that follow from the optics where the spec leaves them to tbcad.
+
+Every rule gives the paper's design the sizes it was tried with, and grows or shrinks with the part
+of the machine that the length must suit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tbcad.spec.section import AUTO, Section
+
+if TYPE_CHECKING:
+    from tbcad.spec.design import OpticsSpec
+    from tbcad.spec.prototype import PrototypeSpec
+
+# Angle between neighbouring directions, of n: an edge of the icosahedron in n parts.
+EDGE_DEG = math.degrees(math.atan(2))
+MAX_DIRECTION_DEG, MEDIAN_DIRECTION_DEG = 3.5, 1.5  # of fine designs
+MEDIAN_OF_SPACING = 0.43
+LARGEST_BALL_MM, BALL_OF_MINOR = 60.0, 0.8  # heavier balls need another drive
+BALL_WALL_MM, MIN_BALL_WALL_MM, WALL_OF_MINOR = 3.0, 1.2, 0.04
+POST_MM, MIN_POST_MM, POST_OF_CAPTURE = 20.0, 8.0, 1 / 3
+CAMERA_MM, MIN_CAMERA_MM, CAMERA_OF_DISTANCE = 60.0, 25.0, 0.56
+CAMERA_STEP_MM = 5.0
+DISC_OF_CAPTURE, MIN_DISC_MM = 17 / 60, 12.0
+TOP_OF_CAPTURE = -1 / 3
+# The crown is this much lower than the disc's face, and stays inside the sphere by the second.
+CROWN_MM, INSIDE_MM = 4.8, 0.3
+# Places of the LEDs in a capture sphere of 60 mm; smaller spheres have no room for any.
+LEDS_MM, LEDS_CAPTURE_MM = (
+    (
+        (10.6, 7.5, -19.0),
+        (3.4, -12.6, -17.0),
+        (-3.4, 12.6, -13.5),
+        (-10.6, -7.5, -7.0),
+    ),
+    60.0,
+)
+BELOW_CAMERA_MM, BELOW_BASE_MM, FLOOR_STEP_MM = 30.0, 50.0, 10.0
+STEP_MM = 0.1  # that lengths are rounded to
+
+AnySection = TypeVar("AnySection", bound=Section)
+
+
+def with_sizes(prototype: PrototypeSpec, optics: OpticsSpec) -> PrototypeSpec:
+    """The section [prototype] with a number for every length in it that was "auto".
+
+    What needs the mirrors or the layout to be chosen stays "auto": the number of balls, the angle
+    of the pads, and how balls are held.
+    """
+    balls = _filled(prototype, _ball_sizes(optics))
+    stage = _filled(prototype.stage, _stage_sizes(optics))
+    frame = _filled(prototype.frame, {"floor_mm": _floor(optics, balls)})
+    return balls.model_copy(update={"stage": stage, "frame": frame})
+
+
+def _filled(section: AnySection, sizes: dict[str, Any]) -> AnySection:
+    """A section with those sizes whose keys are "auto"."""
+    return section.model_copy(
+        update={key: size for key, size in sizes.items() if getattr(section, key) == AUTO}
+    )
+
+
+def _ball_sizes(optics: OpticsSpec) -> dict[str, float]:
+    minor, spacing = optics.semi_minor_mm, EDGE_DEG / optics.n
+    camera = CAMERA_STEP_MM * round(CAMERA_OF_DISTANCE * _distance(optics) / CAMERA_STEP_MM)
+    return {
+        "auto_direction_max_deg": max(_rounded(spacing), MAX_DIRECTION_DEG),
+        "auto_direction_median_deg": max(
+            _rounded(MEDIAN_OF_SPACING * spacing), MEDIAN_DIRECTION_DEG
+        ),
+        "largest_ball_mm": min(_rounded(BALL_OF_MINOR * minor), LARGEST_BALL_MM),
+        "ball_wall_mm": _within(WALL_OF_MINOR * minor, MIN_BALL_WALL_MM, BALL_WALL_MM),
+        "post_diameter_mm": _within(
+            POST_OF_CAPTURE * optics.capture_diameter_mm, MIN_POST_MM, POST_MM
+        ),
+        "camera_diameter_mm": min(max(camera, MIN_CAMERA_MM), CAMERA_MM),
+    }
+
+
+def _stage_sizes(optics: OpticsSpec) -> dict[str, Any]:
+    """The disc, as low as the crown below it stays inside the capture sphere, and the LEDs."""
+    capture = optics.capture_diameter_mm
+    disc = max(_rounded(DISC_OF_CAPTURE * capture), MIN_DISC_MM)
+    depth = math.sqrt(max((capture / 2 - INSIDE_MM) ** 2 - (disc / 2) ** 2, 0.0)) - CROWN_MM
+    scale = capture / LEDS_CAPTURE_MM
+    leds = [tuple(_rounded(scale * x) for x in place) for place in LEDS_MM]
+    return {
+        "disc_mm": disc,
+        "top_mm": min(max(_rounded(TOP_OF_CAPTURE * capture), -_rounded(depth)), 0.0),
+        "leds_mm": tuple(leds) if scale >= 1 else (),
+    }
+
+
+def _floor(optics: OpticsSpec, balls: PrototypeSpec) -> float:
+    """Height of the base plate: below the camera, and below what the base sweeps."""
+    x, _, z = optics.camera_mm
+    below_camera = -z + balls.camera_length_mm + BELOW_CAMERA_MM
+    reach = (optics.semi_minor_mm + balls.largest_ball_mm) * x / _distance(optics)
+    below_base = -z / 2 + reach + BELOW_BASE_MM
+    return -FLOOR_STEP_MM * math.ceil(max(below_camera, below_base) / FLOOR_STEP_MM)
+
+
+def _distance(optics: OpticsSpec) -> float:
+    """From the origin to the pinhole, mm."""
+    return math.hypot(*optics.camera_mm)
+
+
+def _within(value: float, low: float, high: float) -> float:
+    return min(max(_rounded(value), low), high)
+
+
+def _rounded(value: float) -> float:
+    return round(round(value / STEP_MM) * STEP_MM, 6) + 0.0
