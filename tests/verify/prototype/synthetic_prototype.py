@@ -39,6 +39,27 @@ POLAR = (55.0, 80.0, 100.0, 122.0)
 AZIMUTH = (30.0, 0.0, -35.0, 40.0)
 CAP, EDGE = 3, 5.0  # the last of them, from 0; radius of its front's edge
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how parts lie on the bed
+STEPS = 200 * 16 * 3 / 360
+DRIVE = {
+    "mass_g": 500.0,
+    "centre_mm": [0.0, 0.0, 0.0],
+    "moment_g_mm": 0.0,
+    "azimuth_deg": 0.0,
+    "inertia_g_mm2": 0.0,
+    "worst_torque_nmm": 0.0,
+    "safety": 2.0,
+    "required_torque_nmm": 0.0,
+    "holding_torque_nmm": 450 * 3 * 0.95,
+    "drive": "nema17-belt",
+    "motor": "NEMA17-40",
+    "ratio": 3.0,
+    "steps_per_deg": STEPS,
+    "wind_up_deg": 0.0,
+    "belt_pull_n": 0.0,
+    "belt_centre_mm": 78.97134949670655,
+    "counterweight_g": 0.0,
+    "counterweight_radius_mm": 30.0,
+}
 BALL_COLUMNS = (
     "number,kind,size,diameter_mm,grade,standard,mass_g,radius_mm,body_radius_mm,polar_deg,"
     "azimuth_deg,px,py,pz,nx,ny,nz,cx,cy,cz,bx,by,bz,mirrors,pixels,pixels_shell,coverage_mm,"
@@ -243,12 +264,27 @@ def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
 
 
 def program(stops: list[list[Any]]) -> str:
-    lines = ["(plan)", "M0 (MSG, ready?)", "G21 G90 G94", "G92 X0.0000"]
-    for _ in range(2):
-        lines.append(f"G1 X{stops[0][1]:.4f} F900")
-        for row in stops:
-            lines += [f"G1 X{np.trunc(row[1] * 1e4) / 1e4:.4f}", "G4 P0.5", "M8", "M9"]
-    return "\n".join([*lines, "G1 X0.0000", "M2"]) + "\n"
+    """As tbcad writes it, by hand: times and speeds are those of the paper's design."""
+    at = [f"X{np.trunc(row[1] * 1e4) / 1e4:.4f}" for row in stops]
+    rest = len(stops) * 1.7 / 30 + (stops[-1][1] - stops[0][1]) / 225
+    lines = [
+        f"(rotation plan: {len(stops)} stops, twice, about {rest:.0f} min)",
+        f"($100={STEPS:.6g}: steps a degree)",
+        "($110=900: degrees a minute, at most)",
+        "($120=50: degrees/s^2)",
+        "M0 (MSG, base at 0 degrees, object straight? Then resume)",
+        "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
+        "G92 X0.0000",
+    ]
+    for run in range(2):
+        lines.append(f"G1 {at[0]} F900")
+        for k, row in enumerate(stops):
+            lines.append(f"(stop {k + 1} of {len(stops)}: {row[2]} mirrors)")
+            lines += [f"G1 {at[k]}", "G4 P0.500", "M8", "G4 P0.200", "M9", "G4 P1.000"]
+        if run == 0:
+            lines.append(f"G1 {at[0]}")
+            lines.append("M0 (MSG, turn the object by 180 degrees about z, then resume)")
+    return "\n".join([*lines, "G1 X0.0000", "G92.1", "M2"]) + "\n"
 
 
 def ball_rows(
@@ -355,6 +391,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         ],
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
+        "drive": DRIVE,
         "bought": [{"name": "motor", "turns": False}],
         "assembly": {"glb": "whole.glb"},
     }

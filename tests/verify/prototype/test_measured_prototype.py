@@ -16,7 +16,6 @@ from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.prototype import (
     ball_views,
-    gcode,
     pinhole_cells,
     plan_checks,
     ray_transfer,
@@ -241,19 +240,6 @@ def test_twins_are_turned_about_z(context: PrototypeContext) -> None:
     u = rows.columns("ux", 3)
     np.testing.assert_allclose(
         u[:, plan_checks.twins(context)], u[:, context.mirror_rows] * [[-1], [-1], [1]], atol=1e-12
-    )
-
-
-def test_a_program_is_followed_as_controllers_do() -> None:
-    found = gcode.run_program("(G1 X9)\ng92 x5\nG1 X1.5 F9 ; G1 X3\nm8\nM9\nG1X-.5\nM8\n")
-    assert found.moves.tolist() == [1.5, -0.5]
-    assert found.photographs.tolist() == [1.5, -0.5]
-    assert found.faults == ()
-    pauses = gcode.run_program("M0\nG1 A0\nG1 A1\nM0\nG1 A0\nM0 (turn)\nG1 A1\nM0\n")
-    assert pauses.photographs.tolist() == [1.0, 1.0]
-    assert gcode.run_program("G91\nG1 X1\nwhat?").faults == (
-        "line 1 is in inches or relative",
-        "line 3 is no G-code",
     )
 
 

@@ -220,18 +220,22 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     ),
     "a stop beyond the swing": (
         in_record("swing_deg", to=lambda swing: [swing[0] + 1e-6, swing[1]]),
-        ("plan stops",),
+        ("plan stops", "plan program"),
         "stop 1 beyond",
     ),
     "program driven beyond the swing": (
-        program("G4 P0.5", "G1 X179.0"),
+        program("G4 P0.500", "G1 X179.0000"),
         ("plan program",),
         "beyond the swing",
     ),
     "program angle off": (angle_off, ("plan program",), "photograph"),
-    "program in inches": (program("G21", "G20"), ("plan program",), "inches"),
-    "program without a photograph": (program("M8\n", ""), ("plan program",), "photographs"),
-    "program that is none": (program("G4 P0.5", "hello"), ("plan program",), "no G-code"),
+    "program in inches": (program("G21", "G20"), ("plan program",), "none that a plan has"),
+    "program without a photograph": (program("M8\n", ""), ("plan program",), "is not on"),
+    "program that is none": (
+        program("G4 P0.500", "hello"),
+        ("plan program",),
+        "none that a plan has",
+    ),
     "pose mirrored": (
         in_record("parts", 4, "axes", to=turned_over),
         ("print pose",),

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
-from tbcad_verify.prototype import gcode
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.gcode_checks import program_check
 from tbcad_verify.record.prototype import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,
@@ -23,7 +23,6 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.types import Floats, Ints
 
 ERROR_DEG = 1e-6
-PROGRAM_DEG = 1.0001e-4  # the digits of the program
 SAME_DIRECTION = 1e-9
 TURNS = (0.0, 180.0)
 CHECKS = (
@@ -37,7 +36,7 @@ CHECKS = (
 
 def checks(context: PrototypeContext) -> list[Check]:
     """Compare plan, stops and program with the mirrors, the balls and each other."""
-    return guarded_each(CHECKS, (_mirrors, _twins, _errors, _stops, _program), context)
+    return guarded_each(CHECKS, (_mirrors, _twins, _errors, _stops, program_check), context)
 
 
 def _mirrors(name: CheckName, context: PrototypeContext) -> Check:
@@ -153,19 +152,3 @@ def _is_as_planned(context: PrototypeContext, k: int, rows: Ints) -> bool:
         return False
     worst = np.abs(plan.errors[rows][:, 1:]).max(axis=0, initial=0)
     return bool(np.abs(worst - stops.errors[k]).max() <= ERROR_DEG)
-
-
-def _program(name: CheckName, context: PrototypeContext) -> Check:
-    """Photographs at every stop, in order, twice, and no move beyond the swing."""
-    run = gcode.run_program(context.prototype.program)
-    expected = np.tile(context.prototype.stops.angle, 2)
-    faults = list(run.faults)
-    if run.photographs.shape != expected.shape:
-        faults.append(f"{run.photographs.size} photographs, not {expected.size}")
-    else:
-        off = np.flatnonzero(~(np.abs(run.photographs - expected) <= PROGRAM_DEG))
-        faults += [f"photograph {k + 1} at {run.photographs[k]:.4f} deg" for k in off.tolist()]
-    low, high = context.prototype.swing
-    beyond = (run.moves < low - PROGRAM_DEG) | (run.moves > high + PROGRAM_DEG)
-    faults += [f"{run.moves[k]:.4f} deg is beyond the swing" for k in np.flatnonzero(beyond)]
-    return at_most(name, len(faults), 0, short_list(faults))

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype_tables import MOST, Balls, Plan, Stops
+from tbcad_verify.record.prototype_tables import LARGEST, MOST, Balls, Plan, Stops
 from tbcad_verify.record.validation import (
     FileOrNone,
     Matrix,
@@ -106,6 +106,32 @@ class Bought(Strict):
     turns: bool
 
 
+Amount = Annotated[float, Field(ge=0, le=LARGEST)]
+
+
+class DriveRecord(Strict):
+    """What the drive must bear and does; balance and torques with the base at angle zero."""
+
+    mass_g: Amount
+    centre: Vector = Field(alias="centre_mm")
+    moment_g_mm: Amount
+    azimuth_deg: Angle
+    inertia_g_mm2: Annotated[float, Field(ge=0, le=1e15)]
+    worst_torque_nmm: Amount
+    safety: Amount
+    required_torque_nmm: Amount
+    holding_torque_nmm: Amount
+    drive: str
+    motor: str
+    ratio: Amount
+    steps_per_deg: Amount
+    wind_up_deg: Angle
+    belt_pull_n: Amount
+    belt_centre_mm: Amount
+    counterweight_g: Amount
+    counterweight_radius_mm: Amount
+
+
 class Assembly(Strict):
     """Files of the whole; empty: none."""
 
@@ -128,6 +154,7 @@ class Prototype(Strict):
         leds: of the stage.
         bought: purchased parts other than balls.
         assembly: files of the whole.
+        drive: of the base.
         balls: K of them.
         plan: every picture.
         stops: of the base.
@@ -146,6 +173,7 @@ class Prototype(Strict):
     leds: list[Led] = Field(max_length=MOST)
     bought: list[Bought] = Field(max_length=MOST)
     assembly: Assembly = Assembly()
+    drive: DriveRecord
     balls: Balls
     plan: Plan
     stops: Stops

@@ -1,0 +1,119 @@
+"""The program against the plan: every photograph once, at its angle, at rest, from below.
+
+What the program does is taken from a machine that runs it; what it has to do, from the stops and
+from the motion that the design asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.gcode_machine import Machine, Photograph, run_program
+from tbcad_verify.record.spec import MotionSpec
+from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
+
+PROGRAM_DEG = 1.0001e-4  # the digits of angles in the program
+PROGRAM_S = 5.1e-4  # of durations
+SHARE = 1e-5  # of other numbers, which have six digits
+RUNS = 2  # one for each turn of the object
+PAUSES = ["base", "turn"]
+SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
+MINUTES = 1.0  # by which the duration in the comment may be off, and
+MINUTES_SHARE = 0.1
+SETTINGS = ("steps", "speed", "acceleration")
+
+
+def program_check(name: CheckName, context: PrototypeContext) -> Check:
+    """Run the program, and compare what it does with the stops."""
+    machine = run_program(context.prototype.program)
+    faults = [*machine.faults, *_deviations(context, machine)]
+    return at_most(name, len(faults), 0, short_list(faults))
+
+
+def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+    yield from _travel(context, machine)
+    yield from _settings(context, machine)
+    motion, stops = context.export.spec.prototype.motion, context.prototype.stops
+    expected = np.tile(stops.angle, RUNS)
+    if machine.angles.shape != expected.shape:
+        yield f"{machine.angles.size} photographs, not {expected.size}"
+    else:
+        for k, one in enumerate(machine.photographs):
+            turned, stop = divmod(k, len(stops))
+            if not abs(one.angle - expected[k]) <= PROGRAM_DEG:
+                yield f"photograph {k + 1} at {one.angle:.4f} deg"
+            if one.turned != turned:
+                yield f"photograph {k + 1} with the object turned {one.turned} times"
+            if (one.stop, one.mirrors) != (stop + 1, stops.mirrors[stop]):
+                yield f"photograph {k + 1} has another comment than its stop"
+    low = context.prototype.swing[0]
+    for k, one in enumerate(machine.photographs):
+        if not one.rising and one.angle > low + PROGRAM_DEG:
+            yield f"photograph {k + 1} is approached from above"
+        yield from (f"photograph {k + 1} {what}" for what in _unlike_motion(one, motion))
+
+
+def _unlike_motion(one: Photograph, motion: MotionSpec) -> Iterator[str]:
+    """What is wrong with the motion about one photograph."""
+    if one.settled < motion.settle_s - PROGRAM_S:
+        yield f"{one.settled:g} s after the motion"
+    if np.isinf(one.released) != (motion.trigger == "pause"):
+        yield "with another trigger"
+    # Written so that NaN, of a release that is never turned off, fails.
+    if not one.released >= motion.trigger_s - PROGRAM_S:
+        yield f"with the release on for {one.released:g} s"
+    if not one.waited >= motion.exposure_s - PROGRAM_S:
+        yield f"{one.waited:g} s before the next motion"
+
+
+def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+    motion = context.export.spec.prototype.motion
+    low, high = context.prototype.swing
+    if machine.pauses != PAUSES:
+        yield f"pauses for {', '.join(machine.pauses) or 'nothing'}, not for {', '.join(PAUSES)}"
+    for angle in machine.bases:
+        if not _is_close(angle, motion.home_deg):
+            yield f"starts at {angle:g} deg"
+    if not machine.moves or abs(machine.moves[-1] - motion.home_deg) > PROGRAM_DEG:
+        yield "does not end at home_deg"
+    for speed in machine.feeds:
+        if not _is_close(speed, motion.feed_deg_min):
+            yield f"a speed of {speed:g}"
+    for angle in machine.moves:
+        if not low - PROGRAM_DEG <= angle <= high + PROGRAM_DEG:
+            yield f"{angle:.4f} deg is beyond the swing"
+    reached = [*machine.moves, *machine.bases]
+    for name, end, far in (("lower", low, min), ("upper", high, max)):
+        if reached and abs(far(reached) - end) > PROGRAM_DEG:
+            yield f"{far(reached):.4f} deg is not the swing's {name} end"
+
+
+def _settings(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+    """What comments tell the person who sets the controller up."""
+    motion, told = context.export.spec.prototype.motion, machine.told
+    steps = context.prototype.drive.steps_per_deg
+    expected = {
+        "steps": steps,
+        "speed": motion.feed_deg_min,
+        "acceleration": motion.acceleration_deg_s2,
+        "stops": len(context.prototype.stops),
+    }
+    number = SETTING[motion.axis]
+    expected |= {f"{name}_setting": 100 + 10 * k + number for k, name in enumerate(SETTINGS)}
+    for name, value in expected.items():
+        if len(told.get(name, ())) != 1 or not _is_close(told[name][0], value):
+            yield f"the comments' {name.replace('_', ' ')} is not {value:g}"
+    if machine.axis != motion.axis:
+        yield f"drives axis {machine.axis or 'none'}"
+    if any(count != len(context.prototype.stops) for count in told.get("count", ())):
+        yield "a comment has another number of stops"
+    minutes, known = machine.seconds / 60, told.get("minutes", [np.inf])
+    if not abs(known[0] - minutes) <= MINUTES + MINUTES_SHARE * minutes:
+        yield f"takes {minutes:.0f} min"
+
+
+def _is_close(one: float, two: float) -> bool:
+    return abs(one - two) <= SHARE * max(abs(one), abs(two))
