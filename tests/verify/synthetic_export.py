@@ -20,6 +20,21 @@ from typing import Any
 import numpy as np
 
 PAPER = Path(__file__).parents[2] / "designs" / "turtleback.toml"
+# Of keys whose values tbcad chooses, by section of the prototype.
+CHOSEN: dict[str, dict[str, Any]] = {
+    "": {
+        "k": 4,
+        "auto_direction_max_deg": 3.5,
+        "auto_direction_median_deg": 1.5,
+        "largest_ball_mm": 60.0,
+        "ball_wall_mm": 3.0,
+        "post_diameter_mm": 20.0,
+        "camera_diameter_mm": 60.0,
+    },
+    "base": {"pad_angle_deg": 50.0, "hold": "magnet", "hub_boss_mm": 20.0},
+    "stage": {"top_mm": -20.0, "disc_mm": 17.0, "leds_mm": []},
+    "frame": {"floor_mm": -230.0},
+}
 MANIFEST_SCHEMA = "tbcad-manifest/1"
 PIN = np.array([100.0, 0.0, -100.0])
 B = 100.0
@@ -386,6 +401,8 @@ def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
         "semi_minor_mm": B,
     }
     value["camera"] = sensor
+    for section, chosen in CHOSEN.items():
+        (value["prototype"][section] if section else value["prototype"]).update(chosen)
     value["mirrors"]["coating_um"] = 1000 * design.coating
     return value
 

@@ -208,6 +208,8 @@ def read_export(folder: Path) -> Export:
     prototype = None
     if RECORD in manifest.files or (root / RECORD).exists():
         prototype = read_prototype(root, cameras)
+        if missing := design.spec.prototype.left_open():
+            raise BadExport(f"{DESIGN}: spec.{missing[0]} has no value for the prototype; {AGAIN}")
         digests |= prototype.digests
     _check_parts(design, prototype)
     return Export(

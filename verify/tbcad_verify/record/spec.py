@@ -7,12 +7,20 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
 
 from tbcad_verify.record.validation import Strict
 
 LARGEST_MESH_ERROR_MM = 0.5  # that a spec may ask for and still pass
 
+AUTO = "auto"  # of a key that only a prototype needs, where none was built
+
+
+def _or_auto(value: object, check: ValidatorFunctionWrapHandler) -> object:
+    return value if value == AUTO else check(value)
+
+
+OR_AUTO = WrapValidator(_or_auto)
 Side = Annotated[float, Field(ge=20, le=2000)]
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
 Place = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -21,7 +29,7 @@ Place = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 class OpticsSpec(Strict):
     """Where the mirrors, the cameras and the object are."""
 
-    n: int = Field(ge=1, le=60)
+    n: int = Field(ge=2, le=60)
     capture_diameter_mm: float = Field(gt=0, le=1000)
     camera_mm: tuple[
         Annotated[float, Field(gt=0, le=10_000)],
@@ -105,11 +113,10 @@ class BaseSpec(Strict):
     light_clearance_mm: float = Field(ge=0, le=20)
     clearance_mm: float = Field(ge=0.1, le=5)
     pad_mm: float = Field(ge=0.5, le=20)
-    # "auto" stands only where no prototype was built: a prototype's record has what was chosen.
-    pad_angle_deg: Annotated[float, Field(ge=20, le=70)] | Literal["auto"]
+    pad_angle_deg: Annotated[float, Field(ge=20, le=70), OR_AUTO]
     cup_wall_mm: float = Field(ge=0.8, le=20)
     floor_mm: float = Field(ge=0.6, le=20)
-    hold: Literal["magnet", "glue", "auto"]
+    hold: Annotated[Literal["magnet", "glue"], OR_AUTO]
     magnets_mm: Annotated[
         list[Annotated[float, Field(ge=1, le=50)]], Field(min_length=1, max_length=20)
     ]
@@ -120,6 +127,7 @@ class BaseSpec(Strict):
     relief_mm: float = Field(ge=0.2, le=3)
     drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
     shaft_mm: float = Field(ge=3, le=25)
+    hub_boss_mm: Annotated[float, Field(ge=20, le=100), OR_AUTO]
     lock: Literal["set-screws", "clamp"]
     insert_hole_mm: float = Field(ge=2, le=10)
     insert_depth_mm: float = Field(ge=2, le=20)
@@ -153,10 +161,10 @@ class MotionSpec(Strict):
 class StageSpec(Strict):
     """The stage that carries the object, with LEDs at known places for calibration."""
 
-    top_mm: float = Field(ge=-1000, le=1000)
-    disc_mm: float = Field(ge=4, le=500)
+    top_mm: Annotated[float, Field(ge=-1000, le=1000), OR_AUTO]
+    disc_mm: Annotated[float, Field(ge=4, le=500), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
-    leds_mm: Annotated[list[Place], Field(max_length=12)]
+    leds_mm: Annotated[list[Place], Field(max_length=12), OR_AUTO]
     led_wall_mm: float = Field(ge=0.8, le=20)
     wire_mm: float = Field(ge=1, le=10)
     wall_mm: float = Field(ge=1, le=20)
@@ -165,7 +173,7 @@ class StageSpec(Strict):
 class FrameSpec(Strict):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
-    floor_mm: float = Field(ge=-3000, le=-10)
+    floor_mm: Annotated[float, Field(ge=-3000, le=-10), OR_AUTO]
     clearance_mm: float = Field(ge=0.5, le=50)
     flange_mm: float = Field(ge=3, le=30)
     web_mm: float = Field(ge=3, le=30)
@@ -180,22 +188,22 @@ class FrameSpec(Strict):
 class PrototypeSpec(Strict):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
-    k: Annotated[int, Field(ge=1, le=1000)] | Literal["auto"]
+    k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
     radius_weight_deg: float = Field(ge=0, le=100)
-    auto_direction_max_deg: float = Field(gt=0, le=90)
-    auto_direction_median_deg: float = Field(gt=0, le=90)
+    auto_direction_max_deg: Annotated[float, Field(gt=0, le=90), OR_AUTO]
+    auto_direction_median_deg: Annotated[float, Field(gt=0, le=90), OR_AUTO]
     auto_lost_percent: float = Field(ge=0, le=100)
     catalogues: Annotated[list[str], Field(min_length=1)]
     grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
-    largest_ball_mm: float = Field(gt=0, le=1000)
+    largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     snap: Literal["cover", "nearest"]
     picture: Literal["moved", "fixed"]
     caps: bool
     cap_rim_mm: float = Field(ge=0, le=50)
-    ball_wall_mm: float = Field(ge=0, le=50)
+    ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
     light_margin_mm: float = Field(ge=0, le=20)
-    post_diameter_mm: float = Field(ge=0, le=200)
-    camera_diameter_mm: float = Field(ge=0, le=500)
+    post_diameter_mm: Annotated[float, Field(ge=0, le=200), OR_AUTO]
+    camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
     camera_length_mm: float = Field(ge=0, le=1000)
     max_swing_deg: float = Field(gt=0, le=360)
     stop_error_deg: float = Field(gt=0, le=20)
@@ -203,6 +211,16 @@ class PrototypeSpec(Strict):
     motion: MotionSpec
     stage: StageSpec
     frame: FrameSpec
+
+    def left_open(self) -> list[str]:
+        """Keys without a value, which only an export without a prototype may have."""
+        sections = {"": self, "base.": self.base, "stage.": self.stage, "frame.": self.frame}
+        return [
+            f"prototype.{name}{key}"
+            for name, section in sections.items()
+            for key in type(section).model_fields
+            if getattr(section, key) == AUTO
+        ]
 
 
 class Spec(Strict):
