@@ -140,7 +140,7 @@ def verify_command(
         typer.Option(
             "--printer",
             metavar="NAME|FILE",
-            help="Fail unless every part can be made by this printer: fdm, sla, sls, machined, or "
+            help="Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or "
             "a TOML file; repeatable.",
         ),
     ] = None,

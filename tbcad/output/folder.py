@@ -18,7 +18,7 @@ from pathlib import Path
 
 from tbcad.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
-from tbcad.output.foreign_files import foreign_files, keep_files
+from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files
 from tbcad.output.manifest import is_file
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
@@ -98,11 +98,12 @@ def _check_writable(out: Path, target: Path) -> None:
 
 
 def _files_to_keep(out: Path, target: Path, force: bool) -> list[Path]:
-    """Return the user's files in a folder; without force they are refused."""
+    """Return the user's files in a folder; without force, all but a few names are refused."""
     foreign = foreign_files(target) if target.is_dir() else []
-    if foreign and not force:
-        names = ", ".join(path.name for path in foreign[:_MAX_NAMES])
-        more = f" and {len(foreign) - _MAX_NAMES} more" if len(foreign) > _MAX_NAMES else ""
+    refused = [] if force else [path for path in foreign if not is_always_kept(path)]
+    if refused:
+        names = ", ".join(path.name for path in refused[:_MAX_NAMES])
+        more = f" and {len(refused) - _MAX_NAMES} more" if len(refused) > _MAX_NAMES else ""
         raise InputError(
             f"{out} holds what tbcad did not write ({names}{more}): "
             "choose another folder, or keep them in the new one with --force"

@@ -8,6 +8,9 @@ from pathlib import Path
 from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, VERDICT, is_file, is_listed, read_manifest
 
+# Files that a checkout has in its folder of exports: no build writes them, and each keeps them.
+ALWAYS_KEPT = (".gitignore", "README.md")
+
 
 def foreign_files(folder: Path) -> list[Path]:
     """Return the files and folders that tbcad did not write, sorted.
@@ -26,6 +29,11 @@ def foreign_files(folder: Path) -> list[Path]:
         for path in sorted(folder.iterdir())
         if not (is_file(path) and (path.name in own or is_listed(path, listed.get(path.name))))
     ]
+
+
+def is_always_kept(path: Path) -> bool:
+    """Tell whether a user's file is kept unasked."""
+    return path.name in ALWAYS_KEPT and is_file(path)
 
 
 def keep_files(paths: list[Path], into: Path) -> None:

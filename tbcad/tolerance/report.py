@@ -11,7 +11,7 @@ from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.tables import Record, Table
 from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis
 from tbcad.tolerance.montecarlo.builds import CoverageResult, YieldEstimate, estimate_yield
-from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
+from tbcad.tolerance.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
 from tbcad.tolerance.process.process import ErrorSpec, Process
 from tbcad.types import Floats
@@ -28,6 +28,13 @@ NOTES = (
     "yield.",
 )
 
+UNITS = {
+    "um": "micrometres",
+    "mm": "mm",
+    "permille": "per mille",
+    "mrad": "mrad",
+    "deg": "degrees",
+}
 ERROR_COLUMNS = (
     *("kind", "magnitude", "mean", "loss_mm", "loss_at_yield_mm"),
     *("tolerable_factor", "tolerable_magnitude", "tolerable_mean"),
@@ -61,14 +68,36 @@ def _largest_loss_sentence(analysis: Analysis) -> str:
     if not analysis.single_errors:
         return ""
     largest = analysis.single_errors[0]
-    factor = largest.tolerable_factor
-    if factor == 0:
-        limit = "the design itself falls short even without errors"
-    elif math.isfinite(factor):
-        limit = f"alone it may be {factor:.2g} times as large"
-    else:
-        limit = "harmless"
+    limit = _limit_text(analysis, largest)
     return f"Largest loss by {in_words(largest.kind)}: {largest.loss:.2f} mm by itself; {limit}."
+
+
+def _limit_text(analysis: Analysis, effect: SingleErrorEffect) -> str:
+    """How large an error may be when there is no other, against how large it is."""
+    factor = effect.tolerable_factor
+    if factor == 0:
+        return "the design itself falls short even without errors"
+    if not math.isfinite(factor):
+        return "harmless"
+    key = _keys(analysis.process)[effect.kind]
+    error: ErrorSpec = getattr(analysis.process, key)
+    size, unit = error.magnitude or error.mean, UNITS[key.rpartition("_")[2]]
+    few = f"fewer than {_wanted(analysis)} of the builds are good"
+    if abs(factor - 1) <= FACTOR_TOLERANCE:
+        return f"at {size:g} {unit} it is at its limit: with more, and no other error, {few}"
+    return (
+        f"with no other error, {few} above {factor * size:.3g} {unit} "
+        f"({analysis.process.name} has {size:g})"
+    )
+
+
+def _keys(process: Process) -> dict[str, str]:
+    """The process's key of each kind of error, which ends in its unit."""
+    return {key.rpartition("_")[0]: key for key, _ in process}
+
+
+def _wanted(analysis: Analysis) -> str:
+    return f"{100 * analysis.options.wanted_yield:.6g}%"
 
 
 def _margin_sentence(analysis: Analysis) -> str:
@@ -85,8 +114,7 @@ def _processes_sentence(analysis: Analysis) -> str:
     margins = {option.name: option.margin.mm for option in analysis.process_options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
-    wanted = 100 * analysis.options.wanted_yield
-    text = f"Margins needed for {wanted:.6g}%: {', '.join(enough) or 'none found'}"
+    text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
     return text + (f"; none was found for {' and '.join(none)}." if none else ".")
 
 
@@ -201,8 +229,7 @@ def _builds_table(analysis: Analysis) -> Table:
 
 def _error_table(analysis: Analysis) -> Table:
     process, effects = analysis.process, analysis.single_errors
-    keys = {key.rpartition("_")[0]: key for key, _ in process}
-    records = [_error_record(effect, keys[effect.kind], process) for effect in effects]
+    records = [_error_record(effect, _keys(process)[effect.kind], process) for effect in effects]
     return Table.of_records("tolerance-sensitivity", records, columns=ERROR_COLUMNS)
 
 

@@ -14,8 +14,8 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.output import folder as folder_module
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.foreign_files import is_file
-from tbcad.output.manifest import fingerprint, write_manifest
+from tbcad.output.foreign_files import ALWAYS_KEPT
+from tbcad.output.manifest import fingerprint, is_file, write_manifest
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("design.json", "mirrors.csv", "shell_a.stl")
@@ -126,6 +126,34 @@ class TestReplacing:
         assert (tmp_path / "far.txt").read_text() == "far"
         assert hidden(out.parent) == []
 
+    def test_keeps_what_a_checkout_has_in_its_folder_of_exports(self, out: Path) -> None:
+        """Nobody has to ask for it, before the first export or later; as it was, to the byte."""
+        out.mkdir()
+        for name in ALWAYS_KEPT:
+            (out / name).write_bytes((ROOT / "exports" / name).read_bytes())
+        for version in (1, 2):
+            export(out, version)
+            assert version_of(out) == version
+        assert sorted(path.name for path in out.iterdir()) == sorted(
+            [*ALWAYS_KEPT, *NAMES, "manifest.json", "verify.json"]
+        )
+        for name in ALWAYS_KEPT:
+            assert (out / name).read_bytes() == (ROOT / "exports" / name).read_bytes()
+
+    @pytest.mark.parametrize("name", ["readme.md", "README.txt", ".gitattributes", "sub/README.md"])
+    def test_keeps_no_other_name_unasked(self, out: Path, name: str) -> None:
+        (out / name).parent.mkdir(parents=True)
+        (out / name).write_text("mine")
+        with pytest.raises(InputError, match="--force"):
+            export(out, 1)
+        assert tree(out)[name] == b"mine"
+
+    def test_a_folder_or_link_with_a_kept_name_is_the_users(self, out: Path) -> None:
+        (out / "README.md").mkdir(parents=True)
+        (out / ".gitignore").symlink_to("../.gitignore")
+        with pytest.raises(InputError, match=r"\(\.gitignore, README\.md\).*--force"):
+            export(out, 1)
+
     def test_changed_files_are_the_users_and_kept_beside_the_new(self, out: Path) -> None:
         export(out, 1)
         stl = out / "shell_a.stl"
@@ -197,6 +225,21 @@ def test_a_failed_second_move_puts_the_old_export_back(
         export(out, 2)
     assert version_of(out) == 1
     assert hidden(out.parent) == []
+
+
+def test_a_checkout_has_a_folder_of_exports() -> None:
+    """git keeps these two files and no export."""
+    done = subprocess.run(
+        ["git", "ls-files", "exports"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        pytest.skip("no checkout of git")
+    assert done.stdout.split() == [f"exports/{name}" for name in ALWAYS_KEPT]
+    ignored = subprocess.run(
+        ["git", "check-ignore", *(f"exports/{name}" for name in (*NAMES, *ALWAYS_KEPT))],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ignored.stdout.split() == [f"exports/{name}" for name in NAMES]
 
 
 def test_the_system_exchanges_folders(tmp_path: Path) -> None:

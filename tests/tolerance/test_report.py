@@ -28,8 +28,8 @@ from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
-from tbcad.tolerance.process.process import load_process
-from tbcad.tolerance.report import json_text, report_dict, summary_text, tolerance_study
+from tbcad.tolerance.process.process import ErrorSpec, load_process
+from tbcad.tolerance.report import UNITS, json_text, report_dict, summary_text, tolerance_study
 
 BUILDS, TARGET = 25, 60.0
 ALONE = (
@@ -109,10 +109,27 @@ class TestWords:
         assert f"1 % cover less than {np.quantile(worst, 0.01):.2f})" in said
 
     def test_worst_kind_of_error(self, analysis: Analysis) -> None:
+        """In the unit of the process: 0.375 times the 25 micrometres of sla."""
         assert (
-            "Largest loss by sphere centre: 1.25 mm by itself; alone it may be 0.38 times"
-            in summary_text(analysis)
-        )
+            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
+            "of the builds are good above 9.38 micrometres (sla has 25)."
+        ) in summary_text(analysis)
+
+    @pytest.mark.parametrize(
+        ("factor", "words"),
+        [(1.01, "at 25 micrometres it is at its limit"), (1.5, "above 37.5 micrometres")],
+    )
+    def test_how_large_the_worst_may_be(
+        self, analysis: Analysis, factor: float, words: str
+    ) -> None:
+        worst = replace(ALONE[0], tolerable_factor=factor)
+        said = summary_text(replace(analysis, single_errors=(worst,)))
+        assert words in said
+        assert " times " not in said
+
+    def test_every_kind_has_a_unit(self, analysis: Analysis) -> None:
+        assert {key.rpartition("_")[2] for key, value in analysis.process
+                if isinstance(value, ErrorSpec)} == set(UNITS)  # fmt: skip
 
     def test_nothing_is_lost(self, analysis: Analysis) -> None:
         harmless = summary_text(replace(analysis, single_errors=ALONE[2:]))

@@ -28,6 +28,7 @@ from tbcad.spec.section import Section
 from tbcad.tolerance.montecarlo.draws import Distribution, Error, Errors
 
 BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
+RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
 MICROMETRE = 1e-3  # mm
 BY_USER = "set by an option"
 
@@ -199,6 +200,9 @@ def _built_in(name: str) -> Table:
 
 def _own(path: Path) -> Table:
     if not path.is_file():
+        if str(path) in RENAMED:
+            new = RENAMED[str(path)]
+            raise SpecError(f"process {path} is called {new}: write {new}")
         close = get_close_matches(str(path).lower(), BUILT_IN, 1)
         hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
         raise SpecError(

@@ -56,6 +56,9 @@ def table(magnitude: float, mean: float, **others: str) -> str:
 
 
 class TestBuiltIn:
+    def test_a_former_name_is_refused_with_the_present_one(self) -> None:
+        assert refusal("machined") == "process machined is called cnc: write cnc"
+
     def test_are_all_files_there_are(self) -> None:
         there = files("tbcad.tolerance").joinpath("process").iterdir()
         assert sorted(f"{name}.toml" for name in BUILT_IN) == sorted(

@@ -230,7 +230,7 @@ def test_limits_that_are_just_met_are_met() -> None:
 
 def test_what_a_round_tool_leaves_in_inner_edges() -> None:
     """In a right angle a tool of radius r leaves (sqrt 2 - 1) r; a T has two, 30 long each."""
-    part, mill = shape(tee()), load("machined")
+    part, mill = shape(tee()), load("cnc")
     left = (math.sqrt(2) - 1) * mill.spot_mm / 2
 
     def length(tolerance: float) -> float | None:
@@ -243,7 +243,7 @@ def test_what_a_round_tool_leaves_in_inner_edges() -> None:
 
 
 def test_rows_are_json_and_the_same_every_time() -> None:
-    names = ("fdm", "sla", "sls", "machined")
+    names = ("fdm", "sla", "sls", "cnc")
     rows = [[to_row(assess("x.stl", part, load(k))) for k in names] for part in (bad(), bad())]
     text = [json.dumps(row, allow_nan=False, sort_keys=True) for row in rows]
     assert text[0] == text[1]

@@ -32,12 +32,12 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_the_four_built_in_ones() -> None:
-    assert built_in() == ("fdm", "machined", "sla", "sls")
+    assert built_in() == ("cnc", "fdm", "sla", "sls")
     profiles = {name: load(name) for name in built_in()}
     assert all(profile.name == name for name, profile in profiles.items())
     assert profiles["fdm"].bed_mm == (256, 256, 256)
-    assert [p.overhang_deg is None for p in profiles.values()] == [False, True, False, True]
-    assert [profile.process for profile in profiles.values()] == ["FDM", "machined", "SLA", "SLS"]
+    assert [p.overhang_deg is None for p in profiles.values()] == [True, False, False, True]
+    assert [profile.process for profile in profiles.values()] == ["CNC", "FDM", "SLA", "SLS"]
 
 
 def test_the_first_file_explains_every_key() -> None:
@@ -69,7 +69,7 @@ BAD = [
     ("wall_mm = 1.8", "wall_mm = nan", "wall_mm is nan, allowed is a number"),
     ("wall_mm = 1.8", "wall_mm = inf", "wall_mm is inf, allowed is a number"),
     ("spot_mm = 0.6", "spot_mm = 0", "spot_mm is 0, allowed is a number above 0 to 100:"),
-    ('"FDM"', '"fdm"', "process is fdm, allowed is FDM, SLA, SLS or machined"),
+    ('"FDM"', '"fdm"', "process is fdm, allowed is FDM, SLA, SLS or CNC"),
     ("[200, 210.5, 250]", "[200, 210.5]", "bed_mm.* allowed is three numbers above 0 to 100000"),
     ("[200, 210.5, 250]", "[200, 0, 250]", "bed_mm\\[1\\] is 0, allowed is three numbers above"),
     ("[200, 210.5, 250]", "200", "bed_mm is 200, allowed is three numbers above"),
@@ -109,7 +109,8 @@ def test_a_bad_profile_is_a_bad_export() -> None:
     ("name", "message"),
     [
         ("fmd", "did you mean fdm"),
-        ("FDM", "built in are fdm, machined, sla, sls; or give the path of a .toml"),
+        ("machined", "^profile machined: it is called cnc now: write cnc$"),
+        ("FDM", "built in are cnc, fdm, sla, sls; or give the path of a .toml"),
         ("no/such.toml", "neither built in nor a file"),
         ("", "neither built in nor a file"),
         ("a\0b", "neither built in nor a file"),

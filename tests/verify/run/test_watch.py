@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -117,6 +118,8 @@ def test_too_little_time_is_no_pass(export_folder: Path) -> None:
     assert not report.passed
     assert {check.passed for check in report.checks} == {None}
     assert "unknown: reading" in report.verdict
+    assert len(report.verdict) < 160
+    assert re.search(r"and \d+ more$", report.verdict)
 
 
 def test_a_file_replaced_while_it_is_read(export_folder: Path) -> None:

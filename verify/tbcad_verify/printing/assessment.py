@@ -29,7 +29,7 @@ class PrintAssessment:
         measures: of the part.
         profile: of the machine.
         placement: how it lies in the machine, and overhangs.
-        uncut_mm: only for machined parts: length of inner edges in which a round tool leaves more
+        uncut_mm: only for milled parts: length of inner edges in which a round tool leaves more
             than the tolerance.
         problems: one sentence each; none: it can be made.
     """
@@ -67,7 +67,7 @@ def uncut_edge_length(measures: PartMeasures, profile: Profile) -> float | None:
     A tool of radius r that touches both faces of an edge that bends by beta stays away from the
     edge by r (1 / cos(beta / 2) - 1). None for processes without a tool.
     """
-    if profile.process != "machined":
+    if profile.process != "CNC":
         return None
     distance = profile.spot_mm / 2 * (1 / np.cos(measures.inner_edges.bend / 2) - 1)
     return float(measures.inner_edges.length[distance > profile.tolerance_mm].sum())

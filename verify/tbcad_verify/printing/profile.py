@@ -16,6 +16,7 @@ from tbcad_verify.record.validation import allowed, fault, shown
 
 MAX_BYTES = 100_000  # a profile is one or two thousand
 FOLDER = "profiles"
+RENAMED = {"machined": "cnc"}  # as tbcad calls the process
 _PATH = 200  # characters of a path that are shown, the last ones
 
 
@@ -47,7 +48,7 @@ class Profile(BaseModel):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,39}$")
     """In the names of checks."""
-    process: Literal["FDM", "SLA", "SLS", "machined"]
+    process: Literal["FDM", "SLA", "SLS", "CNC"]
     """How parts are made."""
     bed_mm: _Sides
     """Width, depth and height of the build volume; for a mill its travel."""
@@ -148,6 +149,8 @@ def _read(path: str) -> str:
 
 
 def _no_such(path: str) -> str:
+    if path in RENAMED:
+        return f"profile {path}: it is called {RENAMED[path]} now: write {RENAMED[path]}"
     likely = get_close_matches(path, built_in(), 1)
     hint = f"did you mean {likely[0]}? " if likely else ""
     return (

@@ -16,7 +16,7 @@ from rich.console import Console
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
-from tbcad_verify.report.checks import MAX_NAMED, Check, finite
+from tbcad_verify.report.checks import MAX_NAMED, Check, finite, short_list
 from tbcad_verify.report.table import table
 from tbcad_verify.types import Floats
 
@@ -167,7 +167,7 @@ def _fail_line(report: Report) -> str:
     for word, verdict in (("failed", False), ("unknown", None)):
         checks = (*report.checks, *report.programs)
         names = dict.fromkeys(check.name for check in checks if check.passed is verdict)
-        parts += [f"{word}: {', '.join(names)}"] if names else []
+        parts += [f"{word}: {short_list(list(names))}"] if names else []
     return f"FAIL: {'; '.join([*_short_of_target(report), *parts])}"
 
 
