@@ -14,7 +14,7 @@ from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 SHELL = "shell"
 PROTOTYPE = ("rig", "base", "seat", "exploded")
 SUBJECTS = (SHELL, *PROTOTYPE)
-SHELL_FILES = ("mirrors.csv", "shell_a.stl", "shell_b.stl")
+SHELL_FILES = ("design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
 MESH_SUFFIXES = (".stl", ".glb")
 

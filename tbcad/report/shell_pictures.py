@@ -5,19 +5,40 @@ crash the process, so the command starts it as a child.
 """
 
 import csv
+import json
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from tbcad.types import Floats
+from tbcad.geometry.vectors import dot, unit
+from tbcad.types import Bools, Floats, Ints
 
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0
-# A facet farther from every apex than this many half widths belongs to the casing.
-REACH = 3.0
+UP = (0.0, 0.0, 1.0)
+# Gap between the halves, in largest coordinates, and the direction of view, of both pictures.
+VIEWS = ((0.08, (1.5, 3.0, -1.95)), (0.0, (-0.4, 0.9, 2.8)))
+FRAME_MARGIN = 1.04  # the picture is larger than what it shows by this factor
+STRUCTURE_GREY = 205
+# A facet is a mirror's when its corners lie on the mirror and it faces as the mirror does there.
+# Several mirrors are tried, those with the nearest apices: cells of different radius are not those
+# of the nearest apex.
+CORNER_TOLERANCE_MM = 0.01
+FACING_COS = 0.9
+TRIED = 8
+
+
+class ModelledMirrors(NamedTuple):
+    """One camera's m mirrors as they are modelled, mm: surface under the coat."""
+
+    apex: Floats
+    normal: Floats
+    curvature: Floats
+    polar: Floats
 
 
 def draw(folder: Path, picture: Path) -> None:
@@ -30,51 +51,108 @@ def draw(folder: Path, picture: Path) -> None:
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
     halves = [_coloured(folder, camera) for camera in "ab"]
     size = float(np.abs(np.asarray(halves[0].bounds)).max())
-    views = (
-        (0.08, (-1.5, -3.0, 2.0), (0.0, 0.0, 0.05)),
-        (0.0, (0.4, -0.9, -2.7), (0.0, 0.0, 0.1)),
-    )
-    for column, (gap, eye, focus) in enumerate(views):
+    for column, (gap, direction) in enumerate(VIEWS):
         plotter.subplot(0, column)
         plotter.set_background("white")
-        for half, side in zip(halves, (1, -1), strict=True):
+        shift = np.array([gap * size, 0.0, 0.0])
+        placed = [half.translate(side * shift) for half, side in zip(halves, (1, -1), strict=True)]
+        for half in placed:
             plotter.add_mesh(
-                half.translate((side * gap * size, 0, 0), inplace=False),
+                half,
                 scalars="colour",
                 rgb=True,
                 smooth_shading=False,
                 specular=0.4,
                 specular_power=20,
             )
-        scaled = (tuple(size * x for x in point) for point in (eye, focus))
-        plotter.camera_position = [*scaled, (0.0, 0.0, 1.0)]
-        plotter.camera.view_angle = ANGLE_DEG
+        points = np.concatenate([np.asarray(half.points) for half in placed])
+        _show_all(plotter, points, np.array(direction))
     plotter.screenshot(picture)
     plotter.close()
+
+
+def _show_all(plotter: pyvista.Plotter, points: Floats, direction: Floats) -> None:
+    eye, focus = camera_that_shows(points, direction)
+    plotter.camera_position = [tuple(eye), tuple(focus), UP]
+    plotter.camera.view_angle = ANGLE_DEG
+    plotter.reset_camera_clipping_range()
+
+
+def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats]:
+    """Pinhole and focus (3,) of a camera in whose square picture points (n, 3) just fit.
+
+    A point is in the picture where |across - centre| <= slope (distance + depth), for both axes of
+    the picture: the distance follows from the outermost points on either side.
+
+    Args:
+        points: to show, mm.
+        direction: of the view, (3,).
+    """
+    forward = unit(direction)
+    right = unit(np.cross(forward, UP))
+    axes = np.stack([right, np.cross(right, forward)])
+    slope = np.tan(np.radians(ANGLE_DEG / 2)) / FRAME_MARGIN
+    across, depth = points @ axes.T, slope * (points @ forward)[:, None]
+    high, low = (across - depth).max(axis=0), (across + depth).min(axis=0)
+    distance = float((high - low).max() / (2 * slope))
+    focus = (high + low) / 2 @ axes
+    return focus - distance * forward, focus
 
 
 def _coloured(folder: Path, camera: str) -> pyvista.PolyData:
     """A half with mirrors in the colour of their polar angle, alternating in brightness."""
     half = pyvista.read(folder / f"shell_{camera}.stl")
-    apex, polar, width = _mirrors(folder, camera)
-    centre = np.asarray(half.cell_centers().points)
-    distance, nearest = cKDTree(apex).query(centre)
-    share = (polar - polar.min()) / np.ptp(polar)
+    mirrors = read_mirrors(folder, camera)
+    corners = np.asarray(half.points, dtype=np.float64)[half.regular_faces]
+    mirror, found = mirror_of_facets(corners, mirrors)
+    share = (mirrors.polar - mirrors.polar.min()) / np.ptp(mirrors.polar)
     colour = np.column_stack([0.25 + 0.7 * share, 0.5 + 0.25 * share, 0.95 - 0.65 * share])
-    colour *= np.where(np.arange(len(apex)) % 3 == 0, 0.85, 1.0)[:, None]
-    inward = (np.asarray(half.cell_normals) * centre).sum(axis=1) < 0
-    mirror = inward & (distance < REACH * width[nearest])
-    half["colour"] = np.where(mirror[:, None], 255 * colour[nearest], 205).astype(np.uint8)
+    colour *= np.where(np.arange(len(colour)) % 3 == 0, 0.85, 1.0)[:, None]
+    rgb = np.where(found[:, None], 255 * colour[mirror], STRUCTURE_GREY)
+    half["colour"] = rgb.astype(np.uint8)
     return half
 
 
-def _mirrors(folder: Path, camera: str) -> tuple[Floats, Floats, Floats]:
-    """Apices (m, 3), polar angles and half widths of one camera's mirrors."""
+def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, Bools]:
+    """The mirror that each facet (f, 3, 3) is of, and whether it is a mirror's, (f,) each."""
+    middle = corners.mean(axis=1)
+    facing = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    ranks = range(1, min(TRIED, len(mirrors.apex)) + 1)
+    nearest = np.asarray(cKDTree(mirrors.apex).query(middle, k=ranks)[1])
+    best = np.zeros(len(corners), dtype=np.int64)
+    smallest = np.full(len(corners), np.inf)
+    for tried in nearest.T:
+        one = ModelledMirrors(*(values[tried] for values in mirrors))
+        away = np.max([np.abs(_height(corners[:, k], one)) for k in range(3)], axis=0)
+        away[dot(facing, _outward(middle, one)) < FACING_COS] = np.inf
+        better = away < smallest
+        best[better], smallest[better] = tried[better], away[better]
+    return best, smallest < CORNER_TOLERANCE_MM
+
+
+def _height(points: Floats, mirrors: ModelledMirrors) -> Floats:
+    """Height of points (f, 3) above the surface of a mirror each, mm, to the first order."""
+    offset, curved = points - mirrors.apex, mirrors.curvature
+    # (|p - centre|^2 - r^2) / 2r, which is the plane's height where the curvature is zero.
+    return np.asarray(dot(offset, mirrors.normal) + curved * dot(offset, offset) / 2)
+
+
+def _outward(points: Floats, mirrors: ModelledMirrors) -> Floats:
+    """Unit normals of mirrors at points (f, 3) near them, toward the object."""
+    return unit(mirrors.normal + mirrors.curvature[:, None] * (points - mirrors.apex))
+
+
+def read_mirrors(folder: Path, camera: str) -> ModelledMirrors:
+    """One camera's mirrors of an export."""
     with (folder / "mirrors.csv").open(newline="", encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["camera"] == camera]
-    columns = ("px", "py", "pz", "polar_deg", "size_mm")
+    record = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    coat = record["coating_mm"]
+    columns = ("px", "py", "pz", "nx", "ny", "nz", "polar_deg")
     values = np.array([[float(row[name]) for name in columns] for row in rows])
-    return values[:, :3], values[:, 3], values[:, 4]
+    apex, normal, polar = values[:, :3], values[:, 3:6], values[:, 6]
+    radius = np.array([float(row["radius_mm"] or "inf") for row in rows])
+    return ModelledMirrors(apex - coat * normal, normal, 1 / (radius - coat), polar)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,72 @@
+"""What the picture of the shells shows: every mirror in its colour, and all of both halves."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import design
+from tbcad.mirrors.record import write_record
+from tbcad.report.shell_pictures import (
+    ANGLE_DEG,
+    FRAME_MARGIN,
+    UP,
+    VIEWS,
+    camera_that_shows,
+    mirror_of_facets,
+    read_mirrors,
+)
+from tbcad.shell.facets import mirror_facets
+from tbcad.shell.files import camera_a_mesh
+from tbcad.spec.load import load_spec
+
+ROOT = Path(__file__).parents[2]
+AFTERNOON = ROOT / "designs" / "afternoon-print.toml"
+
+
+@pytest.mark.parametrize(
+    ("file", "options"),
+    [
+        (None, ["n=3"]),
+        (None, ["n=4", "radius_rule=flat"]),
+        (None, ["n=5", "coating_um=400"]),
+        (AFTERNOON, []),
+    ],
+    ids=["n = 3", "flat", "coat", "afternoon-print"],
+)
+def test_facets_belong_to_the_mirrors_that_they_were_made_for(
+    file: Path | None, options: list[str], tmp_path: Path
+) -> None:
+    """All facets of the casing are grey, also where three corners lie on the edge of a mirror."""
+    array = design(load_spec(file, options))
+    write_record(tmp_path, array, shells=False)
+    mesh, half = camera_a_mesh(array), array.halves[0]
+    made = mirror_facets(array.spec, half.modelled_cells, half.apex_distance).mirror
+    corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
+    mirror, found = mirror_of_facets(corners, read_mirrors(tmp_path, "a"))
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    front = np.arange(len(mesh.triangles)) < len(made)
+    assert area[found != front].sum() < 1e-4 * area[front].sum()
+    other = mirror[: len(made)] != made  # slivers along an edge lie on both of its mirrors
+    assert area[: len(made)][other].sum() < 1e-4 * area[front].sum()
+    assert not found[~front].any()
+
+
+@pytest.mark.parametrize("direction", [direction for _, direction in VIEWS])
+def test_the_picture_just_holds_all_points(direction: tuple[float, float, float]) -> None:
+    points = np.random.default_rng(3).uniform((-150, -90, -30), (150, 90, 110), (500, 3))
+    eye, focus = camera_that_shows(points, np.array(direction))
+    forward = (focus - eye) / np.linalg.norm(focus - eye)
+    assert forward == pytest.approx(np.array(direction) / np.linalg.norm(direction))
+    right = np.cross(forward, UP)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    ahead = (points - eye) @ forward
+    assert ahead.min() > 0
+    seen = np.stack([(points - eye) @ right, (points - eye) @ up]) / ahead
+    seen /= np.tan(np.radians(ANGLE_DEG / 2))
+    assert np.abs(seen).max() == pytest.approx(1 / FRAME_MARGIN)
+    widest = np.abs(seen).max(axis=1).argmax()
+    assert -seen[widest].min() == pytest.approx(seen[widest].max())
