@@ -41,6 +41,7 @@ class CouponRow:
 
     Attributes:
         seat: number of a seat of this size.
+        offsets: of the pads, one for each seat, mm.
         name: the body's diameter.
         first: width of the size's place, mm.
         cell: width of the place of one seat with its offset, mm.
@@ -48,6 +49,7 @@ class CouponRow:
     """
 
     seat: int
+    offsets: tuple[float, ...]
     name: str
     first: float
     cell: float
@@ -62,30 +64,39 @@ def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
     """Plates with a seat for each size and each offset of the pads, as few as the bed allows.
 
     Raises:
-        SpecError: when a row of seats is larger than the bed.
+        SpecError: when a single seat is larger than the bed.
         InvalidSolidError: when the kernel fails.
     """
     seats = replace(base.seats, back=base.seats.bottom + base.spec.floor_mm)
-    plates = _plates(coupon_rows(seats, base.spec), printer)
+    plates = _plates(coupon_rows(seats, base.spec, printer), printer)
     return [
         PlacedSolid(name, _plate(name, seats, base.spec, rows), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
     ]
 
 
-def coupon_rows(seats: Seats, spec: BaseSpec) -> list[CouponRow]:
-    """A row for each size, the largest first."""
+def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec) -> list[CouponRow]:
+    """A row for each size, the largest first; several where the bed is too narrow for one."""
     sizes, first = np.unique(np.round(seats.radius, DECIMALS), return_index=True)
-    return [_row(seats, spec, int(k)) for k in first[np.argsort(-sizes)]]
+    width = float(usable_size(printer)[0])
+    rows = []
+    for k in first[np.argsort(-sizes)].tolist():
+        row = _row(seats, spec, k, spec.coupon_offsets_mm)
+        count = max(int((width - row.first) / row.cell), 1)
+        rows += [
+            _row(seats, spec, k, spec.coupon_offsets_mm[start : start + count])
+            for start in range(0, len(spec.coupon_offsets_mm), count)
+        ]
+    return rows
 
 
-def _row(seats: Seats, spec: BaseSpec, k: int) -> CouponRow:
+def _row(seats: Seats, spec: BaseSpec, k: int, offsets: tuple[float, ...]) -> CouponRow:
     name = _short(f"{2 * seats.radius[k]:.2f}")
     boss = 2 * float(seats.boss[k])
     cell = _offsets_width(spec) + 2 * GAP_MM + boss
     first = _text_width(name, spec) + 2 * GAP_MM
-    size = (first + cell * len(spec.coupon_offsets_mm), max(boss, _bar_width(spec)) + GAP_MM)
-    return CouponRow(k, name, first, cell, size)
+    size = (first + cell * len(offsets), max(boss, _bar_width(spec)) + GAP_MM)
+    return CouponRow(k, offsets, name, first, cell, size)
 
 
 def _bar_width(spec: BaseSpec) -> float:
@@ -135,8 +146,8 @@ def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
     row_width, depth = row.size
     if (np.array(row.size) > usable_size(printer)[:2]).any():
         raise SpecError(
-            f"the coupon's seats for {row.name} mm take {row_width:.0f} x {depth:.0f} mm: make "
-            "printer.bed_mm larger or prototype.base.coupon_offsets_mm shorter"
+            f"the coupon's seat for {row.name} mm takes {row_width:.0f} x {depth:.0f} mm: make "
+            "printer.bed_mm larger or prototype.largest_ball_mm smaller"
         )
 
 
@@ -145,7 +156,7 @@ def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) 
     for row, left in (place for shelf in shelves for place in shelf):
         k = row.seat
         bodies += _texts(row, spec, left)
-        for n, offset in enumerate(spec.coupon_offsets_mm):
+        for n, offset in enumerate(row.offsets):
             at = np.array([*_seat_middle(row, left, n, seats), float(seats.back[k])])
             wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
             bodies.append(moved(cut(wall, [seat_hollow(seats, k, offset)]), DOWN, at))
@@ -200,7 +211,7 @@ def _texts(row: CouponRow, spec: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
     solids = _text(row.name, spec, left, row.first / 2)
     half = _offsets_width(spec) / 2
-    for n, offset in enumerate(spec.coupon_offsets_mm):
+    for n, offset in enumerate(row.offsets):
         solids += _text(_offset_text(offset), spec, left, row.first + n * row.cell + half)
     return solids
 

@@ -11,7 +11,12 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
 from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import (
+    MORE_BALLS,
+    PrototypeLayout,
+    ball_counts,
+    prototype_layout,
+)
 from tbcad.prototype.balls.placement import greedy_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
@@ -259,7 +264,7 @@ class TestAsked:
 
     def test_auto_is_the_minimum_number_within_the_limits(self, small_design: MirrorDesign) -> None:
         auto = small(small_design, "prototype.k=auto")
-        limits = load_spec(None).prototype
+        limits = small_design.spec.prototype
 
         def within(k: int) -> bool:
             layout = small(small_design, f"prototype.k={k}")
@@ -272,6 +277,21 @@ class TestAsked:
 
         assert within(len(auto))
         assert not within(len(auto) - 1)
+
+    def test_auto_has_fewer_balls_where_the_limits_cannot_be_kept(
+        self, small_design: MirrorDesign
+    ) -> None:
+        """No number is refused: all from many down to one are tried, each once."""
+        options = ["n=6", "auto_direction_max_deg=1e-9", "caps=false", "grade=G3"]
+        counts = list(ball_counts(load_spec(None, options), small_design))
+        assert counts == list(range(len(counts), 0, -1))
+
+    def test_auto_tries_more_balls_than_needed_and_then_fewer(
+        self, small_design: MirrorDesign
+    ) -> None:
+        counts = list(ball_counts(small_design.spec, small_design))
+        assert sorted(counts) == list(range(1, counts[0] + MORE_BALLS + 1))
+        assert counts[: MORE_BALLS + 1] == sorted(counts[: MORE_BALLS + 1])
 
     def test_one_ball(self, small_design: MirrorDesign) -> None:
         single = small(small_design, "prototype.k=1")
@@ -297,16 +317,12 @@ class TestRefused:
         [
             (["prototype.k=104"], "prototype.k is 104, but camera a has 103 mirrors"),
             (
-                ["max_swing_deg=150"],
+                ["prototype.k=16", "max_swing_deg=150"],
                 "found no place for 16 balls on one base within a swing of 150",
             ),
             (["camera_diameter_mm=500", "camera_length_mm=1000"], "camera_diameter_mm smaller"),
             (["largest_ball_mm=0.9"], "no ball of grade G40 up to 0.9 mm"),
             (['catalogues=["nowhere.csv"]'], "neither metric nor inch nor a file"),
-            (
-                ["prototype.k=auto", "auto_direction_max_deg=1e-9", "caps=false", "grade=G3"],
-                "no number of balls up to 55",
-            ),
         ],
     )
     def test_what_cannot_be_built(

@@ -371,7 +371,7 @@ class TestCoupon:
     ) -> None:
         """A seat's pads are sqrt(3) sin(tilt) times the radius of the sphere in it apart."""
         seats = base.seats
-        rows = coupon_rows(seats, SPEC)
+        rows = coupon_rows(seats, SPEC, PRINTER)
         assert len(rows) == len(np.unique(np.round(seats.radius, 6)))
         planes = [plane_faces(plate.shape) for plate in plates]
         middle = np.concatenate([one + 1e4 * n for n, (one, _) in enumerate(planes)])
@@ -417,10 +417,21 @@ class TestCoupon:
             area = solid.area_faces[in_plane(solid, plane, normal)].sum()
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
-    def test_a_row_larger_than_the_bed(self, prototype: PrototypeLayout) -> None:
-        crowded = base_layout(BaseSpec(coupon_offsets_mm=(0.1,) * 9), prototype)
+    def test_a_row_wider_than_the_bed_becomes_several(self, prototype: PrototypeLayout) -> None:
+        """Every offset of a size has one seat, and no row is wider than the bed."""
+        offsets = tuple(0.1 * k for k in range(9))
+        base = base_layout(BaseSpec(coupon_offsets_mm=offsets), prototype)
+        rows = coupon_rows(base.seats, base.spec, PRINTER)
+        assert max(row.size[0] for row in rows) <= usable_size(PRINTER)[0]
+        for seat in {row.seat for row in rows}:
+            parts = [row.offsets for row in rows if row.seat == seat]
+            assert sum(parts, ()) == offsets
+        assert len(rows) > len({row.seat for row in rows})
+
+    def test_a_seat_larger_than_the_bed(self, prototype: PrototypeLayout) -> None:
+        base = base_layout(BaseSpec(), prototype)
         with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
-            coupon_plates(crowded, PrinterSpec(bed_mm=(100.0, 100.0, 100.0)))
+            coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)))
 
 
 class TestRelief:

@@ -20,7 +20,7 @@ from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.spec.prototype import PrototypeSpec
 from tests.helpers import as_trimesh, cylinders, manifold
 from tests.prototype.conftest import SMALL
 
@@ -230,7 +230,9 @@ class TestClearance:
         teeth: int,
     ) -> None:
         drive = next(d for d in load_drives(PARTS) if d.wheel and d.wheel["teeth"] == teeth)
-        near = spec.model_copy(update={"frame": FrameSpec(clearance_mm=0.5)})
+        near = spec.model_copy(
+            update={"frame": spec.frame.model_copy(update={"clearance_mm": 0.5})}
+        )
         frame = frame_layout(near, small_prototype, carrier, stage, drive, keep_out, PARTS)
         parts = printed_solids(frame) | printed_solids(stage)
         shapes = {name: part.shape for name, part in parts.items()} | purchased_solids(frame)

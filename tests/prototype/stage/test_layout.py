@@ -34,9 +34,11 @@ from tbcad.prototype.keepout import (
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
 
 PARTS = load_parts()
+SIZED = load_spec(None).prototype
 CAPTURE = 30.0
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -50,8 +52,8 @@ def stage_with(
     def of(keep_out: KeepOut = keep_out, **changed: Any) -> StageLayout:
         sections = {
             "post_diameter_mm": changed.pop("post", 20.0),
-            "frame": FrameSpec(floor_mm=changed.pop("floor_mm", FrameSpec().floor_mm)),
-            "stage": StageSpec.model_validate(changed),
+            "frame": FrameSpec(floor_mm=changed.pop("floor_mm", SIZED.frame.floor_mm)),
+            "stage": StageSpec.model_validate(dict(SIZED.stage) | changed),
         }
         return stage_layout(spec.model_copy(update=sections), small_prototype, keep_out, PARTS)
 
@@ -73,12 +75,12 @@ class TestStage:
         found = led_poses(stage)
         assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
         assert np.array([place for _, place, _ in found]).tolist() == [
-            list(place) for place in StageSpec().leds_mm
+            list(place) for place in SIZED.stage.leds_mm
         ]
         assert all((direction == UP).all() for _, _, direction in found)
 
     def test_leds_are_inside_the_sphere_and_not_in_a_plane(self) -> None:
-        places = np.array(StageSpec().leds_mm)
+        places = np.array(SIZED.stage.leds_mm)
         assert (norm(places) + 1.5 < CAPTURE).all()
         # Six times the volume of their tetrahedron over the area of its largest face.
         sides = places[1:] - places[0]
@@ -147,12 +149,12 @@ class TestStage:
         place: tuple[float, float, float],
         message: str,
     ) -> None:
-        places = list(StageSpec().leds_mm)
+        places = list(SIZED.stage.leds_mm)
         places[number - 1] = place
         assert message in refusal(leds_mm=places)
 
     def test_leds_in_one_plane_are_refused(self, refusal: Callable[..., str]) -> None:
-        places = [(x, y, -15.0) for x, y, _ in StageSpec().leds_mm]
+        places = [(x, y, -15.0) for x, y, _ in SIZED.stage.leds_mm]
         assert "nearly in one plane" in refusal(leds_mm=places)
 
     def test_a_floor_too_high_is_refused(self, refusal: Callable[..., str]) -> None:
@@ -160,7 +162,7 @@ class TestStage:
 
     def test_three_leds_are_refused_by_the_spec(self) -> None:
         with pytest.raises(ValidationError, match="4 to 12 places"):
-            StageSpec.model_validate({"leds_mm": StageSpec().leds_mm[:3]})
+            StageSpec.model_validate({"leds_mm": SIZED.stage.leds_mm[:3]})
 
     def test_no_led_is_hidden_in_a_march_along_its_rays(
         self, small_prototype: PrototypeLayout, stage: StageLayout

@@ -13,6 +13,7 @@ from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import StageSpec
 from tests.helpers import as_trimesh
@@ -46,7 +47,7 @@ class TestSolids:
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
 
     def test_volume_of_the_disc(self, solids: dict[str, PlacedSolid]) -> None:
-        disc = StageSpec().disc_mm / 2
+        disc = load_spec(None).prototype.stage.disc_mm / 2
         stud = min(STUD_MM, disc / 5) + STUD_PLAY_MM
         area = np.pi * (disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)

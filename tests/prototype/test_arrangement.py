@@ -1,0 +1,80 @@
+"""The arrangement of a prototype: every layout has room, and the spec's own values are kept."""
+
+import pytest
+
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.prototype.arrangement import Arrangement, arrange, arrangements
+from tbcad.prototype.base.solid import carrier_parts
+from tbcad.prototype.drive.balance import ball_masses
+from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec, spec_dict
+
+
+@pytest.fixture(scope="module")
+def small(small_design: MirrorDesign) -> Arrangement:
+    return arrange(small_design)
+
+
+class TestChoice:
+    def test_leaves_no_key_open(self, small: Arrangement) -> None:
+        prototype = spec_dict(small.spec)["prototype"]
+        assert "auto" not in {*prototype.values(), *prototype["base"].values()}
+
+    def test_everything_keeps_its_clearance(self, small: Arrangement) -> None:
+        clearance = small.spec.prototype.frame.clearance_mm
+        assert min(*small.frame.light.values(), *small.frame.swept.values()) >= clearance
+        assert small.stage.swept >= clearance
+        assert small.layout.fit.coverage.min() >= 60 - 1e-6
+
+    def test_is_the_same_every_time(self, small: Arrangement, small_design: MirrorDesign) -> None:
+        assert arrange(small_design).spec == small.spec
+
+    def test_keeps_what_the_spec_sets(self) -> None:
+        options = ["n=6", "prototype.k=3", "base.hold=glue", "pad_angle_deg=35", "hub_boss_mm=30"]
+        chosen = arrange(design(load_spec(None, options))).spec.prototype
+        base = chosen.base
+        assert (chosen.k, base.hold, base.pad_angle_deg, base.hub_boss_mm) == (3, "glue", 35, 30)
+
+    def test_glue_only_where_no_magnet_fits(self, small_design: MirrorDesign) -> None:
+        magnets = list(arrangements(small_design))
+        assert {one.spec.prototype.base.hold for one in magnets} == {"magnet"}
+        spec = load_spec(None, ["n=6", "prototype.k=4", "magnets_mm=[40.0]"])
+        assert arrange(design(spec)).spec.prototype.base.hold == "glue"
+
+    @pytest.mark.parametrize("n", [2, 3, 5, 8])
+    def test_few_mirrors(self, n: int) -> None:
+        chosen = arrange(design(load_spec(None, [f"n={n}"])))
+        assert chosen.layout.fit.coverage.min() >= 60 - 1e-6
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("n", [4, 6, 7, *range(9, 41)])
+    def test_every_subdivision(self, n: int) -> None:
+        self.test_few_mirrors(n)
+
+
+class TestMass:
+    def test_estimate_agrees_with_the_solid(self, small: Arrangement) -> None:
+        """Flanges, numbers and overlaps of ribs are left out: some per cent."""
+        printer = small.spec.printer
+        solids = carrier_parts(small.base, small.split, printer)
+        exact = sum(part.mass_g(printer.density_g_cm3) for part in solids)
+        carried = ball_masses(small.layout, printer.density_g_cm3).mass_g.sum()
+        assert small.balance.mass_g - carried == pytest.approx(exact, rel=0.15)
+
+
+class TestRefused:
+    def test_the_cause_and_what_was_tried(self) -> None:
+        spec = load_spec(None, ["n=6", "camera_diameter_mm=500", "camera_length_mm=1000"])
+        with pytest.raises(SpecError, match=r"camera_diameter_mm smaller \(tried: \d+, .* balls\)"):
+            arrange(design(spec))
+
+    def test_a_remedy_that_was_tried(self, small_design: MirrorDesign) -> None:
+        """13 balls have no room beside the post; the message names a number that has."""
+        spec = load_spec(None, ["n=6", "prototype.k=103"])
+        fixed = MirrorDesign(spec, small_design.halves)
+        with pytest.raises(SpecError, match=r"tried: there is room with prototype\.k auto \(which"):
+            arrange(fixed)
+
+    def test_planar_mirrors(self) -> None:
+        with pytest.raises(SpecError, match="a prototype of balls needs curved mirrors"):
+            arrange(design(load_spec(None, ["n=3", "radius_rule=flat"])))
