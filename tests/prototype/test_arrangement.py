@@ -18,7 +18,7 @@ def small(small_design: MirrorDesign) -> Arrangement:
 class TestChoice:
     def test_leaves_no_key_open(self, small: Arrangement) -> None:
         prototype = spec_dict(small.spec)["prototype"]
-        assert "auto" not in {*prototype.values(), *prototype["base"].values()}
+        assert "auto" not in [*prototype.values(), *prototype["base"].values()]
 
     def test_everything_keeps_its_clearance(self, small: Arrangement) -> None:
         clearance = small.spec.prototype.frame.clearance_mm
@@ -69,7 +69,7 @@ class TestRefused:
             arrange(design(spec))
 
     def test_a_remedy_that_was_tried(self, small_design: MirrorDesign) -> None:
-        """13 balls have no room beside the post; the message names a number that has."""
+        """A ball for every mirror is too many; the message names a number that has room."""
         spec = load_spec(None, ["n=6", "prototype.k=103"])
         fixed = MirrorDesign(spec, small_design.halves)
         with pytest.raises(SpecError, match=r"tried: there is room with prototype\.k auto \(which"):

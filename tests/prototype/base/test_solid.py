@@ -37,6 +37,7 @@ from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
 from tbcad.prototype.base.split import downward_directions, split_base
+from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
