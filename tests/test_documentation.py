@@ -1,0 +1,207 @@
+"""The documentation: its tables and links, and every command that it shows."""
+
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import trimesh
+import typer
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+import tbcad.cli  # noqa: F401 - adds all commands
+from tbcad.cli import run
+from tests.cli.commands import commands
+
+ROOT = Path(__file__).parents[1]
+CHANGELOG = "CHANGELOG.md"  # shows commands as they once were
+
+
+def documents() -> list[str]:
+    """All Markdown files of the checkout; without git, those where documentation is."""
+    done = subprocess.run(
+        ["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    places = ("*.md", "docs/**/*.md", "exports/*.md", "verify/*.md", "benchmarks/*.md")
+    found = [str(path.relative_to(ROOT)) for place in places for path in ROOT.glob(place)]
+    return sorted(done.stdout.split() or found)
+
+
+def parsed(document: str) -> list[Token]:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    return MarkdownIt("commonmark").enable("table").parse(text)
+
+
+def cells(line: str) -> int:
+    """Number of cells of a row; a bar in code or behind a backslash is text."""
+    return len(re.sub(r"\\\||`[^`]*`", "", line).strip().strip("|").split("|"))
+
+
+@pytest.mark.parametrize("document", documents())
+def test_tables_are_tables(document: str) -> None:
+    """Every line that begins with a bar is a row of a table, with as many cells as its head."""
+    tokens = parsed(document)
+    lines = (ROOT / document).read_text(encoding="utf-8").splitlines()
+    code = {k for one in tokens if one.type == "fence" and one.map for k in range(*one.map)}
+    rows = {k for k, line in enumerate(lines) if line.lstrip().startswith("|") and k not in code}
+    tables = [range(*one.map) for one in tokens if one.type == "table_open" and one.map]
+    assert rows == {k for table in tables for k in table}
+    for table in tables:
+        assert len(table) > 2, lines[table[0]]
+        assert {cells(lines[k]) for k in table} == {cells(lines[table[0]])}, lines[table[0]]
+
+
+@pytest.mark.parametrize("document", documents())
+def test_links_lead_to_files_and_headings(document: str) -> None:
+    inline = [child for token in parsed(document) for child in token.children or ()]
+    targets = [str(one.attrs.get("href") or one.attrs.get("src") or "") for one in inline]
+    for target in targets:
+        name, _, heading = target.partition("#")
+        if not target or re.match(r"[a-z]+:", target):
+            continue
+        file = (ROOT / document).parent / name if name else ROOT / document
+        assert file.exists(), target
+        assert not heading or heading in headings(file), target
+
+
+def headings(file: Path) -> set[str]:
+    """Names of a page's headings as GitHub links to them."""
+    lines = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", line.lower()).replace(" ", "-") for line in lines}
+
+
+@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
+def test_packages_of_debian_are_those_of_the_ci(document: str) -> None:
+    text, ci = ((ROOT / name).read_text(encoding="utf-8") for name in (document, ".ci/run"))
+    named = re.findall(r"`apt-get install ([^`]*)`", text)
+    libraries, pictures = (
+        re.findall(pattern, ci)[0].split()
+        for pattern in (r"libraries=\((.*)\)", r"\n *(.*)\) +# for pictures")
+    )
+    assert [sorted(one.split()) for one in named] == [sorted(libraries), sorted(pictures)]
+
+
+class Command(NamedTuple):
+    """A command of a document: where, its words without `tbcad`, and what is said about it."""
+
+    document: str
+    words: tuple[str, ...]
+    comment: str
+    whole: bool
+
+
+def shown_commands() -> Iterator[Command]:
+    for document in documents():
+        if document == CHANGELOG:
+            continue
+        for token in parsed(document):
+            if token.type == "fence" and token.info == "sh":
+                yield from _of_block(document, token.content.replace("\\\n", " "))
+            for child in token.children or ():
+                if child.type == "code_inline" and child.content.startswith("tbcad "):
+                    words = shlex.split(child.content)[1:]
+                    yield Command(document, tuple(words), "", whole=False)
+
+
+def _of_block(document: str, text: str) -> Iterator[Command]:
+    for part in re.split(r"\n|&&", text):
+        line, _, comment = part.partition(" #")
+        match shlex.split(line):
+            case ["tbcad" | ".venv/bin/tbcad", *words]:
+                yield Command(document, tuple(words), comment.strip(), whole=True)
+
+
+EVERY = list(shown_commands())
+
+
+def test_commands_are_found() -> None:
+    assert sum(one.whole for one in EVERY) > 20
+    assert {"README.md", "docs/tolerance.md", "docs/light-field.md"} <= {
+        one.document for one in EVERY if one.whole
+    }
+
+
+@pytest.mark.parametrize("shown", EVERY, ids=lambda one: f"{one.document}: {' '.join(one.words)}")
+def test_commands_are_understood(shown: Command) -> None:
+    """By the real command with its real options; a sentence may leave its arguments out."""
+    known, words = commands(), shown.words
+    name = next(words[:k] for k in range(len(words), -1, -1) if words[:k] in known)
+    command: Any = known[name]
+    if hasattr(command, "commands"):
+        assert not [word for word in words[len(name) :] if word != "--version"]
+        return
+    try:
+        command.make_context("tbcad", list(words[len(name) :]))
+    except typer.BadParameter as error:
+        missing = error.__cause__ is None
+        if shown.whole or not missing:
+            raise
+
+
+# What makes a command of the documentation quick; what is added later counts.
+SMALLER = {
+    ("build",): ["--n", "3", "--parts", "shell"],
+    ("refocus",): ["--truth-samples", "2", "--frames", "2"],
+    ("study", "ssim"): ["--sensor", "416x310", "--azimuths", "1"],
+    ("tolerance",): ["--builds", "20", "--yield", "0.9"],
+}
+PICTURES = ["--width", "96", "--height", "72"]
+SMALL_SENSOR = ["--set", "camera.width_px=416", "--set", "camera.height_px=310"]
+# Needs computers that a test does not have.
+NOT_RUN = ("--scheduler",)
+
+
+@pytest.fixture(scope="module")
+def whole_export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Both parts of a small design, with few pixels."""
+    out = tmp_path_factory.mktemp("documentation") / "exports"
+    assert run(["build", "--n", "3", *SMALL_SENSOR, "--no-verify", "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer simulated builds, pictures, viewpoints and processes."""
+    for name, value in {
+        "SEARCH_BUILDS": 10,
+        "PHOTOGRAPHED_BUILDS": 1,
+        "VIEWPOINTS": ((60.0,), 1, 640.0),
+        "BUILT_IN": ("diamond",),
+    }.items():
+        monkeypatch.setattr(f"tbcad.tolerance.analysis.{name}", value)
+
+
+def smaller(words: tuple[str, ...]) -> list[str]:
+    more = next((more for name, more in SMALLER.items() if words[: len(name)] == name), [])
+    return [*words, *more, *(PICTURES if words[0] in ("view", "refocus") else [])]
+
+
+def expected_code(shown: Command) -> int:
+    code = re.search(r"exit (\d)", shown.comment)
+    return int(code[1]) if code else 0
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("document", sorted({one.document for one in EVERY if one.whole}))
+def test_commands_work_one_after_the_other(
+    document: str, whole_export: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a user types them, on a small design: with an export and a mesh of the user's own."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "designs", tmp_path / "designs")
+    for name in ("my.ply", "bunny.ply", "dragon.ply"):
+        trimesh.creation.icosphere(2, 20.0).export(tmp_path / name)
+    (tmp_path / "captures").mkdir()
+    for shown in EVERY:
+        if shown.document != document or not shown.whole or {*NOT_RUN} & {*shown.words}:
+            continue
+        # A build before this one has left shells alone.
+        shutil.rmtree(tmp_path / "exports", ignore_errors=True)
+        shutil.copytree(whole_export, tmp_path / "exports")
+        assert run(smaller(shown.words)) == expected_code(shown), shown.words
