@@ -105,6 +105,20 @@ def slot(
     return (Prism(corners, depth), *ends)
 
 
+def volume(body: Primitive) -> float:
+    """Volume of a primitive, mm^3."""
+    if isinstance(body, Cylinder):
+        return float(np.pi * body.radius**2 * body.length)
+    if isinstance(body, Prism):
+        middle = body.corners - body.corners[0]
+        area = np.cross(middle[1:-1], middle[2:]).sum(axis=0) / 2
+        return float(abs(area @ body.along))
+    # Pappus: the first moment of the section about the axis, times the full turn.
+    (z, r), (next_z, next_r) = body.profile.T, np.roll(body.profile, -1, axis=0).T
+    moment = ((z * next_r - next_z * r) * (r + next_r)).sum() / 6
+    return float(2 * np.pi * abs(moment))
+
+
 def enclosing_triangles(body: Primitive) -> Floats:
     """Triangles (t, 3, 3) of a closed surface that encloses a primitive, mm."""
     if isinstance(body, Prism):

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -32,7 +31,7 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Progress
 
-MAX_MODELS = 3  # arrangements whose solids are tried
+MAX_MODELS = 4  # arrangements whose solids are tried
 CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
 COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
 
@@ -82,20 +81,26 @@ def build_prototype_model(
 ) -> PrototypeModel:
     """Arrange the prototype of a design and build its solids.
 
-    Where the solids of the preferred arrangement fail, the next ones are tried.
+    Where the kernel fails with the preferred arrangement, other pads and numbers of balls are
+    tried: another hub's boss would leave the same faces grazing each other.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
     progress("prototype: balls, their places, stops")
-    errors: list[Exception] = []
-    for arrangement in islice(arrangements(design), MAX_MODELS):
+    errors: dict[tuple[int, float], Exception] = {}
+    for arrangement in arrangements(design):
+        seats = len(arrangement.layout), arrangement.base.seats.tilt
+        if seats in errors:
+            continue
         try:
             return _model(arrangement, progress)
         except (SpecError, InvalidSolidError) as error:
-            errors.append(error)
-    raise errors[0]
+            errors[seats] = error
+        if len(errors) == MAX_MODELS:
+            break
+    raise next(iter(errors.values()))
 
 
 def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
