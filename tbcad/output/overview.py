@@ -18,9 +18,9 @@ from tbcad.spec.design import MeshSpec, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
-# Hours of printing for a cubic centimetre of solid volume, and what the slicer fills of it: carrier,
-# shell, head and post of the paper's design by PrusaSlicer 2.5 (0.4 mm nozzle, 0.2 mm layers, 15 %
-# infill) took 0.035 to 0.076 hours and 40 to 98 %.
+# Hours of printing for a cubic centimetre of solid volume, and what share of it the slicer fills:
+# carrier, shell, head and post of the paper's design by PrusaSlicer 2.5 (0.4 mm nozzle, 0.2 mm
+# layers, 15 % infill) took 0.035 to 0.076 hours and 40 to 98 %.
 HOURS_PER_CM3, FILLED = 0.05, 0.5
 # Judgements on prices of 2026, in euros for a kilogram: filament; steel balls of 10 to 60 mm.
 FILAMENT_PER_KG, BALLS_PER_KG = 25.0, 40.0

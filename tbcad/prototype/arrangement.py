@@ -23,6 +23,7 @@ from tbcad.prototype.stage.layout import StageLayout, stage_layout
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.section import AUTO
+from tbcad.spec.sizes import led_places
 from tbcad.types import Progress
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
@@ -149,7 +150,7 @@ def _frame_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterat
         base = base_layout(chosen.prototype.base, layout)
         keep_out = _keep_out(chosen, layout, base)
         try:
-            stage = stage_layout(chosen.prototype, layout, keep_out, parts)
+            chosen, stage = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
             yield chosen, error
             return
@@ -157,6 +158,20 @@ def _frame_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterat
             yield chosen, _arranged(chosen, layout, base, keep_out, stage, parts)
         except SpecError as error:
             yield chosen, error
+
+
+def _staged(
+    spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
+) -> tuple[Spec, StageLayout]:
+    """The stage, without LEDs where those in the automatic places cannot be used."""
+    section = spec.prototype.stage
+    try:
+        return spec, stage_layout(spec.prototype, layout, keep_out, parts)
+    except SpecError:
+        if section.leds_mm != led_places(spec.optics.capture_diameter_mm):
+            raise
+    without = _with(spec, stage=section.model_copy(update={"leds_mm": ()}))
+    return without, stage_layout(without.prototype, layout, keep_out, parts)
 
 
 def _with(spec: Spec, **values: object) -> Spec:

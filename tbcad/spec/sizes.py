@@ -85,13 +85,18 @@ def _stage_sizes(optics: OpticsSpec) -> dict[str, Any]:
     capture = optics.capture_diameter_mm
     disc = max(_rounded(DISC_OF_CAPTURE * capture), MIN_DISC_MM)
     depth = math.sqrt(max((capture / 2 - INSIDE_MM) ** 2 - (disc / 2) ** 2, 0.0)) - CROWN_MM
-    scale = capture / LEDS_CAPTURE_MM
-    leds = [tuple(_rounded(scale * x) for x in place) for place in LEDS_MM]
     return {
         "disc_mm": disc,
         "top_mm": min(max(_rounded(TOP_OF_CAPTURE * capture), -_rounded(depth)), 0.0),
-        "leds_mm": tuple(leds) if scale >= 1 else (),
+        "leds_mm": led_places(capture),
     }
+
+
+def led_places(capture: float) -> tuple[tuple[float, ...], ...]:
+    """Places of the LEDs in a capture sphere of a diameter (mm), none in a small one."""
+    scale = capture / LEDS_CAPTURE_MM
+    places = [tuple(_rounded(scale * x) for x in place) for place in LEDS_MM]
+    return tuple(places) if scale >= 1 else ()
 
 
 def _floor(optics: OpticsSpec, balls: PrototypeSpec) -> float:

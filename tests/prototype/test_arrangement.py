@@ -46,7 +46,7 @@ class TestChoice:
         chosen = arrange(design(load_spec(None, [f"n={n}"])))
         assert chosen.layout.fit.coverage.min() >= 60 - 1e-6
 
-    @pytest.mark.slow
+    @pytest.mark.designs
     @pytest.mark.parametrize("n", [4, 6, 7, *range(9, 41)])
     def test_every_subdivision(self, n: int) -> None:
         self.test_few_mirrors(n)

@@ -1,0 +1,93 @@
+"""The table of docs/every-n.md: what every subdivision gives, and which were built and verified.
+
+    python docs/every_n.py                    # figures of n = 2 to 40, without solids: minutes
+    python docs/every_n.py --build 3 5 31     # builds and verifies these, and adds the verdicts
+
+Results are kept in docs/every-n.json; a run renews the rows it is asked for.
+"""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import tbcad
+from tbcad.output.overview import overview
+
+DOCS = Path(__file__).parent
+RESULTS, PAGE = DOCS / "every-n.json", DOCS / "every-n.md"
+SUBDIVISIONS = range(2, 41)
+COLUMNS = ("n", "mirrors", "lens", "minimum coverage", "balls + caps", "prototype's coverage")
+COLUMNS += ("pixels kept", "turning", "verdict")
+BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
+
+
+def figures(n: int) -> dict[str, Any]:
+    """Figures of a subdivision."""
+    found = overview(tbcad.design(n=n), optional_prototype=True)
+    row: dict[str, Any] = {
+        "mirrors": found.mirrors,
+        "view_angle_deg": found.view_angle_deg,
+        "minimum_coverage_mm": round(found.minimum_coverage_mm, 2),
+        "note": found.note,
+    }
+    if (prototype := found.prototype) is not None:
+        row |= {
+            "balls": prototype.balls,
+            "caps": prototype.caps,
+            "prototype_coverage_mm": round(prototype.minimum_coverage_mm, 2),
+            "kept_share": round(prototype.kept_share, 3),
+            "turning_mass_g": round(prototype.turning_mass_g),
+        }
+    return row
+
+
+def verdict(n: int) -> str:
+    """Verdict of a build with both parts."""
+    with tempfile.TemporaryDirectory() as folder:
+        built = tbcad.build(tbcad.load_spec(None, [f"n={n}"]), Path(folder) / "exports")
+    assert built.report is not None
+    return f"{built.report.verdict}, {' and '.join(built.parts)}"
+
+
+def page_row(n: str, row: dict[str, Any]) -> str:
+    """A row of the table."""
+    cells = [n, row["mirrors"], f"{row['view_angle_deg']:.0f}°"]
+    cells.append(f"{row['minimum_coverage_mm']:.2f} mm")
+    if "balls" in row:
+        cells += [f"{row['balls']} + {row['caps']}", f"{row['prototype_coverage_mm']:.2f} mm"]
+        cells += [f"{row['kept_share']:.0%}", f"{row['turning_mass_g']} g"]
+    else:
+        cells += ["none", "", "", ""]
+    return "| " + " | ".join(map(str, [*cells, row.get("verdict", "")])) + " |"
+
+
+def write_page(results: dict[str, dict[str, Any]]) -> None:
+    """Renew the table in the page."""
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+    lines += [page_row(n, results[n]) for n in sorted(results, key=int)]
+    head, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
+    tail = rest.split(END)[1]
+    text = head + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + tail
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Renew rows, keep the others."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", type=int, nargs="+", default=[], metavar="N")
+    wanted = parser.parse_args().build
+    results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    for n in wanted or SUBDIVISIONS:
+        row = figures(n)
+        if n in wanted:
+            row["verdict"] = verdict(n)
+        results[str(n)] = row
+        RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
+        write_page(results)
+        print(n, row, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""Designs of many sizes are built and verified, or refused in one line that is right."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+import tbcad
+from tbcad.errors import InputError
+
+pytestmark = pytest.mark.designs
+
+
+@pytest.mark.parametrize("n", [3, 5, 7, 11, 13, 22, 31, 36])
+def test_subdivisions(n: int, tmp_path: Path) -> None:
+    built = tbcad.build(tbcad.load_spec(None, [f"n={n}"]), tmp_path / "exports")
+    assert built.report is not None
+    assert built.passed, built.report
+    assert (built.parts, built.note) == (("shell", "prototype"), "")
+
+
+@st.composite
+def optics(draw: st.DrawFn) -> list[str]:
+    """A camera, a capture sphere and an ellipsoid round it, at n = 3."""
+    distance = draw(st.floats(80, 250))
+    polar = math.radians(draw(st.floats(110, 160)))
+    camera = [distance * math.sin(polar), 0.0, distance * math.cos(polar)]
+    diameter = draw(st.floats(20, 80))
+    # The sphere fits the ellipsoid: its focus is this far inside.
+    smallest = math.sqrt(diameter**2 / 4 + diameter * distance / 2)
+    minor = smallest * draw(st.floats(1.05, 2.5))
+    assume(minor < 400)
+    numbers = [f"camera_mm={[round(x, 1) for x in camera]}", f"semi_minor_mm={minor:.1f}"]
+    return ["n=3", f"capture_diameter_mm={diameter:.1f}", *numbers]
+
+
+@given(options=optics())
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+def test_any_optics(options: list[str], tmp_path: Path) -> None:
+    """What has no prototype is built without; what has no shells is refused in one line."""
+    message = ""
+    try:
+        built = tbcad.build(tbcad.load_spec(None, options), tmp_path / "exports", force=True)
+    except InputError as error:
+        message = str(error)
+    assert message.isprintable()
+    if not message:
+        assert built.report is not None
+        assert built.passed, (options, built.report)
