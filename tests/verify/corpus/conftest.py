@@ -21,6 +21,27 @@ SETTINGS = (
     "mesh.structure_error_mm=0.2",
 )
 
+# With every kind of part, LEDs too; a ball, caps, magnets.
+PROTOTYPE_SETTINGS = (
+    "optics.n=6",
+    "camera.width_px=416",
+    "camera.height_px=310",
+    "mesh.structure_error_mm=0.03",
+)
+
+
+@pytest.fixture(scope="session")
+def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A small prototype as `tbcad build` writes it; tests break copies of it only."""
+    folder = tmp_path_factory.mktemp("corpus") / "prototype"
+    options = [word for setting in PROTOTYPE_SETTINGS for word in ("--set", setting)]
+    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
+    assert run(words) == 0
+    before = digests(folder)
+    with remembered():
+        yield folder
+    assert digests(folder) == before, "a mutation wrote through a link"
+
 
 @pytest.fixture(scope="session")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:

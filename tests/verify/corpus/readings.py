@@ -6,11 +6,17 @@ import hashlib
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest import mock
 
+import manifold3d
+import numpy as np
 from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.prototype import stages as prototype_stages
+from tbcad_verify.prototype import step_files
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
+from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.run import stages
 from tbcad_verify.step import shell_checks
@@ -18,12 +24,22 @@ from tbcad_verify.step import shell_checks
 
 @contextmanager
 def remembered() -> Iterator[None]:
-    """Within, no STEP file is read twice and no mesh is put on printers twice; what fails is."""
-    step, shape = _Once(shell_checks.examine, _bytes), _Once(stages.measure, _corners)
-    with (
-        mock.patch.object(shell_checks, "examine", step),
-        mock.patch.object(stages, "measure", shape),
-    ):
+    """Within, nothing slow is done twice on the same input; what fails is.
+
+    No STEP file is read twice and no mesh put on printers; no balls are traced, no parts swept.
+    """
+    places = (
+        (shell_checks, "examine", _bytes),
+        (step_files, "examine_all", lambda blobs: " ".join(map(_bytes, blobs))),
+        (stages, "measure", _corners),
+        (prototype_stages.ball_views, "ball_views", _traced),
+        (prototype_stages.swing, "axial_solid", _measured),
+        (prototype_stages.swing, "sweep", _measured),
+    )
+    with ExitStack() as stack:
+        for module, name, key in places:
+            once = _Once(getattr(module, name), key)
+            stack.enter_context(mock.patch.object(module, name, once))
         yield
 
 
@@ -36,11 +52,42 @@ class _Once:
         self._busy: defaultdict[object, threading.Lock] = defaultdict(threading.Lock)
 
     def __call__(self, first: Any, *rest: Any) -> Any:
-        key = self._key(first), repr(rest)
+        key = self._key(first), repr([_shown(one) for one in rest])
         with self._busy[key]:
             if key not in self._found:
                 self._found[key] = self._work(first, *rest)
             return self._found[key]
+
+
+def _shown(value: Any) -> object:
+    """A solid by its corners; all else as it is."""
+    if isinstance(value, AxialSolid):
+        return value.name, hashlib.sha256(value.profile.tobytes()).hexdigest()
+    if isinstance(value, manifold3d.Manifold):
+        return hashlib.sha256(value.to_mesh64().vert_properties.tobytes()).hexdigest()
+    return value
+
+
+def _traced(measured: MeasuredPrototype) -> str:
+    """All that the light of the balls depends on."""
+    context, found = measured.context, hashlib.sha256()
+    arrays = [measured.centre, measured.radius, measured.body, context.angle, context.ball]
+    arrays += [
+        measured.rotating.owner,
+        measured.fixed.owner,
+        context.export.mirrors.columns("ux", 15),
+    ]
+    for array in arrays:
+        found.update(np.ascontiguousarray(array).tobytes())
+    found.update(
+        repr((context.camera, context.export.target_mm, context.export.foot_z_mm)).encode()
+    )
+    return found.hexdigest()
+
+
+def _measured(measured: MeasuredPrototype) -> str:
+    """The swing; parts are told apart by what follows."""
+    return repr((measured.context.prototype.swing, measured.context.frame.tolist()))
 
 
 def _bytes(blob: FileBytes) -> str:

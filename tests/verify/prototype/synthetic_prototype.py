@@ -39,6 +39,11 @@ POLAR = (55.0, 80.0, 100.0, 122.0)
 AZIMUTH = (30.0, 0.0, -35.0, 40.0)
 CAP, EDGE = 3, 5.0  # the last of them, from 0; radius of its front's edge
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how parts lie on the bed
+# What is not made: no STEP assembly, no parts list, names and balls of its own, no weight.
+NOT_MADE = {
+    *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
+    *("drive", "ball labels"),
+}
 STEPS = 200 * 16 * 3 / 360
 DRIVE = {
     "mass_g": 500.0,
@@ -392,7 +397,8 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
         "drive": DRIVE,
-        "bought": [{"name": "motor", "turns": False}],
+        "bought": [{"name": "motor", "what": "a box", "part": "NEMA17-40", "turns": False}],
+        "frame_stock": {"plate": "none", "upright": "none", "uprights_cut_to_mm": 0.0},
         "assembly": {"glb": "whole.glb"},
     }
     return found, files

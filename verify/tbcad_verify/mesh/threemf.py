@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tempfile
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,10 +47,18 @@ def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) ->
     return at_most(name, float(difference[worst]), limit, f"facet {worst} is elsewhere in the STL")
 
 
+@cache
+def _library() -> Any:
+    """The library with its table of functions, which takes long to fill."""
+    import lib3mf
+
+    return lib3mf.get_wrapper()
+
+
 def _corners(name: str, path: Path) -> NDArray[np.float32]:
     import lib3mf
 
-    model = lib3mf.get_wrapper().CreateModel()
+    model = _library().CreateModel()
     try:
         model.QueryReader("3mf").ReadFromFile(str(path))
         objects, items = model.GetObjects(), model.GetBuildItems()

@@ -10,8 +10,20 @@ import numpy as np
 
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.prototype import assembly, ball_views, caps, leds, plan_checks, seats, swing
+from tbcad_verify.prototype import (
+    assembly,
+    ball_views,
+    caps,
+    drive_checks,
+    inventory,
+    leds,
+    plan_checks,
+    purchases,
+    seats,
+    swing,
+)
 from tbcad_verify.prototype import record_checks as records
+from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.ball_views import BallViews, ball_coverage
 from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
@@ -25,7 +37,8 @@ from tbcad_verify.prototype.measured_parts import (
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import Prototype
+from tbcad_verify.record.prototype import PARTS_LIST, Prototype
+from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.report.checks import (
     attempt,
     check_names,
@@ -34,16 +47,18 @@ from tbcad_verify.report.checks import (
     require,
 )
 from tbcad_verify.run.results import Results, ResultSink
+from tbcad_verify.step.solids_text import TextSolid
 
 STAGES = (
     "prototype's record",
     "printed parts",
+    "parts and purchases",
     "seats",
     "light paths of the balls",
     "swing",
     "printability of the prototype",
 )
-RECORD, PARTS, SEATS, LIGHT, SWING, PRINTING = STAGES
+RECORD, PARTS, PURCHASES, SEATS, LIGHT, SWING, PRINTING = STAGES
 PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
 NO_SEATS = "the seats could not be measured"
 DIGITS = 9
@@ -74,6 +89,9 @@ def verify_prototype(
     for part in parts:
         masses = {} if part.placed_mass is None else {part.part.name: part.placed_mass}
         sink(Results(checks=part.checks, masses=masses))
+    sink(Results(stages=[PURCHASES]))
+    drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
+    _purchases(context, parts, sink, lambda: require(drawn, no_drawing))
     sink(Results(stages=[SEATS]))
     held = _seats(context, parts, sink)
     fitted = _caps(context, parts, sink) if prototype.balls.cap.any() else []
@@ -85,7 +103,13 @@ def verify_prototype(
     placed_files = stl_names(parts, *PLACED)
     _add(sink, ball_views, placed_files, lambda: (context, require(views, no_views)))
     sink(Results(stages=[SWING]))
-    _swing(context, parts, sink, lambda: require(measured, reason))
+    _swing(
+        context,
+        parts,
+        sink,
+        lambda: require(measured, reason),
+        lambda: require(drawn, no_drawing),
+    )
     sink(Results(prototype=json_rows(context, held, views)))
     return parts
 
@@ -96,6 +120,36 @@ def _add(
     """Hand over a module's checks; all of them are unknown if they or their arguments break."""
     names = check_names(module.CHECKS, files)
     sink(Results(checks=guarded(names, lambda: module.checks(names, *arguments()))))
+
+
+def _purchases(
+    context: PrototypeContext,
+    parts: list[MeasuredPart],
+    sink: ResultSink,
+    drawn: Callable[[], dict[str, Shape]],
+) -> None:
+    """What there is, in all files that list it, and what follows from it."""
+    found, reason = attempt(lambda: inventory.assembly_solids(context))
+    own, no_own = attempt(lambda: inventory.part_solids(context))
+    counted, no_solids = attempt(
+        lambda: purchases.Solids(
+            _of_role(context, "base", require(own, no_own)),
+            _of_role(context, "cap", require(own, no_own)),
+            require(found, reason),
+        )
+    )
+    _add(
+        sink,
+        inventory,
+        RECORD_FILE,
+        lambda: (context, drawn(), require(found, reason), require(own, no_own)),
+    )
+    _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
+    _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(found, reason)))
+
+
+def _of_role(context: PrototypeContext, role: str, solids: dict[str, TextSolid]) -> list[TextSolid]:
+    return [solids[part.name] for part in context.prototype.parts if part.role == role]
 
 
 def _seats(
@@ -121,12 +175,12 @@ def _swing(
     parts: list[MeasuredPart],
     sink: ResultSink,
     measured: Callable[[], MeasuredPrototype],
+    drawn: Callable[[], dict[str, Shape]],
 ) -> None:
-    drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
-    bought, reason = attempt(lambda: assembly.fixed_solids(context, require(drawn, no_drawing)))
+    bought, reason = attempt(lambda: assembly.fixed_solids(context, drawn()))
     files, file = stl_names(parts, *PLACED), context.prototype.assembly.glb
     _add(sink, swing, files, lambda: (measured(), parts, require(bought, reason)))
-    _add(sink, assembly, file, lambda: (context, parts, require(drawn, no_drawing)))
+    _add(sink, assembly, file, lambda: (context, parts, drawn()))
     _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
 
 

@@ -13,8 +13,17 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tbcad_verify.errors import BadExport
+from tbcad_verify.record.columns import WIDEST
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype_tables import LARGEST, MOST, Balls, Plan, Stops
+from tbcad_verify.record.prototype_tables import (
+    LARGEST,
+    MOST,
+    Balls,
+    PartsList,
+    Plan,
+    PlateHoles,
+    Stops,
+)
 from tbcad_verify.record.validation import (
     FileOrNone,
     Matrix,
@@ -30,6 +39,7 @@ from tbcad_verify.types import Floats
 
 SCHEMA = "tbcad-prototype/2"
 RECORD = "prototype.json"
+PARTS_LIST, PLATE_HOLES = "bom.csv", "plate_holes.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
@@ -73,6 +83,7 @@ class Printed(PartFiles):
 
     Attributes:
         role: what it is.
+        what: it is for.
         number: of a cap, its ball's, from 1.
         quantity: how many are made.
         axes: (3, 3).
@@ -80,6 +91,7 @@ class Printed(PartFiles):
     """
 
     role: Literal["base", "cap", "stage", "frame", "tool"]
+    what: str = Field(max_length=WIDEST)
     number: int | None = Field(alias="ball")
     quantity: int = Field(ge=1, le=MOST)
     axes: Matrix
@@ -100,10 +112,27 @@ class Led(Strict):
 
 
 class Bought(Strict):
-    """A purchased part, whose shape only the assembly has; `turns`: whether with the base."""
+    """A purchased part, whose shape only the assembly has.
+
+    Attributes:
+        name: of its body in the assembly.
+        what: description.
+        part: name in the parts list; None for what the user has.
+        turns: whether with the base.
+    """
 
     name: Name
+    what: str
+    part: str | None
     turns: bool
+
+
+class FrameStock(Strict):
+    """Parts of the frame that are cut or drilled."""
+
+    plate: str
+    upright: str
+    uprights_cut_to_mm: float = Field(ge=0, le=LARGEST)
 
 
 Amount = Annotated[float, Field(ge=0, le=LARGEST)]
@@ -153,11 +182,14 @@ class Prototype(Strict):
         parts: printed.
         leds: of the stage.
         bought: purchased parts other than balls.
+        frame_stock: parts of the frame that are cut or drilled.
         assembly: files of the whole.
         drive: of the base.
         balls: K of them.
         plan: every picture.
         stops: of the base.
+        parts_list: what to buy and to print; None without the file.
+        plate_holes: of the base plate; None without the file.
         program: text of the controller's program.
         digests: file name -> (size, sha256), of what was parsed.
     """
@@ -172,11 +204,14 @@ class Prototype(Strict):
     parts: list[Printed] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     bought: list[Bought] = Field(max_length=MOST)
+    frame_stock: FrameStock
     assembly: Assembly = Assembly()
     drive: DriveRecord
     balls: Balls
     plan: Plan
     stops: Stops
+    parts_list: PartsList | None
+    plate_holes: PlateHoles | None
     program: str
     digests: Mapping[str, tuple[int, str]]
 
@@ -213,7 +248,8 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     names = (RECORD, BALLS, PLAN, STOPS, PROGRAM)
-    texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in names}
+    optional = [name for name in (PARTS_LIST, PLATE_HOLES) if (folder / name).exists()]
+    texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (*names, *optional)}
     value = parse_json(texts[RECORD], SCHEMA)
     if value.get("balls") != BALLS:
         raise BadExport(
@@ -223,6 +259,8 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "balls": Balls.read(texts[BALLS]),
         "plan": Plan.read(texts[PLAN]),
         "stops": Stops.read(texts[STOPS]),
+        "parts_list": PartsList.read(texts[PARTS_LIST]) if PARTS_LIST in texts else None,
+        "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
         "program": texts[PROGRAM].text(),
         "digests": {name: blob.digest for name, blob in texts.items()},
     }

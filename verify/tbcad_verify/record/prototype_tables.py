@@ -1,4 +1,4 @@
-"""balls.csv, rotation_plan.csv and stops.csv of a prototype."""
+"""The tables of a prototype: balls, rotation plan, stops, parts list, holes of the plate."""
 
 from __future__ import annotations
 
@@ -73,6 +73,36 @@ class Balls(Columns):
     def names(self, which: NDArray[np.integer]) -> list[str]:
         """What reports call them."""
         return [f"ball {k + 1}" for k in which.tolist()]
+
+
+class PartsList(Columns):
+    """bom.csv: one kind of part a row."""
+
+    most_rows: ClassVar[int] = MOST
+
+    item: Counts
+    quantity: Counts
+    part: Texts
+    what: Texts
+    material: Texts
+    mass_g: Masses
+    total_mass_g: Masses
+    print_volume_mm3: Masses
+    origin: Annotated[
+        NDArray[np.str_], column(Literal["bought", "printed"], np.str_), Field(alias="from")
+    ]
+
+
+class PlateHoles(Columns):
+    """plate_holes.csv: one tapped hole of the base plate a row."""
+
+    most_rows: ClassVar[int] = MOST
+
+    hole: Counts
+    x_mm: Numbers
+    y_mm: Numbers
+    thread: Texts
+    holds: Texts
 
 
 class Plan(Columns):

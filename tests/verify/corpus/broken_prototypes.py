@@ -1,0 +1,234 @@
+"""Prototypes that are broken in what is driven, listed, bought, drilled or drawn."""
+
+from __future__ import annotations
+
+from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.prototype_changes import (
+    BALLS,
+    BILL,
+    GLB,
+    HOLES,
+    PROGRAM,
+    RECORD,
+    STEP,
+    compact,
+    drive,
+    empty_step,
+    exchange,
+    glb,
+    led,
+    moved_part,
+    moved_point,
+    no_led,
+    no_spec_led,
+    not_bought,
+    nudged,
+    program,
+    record,
+    row,
+    scaled,
+    shifted,
+    step_text,
+    table,
+    together,
+    undrawn,
+    unlisted,
+    without_part,
+)
+
+LIST, PLAN = "parts list", "plan program"
+DWELL = r"G4 P0\.500\n"
+WORDS = (
+    *("G28", "G2 X1.0000", "Y5000", "G93", "G10 L2 P1 X5.0000", "G55", "M7", "G20", "G91", "M30"),
+    *("G0 X1.0000", "G1 X1.0000 (hold on!)", "$H"),
+)
+
+PROGRAMS: tuple[Mutation, ...] = (
+    *(
+        fails(f"program: {word}", PROGRAM, program(DWELL, f"{word}\nG4 P0.500\n", 1), PLAN, "line")
+        for word in WORDS
+    ),
+    fails("program: G92 X50", PROGRAM, program("G92 X.*", "G92 X50.0000"), PLAN, "swing"),
+    fails("program: M2 halfway", PROGRAM, program(DWELL, "M2\n", 1), PLAN, "after the end"),
+    fails("program: never turned", PROGRAM, program(r"M0 \(MSG, turn.*\n", ""), PLAN, "pauses for"),
+    fails("program: no dwell", PROGRAM, program("G4 .*\n", ""), PLAN, "0 s after the motion"),
+    fails("program: too short a dwell", PROGRAM, program("P0.500", "P0.100"), PLAN, "0.1 s after"),
+    fails("program: no M9", PROGRAM, program("M9\n", ""), PLAN, "release is on"),
+    fails("program: no F", PROGRAM, program(" F900", ""), PLAN, "without a speed"),
+    fails("program: F0", PROGRAM, program(" F900", " F0"), PLAN, "without a speed"),
+    fails("program: no photograph", PROGRAM, program("M8\n", "", 1), PLAN, "is not on"),
+    fails("program: other steps", PROGRAM, program(r"\$100=[\d.]+", r"$100=99"), PLAN, "steps is"),
+)
+
+PARTS: tuple[Mutation, ...] = (
+    fails("no post", "all", without_part("stage_post"), "inventory", "stage part stage_post"),
+    fails("no head", "all", without_part("bearing_head"), "inventory", "part bearing_head"),
+    fails("no coupon", RECORD, without_part("coupon_1"), "inventory", "tool parts are missing"),
+    fails(
+        "two posts", RECORD, record(lambda r: r["parts"][7].update(quantity=2)), "inventory", "2 of"
+    ),
+    fails(
+        "a part not drawn", "STEP, GLB", undrawn("stage_post"), "inventory", "stage_post is missing"
+    ),
+    fails(
+        "a body too many in the GLB",
+        GLB,
+        glb(lambda scene: scene.add_geometry(scene.geometry[next(iter(scene.geometry))], "extra")),
+        "inventory",
+        "extra",
+    ),
+    fails("no motor", RECORD, record(not_bought("motor")), "inventory", "purchased part motor"),
+    fails(
+        "a motor that turns",
+        RECORD,
+        record(lambda r: [one.update(turns=True) for one in r["bought"] if one["name"] == "motor"]),
+        "inventory",
+        "motor turns",
+    ),
+    fails(
+        "another number of balls in the spec",
+        "design.json",
+        record(lambda r: None, lambda d: d["spec"]["prototype"].update(k=3)),
+        "inventory",
+        "the spec asks for 3",
+    ),
+    fails("an LED elsewhere", RECORD, led(2.0, spec=False), "leds as designed", "led_1 is not"),
+    fails(
+        "an LED elsewhere, spec too", RECORD, led(2.0, spec=True), "leds as designed", "no pocket"
+    ),
+    fails("an LED less", RECORD, record(no_led), "leds as designed", "the spec has 4"),
+    fails(
+        "an LED less, spec too",
+        RECORD,
+        record(no_led, no_spec_led),
+        "leds as designed",
+        "4 pockets",
+    ),
+    fails(
+        "an LED that shines down",
+        RECORD,
+        record(lambda r: r["leds"][0].update(direction=[0.0, 0.0, -1.0])),
+        "leds as designed",
+        "led_1",
+    ),
+)
+
+ASSEMBLIES: tuple[Mutation, ...] = (
+    fails("an empty assembly", STEP, step_text(empty_step), "inventory", "solid in prototype.step"),
+    fails("a plate of another size", STEP, step_text(moved_point), "assembly step", "plate"),
+    Mutation(
+        "an assembly that moves a part",
+        STEP,
+        step_text(moved_part),
+        1,
+        ("inventory",),
+        ("the assembly moves a part",),
+        unknown=True,
+    ),
+    fails("the motor drawn aside", GLB, glb(nudged("motor", 0.1)), "assembly step", "motor"),
+    fails("a disc drawn aside", GLB, glb(nudged("stage_disc", 0.1)), "assembly step", "stage_disc"),
+)
+
+PURCHASES: tuple[Mutation, ...] = (
+    fails(
+        "one row of a parts list",
+        BILL,
+        table(BILL, lambda rows: rows.__delitem__(slice(1, None))),
+        LIST,
+    ),
+    refused(
+        "a parts list of no rows", BILL, table(BILL, lambda rows: rows.clear()), BILL, "0 rows"
+    ),
+    *(
+        fails(f"nothing bought: {name}", BILL, unlisted(name), LIST, name.partition("x")[0])
+        for name in ("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1")
+    ),
+    fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
+    fails("another volume", BILL, row(BILL, 0, print_volume_mm3=1.0), LIST, "its volume"),
+    fails("another mass", BILL, row(BILL, 6, mass_g=1.0), LIST, "its mass"),
+    fails("another description", BILL, row(BILL, 6, what="a motor"), LIST, "its description"),
+    fails(
+        "screws that are too short",
+        BILL,
+        table(
+            BILL, lambda rows: [one.update(part="M5x8") for one in rows if one["part"] == "M5x12"]
+        ),
+        LIST,
+        "too short",
+    ),
+    refused("a plate of no holes", HOLES, table(HOLES, lambda rows: rows.clear()), HOLES, "0 rows"),
+    fails(
+        "a hole less",
+        HOLES,
+        table(HOLES, lambda rows: rows.pop()),
+        "plate holes",
+        "the plate has 12",
+    ),
+    fails(
+        "holes 10 mm aside", HOLES, table(HOLES, shifted("x_mm", 10.0)), "plate holes", "elsewhere"
+    ),
+    fails(
+        "a hole 10 um aside",
+        HOLES,
+        table(HOLES, lambda r: shifted("y_mm", 0.01)(r[:1])),
+        "plate holes",
+        "hole 1",
+    ),
+    fails("another thread", HOLES, row(HOLES, 0, thread="M6"), "plate holes", "thread M6"),
+    fails(
+        "holes of another bracket",
+        HOLES,
+        row(HOLES, 0, holds="camera_bracket"),
+        "plate holes",
+        "under no",
+    ),
+    fails(
+        "another plate",
+        RECORD,
+        record(lambda r: r["frame_stock"].update(plate="PLATE-300x200x8")),
+        "plate holes",
+        "another plate",
+    ),
+    fails(
+        "sizes of two balls exchanged",
+        BALLS,
+        table(BALLS, exchange("size")),
+        "ball labels",
+        "ball 1 is no",
+    ),
+    fails(
+        "a grade that does not exist", BALLS, row(BALLS, 0, grade="G7"), "ball labels", "grade G7"
+    ),
+    fails("a cap of steel", BALLS, row(BALLS, 0, mass_g=9.0), "ball labels", "a cap has none"),
+    fails("an error of direction", BALLS, row(BALLS, 0, error_deg=0.0), "ball labels", "deg off"),
+)
+
+DRIVES: tuple[Mutation, ...] = (
+    *(
+        fails(f"drive: {key}", RECORD, scaled(key, 1.1), "drive", key)
+        for key in (
+            *("mass_g", "moment_g_mm", "azimuth_deg", "inertia_g_mm2", "worst_torque_nmm"),
+            *("required_torque_nmm", "holding_torque_nmm", "ratio", "steps_per_deg", "wind_up_deg"),
+            *("belt_pull_n", "belt_centre_mm", "counterweight_g", "safety"),
+        )
+    ),
+    fails("drive: centre", RECORD, drive(centre_mm=[0.0, 0.0, 0.0]), "drive", "centre_mm"),
+    fails("drive: another motor", RECORD, drive(motor="NEMA17-60"), "drive", "motor is NEMA17-60"),
+    fails("drive: another kind", RECORD, drive(drive="stage-60"), "drive", "drive is stage-60"),
+    refused("drive: less than nothing", RECORD, drive(mass_g=-1.0), RECORD, "drive.mass_g is -1.0"),
+    refused("no drive", RECORD, record(lambda r: r.pop("drive")), RECORD, "drive is missing"),
+    fails(
+        "pads of 10 mm error",
+        RECORD,
+        record(lambda r: r.update(target_pad_um=10_000.0)),
+        "prototype requirements",
+        "target_pad_um",
+    ),
+)
+
+GOOD: tuple[Mutation, ...] = (
+    Mutation("as it is", "none", lambda _: (), 0),
+    Mutation("prototype.json in one line", RECORD, compact, 0),
+    Mutation("a note in the record", RECORD, together(record(lambda r: r.update(note="mine"))), 0),
+)
+PROTOTYPES: tuple[Mutation, ...] = (*PROGRAMS, *PARTS, *ASSEMBLIES, *PURCHASES, *DRIVES)
