@@ -41,8 +41,8 @@ Sensors = Annotated[
     typer.Option(
         "--sensor",
         metavar="WxH",
-        help="Width x height, pixels; repeatable. By default the sensor of the design, and 2, 3 "
-        "and 4 times its width and height.",
+        help="Width x height, pixels; repeatable. By default the sensor of the design, and half, "
+        "twice and four times its width and height (Table II).",
     ),
 ]
 Azimuths = Annotated[int, typer.Option(help="Number of azimuths at each elevation.")]
@@ -102,7 +102,7 @@ def capture_area_command(
 def elevation_command(
     design: DesignFile = None, settings: Settings = None, out: Out = STUDIES
 ) -> int:
-    """Correlate the mirrors' radii with their polar angle (Fig. 7b)."""
+    """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
     from tbcad.simulate.study.elevation import elevation
 
     return _write(out, partial(elevation, _spec(design, settings)))
@@ -174,6 +174,50 @@ def prototype_command(
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
     return _write(out, partial(prototype_vs_shell, export, subject, places, method, samples))
+
+
+@study.command("low-pass")
+def low_pass_command(
+    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    out: Out = STUDIES,
+    object_file: ObjectFile = None,
+    paint: PaintOption = "own",
+    azimuths: Azimuths = 4,
+    distance: Distance = 640.0,
+    filter_px: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="PX",
+            help="Separation of the filter's four images, pixels; repeatable. By default 0.75, 1 "
+            "and 2.",
+        ),
+    ] = None,
+    lens_px: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="PX",
+            help="Diameter of a lens's blur circle, pixels; repeatable. By default 2.4, the least "
+            "that the depth of field allows.",
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
+    ] = 2,
+) -> int:
+    """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.study.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
+    from tbcad.simulate.study.viewpoints import viewpoints_around
+
+    usual = BlurOptions()
+    options = BlurOptions(
+        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples
+    ).checked()
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
+    export = read_export(folder)
+    subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
+    return _write(out, partial(low_pass, export, subject, places, options))
 
 
 def _spec(design: Path | None, settings: list[str] | None) -> "Spec":

@@ -4,7 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.types import Bytes
+from tbcad.types import Bytes, Floats
+
+# Blurs that are tried, standard deviations of a Gaussian in pixels, and how finely.
+BLUR_RANGE_PX = (0.05, 20.0)
+BLUR_STEP_PX = 0.01
 
 
 @dataclass(frozen=True)
@@ -26,11 +30,16 @@ def image_quality(truth: Bytes, picture: Bytes) -> ImageQuality:
     SSIM as Z. Wang and others, IEEE Trans. Image Processing 13(4), 2004, section III: a Gaussian
     window of 1.5 pixels; the mean over the colours.
     """
+    return image_quality_map(truth, picture)[0]
+
+
+def image_quality_map(truth: Bytes, picture: Bytes) -> tuple[ImageQuality, Floats]:
+    """The same, and SSIM about each pixel, the mean over the colours, (h, w)."""
     from skimage.metrics import structural_similarity
 
     error = np.mean((truth.astype(np.float64) - picture.astype(np.float64)) ** 2)
     psnr = float(10 * np.log10(255**2 / error)) if error > 0 else float("inf")
-    ssim = structural_similarity(
+    ssim, about = structural_similarity(
         truth,
         picture,
         channel_axis=2,
@@ -38,5 +47,26 @@ def image_quality(truth: Bytes, picture: Bytes) -> ImageQuality:
         gaussian_weights=True,
         sigma=1.5,
         use_sample_covariance=False,
+        full=True,
     )
-    return ImageQuality(psnr, float(ssim))
+    return ImageQuality(psnr, float(ssim)), np.asarray(about.mean(axis=2))
+
+
+def equivalent_blur_px(truth: Bytes, picture: Bytes) -> float:
+    """Blur of a picture (h, w, 3): standard deviation, in pixels, of a Gaussian.
+
+    It is the Gaussian with which the blurred truth comes nearest to the picture, by least squares.
+    """
+    from scipy.ndimage import gaussian_filter
+    from scipy.optimize import minimize_scalar
+
+    sharp, target = truth.astype(np.float32), picture.astype(np.float32)
+
+    def error(sigma: float) -> float:
+        blurred = gaussian_filter(sharp, (sigma, sigma, 0))
+        return float(np.mean((blurred - target) ** 2))
+
+    found = minimize_scalar(
+        error, bounds=BLUR_RANGE_PX, method="bounded", options={"xatol": BLUR_STEP_PX}
+    )
+    return float(found.x)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
+from scipy.ndimage import gaussian_filter
 
 from tbcad.errors import InputError
 from tbcad.simulate.image_files import (
@@ -15,7 +16,7 @@ from tbcad.simulate.image_files import (
     write_animation,
     write_images,
 )
-from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.image_quality import equivalent_blur_px, image_quality, image_quality_map
 
 RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
 
@@ -87,3 +88,29 @@ def test_ssim_of_even_pictures_in_closed_form() -> None:
     c1 = (0.01 * 255) ** 2
     expected = (2 * 100 * 140 + c1) / (100**2 + 140**2 + c1)
     assert image_quality(one, other).ssim == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("sigma", [0.7, 2.0, 6.0])
+def test_equivalent_blur_is_that_of_the_picture(sigma: float) -> None:
+    """With noise, too, which no blur explains."""
+    rng = np.random.default_rng(2)
+    sharp = gaussian_filter(rng.uniform(0, 255, (160, 200, 3)), (2.0, 2.0, 0))
+    sharp = (sharp - sharp.min()) / np.ptp(sharp) * 255
+    blurred = gaussian_filter(sharp, (sigma, sigma, 0))
+    noisy = np.clip(blurred + rng.normal(0, 3, blurred.shape), 0, 255)
+    for picture, tolerance in ((blurred, 0.03), (noisy, 0.05)):
+        found = equivalent_blur_px(sharp.astype(np.uint8), picture.astype(np.uint8))
+        assert found == pytest.approx(sigma, rel=tolerance)
+
+
+def test_similarity_about_each_pixel() -> None:
+    """Its mean, without half a window at the border, is the similarity of the pictures."""
+    rng = np.random.default_rng(1)
+    one = rng.integers(0, 255, (40, 60, 3), dtype=np.uint8)
+    other = one.copy()
+    other[:, 30:] = 0
+    quality, about = image_quality_map(one, other)
+    assert quality == image_quality(one, other)
+    assert about[5:-5, 5:-5].mean() == pytest.approx(quality.ssim)
+    assert about[:, :20].min() > 0.999
+    assert about[:, 40:].max() < 0.1

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Literal
 
-from tbcad.simulate.capture.photograph import Band, photograph
+from tbcad.simulate.capture.photograph import Band, Samples, photograph
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
@@ -20,7 +20,7 @@ CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
 
 
 def camera_photographs(
-    export: Exported, scene: Scene, geometry: Geometry, samples: int, progress: Progress
+    export: Exported, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
 ) -> CameraPhotographs:
     """Both cameras, each with what takes its photograph.
 
@@ -29,7 +29,7 @@ def camera_photographs(
         scene: the object.
         geometry: spheres of the record, meshes of the shells, or the prototype's balls, stop by
             stop.
-        samples: a pixel is the mean of samples x samples rays.
+        samples: a pixel is the mean of these rays.
         progress: called with each step.
 
     Raises:

@@ -15,6 +15,8 @@ from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
 from tbcad.types import Bytes, Colours, Progress
 
 Tracer = Callable[[range, Shift], ReflectedRays]
+Samples = int | tuple[Shift, ...]
+"""Rays whose mean is a pixel: k x k over its area, or these places from its centre, pixels."""
 
 BAND_ROWS = 64  # also the height of a chunk of the light field's file
 CENTRE: Shift = (0.0, 0.0)
@@ -36,7 +38,11 @@ class Band:
 
 
 def photograph(
-    view: Camera, trace: Tracer, scene: Scene, samples: int = 1, progress: Progress = lambda _: None
+    view: Camera,
+    trace: Tracer,
+    scene: Scene,
+    samples: Samples = 1,
+    progress: Progress = lambda _: None,
 ) -> Iterator[Band]:
     """The bands of a camera's picture from top to bottom; few are in memory at a time.
 
@@ -44,7 +50,7 @@ def photograph(
         view: the camera.
         trace: gives the rays of rows after the mirrors.
         scene: the object.
-        samples: a pixel is the mean of samples x samples rays.
+        samples: a pixel is the mean of these rays.
         progress: called with each step.
     """
     height = view.height_px
@@ -64,13 +70,18 @@ def to_bytes(colours: NDArray[np.floating]) -> Bytes:
     return np.asarray(np.rint(colours), dtype=np.uint8)
 
 
-def _band(view: Camera, trace: Tracer, scene: Scene, samples: int, rows: range) -> Band:
+def _band(view: Camera, trace: Tracer, scene: Scene, samples: Samples, rows: range) -> Band:
     rays, colour = _through(view, trace, scene, rows, CENTRE)
-    if samples > 1:
-        shifts = subpixel_shifts(samples)
+    shifts = sample_shifts(samples)
+    if shifts != [CENTRE]:
         colours = (_through(view, trace, scene, rows, shift)[1] for shift in shifts)
-        colour = sum(colours, np.zeros_like(colour)) / np.float32(samples**2)
+        colour = sum(colours, np.zeros_like(colour)) / np.float32(len(shifts))
     return Band(rows, rays, to_bytes(colour))
+
+
+def sample_shifts(samples: Samples) -> list[Shift]:
+    """Places of a pixel's rays, from its centre."""
+    return subpixel_shifts(samples) if isinstance(samples, int) else list(samples)
 
 
 def subpixel_shifts(samples: int) -> list[Shift]:

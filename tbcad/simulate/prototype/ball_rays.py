@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.optics.reflection import reflect
-from tbcad.simulate.capture.photograph import row_bands, subpixel_shifts, to_bytes
+from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
 from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
@@ -85,14 +85,14 @@ def image_points(camera: Camera, direction: Floats) -> Floats:
     return np.asarray(np.clip(pixels, 0, last))
 
 
-def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: int = 1) -> Bytes:
+def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: Samples = 1) -> Bytes:
     """The whole photograph of a stop, (h, w, 3).
 
     Args:
         run: of camera a's mirrors, or of camera b's with the object turned.
         scene: the object.
         stop: number of the stop, from 0.
-        samples: a pixel is the mean of samples x samples rays.
+        samples: a pixel is the mean of these rays.
     """
     height, width = run.camera.height_px, run.camera.width_px
     bands = [np.arange(rows.start * width, rows.stop * width) for rows in row_bands(height)]
@@ -101,7 +101,7 @@ def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: int = 1
 
 
 def resampled_photograph(
-    run: PrototypeRun, scene: Scene, stop: int, samples: int, places: Floats
+    run: PrototypeRun, scene: Scene, stop: int, samples: Samples, places: Floats
 ) -> Bytes:
     """The photograph of a stop at columns and rows (n, 2) between its pixels' centres, (n, 3).
 
@@ -118,15 +118,16 @@ def resampled_photograph(
     return to_bytes(np.einsum("nk,nkc->nc", weight, corners))
 
 
-def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: int, pixels: Ints) -> Bytes:
+def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels: Ints) -> Bytes:
     """Pixels (n,) of a photograph, counted row by row, (n, 3)."""
     row, column = np.divmod(pixels, run.camera.width_px)
     centres = np.column_stack([column, row]).astype(np.float64)
     stops = np.full(len(pixels), stop)
     total = np.zeros((len(pixels), 3), dtype=np.float32)
-    for shift in subpixel_shifts(samples):
+    shifts = sample_shifts(samples)
+    for shift in shifts:
         total += camera_colours(run, scene, pixel_rays(run.camera, centres + shift), stops)
-    return to_bytes(total / np.float32(samples**2))
+    return to_bytes(total / np.float32(len(shifts)))
 
 
 @compiled

@@ -18,9 +18,10 @@ from tbcad.geometry.vectors import unit
 from tbcad.simulate.capture.photograph import (
     CENTRE,
     Band,
+    Samples,
     Tracer,
     row_bands,
-    subpixel_shifts,
+    sample_shifts,
     to_bytes,
 )
 from tbcad.simulate.parallel import in_batches, in_threads
@@ -53,7 +54,7 @@ class MergePlan:
     Attributes:
         run: the run.
         scene: the object.
-        samples: a pixel is the mean of samples x samples rays.
+        samples: a pixel is the mean of these rays.
         trace_shell: traces rows of the shell's picture.
         boxes: columns x0, x1 and rows y0, y1, ends excluded, of the shell's picture that hold the
             object seen directly, or a mirror's cell, (1 + m, 4).
@@ -64,7 +65,7 @@ class MergePlan:
 
     run: PrototypeRun
     scene: Scene
-    samples: int
+    samples: Samples
     trace_shell: Tracer
     boxes: Ints
     rotation: Floats
@@ -76,7 +77,7 @@ def merge_run(
     run: PrototypeRun,
     scene: Scene,
     resample: Resample = "photograph",
-    samples: int = 1,
+    samples: Samples = 1,
     progress: Progress = lambda _: None,
 ) -> Iterator[Band]:
     """Bands of the merged picture from top to bottom, as those of tbcad.simulate.capture.
@@ -86,7 +87,7 @@ def merge_run(
         scene: the object.
         resample: "photograph": between the four nearest pixels of the stop's photograph, as with
             a real prototype; "exact": traced along the rotated direction itself.
-        samples: a pixel, of the photograph or of the picture, is the mean of samples x samples.
+        samples: a pixel, of the photograph or of the picture, is the mean of these rays.
         progress: called with each step.
 
     Where a rotated direction leaves the photograph, or meets something else than its ball, there
@@ -101,7 +102,7 @@ def merge_run(
     )
 
 
-def _merge_plan(run: PrototypeRun, scene: Scene, samples: int) -> MergePlan:
+def _merge_plan(run: PrototypeRun, scene: Scene, samples: Samples) -> MergePlan:
     return MergePlan(
         run,
         scene,
@@ -184,10 +185,11 @@ def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> Band:
 def _traced(plan: MergePlan, rows: range) -> Bytes:
     """Colours (n, 3) along the rotated directions themselves."""
     total = np.zeros((len(rows) * plan.run.reflector.camera.width_px, 3), dtype=np.float32)
-    for shift in subpixel_shifts(plan.samples):
+    shifts = sample_shifts(plan.samples)
+    for shift in shifts:
         _, hits, front, direct = _merged_pixels(plan, rows, shift)
         total += np.where(front[:, None], direct, reflected_colours(plan.scene, hits))
-    return to_bytes(total / np.float32(plan.samples**2))
+    return to_bytes(total / np.float32(len(shifts)))
 
 
 def _merged_pixels(

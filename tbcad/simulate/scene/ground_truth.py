@@ -40,20 +40,22 @@ def lens_picture(
         progress: called with each step.
     """
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
-    for k, (point, shift) in enumerate(zip(_disc(samples), _square(samples), strict=True)):
+    for k, (point, shift) in enumerate(
+        zip(disc_points(samples), pixel_points(samples), strict=True)
+    ):
         progress(f"ray {k + 1} of {samples}")
         total += _colours(scene, *lens_rays(view, focus, point * focus.aperture_mm / 2, shift))
     return total / np.float32(samples)
 
 
-def _disc(count: int) -> Floats:
+def disc_points(count: int) -> Floats:
     """Points (n, 2) spread evenly over the unit disc, on Vogel's spiral."""
     k = np.arange(count)
     radius, angle = np.sqrt((k + 0.5) / count), GOLDEN_ANGLE * k
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-def _square(count: int) -> list[tuple[float, float]]:
+def pixel_points(count: int) -> list[tuple[float, float]]:
     """Points spread evenly over a pixel, from its centre (the R2 sequence of M. Roberts, 2018)."""
     plastic = 1.324717957244746
     steps = np.arange(count)[:, None] / np.array([plastic, plastic**2])

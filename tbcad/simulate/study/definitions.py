@@ -1,78 +1,154 @@
-"""What "virtual cameras" and "pixels of one" may mean: every definition with its figure."""
+"""What the two numbers of Table II may mean: every definition, for its four sensors."""
 
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, numbered_directions
-from tbcad.simulate.study.paper import claimed
-from tbcad.simulate.study.pixels import Sensor, count_pixels, virtual_cameras
+from tbcad.schedule import run_units
+from tbcad.simulate.study.frame_pitch import apices_in_frame, axes_at_pitch, best_pitch
+from tbcad.simulate.study.paper import (
+    NUMBER,
+    RESOLUTION,
+    BalancedSensor,
+    is_table_i,
+)
+from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels, virtual_cameras
 from tbcad.simulate.study.sweep import try_design
-from tbcad.simulate.study.tables import Cell, Record, Table
+from tbcad.simulate.study.tables import Record, Table
 from tbcad.spec.design import Spec
+from tbcad.types import Floats, Progress
 
 NOTES = (
-    "The paper has 1657 virtual cameras at n = 18 (Table I) and 1586 in another place. 1657 is "
-    "the number of directions with z >= 0, the definition used here.",
-    "Definitions of the same figure: none that we tried is 1586, whether of cameras or of pixels.",
+    "Table II heads its columns 'Number of virtual camera' and 'Average of virtual camera "
+    "resolution'. value: what a definition gives for that row's n and sensor. "
+    "rms_from_..._percent: root mean square over the four rows of value / column - 1.",
+    "Only the second column grows with n as a number of mirrors does: 5 n^2 + 4 n + 2 mirrors of "
+    "both arrays, those on the seam counted for both, less 6, 6, 12 and 24. The headings stand in "
+    "the wrong order.",
+    "Mirrors whose apex is in the frame: of a camera that is turned about y so that its optical "
+    "axis leaves the vertical by pitch_deg, toward the object. The paper does not state where its "
+    "cameras look; the pitch is the one whose counts come nearest to the second column.",
+    "seeing: pixels whose ray meets the capture sphere after the mirror; disc: of these the ones "
+    "in the largest cone about the apex that fits in the flat mirror (2 theta_0, Fig. 3).",
 )
 # What radii are called: their keys of the design.
 RADII: dict[str, dict[str, object]] = {
+    "traced": {"radius_rule": "traced"},
     "traced, no margin": {"radius_rule": "traced", "margin_mm": 0.0},
-    "traced, the design's margin": {"radius_rule": "traced"},
     "paper": {"radius_rule": "paper"},
     "flat": {"radius_rule": "flat"},
 }
+COLUMNS = (
+    *("definition", "radii", "width_px", "height_px", "n", "value"),
+    *(f"paper_{NUMBER}", f"paper_{RESOLUTION}", "reason"),
+)
+FIT_COLUMNS = ("definition", "radii", *(f"rms_from_{c}_percent" for c in (NUMBER, RESOLUTION)))
+ANY = "any"
+IN_FRAME = "mirrors of both arrays whose apex is in the frame"
+DISC = "disc pixels / mirrors"
+PITCHED_RADII = "paper"  # counted at the pitch, too
 
 
-def definitions(spec: Spec) -> Table:
-    """Every definition of both figures for one design."""
-    records = [_record(spec, name, "any", value) for name, value in _directions(spec).items()]
-    for radii, keys in RADII.items():
-        attempt = try_design(spec, mirrors=keys)
-        if attempt.half is None:
-            refused = _record(spec, "no design", radii, None, attempt.reason)
-            records.append({**refused, "paper": None, "other_paper": None})
-        else:
-            pixels = _pixels(spec, attempt.half)
-            records += [_record(spec, name, radii, value) for name, value in pixels.items()]
-    return Table.of_records("resolution-definitions", records, NOTES)
+def definitions(
+    spec: Spec, rows: tuple[BalancedSensor, ...], progress: Progress = lambda _: None
+) -> tuple[Table, Table]:
+    """Every definition for rows of Table II, and how far each is from its columns.
+
+    Args:
+        spec: the design, whose n and sensor are those of the rows, one after the other.
+        rows: of Table II.
+        progress: called with each design that is done.
+    """
+    units = [(row, radii) for row in reversed(rows) for radii in RADII]
+    pitch = best_pitch(spec) if rows else 0.0
+    counted = run_units(
+        lambda unit: _pixel_records(spec, pitch, *unit),
+        units,
+        progress=lambda unit: progress(f"Table II: n = {unit[0].n}, radii {unit[1]}"),
+    )
+    records = [record for row in rows for record in _mirror_records(spec, row, pitch)]
+    records += [record for found in reversed(counted) for record in found]
+    table = Table.of_records("resolution-definitions", records, NOTES, COLUMNS)
+    fits = _fits(table, known=is_table_i(spec))
+    return table, Table.of_records("resolution-table-ii", fits, columns=FIT_COLUMNS)
 
 
-def _record(spec: Spec, name: str, radii: str, value: Cell, reason: str = "") -> Record:
-    n = spec.optics.n
-    known = n == claimed("design_n")
+def _record(
+    row: BalancedSensor, name: str, radii: str, value: float | None, reason: str = ""
+) -> Record:
+    number, resolution = row.printed
     return {
         "definition": name,
         "radii": radii,
-        "n": n,
+        "width_px": row.width_px,
+        "height_px": row.height_px,
+        "n": row.n,
         "value": value,
-        "paper": int(claimed("virtual_cameras")) if known else None,
-        "other_paper": int(claimed("other_count")) if known else None,
+        f"paper_{NUMBER}": number,
+        f"paper_{RESOLUTION}": resolution,
         "reason": reason,
     }
 
 
-def _directions(spec: Spec) -> dict[str, Cell]:
-    u = numbered_directions(spec.optics.n)[0]
+def _mirror_records(spec: Spec, row: BalancedSensor, pitch: float) -> list[Record]:
+    u = numbered_directions(row.n)[0]
     upper = u[:, 2] >= 0
-    return {
-        "virtual cameras: directions with z >= 0": int(upper.sum()),
+    half_a = upper & (u[:, 0] >= 0)
+    values = {
+        "directions with z >= 0": int(upper.sum()),
         "directions with z > 0": int((u[:, 2] > 0).sum()),
         "half of all directions": len(u) / 2,
-        "mirrors of both halves, halved ones twice": 2 * int((upper & (u[:, 0] >= 0)).sum()),
+        "mirrors of both arrays, those on the seam counted twice": 2 * int(half_a.sum()),
+        f"{IN_FRAME}, {_at(pitch)}": apices_in_frame(spec, row.n, pitch),
     }
+    return [_record(row, name, ANY, value) for name, value in values.items()]
 
 
-def _pixels(spec: Spec, half: MirrorArray) -> dict[str, float]:
-    sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
-    counted = count_pixels(half, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
-    cameras = virtual_cameras(half)
-    seen, on = float(counted.seen.sum()), float(counted.on.sum())
-    return {
-        "seeing pixels / virtual cameras": 2 * seen / cameras,
-        "seeing pixels / mirrors": seen / len(half),
-        "seeing pixels of a mirror, median": float(np.median(counted.seen)),
-        "pixels on mirrors / virtual cameras": 2 * on / cameras,
-        "pixels on mirrors / mirrors": on / len(half),
-        "pixels on a mirror, median": float(np.median(counted.on)),
-        "pixels of both frames / virtual cameras": 2 * sensor.width_px * sensor.height_px / cameras,
-    }
+def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) -> list[Record]:
+    attempt = try_design(spec, optics={"n": row.n}, mirrors=RADII[radii])
+    if attempt.half is None:
+        return [_record(row, "no design", radii, None, attempt.reason)]
+    sensor = Sensor(row.width_px, row.height_px)
+    radius = spec.optics.capture_diameter_mm / 2
+    counts = count_pixels(attempt.half, (sensor,), radius)[0]
+    values = _pixels(attempt.half, counts)
+    values["pixels of both frames / virtual cameras"] = (
+        2 * sensor.width_px * sensor.height_px / virtual_cameras(attempt.half)
+    )
+    if radii == PITCHED_RADII:
+        turned = count_pixels(attempt.half, (sensor,), radius, axes=axes_at_pitch(pitch))[0]
+        values[f"{DISC}, {_at(pitch)}"] = float(turned.disc.mean())
+    return [_record(row, name, radii, value) for name, value in values.items()]
+
+
+def _at(pitch: float) -> str:
+    return f"camera pitched by {np.degrees(pitch):.1f} deg"
+
+
+def _pixels(half: MirrorArray, counts: PixelCounts) -> dict[str, float]:
+    kinds = {"seeing": counts.seen, "disc": counts.disc, "on mirrors": counts.on}
+    figures: dict[str, float] = {}
+    for name, pixels in kinds.items():
+        figures[f"{name} pixels / virtual cameras"] = (
+            2 * float(pixels.sum()) / virtual_cameras(half)
+        )
+        figures[f"{name} pixels / mirrors"] = float(pixels.mean())
+        figures[f"{name} pixels of a mirror, median"] = float(np.median(pixels))
+    return figures
+
+
+def _fits(table: Table, *, known: bool) -> list[Record]:
+    """How far each definition is from both columns; of another design than the paper's: unknown."""
+    keys = dict.fromkeys(zip(table.column("definition"), table.column("radii"), strict=True))
+    fits: list[Record] = []
+    for definition, radii in keys:
+        rows = table.where(definition=definition, radii=radii)
+        fit: Record = {"definition": definition, "radii": radii}
+        for name, column in zip(FIT_COLUMNS[2:], (NUMBER, RESOLUTION), strict=True):
+            off = _rms_percent(rows.numbers("value"), rows.numbers(f"paper_{column}"))
+            fit[name] = off if known and np.isfinite(off) else None
+        fits.append(fit)
+    return fits
+
+
+def _rms_percent(values: Floats, columns: Floats) -> float:
+    return float(100 * np.sqrt(np.mean((values / columns - 1) ** 2)))

@@ -13,7 +13,7 @@ from tbcad.simulate.study.lens import (
     focal_length,
     lens_for,
 )
-from tbcad.simulate.study.paper import claimed, claims
+from tbcad.simulate.study.paper import claimed, claims, with_lens_of_table_i
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import try_design
@@ -35,7 +35,9 @@ NOTES = (
     "Coddington's equations; tangential and sagittal fans have images of their own.",
     "_depth_: the same along the camera's optical axis, which is what a lens focuses on. The "
     "camera is turned as the design turns it.",
-    "Mirrors of camera a; b's mirror them. The paper's range is of distances, as we read it.",
+    "Mirrors of camera a; b's mirror them. Section 6 has 'the range of 150-250 mm from the camera' "
+    "in the paper's experiments, with its prototype, whose dimensions it does not state; read as "
+    "distances.",
 )
 LENS_NOTES = (
     "A thin lens without aberrations or field curvature, stop at the lens, whose angle of view is "
@@ -45,8 +47,10 @@ LENS_NOTES = (
     "blur limited: the largest pupil within --blur-px. sharpest: minimum total_px. light: relative "
     "to the lens wide open (--wide-open); stops_lost: in factors of two. No stop is wider than "
     "wide open.",
-    "The aperture that the paper gives, if it gives one, is not known to us.",
+    "The paper states neither aperture nor focal length: only that the aperture must be smaller "
+    "than with planar mirrors, and 100 ms of exposure.",
 )
+CONSTANT = "camera to images of the centre, flat radii: farthest less nearest"
 PAPER_RANGE = "the paper's distances"
 RANGES_SHOWN = ("traced radii, along the axis", PAPER_RANGE)
 # Columns of the stops that are figures of the study: what they are called, and their units.
@@ -98,6 +102,7 @@ class LensOptions:
 
 def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
+    spec = with_lens_of_table_i(spec)
     camera, wide_open = spec.camera, options.checked().wide_open
     lens = lens_for(
         np.radians(camera.hfov_deg), camera.width_px, options.pixel_um / 1000, wide_open
@@ -109,7 +114,7 @@ def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda
         _mirror_table(by_rule, (*NOTES, *refusals)),
         Table.of_records("depth-of-field-stops", stops, LENS_NOTES),
     )
-    figures = (*_image_figures(by_rule), *_stop_figures(stops))
+    figures = (*_image_figures(by_rule), *_flat_figures(by_rule, ranges), *_stop_figures(stops))
     panels = (_image_panel(by_rule), _blur_panel(ranges, lens))
     return Study("depth-of-field", figures, tables, panels)
 
@@ -200,6 +205,23 @@ def _image_figures(by_rule: dict[str, VirtualImages]) -> list[Figure]:
     ]
 
 
+def _flat_figures(by_rule: dict[str, VirtualImages], ranges: dict[str, DepthRange]) -> list[Figure]:
+    """Whether flat mirrors keep the images at one distance, and convex ones need more depth."""
+    if "flat" not in by_rule:
+        return []
+    where = claims()["depth_near"].where
+    centre = by_rule["flat"].distance[:, 1]
+    figures = [Figure(CONSTANT, "mm", float(np.ptp(centre)), 0.0, where)]
+    for kind in ("distances", "along the axis"):
+        spread = {rule: ranges[f"{rule} radii, {kind}"].spread for rule in by_rule}
+        figures += [
+            Figure(f"1/near - 1/far of {rule} radii over flat, {kind}", "", ratio, "> 1", where)
+            for rule, ratio in ((rule, spread[rule] / spread["flat"]) for rule in spread)
+            if rule != "flat"
+        ]
+    return figures
+
+
 def _stop_figures(stops: list[Record]) -> list[Figure]:
     where = claims()["depth_near"].where
     return [
@@ -222,7 +244,7 @@ def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
         paper = claimed(key)
         series.append(Series(f"the paper: {paper:g} mm", ends, np.full(2, paper), style))
     title = "Virtual images of the capture sphere"
-    return Panel(title, "polar angle about w, deg", "from the camera, mm", tuple(series))
+    return Panel(title, "polar angle, degrees", "distance from the camera, mm", tuple(series))
 
 
 def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
@@ -236,4 +258,4 @@ def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
             Series(f"blur circle, {name}", f_numbers, blur, f"C{k}--"),
             Series(f"with diffraction, {name}", f_numbers, total, f"C{k}-"),
         ]
-    return Panel("Blur at the ends of the range", "F-number", "pixels", tuple(series))
+    return Panel("Blur at the ends of the range", "F-number", "diameter, pixels", tuple(series))

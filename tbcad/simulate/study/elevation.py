@@ -1,9 +1,12 @@
-"""Radius of the mirrors against their polar angle (the paper's elevation, Fig. 7b)."""
+"""Mirrors over their angles: radius over polar angle (section 5.1), pixels over elevation (4.2)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
+from tbcad.simulate.study.paper import with_lens_of_table_i
+from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import spec_with
@@ -12,45 +15,69 @@ from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
 CURVES = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
-WHERE = "Fig. 7b"
+RADIUS_PLACE = "section 5.1"
+PIXELS_PLACE = "section 4.2, Fig. 7b"
+UNEVEN_PLACE = "section 6"
+BAND_DEG = 15.0
 NOTES = (
-    "The paper's elevation of a mirror is its polar angle about w, the axis from the object to "
-    "the camera; azimuth 0 is the zenith's side. Mirrors of camera a; b's mirror them.",
+    "polar_deg: about w, the axis from the object to the camera, on which the prototype's base "
+    "rotates; the elevation of section 5.1. azimuth 0 is the zenith's side. elevation_deg: of the "
+    "virtual camera above the plane z = 0; the elevation of sections 4.2 and 4.4. Mirrors of "
+    "camera a; b's mirror them.",
     "Radii: paper: eqs. 1 and 2; traced: exact coverage of the capture diameter and "
     "mirrors.margin_mm. nearly_flat: traced radius set by mirrors.max_radius_widths.",
-    "Correlation: Pearson's coefficient over all mirrors. The paper states a correlation; its "
-    "coefficient is not known to us.",
+    "seeing_px: pixels whose ray, off the mirror with its traced radius, meets the capture sphere; "
+    "mirrors that the seam halves count with both halves. area_mm2, to_camera_mm, to_object_mm: "
+    "of the mirror's cell and apex.",
+    "Correlation: Pearson's coefficient over all mirrors. The paper states correlations, no "
+    "coefficient.",
 )
 
 
 def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
-    """The study: radii of every mirror by both rules, and how they follow the angles.
+    """The study: radii of every mirror by both rules, its pixels, and how they follow the angles.
 
     Raises:
         SpecError: the mirrors cannot be made.
     """
-    halves = {}
+    spec, halves = with_lens_of_table_i(spec), {}
     for rule in CURVES:
         progress(f"radii by rule {rule}")
         halves[rule] = design(spec_with(spec, mirrors={"radius_rule": rule})).halves[0]
+    progress("pixels")
+    traced = halves["traced"]
+    sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
+    counts = count_pixels(traced, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    mirrors = _mirrors(traced, halves["paper"], counts, spec.mirrors.max_radius_widths)
     correlations = [record for rule, half in halves.items() for record in _correlations(rule, half)]
+    correlations += _pixel_correlations(mirrors)
     tables = (
-        _mirrors(halves["traced"], halves["paper"], spec.mirrors.max_radius_widths),
+        mirrors,
+        Table.of_records("elevation-pixels", _bands(mirrors)),
         Table.of_records("elevation-correlation", correlations),
     )
-    panels = (_panel(halves, "radius", ""), _panel(halves, "radius, logarithmic", "y"))
-    return Study("elevation", _figures(halves, correlations), tables, panels)
+    panels = (_radius_panel(halves), _pixel_panel(mirrors))
+    figures = (*_figures(halves, correlations), *_pixel_figures(mirrors))
+    return Study("elevation", figures, tables, panels)
 
 
-def _mirrors(traced: MirrorArray, paper: MirrorArray, max_radius_widths: float) -> Table:
+def _mirrors(
+    traced: MirrorArray, paper: MirrorArray, counts: PixelCounts, max_radius_widths: float
+) -> Table:
     longest = max_radius_widths * traced.half_width
+    halved = np.where(traced.u[:, 0] == 0, 2, 1)
     columns: dict[str, ArrayLike] = {
         "id": traced.ids,
         "polar_deg": np.degrees(traced.polar),
         "azimuth_deg": np.degrees(traced.azimuth),
+        "elevation_deg": np.degrees(np.arcsin(np.clip(traced.u[:, 2], -1, 1))),
         "traced_radius_mm": traced.mirrors.radius,
         "paper_radius_mm": paper.mirrors.radius,
         "nearly_flat": (traced.mirrors.radius >= longest * (1 - 1e-9)).astype(int),
+        "seeing_px": counts.seen * halved,
+        "area_mm2": traced.area * halved,
+        "to_camera_mm": norm(traced.mirrors.apex - traced.camera.pinhole),
+        "to_object_mm": traced.apex_distance,
     }
     return Table.of_columns("elevation", columns, NOTES)
 
@@ -60,16 +87,39 @@ def _correlations(rule: str, half: MirrorArray) -> list[Record]:
     values = {"radius": radius, "log radius": np.log(radius)}
     angles = {"polar angle": half.polar, "absolute azimuth": np.abs(half.azimuth)}
     return [
-        {
-            "radii": rule,
-            "of": name,
-            "with": other,
-            "correlation": correlation(value, angle),
-            "mirrors": len(half),
-        }
+        _correlated(rule, (name, value), (other, angle), RADIUS_PLACE)
         for name, value in values.items()
         for other, angle in angles.items()
     ]
+
+
+def _pixel_correlations(mirrors: Table) -> list[Record]:
+    """What section 4.2 says of mirrors in higher positions, and section 6 of those nearby."""
+    elevation = ("elevation", mirrors.numbers("elevation_deg"))
+    to_object = ("distance from the object", mirrors.numbers("to_object_mm"))
+    area = ("area", mirrors.numbers("area_mm2"))
+    return [
+        _correlated("traced", ("pixels", mirrors.numbers("seeing_px")), elevation, PIXELS_PLACE),
+        _correlated("traced", area, elevation, PIXELS_PLACE),
+        _correlated(
+            "traced",
+            ("distance from the camera", mirrors.numbers("to_camera_mm")),
+            elevation,
+            PIXELS_PLACE,
+        ),
+        _correlated("traced", area, to_object, UNEVEN_PLACE),
+    ]
+
+
+def _correlated(radii: str, of: tuple[str, Floats], to: tuple[str, Floats], where: str) -> Record:
+    return {
+        "radii": radii,
+        "of": of[0],
+        "with": to[0],
+        "correlation": correlation(of[1], to[1]),
+        "mirrors": len(of[1]),
+        "where": where,
+    }
 
 
 def correlation(x: Floats, y: Floats) -> float:
@@ -77,26 +127,64 @@ def correlation(x: Floats, y: Floats) -> float:
     return float(np.corrcoef(x, y)[0, 1])
 
 
+def _bands(mirrors: Table) -> list[Record]:
+    """Means over the mirrors in bands of elevation; the last holds the zenith."""
+    elevation = mirrors.numbers("elevation_deg")
+    last = 90 / BAND_DEG - 1
+    band = np.minimum(np.floor(elevation / BAND_DEG), last)
+    records: list[Record] = []
+    for k in np.unique(band).tolist():
+        record: Record = {
+            "elevation_from_deg": k * BAND_DEG,
+            "elevation_to_deg": (k + 1) * BAND_DEG,
+            "mirrors": int((band == k).sum()),
+        }
+        for name in ("seeing_px", "area_mm2", "to_camera_mm", "traced_radius_mm"):
+            record[f"mean_{name}"] = float(mirrors.numbers(name)[band == k].mean())
+        records.append(record)
+    return records
+
+
 def _figures(halves: dict[str, MirrorArray], correlations: list[Record]) -> tuple[Figure, ...]:
     ranges = {f"radii by rule {rule}": ("mm", half.mirrors.radius) for rule, half in halves.items()}
     ranges["polar angle"] = ("deg", np.degrees(halves["traced"].polar))
     extremes = (
-        Figure(f"{name}, {which}", unit, value, where=WHERE)
+        Figure(f"{name}, {which}", unit, value, where=RADIUS_PLACE)
         for name, (unit, values) in ranges.items()
         for which, value in (("smallest", float(values.min())), ("largest", float(values.max())))
     )
-    names = "correlation of {of} with {with}, {radii}"
-    return (
-        *extremes,
-        *(Figure(names.format(**r), "", r["correlation"], where=WHERE) for r in correlations),
+    name = "correlation of {of} with {with}, {radii}"
+    correlated = (
+        Figure(name.format(**r), "", r["correlation"], where=str(r["where"])) for r in correlations
+    )
+    return (*extremes, *correlated)
+
+
+def _pixel_figures(mirrors: Table) -> tuple[Figure, ...]:
+    pixels = mirrors.numbers("seeing_px")
+    values = {"fewest": pixels.min(), "median": np.median(pixels), "most": pixels.max()}
+    return tuple(
+        Figure(f"pixels of a virtual camera, {name}", "", float(value), where=UNEVEN_PLACE)
+        for name, value in values.items()
     )
 
 
-def _panel(halves: dict[str, MirrorArray], what: str, logarithmic: str) -> Panel:
+def _radius_panel(halves: dict[str, MirrorArray]) -> Panel:
     series = []
     for rule, (label, style) in CURVES.items():
         radius, polar = halves[rule].mirrors.radius, halves[rule].polar
-        drawn = correlation(np.log(radius) if logarithmic else radius, polar)
-        named = f"{label}: correlation {drawn:.3f}"
+        named = f"{label}: correlation of log radius {correlation(np.log(radius), polar):.3f}"
         series.append(Series(named, np.degrees(polar), radius, style))
-    return Panel(f"Mirrors' {what}", "polar angle about w, deg", "mm", tuple(series), logarithmic)
+    title = "Radius of the mirrors"
+    return Panel(title, "polar angle about the axis, degrees", "mm", tuple(series), "y")
+
+
+def _pixel_panel(mirrors: Table) -> Panel:
+    elevation, pixels = mirrors.numbers("elevation_deg"), mirrors.numbers("seeing_px")
+    bands = Table.of_records("", _bands(mirrors))
+    middle = bands.numbers("elevation_from_deg") + BAND_DEG / 2
+    series = (
+        Series("each virtual camera", elevation, pixels, "C0."),
+        Series(f"mean of {BAND_DEG:g} degrees", middle, bands.numbers("mean_seeing_px"), "ko-"),
+    )
+    return Panel("Pixels that see the object", "elevation, degrees", "pixels", series)

@@ -10,8 +10,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-PANEL_INCHES = (6.4, 4.6)
-DPI = 110
+PANEL_INCHES = (6.4, 5.2)
+DPI = 120
+MARKER_POINTS, CROSS_POINTS = 4, 7
+LEGEND_BELOW = -0.14  # of the axes' height, below the axis label
+LEGEND_COLUMNS = 2
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,14 @@ def _draw(axes: "Axes", panel: Panel) -> None:
     axes.set_ylabel(panel.y_label)
     axes.grid(True, which="both", alpha=0.25)
     if any(series.label for series in panel.series):
-        axes.legend(fontsize=8)
+        # Below the axes, where it hides no data.
+        axes.legend(
+            fontsize=8,
+            loc="upper center",
+            bbox_to_anchor=(0.5, LEGEND_BELOW),
+            ncols=LEGEND_COLUMNS,
+            frameon=False,
+        )
 
 
 def _draw_series(axes: "Axes", series: Series) -> None:
@@ -99,17 +109,16 @@ def _draw_series(axes: "Axes", series: Series) -> None:
     elif series.style == "bars":
         axes.barh(series.y, series.x, height=0.7, label=label)
     else:
-        axes.plot(series.x, series.y, series.style, label=label, markersize=4)
+        size = CROSS_POINTS if set(series.style) & set("x+") else MARKER_POINTS
+        axes.plot(series.x, series.y, series.style, label=label, markersize=size)
 
 
 def _logarithmic(axes: "Axes", letter: str) -> None:
     """A logarithmic axis with plain numbers at 1, 2, 5, 10, ..."""
-    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set(**{f"{letter}scale": "log"})
     axis = axes.xaxis if letter == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    plain = ScalarFormatter()
-    plain.set_scientific(False)
-    axis.set_major_formatter(plain)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
     axis.set_minor_formatter(NullFormatter())

@@ -19,11 +19,13 @@ from tbcad.simulate.views.synthesis import Method
 from tbcad.types import Floats, Progress
 
 LEVEL = 0.95
-WHERE = "section 5.3"
+WHERE = "section 5.1"
 NOTES = (
     "Difference: the prototype's SSIM less the shell's, view by view against the same ray-traced "
     "truth. Interval: Student's t at 95 % over the views; neighbouring views share captured rays "
     "and are not wholly independent, so the true interval is somewhat wider.",
+    "blur: standard deviation, at the object, of the Gaussian with which the truth comes nearest "
+    "to the view.",
     "The prototype's picture is merged from photographs of every stop, as the prototype takes "
     "them, both runs; the same number of rays a pixel for both.",
 )
@@ -63,17 +65,19 @@ def prototype_vs_shell(
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
     light_fields = (_tiles(export, scene, kind, samples, progress) for kind in kinds)
     shell, prototype = (
-        view_quality(tiles, scene, views, truths, method, progress).T for tiles in light_fields
+        view_quality(tiles, scene, views, truths, method, progress) for tiles in light_fields
     )
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {
         "elevation_deg": viewpoints.elevation_deg,
         "azimuth_deg": viewpoints.azimuth_deg,
-        "shell_psnr_db": shell[0],
-        "prototype_psnr_db": prototype[0],
-        "shell_ssim": shell[1],
-        "prototype_ssim": prototype[1],
-        "ssim_difference": prototype[1] - shell[1],
+        "shell_psnr_db": shell["psnr_db"],
+        "prototype_psnr_db": prototype["psnr_db"],
+        "shell_ssim": shell["ssim"],
+        "prototype_ssim": prototype["ssim"],
+        "shell_blur_mm": shell["blur_mm"],
+        "prototype_blur_mm": prototype["blur_mm"],
+        "ssim_difference": prototype["ssim"] - shell["ssim"],
     }
     table = Table.of_columns("prototype", columns, (facts, *NOTES))
     return Study("prototype", _figures(table), (table,), _panels(table))
@@ -93,6 +97,7 @@ def _figures(table: Table) -> tuple[Figure, ...]:
         table.numbers("shell_ssim"), table.numbers("prototype_ssim")
     )
     verdict = "not significant" if low <= 0 <= high else "significant"
+    spread = float(np.std(table.numbers("shell_ssim"), ddof=1)) if len(table.rows) > 1 else None
     figures = (
         Figure("mean SSIM of the shell's views", "", mean["shell_ssim"]),
         Figure("mean SSIM of the prototype's views", "", mean["prototype_ssim"]),
@@ -100,6 +105,9 @@ def _figures(table: Table) -> tuple[Figure, ...]:
         Figure("its interval at 95 %, low", "", low),
         Figure("its interval at 95 %, high", "", high),
         Figure("at 95 % the difference is", "", verdict, "no significant difference"),
+        Figure("standard deviation of SSIM over the shell's views", "", spread),
+        Figure("mean blur of the shell's views", "mm", mean["shell_blur_mm"]),
+        Figure("mean blur of the prototype's views", "mm", mean["prototype_blur_mm"]),
         Figure("mean PSNR of the shell's views", "dB", mean["shell_psnr_db"]),
         Figure("mean PSNR of the prototype's views", "dB", mean["prototype_psnr_db"]),
     )
@@ -114,6 +122,6 @@ def _panels(table: Table) -> tuple[Panel, ...]:
     )
     difference = Series("", elevation, table.numbers("ssim_difference"), "k.")
     return (
-        Panel("Views against the truth", "elevation, deg", "SSIM", pairs),
-        Panel("Prototype less shell", "elevation, deg", "difference of SSIM", (difference,)),
+        Panel("Views against the truth", "elevation, degrees", "SSIM", pairs),
+        Panel("Prototype less shell", "elevation, degrees", "difference of SSIM", (difference,)),
     )

@@ -6,11 +6,19 @@ from functools import partial
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.study.definitions import definitions
-from tbcad.simulate.study.paper import claimed, claims
+from tbcad.simulate.study.definitions import DISC, IN_FRAME, definitions
+from tbcad.simulate.study.paper import (
+    HEADINGS,
+    NUMBER,
+    RESOLUTION,
+    TABLE_II,
+    balanced_sensors,
+    with_lens_of_table_i,
+)
 from tbcad.simulate.study.pixels import (
     PixelCounts,
     Sensor,
+    allowed,
     count_pixels,
     megapixels,
     virtual_cameras,
@@ -22,16 +30,13 @@ from tbcad.simulate.study.tables import Record, Table
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 
-MULTIPLES = (1, 2, 3, 4)
+MULTIPLES = (0.5, 1, 2, 4)  # of the sides of the design's sensor: those of Table II
 COUNTED = (
     *("virtual_cameras", "seeing_px", "on_mirrors_px", "seeing_average_px"),
     *("on_mirrors_average_px", "frame_filled", "rays_traced"),
 )
-SHOWN = (
-    "virtual cameras: directions with z >= 0",
-    "seeing pixels / virtual cameras",
-    "pixels on mirrors / virtual cameras",
-)
+# Definitions that agree with Table II, and with which of its columns.
+AGREEING = ((IN_FRAME, RESOLUTION), (f"{DISC}, camera", NUMBER))
 KINDS = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
 NOTES = (
     "Virtual cameras: directions with z >= 0; mirrors that the seam halves count once.",
@@ -40,14 +45,11 @@ NOTES = (
     "frame_filled is 1 when the outermost mirror is at the frame's edge; beyond 1 the frame of "
     "this sensor and lens does not hold all mirrors, and the rest have no pixels.",
     "rays_traced less than the sensor's pixels: one ray stood for a block of them.",
-    "Only the paper's first and last sensor, 2080 x 1552 and 8320 x 6208, are known to us; that "
-    "the two between are twice and three times the first is our assumption (--sensor).",
 )
 BALANCE_NOTES = (
     "Balanced n: where virtual cameras : average pixels is the ratio, between whole n on a "
     "straight line of the logarithms; nearest_n is the n of the sweep that comes nearest to it.",
-    "Of the paper's Table II we know n = 18 for 2080 x 1552 at 1:1 only; other cells of paper_n "
-    "are empty because they are not known to us.",
+    "paper_n: Table II, which has the ratio 1:1 only (section 6), so other cells are empty.",
 )
 
 
@@ -82,9 +84,10 @@ def parse_ratio(text: str) -> Ratio:
 
 
 def default_sensors(spec: Spec) -> tuple[Sensor, ...]:
-    """The design's sensor and its multiples up to four times the sides."""
-    width, height = spec.camera.width_px, spec.camera.height_px
-    return tuple(Sensor(k * width, k * height) for k in MULTIPLES)
+    """The design's sensor and those of half, twice and four times its sides, as in Table II."""
+    sides = spec.camera.width_px, spec.camera.height_px
+    scaled = (tuple(round(k * side) for side in sides) for k in MULTIPLES)
+    return tuple(Sensor(*sides) for sides in scaled if allowed(*sides))
 
 
 def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> tuple[float, int]:
@@ -127,22 +130,24 @@ def resolution(
     """The study: counts for every n and sensor, and the n that balances them.
 
     Args:
-        spec: the design; its n gives the table of definitions.
+        spec: the design; the table of definitions has the n of Table II.
         ns: subdivisions to try.
         sensors: in place of the design's.
         ratios: of virtual cameras to average pixels.
         progress: called with each step.
         scheduler: address of a Dask scheduler; None for this machine's cores.
     """
+    spec = with_lens_of_table_i(spec)
     by_n = for_each_n(partial(_counts, spec, sensors), ns, progress, scheduler)
     counts = Table.of_records("resolution", [row for rows in by_n for row in rows], NOTES)
     balances = [_balance(counts, s, r, kind) for s in sensors for r in ratios for kind in KINDS]
     balanced = Table.of_records("resolution-balance", balances, BALANCE_NOTES)
     progress("definitions")
-    defined = definitions(spec)
+    rows = tuple(r for r in balanced_sensors() if Sensor(r.width_px, r.height_px) in sensors)
+    defined, fits = definitions(spec, rows, progress)
     figures = (*_definition_figures(defined), *map(_balance_figure, balances))
     panels = (_count_panel(counts, sensors), _balance_panel(balanced, ratios))
-    return Study("resolution", figures, (counts, balanced, defined), panels)
+    return Study("resolution", figures, (counts, balanced, defined, fits), panels)
 
 
 def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
@@ -171,7 +176,8 @@ def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
     cameras, pixels = counted.numbers("virtual_cameras"), counted.numbers(KINDS[kind])
     n, place = balance(counted.numbers("n"), cameras, pixels, ratio)
     inside, nearest = not np.isnan(n), counted.records()[place]
-    known = str(sensor) == "2080x1552" and ratio.cameras == ratio.pixels
+    paper = {(s.width_px, s.height_px): s.n for s in balanced_sensors()}
+    known = paper.get((sensor.width_px, sensor.height_px))
     return {
         **asdict(sensor),
         "ratio": str(ratio),
@@ -180,28 +186,31 @@ def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
         "nearest_n": nearest["n"] if inside else None,
         "virtual_cameras": nearest["virtual_cameras"] if inside else None,
         "average_px": nearest[KINDS[kind]] if inside else None,
-        "paper_n": int(claimed("design_n")) if known else None,
+        "paper_n": known if ratio.cameras == ratio.pixels else None,
         "reason": "" if inside else "outside the sweep: change --from or --to",
     }
 
 
 def _definition_figures(defined: Table) -> list[Figure]:
-    """Definitions of the design itself beside the paper's two figures."""
-    figures = []
-    for record in defined.records():
-        of_cameras = record["radii"] == "any"
-        claim = claims()["virtual_cameras" if of_cameras else "other_count"]
-        paper = None if record["paper"] is None else claim.value
-        name = f"{record['definition']}, n = {record['n']}"
-        name += "" if of_cameras else f", radii {record['radii']}"
-        if record["definition"] in SHOWN:
-            figures.append(Figure(name, "", record["value"], paper, claim.where if paper else ""))
-    return figures
+    """The definitions that agree with the columns of Table II, beside them."""
+    name = "{width_px}x{height_px}, n = {n}: {definition}"
+    return [
+        Figure(
+            name.format(**record),
+            "",
+            record["value"],
+            record[f"paper_{column}"],
+            f"{TABLE_II}, '{HEADINGS[column]}'",
+        )
+        for prefix, column in AGREEING
+        for record in defined.records()
+        if str(record["definition"]).startswith(prefix)
+    ]
 
 
 def _balance_figure(record: Record) -> Figure:
     names = "balanced n at {ratio}, {width_px}x{height_px}, {pixels_counted}"
-    return Figure(names.format(**record), "", record["balanced_n"], record["paper_n"], "Table II")
+    return Figure(names.format(**record), "", record["balanced_n"], record["paper_n"], TABLE_II)
 
 
 def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
@@ -212,10 +221,13 @@ def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
         label = f"seeing pixels of one, {sensor}"
         pixels = counted.numbers("seeing_average_px")
         series.append(Series(label, counted.numbers("n"), pixels, f"C{k}.-"))
-    n = np.array([claimed("design_n")] * 2)
-    paper = np.array([claimed("virtual_cameras"), claimed("other_count")])
-    series.append(Series("the paper: 1657 and 1586 at n = 18", n, paper, "r+"))
-    return Panel("Virtual cameras and pixels", "n", "number", tuple(series), logarithmic="xy")
+    rows = balanced_sensors()
+    n = np.array([row.n for row in rows], dtype=np.float64)
+    for k, (heading, style) in enumerate(zip(HEADINGS.values(), ("rx", "r+"), strict=True)):
+        values = np.array([row.printed[k] for row in rows], dtype=np.float64)
+        series.append(Series(f"{TABLE_II}: '{heading}'", n, values, style))
+    title = "Virtual cameras, and pixels of one, over n"
+    return Panel(title, "subdivision n", "number", tuple(series), logarithmic="xy")
 
 
 def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
@@ -223,7 +235,10 @@ def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
     for k, ratio in enumerate(ratios):
         for kind, style in (("seeing", "o-"), ("on mirrors", "x--")):
             rows = balanced.where(ratio=str(ratio), pixels_counted=kind)
-            label, n = f"{ratio}, {kind}", rows.numbers("balanced_n")
+            label, n = f"{ratio}, pixels {kind}", rows.numbers("balanced_n")
             series.append(Series(label, megapixels(rows), n, f"C{k}{style}"))
-    series.append(Series("the paper", megapixels(balanced), balanced.numbers("paper_n"), "r+"))
-    return Panel("Balanced n", "megapixels", "n", tuple(series), logarithmic="x")
+    series.append(
+        Series(f"{TABLE_II}, 1:1", megapixels(balanced), balanced.numbers("paper_n"), "r+")
+    )
+    title = "n that balances virtual cameras and pixels"
+    return Panel(title, "sensor, megapixels", "subdivision n", tuple(series), logarithmic="x")

@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,36 +18,47 @@ from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
+from tbcad.simulate.study.paper import balanced_sensors, claims, with_lens_of_table_i
 from tbcad.simulate.study.pixels import Sensor, megapixels
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import try_design
 from tbcad.simulate.study.tables import Cell, Record, Table
-from tbcad.simulate.study.viewpoints import Viewpoints, ground_truths, view_quality
+from tbcad.simulate.study.viewpoints import QUALITY, Viewpoints, ground_truths, view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method
 from tbcad.spec.design import Spec
 from tbcad.types import Bytes, Progress
 
-MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", "psnr_db", "ssim", "ssim_sd")
+MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")
 FITS = ("elevation_deg", "sensors", "slope", "intercept", "r2")
 ALL = "all"  # in the place of an elevation: views at all of them
-WHERE = "Fig. 9"
+WHERE = "section 4.4, Fig. 9"
 NOTES = (
     "SSIM and PSNR of views of 640 x 480 pixels, over the whole frame, against ray-traced "
-    "pictures of the same object (4 x 4 rays a pixel).",
-    "Each sensor has its own n: that of the design times the fourth root of how many times the "
-    "pixels it has, rounded, which keeps virtual cameras and pixels of one in proportion. Which n "
-    "the paper took is not known to us; it sweeps n to 36, which is what its largest sensor gets.",
-    "Only the paper's first and last sensor, 2080 x 1552 and 8320 x 6208, are known to us; that "
-    "the two between are twice and three times the first is our assumption (--sensor).",
+    "pictures of the same object (4 x 4 rays a pixel). ssim_on_object: mean of the local SSIM "
+    "where the truth shows the object; object_share: of the frame.",
+    "blur: standard deviation, at the object's centre, of the Gaussian with which the truth comes "
+    "nearest to the view, by least squares. The paper's 'apparent resolution' is read as its "
+    "inverse.",
+    "Each sensor has the n of Table II where the design's own sensor and n are in it; else n is "
+    "that of the design times the fourth root of how many times the pixels it has, rounded, which "
+    "keeps virtual cameras and pixels of one in proportion.",
     "Fit: least squares of the mean SSIM over log10 of a sensor's pixels; r2 is the square of the "
-    "correlation. The paper's slope and R^2 are not known to us.",
+    "correlation. The paper's text states that SSIM is linear, no slope and no R^2.",
 )
 
 
+def sensor_n(spec: Spec, sensor: Sensor) -> int:
+    """A sensor's n: that of Table II where the design is in it, else one in proportion."""
+    paper = {(row.width_px, row.height_px): row.n for row in balanced_sensors()}
+    if paper.get((spec.camera.width_px, spec.camera.height_px)) == spec.optics.n:
+        return paper.get((sensor.width_px, sensor.height_px), proportionate_n(spec, sensor))
+    return proportionate_n(spec, sensor)
+
+
 def proportionate_n(spec: Spec, sensor: Sensor) -> int:
-    """A sensor's n: mirrors grow with n^2, and are to grow with the square root of the pixels."""
+    """Mirrors grow with n^2, and are to grow with the square root of the pixels."""
     pixels = spec.camera.width_px * spec.camera.height_px
     factor = float((sensor.width_px * sensor.height_px / pixels) ** 0.25)
     return max(1, round(spec.optics.n * factor))
@@ -71,7 +82,7 @@ def ssim(
         method: how views are made.
         progress: called with each step.
     """
-    scene = prepared_scene(subject)
+    spec, scene = with_lens_of_table_i(spec), prepared_scene(subject)
     truths = ground_truths(scene, viewpoints.cameras(spec.optics.capture_diameter_mm), progress)
     compared = partial(_compared, spec, scene, viewpoints, truths, method, progress)
     records = [record for sensor in sensors for record in compared(sensor)]
@@ -80,7 +91,7 @@ def ssim(
         "ssim-means", [mean for sensor in sensors for mean in _means(table, sensor)], columns=MEANS
     )
     fits = Table.of_records("ssim-fits", _fits(means), columns=FITS)
-    panels = (_panel(means, fits),)
+    panels = (_ssim_panel(means, fits), *_elevation_panels(means))
     return Study("ssim", tuple(_figures(means, fits)), (table, means, fits), panels)
 
 
@@ -94,9 +105,9 @@ def _compared(
     sensor: Sensor,
 ) -> list[Record]:
     """PSNR and SSIM of the views with one sensor, or what a refusal of its design says."""
-    n, cameras = proportionate_n(spec, sensor), viewpoints.cameras(spec.optics.capture_diameter_mm)
+    n, cameras = sensor_n(spec, sensor), viewpoints.cameras(spec.optics.capture_diameter_mm)
     attempt = try_design(spec, optics={"n": n}, camera=asdict(sensor))
-    quality = np.full((len(cameras), 2), np.nan)
+    quality = {name: np.full(len(cameras), np.nan) for name in QUALITY}
     if attempt.design is not None:
         with _light_field(attempt.design, scene, progress) as light_field:
             tiles = MirrorTiles(light_field)
@@ -104,8 +115,7 @@ def _compared(
     columns = {
         "elevation_deg": viewpoints.elevation_deg,
         "azimuth_deg": viewpoints.azimuth_deg,
-        "psnr_db": quality[:, 0],
-        "ssim": quality[:, 1],
+        **quality,
     }
     head: Record = {**asdict(sensor), "n": n}
     views = Table.of_columns("", columns).records()
@@ -139,8 +149,7 @@ def _mean(name: Cell, group: Table) -> Record:
         **{key: group.column(key)[0] for key in ("width_px", "height_px", "n")},
         "elevation_deg": name,
         "views": len(ssim),
-        "psnr_db": float(group.numbers("psnr_db").mean()),
-        "ssim": float(ssim.mean()),
+        **{key: float(group.numbers(key).mean()) for key in QUALITY},
         "ssim_sd": float(np.std(ssim, ddof=1)) if len(ssim) > 1 else None,
     }
 
@@ -172,20 +181,67 @@ def _figures(means: Table, fits: Table) -> Iterator[Figure]:
         name = "{width_px}x{height_px}, n = {n}: mean".format(**mean)
         yield Figure(f"{name} SSIM", "", mean["ssim"], where=WHERE)
         yield Figure(f"{name} PSNR", "dB", mean["psnr_db"], where=WHERE)
+        yield Figure(f"{name} blur", "mm", mean["blur_mm"], where=WHERE)
     for fit in fits.where(elevation_deg=ALL).records():
         yield Figure("SSIM for ten times the pixels", "", fit["slope"], where=WHERE)
         yield Figure("R^2 of SSIM over log pixels", "", fit["r2"], where=WHERE)
+    for size, rows in _by_sensor(means).items():
+        yield from _elevation_figures(size, rows)
 
 
-def _panel(means: Table, fits: Table) -> Panel:
+def _by_sensor(means: Table) -> dict[str, Table]:
+    """Means at each elevation, without those over all, by sensor."""
+    sizes = dict.fromkeys(zip(means.column("width_px"), means.column("height_px"), strict=True))
+    elevations = replace(means, rows=tuple(r for r in means.rows if ALL not in r))
+    return {f"{w}x{h}": elevations.where(width_px=w, height_px=h) for w, h in sizes}
+
+
+def _elevation_figures(size: str, rows: Table) -> Iterator[Figure]:
+    """Where views are sharpest, most similar, and the object largest."""
+    elevation, place = rows.numbers("elevation_deg"), claims()["sharpest_elevation"]
+    best: dict[str, tuple[int, Cell]] = {
+        "least blur": (int(rows.numbers("blur_mm").argmin()), place.value),
+        "highest SSIM": (int(rows.numbers("ssim").argmax()), f"not {place.value:g}"),
+        "highest SSIM on the object": (int(rows.numbers("ssim_on_object").argmax()), None),
+        "largest image of the object": (int(rows.numbers("object_share").argmax()), place.value),
+    }
+    for name, (index, paper) in best.items():
+        where = place.where if paper else ""
+        yield Figure(
+            f"{size}: elevation of the {name}", "deg", float(elevation[index]), paper, where
+        )
+
+
+def _ssim_panel(means: Table, fits: Table) -> Panel:
     series = []
     for k, elevation in enumerate(dict.fromkeys(means.column("elevation_deg"))):
         rows = means.where(elevation_deg=elevation)
-        name = ALL if elevation == ALL else f"{elevation:g} deg"
+        name = "all elevations" if elevation == ALL else f"elevation {elevation:g} degrees"
         style = "ko" if elevation == ALL else f"C{k}.:"
         series.append(Series(name, megapixels(rows), rows.numbers("ssim"), style))
     x, fit = megapixels(means.where(elevation_deg=ALL)), fits.where(elevation_deg=ALL)
     for slope, intercept, r2 in np.column_stack([fit.numbers(key) for key in FITS[2:]]):
-        label = "fit" if np.isnan(r2) else f"fit, R^2 = {r2:.3f}"
+        label = "line" if np.isnan(r2) else f"line, R^2 = {r2:.3f}"
         series.append(Series(label, x, slope * np.log10(1e6 * x) + intercept, "k-"))
-    return Panel("Views against the truth", "megapixels", "SSIM", tuple(series), logarithmic="x")
+    title = "Similarity of views to the truth"
+    return Panel(title, "sensor, megapixels", "SSIM", tuple(series), logarithmic="x")
+
+
+def _elevation_panels(means: Table) -> tuple[Panel, Panel]:
+    labels = {
+        "blur_mm": ("Blur of views", "standard deviation at the object, mm"),
+        "ssim_on_object": ("Similarity where the object is", "SSIM"),
+    }
+    blur, on_object = (
+        Panel(
+            title,
+            "elevation, degrees",
+            unit,
+            tuple(
+                Series(size, rows.numbers("elevation_deg"), rows.numbers(column), f"C{k}.-")
+                for k, (size, rows) in enumerate(_by_sensor(means).items())
+            ),
+        )
+        for column, (title, unit) in labels.items()
+    )
+    return blur, on_object

@@ -5,18 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.image_quality import equivalent_blur_px, image_quality_map
 from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method, synthesise
-from tbcad.types import Bytes, Floats, Progress
+from tbcad.simulate.views.synthesis import DepthFunction, Method, synthesise
+from tbcad.types import Bools, Bytes, Floats, Progress
 
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 MAX_AZIMUTHS = 360
+# What is measured of a view: SSIM over the frame and where the object is; standard deviation of
+# the Gaussian that blurs the truth as the view is blurred, at the object's centre; object's share.
+QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
 
 
 @dataclass(frozen=True)
@@ -33,11 +37,11 @@ class Viewpoints:
     azimuth_deg: Floats
     distance_mm: float
 
-    def cameras(self, capture_mm: float) -> list[Camera]:
-        """The cameras, 640 x 480, each filled by the capture sphere."""
+    def cameras(self, capture_mm: float, size: tuple[int, int] = (640, 480)) -> list[Camera]:
+        """The cameras, of these columns and rows, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
         return [
-            camera_around_object(a, e, self.distance_mm, capture_mm)
+            camera_around_object(a, e, self.distance_mm, capture_mm, size)
             for a, e in zip(azimuth, elevation, strict=True)
         ]
 
@@ -68,6 +72,19 @@ def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list
     return truths
 
 
+def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
+    """Which pixels of each viewpoint's picture show the object, (h, w)."""
+    depth = depth_along_rays(scene)
+    return [_object_mask(depth, view) for view in views]
+
+
+def _object_mask(depth: DepthFunction, view: Camera) -> Bools:
+    direction = view_directions(view)
+    origin = np.broadcast_to(view.pinhole, direction.shape)
+    distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
+    return np.isfinite(distance).reshape(direction.shape[:2])
+
+
 def view_quality(
     tiles: MirrorTiles,
     scene: Scene,
@@ -75,8 +92,8 @@ def view_quality(
     truths: list[Bytes],
     method: Method,
     progress: Progress,
-) -> Floats:
-    """PSNR (dB) and SSIM of the light field's views against the truth, (v, 2).
+) -> dict[str, Floats]:
+    """The light field's views against the truth: QUALITY, each (v,).
 
     Args:
         tiles: the light field.
@@ -87,9 +104,18 @@ def view_quality(
         progress: called with each step.
     """
     depth = depth_along_rays(scene) if method == "blend" else None
-    qualities = []
-    for k, (view, truth) in enumerate(zip(views, truths, strict=True)):
+    masks, qualities = object_masks(scene, views), []
+    for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
         progress(f"view {k + 1} of {len(views)}")
-        quality = image_quality(truth, synthesise(tiles, view, method, depth).image)
-        qualities.append((quality.psnr_db, quality.ssim))
-    return np.array(qualities)
+        picture = synthesise(tiles, view, method, depth).image
+        qualities.append(picture_quality(view, truth, picture, mask))
+    return {name: np.array([quality[name] for quality in qualities]) for name in QUALITY}
+
+
+def picture_quality(view: Camera, truth: Bytes, picture: Bytes, mask: Bools) -> dict[str, float]:
+    """QUALITY of one view; `mask` (h, w): where the truth shows the object."""
+    quality, about = image_quality_map(truth, picture)
+    blur_mm = equivalent_blur_px(truth, picture) * view.pixel_pitch * float(norm(view.pinhole))
+    on_object = float(about[mask].mean()) if mask.any() else np.nan
+    values = (quality.psnr_db, quality.ssim, on_object, blur_mm, float(mask.mean()))
+    return dict(zip(QUALITY, values, strict=True))

@@ -172,4 +172,4 @@ def _ssim(source: LightField, scene: Scene, reference: ReferenceViews) -> Floats
     """SSIM of each view, (v,)."""
     tiles, views = MirrorTiles(source), reference.views
     quality = view_quality(tiles, scene, views, reference.truths, "nearest", lambda _: None)
-    return quality[:, 1]
+    return quality["ssim"]

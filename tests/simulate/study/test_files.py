@@ -17,7 +17,7 @@ from tbcad.simulate import parallel
 from tbcad.simulate.study.capture_area import capture_area
 from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 from tbcad.simulate.study.elevation import correlation, elevation
-from tbcad.simulate.study.paper import claims
+from tbcad.simulate.study.paper import balanced_sensors, claims, is_table_i
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.plots import Panel, Series, plot_png
 from tbcad.simulate.study.resolution import COUNTED, Ratio, resolution
@@ -44,7 +44,7 @@ def small_resolution() -> Study:
 
 def test_resolution_finds_what_its_rows_say() -> None:
     study = small_resolution()
-    swept, balanced, defined = study.tables
+    swept, balanced, defined, fits = study.tables
     assert len(swept.rows) == 10
     for at in swept.records():
         assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
@@ -61,9 +61,7 @@ def test_resolution_finds_what_its_rows_say() -> None:
         above, below = (found.numbers("n")[side] for side in (actual > aim, actual < aim))
         assert max(below) < at["balanced_n"] < min(above)
     assert np.isfinite(balanced.numbers("balanced_n")).any()
-    (zenith,) = defined.where(definition="directions with z > 0").records()
-    assert zenith["value"] == 5 * 16 - 2 * 4 + 1
-    assert zenith["paper"] is None  # the paper's figures are of n = 18
+    assert defined.rows == fits.rows == ()  # Table II has none of these sensors
 
 
 def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,7 +71,7 @@ def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
         files.append(study_files(small_resolution()))
     assert files[0] == files[1]
-    assert len(files[0]) == 6
+    assert len(files[0]) == 7
 
 
 def test_capture_area_has_the_paper_beside_it() -> None:
@@ -101,13 +99,13 @@ def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPat
     (at,) = study.tables[0].records()
     assert [at[name] for name in COUNTED] == [None] * 7
     assert "no radius gives" in str(at["reason"])
-    assert len(study_files(study)) == 6
+    assert len(study_files(study)) == 7
 
 
 def test_elevation_of_the_paper_design() -> None:
     """Radii by eq. 2 at n = 18: 8.00 ... 65.4 mm (DESIGN.md section 3), tied to the polar angle."""
     study = elevation(load_spec(None))
-    mirrors, correlated = study.tables
+    mirrors, bands, correlated = study.tables
     assert len(mirrors.rows) == 847
     radius, polar = mirrors.numbers("paper_radius_mm"), np.array(mirrors.numbers("polar_deg"))
     assert min(radius) == pytest.approx(8.00, abs=0.005)
@@ -115,6 +113,11 @@ def test_elevation_of_the_paper_design() -> None:
     assert (polar.min(), polar.max()) == (pytest.approx(45), pytest.approx(135))
     for row in correlated.where(of="log radius").records():
         assert (abs(row["correlation"]) > 0.97) == (row["with"] == "polar angle"), row["radii"]
+    assert bands.numbers("mirrors").sum() == 847
+    assert (np.diff(bands.numbers("elevation_from_deg")) == 15).all()
+    low = (mirrors.numbers("elevation_deg") >= 15) & (mirrors.numbers("elevation_deg") < 30)
+    mean = mirrors.numbers("seeing_px")[low].mean()
+    assert bands.where(elevation_from_deg=15.0).numbers("mean_seeing_px")[0] == pytest.approx(mean)
 
 
 def test_correlation_is_pearsons() -> None:
@@ -126,7 +129,7 @@ def test_correlation_is_pearsons() -> None:
 def test_elevation_of_few_mirrors() -> None:
     study = elevation(load_spec(None, ["n=1"]))
     assert len(study.tables[0].rows) == 5
-    assert np.isfinite(study.tables[1].numbers("correlation")).all()
+    assert np.isfinite(study.tables[2].numbers("correlation")).all()
 
 
 def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
@@ -199,6 +202,14 @@ def test_sweeps_refused(first: int, last: int) -> None:
 def test_claims_say_where_in_the_paper() -> None:
     assert all(claim.where and claim.text for claim in claims().values())
     assert claims()["virtual_cameras"].value == 1657
+    assert [row.n for row in balanced_sensors()] == [12, 18, 26, 36]
+
+
+def test_which_designs_are_the_papers() -> None:
+    assert is_table_i(load_spec(None))
+    assert is_table_i(load_spec(None, ["n=5", "radius_rule=flat", "width_px=100"]))
+    for setting in ("hfov_deg=88", "semi_minor_mm=101", "capture_diameter_mm=59"):
+        assert not is_table_i(load_spec(None, [setting]))
 
 
 def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -222,6 +233,8 @@ def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[
         ["elevation", "--design", "missing.toml"],
         ["depth-of-field", "--blur-px", "0"],
         ["depth-of-field", "--pixel-um", "nan"],
+        ["low-pass", "missing", "--filter-px", "0"],
+        ["low-pass", "missing", "--lens-px", "17"],
     ],
 )
 def test_bad_input_is_one_line(

@@ -12,9 +12,11 @@ from tbcad.mirrors import radii
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.study.low_pass import BlurOptions, low_pass
+from tbcad.simulate.study.paper import balanced_sensors
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
-from tbcad.simulate.study.ssim import proportionate_n, ssim
+from tbcad.simulate.study.ssim import proportionate_n, sensor_n, ssim
 from tbcad.simulate.study.study import Study, study_files
 from tbcad.simulate.study.viewpoints import viewpoints_around
 from tbcad.spec.errors import SpecError
@@ -26,6 +28,16 @@ SENSORS = (Sensor(208, 155), Sensor(312, 232), Sensor(416, 310))
 
 def quiet(_: str) -> None:
     pass
+
+
+def test_sensors_of_table_ii_have_its_n() -> None:
+    """Table II: 12, 18, 26 and 36; in proportion 1040 x 776 would have 13 and 4160 x 3104 25."""
+    paper, other = load_spec(None), load_spec(None, ["n=17"])
+    sensors = [Sensor(row.width_px, row.height_px) for row in balanced_sensors()]
+    assert [sensor_n(paper, sensor) for sensor in sensors] == [12, 18, 26, 36]
+    assert [proportionate_n(paper, sensor) for sensor in sensors] == [13, 18, 25, 36]
+    assert [sensor_n(other, sensor) for sensor in sensors] == [12, 17, 24, 34]
+    assert sensor_n(paper, Sensor(3664, 2748)) == 24
 
 
 def test_n_proportionate_to_the_sensor() -> None:
@@ -57,6 +69,26 @@ def test_means(study: Study) -> None:
     (mean,) = means.where(width_px=416, elevation_deg=60.0).records()
     assert mean["views"] == len(mine) == 2
     assert mean["ssim"] == pytest.approx(np.mean(mine))
+
+
+def test_more_pixels_make_sharper_views(study: Study) -> None:
+    rows = study.tables[1].where(elevation_deg="all")
+    blur, share = rows.numbers("blur_mm"), rows.numbers("object_share")
+    assert blur[0] > blur[1] > blur[2] > 0
+    assert len(np.unique(share)) == 1  # the same viewpoints
+    assert 0.01 < share[0] < 0.8
+    on_object, all_over = rows.numbers("ssim_on_object"), rows.numbers("ssim")
+    assert (on_object < all_over).all()  # the background is even
+
+
+def test_elevations_of_the_sharpest_and_most_similar_views(study: Study) -> None:
+    means = study.tables[1].where(width_px=208)
+    rows = {figure.quantity: figure for figure in study.figures}
+    found = rows["208x155: elevation of the least blur"]
+    at = {elevation: means.where(elevation_deg=elevation) for elevation in (15.0, 60.0)}
+    blur = {elevation: row.numbers("blur_mm")[0] for elevation, row in at.items()}
+    assert found.value == min(blur, key=lambda elevation: blur[elevation])
+    assert (found.paper, found.where) == (15, "section 4.4")
 
 
 def test_fit(study: Study) -> None:
@@ -121,6 +153,34 @@ def test_prototype_against_the_shell(export_folder: Path) -> None:
     significant = ttest_rel(*ssim_of.values()).pvalue < 0.05
     verdict = "significant" if significant else "not significant"
     assert rows["at 95 % the difference is"] == verdict
+
+
+def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
+    """Section 5.3: the wider the filter, the lower the contrast, and the blurrier every view."""
+    viewpoints = viewpoints_around((30.0,), 1, 640.0)
+    options = BlurOptions((1.0, 3.0), (3.0,), 1)
+    found = low_pass(read_export(export_folder), built_in_object(60.0), viewpoints, options)
+    means = found.tables[1]
+    assert len(found.tables[0].rows) == len(means.rows) == 5 * 2
+    for view in ("pinhole", "aperture"):
+        none, narrow, wide = (
+            means.where(geometry="prototype", view=view, px=px, blur=blur).records()[0]
+            for blur, px in (("none", 0.0), ("filter", 1.0), ("filter", 3.0))
+        )
+        assert 1 == none["photograph_contrast"] > narrow["photograph_contrast"]
+        assert narrow["photograph_contrast"] > wide["photograph_contrast"] > 0.2
+        assert none["blur_mm"] < narrow["blur_mm"] < wide["blur_mm"]
+        assert none["ssim"] > wide["ssim"]
+    (shell,) = means.where(geometry="shell", view="aperture").records()
+    assert shell["blur_mm"] < none["blur_mm"]
+    assert len(study_files(found)) == 5
+
+
+def test_blurs_refused() -> None:
+    with pytest.raises(InputError, match="--filter-px 0"):
+        BlurOptions((0.0,)).checked()
+    with pytest.raises(InputError, match="--lens-px nan"):
+        BlurOptions(lens_px=(np.nan,)).checked()
 
 
 def test_viewpoints_around_the_object() -> None:
