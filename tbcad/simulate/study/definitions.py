@@ -58,6 +58,7 @@ def definitions(
         rows: of Table II.
         progress: called with each design that is done.
     """
+    spec = with_lens_of_table_i(spec)
     units = [(row, radii) for row in reversed(rows) for radii in RADII]
     pitch = best_pitch(spec) if rows else 0.0
     counted = run_units(

@@ -42,6 +42,7 @@ NOTES = (
     "Virtual cameras: directions with z >= 0; mirrors that the seam halves count once.",
     "Seeing pixels: those of both cameras whose ray, off its exact mirror, meets the capture "
     "sphere. Pixels on mirrors: all whose ray meets a mirror. Average: divided by virtual cameras.",
+    "The lens is that of Table I, 89 degrees, where the design leaves its angle open.",
     "frame_filled is 1 when the outermost mirror is at the frame's edge; beyond 1 the frame of "
     "this sensor and lens does not hold all mirrors, and the rest have no pixels.",
     "rays_traced less than the sensor's pixels: one ray stood for a block of them.",

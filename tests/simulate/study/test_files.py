@@ -127,8 +127,8 @@ def test_correlation_is_pearsons() -> None:
 
 
 def test_elevation_of_few_mirrors() -> None:
-    study = elevation(load_spec(None, ["n=1"]))
-    assert len(study.tables[0].rows) == 5
+    study = elevation(load_spec(None, ["n=2"]))
+    assert len(study.tables[0].rows) == 15
     assert np.isfinite(study.tables[2].numbers("correlation")).all()
 
 

@@ -94,7 +94,7 @@ def test_sides_that_do_not_divide_are_sampled_too(wide: MirrorDesign) -> None:
     assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 6, 9])
+@pytest.mark.parametrize("n", [2, 5, 6, 9])
 def test_number_of_virtual_cameras(n: int) -> None:
     """5 n^2 + 2 n + 1 vertices have z >= 0: 1657 at n = 18 (Table I)."""
     half = design(load_spec(None, [f"n={n}"])).halves[0]
