@@ -10,6 +10,7 @@ from tbcad.simulate.study.paper import (
     RESOLUTION,
     BalancedSensor,
     is_table_i,
+    with_lens_of_table_i,
 )
 from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels, virtual_cameras
 from tbcad.simulate.study.sweep import try_design
