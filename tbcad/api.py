@@ -5,8 +5,9 @@ bad input is refused before they are loaded.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal
 
 from tbcad.errors import InputError
@@ -17,6 +18,7 @@ from tbcad.types import Progress
 
 if TYPE_CHECKING:
     from build123d import Part
+    from tbcad_verify.report.as_made import AsMade
     from tbcad_verify.report.report import Report
     from tbcad_verify.run.verify import VerifyOptions
 
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from tbcad.tolerance.analysis import Analysis, ToleranceOptions
 
 Settings = Mapping[str, str] | Sequence[str]
+AS_MADE_STAGE = "simulated builds by each process"
 
 
 def silent(_: str) -> None:
@@ -179,13 +182,61 @@ def build(
     chosen, out = _spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
     check_replaceable(out, force)
+    started = monotonic()
     progress("mirrors: radii and cells")
     mirrors = design(chosen, detail=detail)
     with replacing(out, force) as folder:
         export = write_export(mirrors, folder, asked, progress, optional_prototype=parts is None)
-        # The files are read back before they replace the old ones.
-        report = _verify(folder, progress=progress) if verify else None
-    return Build(out, Design(export.spec, mirrors.halves), export.parts, export.note, report)
+        made = Design(export.spec, mirrors.halves)
+        report = None
+        if verify:
+            # The files are read back before they replace the old ones.
+            report = replace(
+                _verify(folder, progress=progress),
+                folder=out,
+                note=export.note,
+                as_made=_as_made(made, export.parts, progress, detail),
+                seconds=monotonic() - started,
+            )
+    return Build(out, made, export.parts, export.note, report)
+
+
+def _as_made(
+    mirrors: Design, parts: Sequence[str], progress: Progress, detail: Progress
+) -> "AsMade | None":
+    from tbcad.output.parts import SHELL
+    from tbcad.simulate.scene.reflector import reflectors
+    from tbcad.tolerance.as_made import as_made
+
+    if SHELL not in parts:
+        return None
+    progress(AS_MADE_STAGE)
+    spec = mirrors.spec
+    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
+    return as_made(reflectors(mirrors), target, coat, detail)
+
+
+def as_made(
+    exports: Path | str, progress: Progress = silent, detail: Progress = silent
+) -> "AsMade | None":
+    """Simulate a few builds of an export by every built-in process.
+
+    Returns:
+        Their yields; None where no shell was built, or its record cannot be read.
+    """
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.tolerance.as_made import as_made as simulated
+
+    folder = Path(exports)
+    if not (folder / "shell_a.stl").is_file():
+        return None
+    progress(AS_MADE_STAGE)
+    try:
+        export = read_export(folder)
+    except InputError:  # the verification says what is wrong with it
+        return None
+    coat = export.spec.mirrors.coating_um
+    return simulated(export.reflectors, export.capture_mm, coat, detail)
 
 
 def verify(

@@ -1,56 +1,157 @@
 """Progress of a long command: a bar on a terminal, plain lines elsewhere."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from time import monotonic
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.text import Text
 
-PIPED_WIDTH = 160
+WIDTH = 80  # columns of what is printed where no terminal says how many it has
+BAR_WIDTH = 12
+MINUTE = 60
+# The pace of this computer is taken from the stages done, and from this share of all of them as if
+# it had been done at the expected pace: the first short stages say little of the others.
+PRIOR_SHARE = 0.1
 
 
 def report_console() -> Console:
-    """Where results are printed; piped, a table needs no terminal's width."""
-    return Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    """Where results are printed."""
+    return Console() if sys.stdout.isatty() else Console(width=WIDTH)
+
+
+class TimeLeft:
+    """Estimate of the time left, from expected durations and the pace so far."""
+
+    def __init__(self, expected: Mapping[str, float], clock: Callable[[], float] = monotonic):
+        """Take the expected seconds of all stages, in order, by title."""
+        self._begins = dict(zip(expected, _sums_before(expected), strict=True))
+        self._expected, self._clock = expected, clock
+        self.total = sum(expected.values())
+        self._started = self._stage_started = clock()
+        self._done, self._stage = 0.0, 0.0
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage: those before it are done. A stage not expected changes nothing."""
+        if stage in self._begins:
+            self._done, self._stage = self._begins[stage], self._expected[stage]
+            self._stage_started = self._clock()
+
+    @property
+    def done(self) -> float:
+        """Expected seconds of what is done."""
+        return self._done + min(self._clock() - self._stage_started, self._stage)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds left, about."""
+        prior = PRIOR_SHARE * self.total
+        pace = (self._clock() - self._started + prior) / (self.done + prior)
+        return pace * (self.total - self.done)
+
+
+def _sums_before(expected: Mapping[str, float]) -> list[float]:
+    sums = [0.0]
+    for seconds in expected.values():
+        sums.append(sums[-1] + seconds)
+    return sums[:-1]
+
+
+class _TimeLeftColumn(ProgressColumn):
+    """The estimate, in words."""
+
+    def __init__(self, left: TimeLeft) -> None:
+        super().__init__()
+        self._left = left
+
+    def render(self, task: Task) -> Text:
+        task.completed = self._left.done
+        minutes, seconds = divmod(round(self._left.seconds), MINUTE)
+        return Text(f"about {minutes}:{seconds:02d} left")
 
 
 class Stages:
     """Stages of one command, shown on stderr."""
 
-    def __init__(self, bar: Progress | None, total: int) -> None:
+    def __init__(self, bar: Progress | None, total: float, left: TimeLeft | None = None) -> None:
         """Show stages on a bar, or in plain lines when there is none."""
-        self._bar = bar
+        self._bar, self._left = bar, left
         self._task = bar.add_task("", total=total) if bar else None
-        self._plain = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._started = monotonic()
         self._stage = ""
 
     def stage(self, text: str) -> None:
         """Begin the next stage."""
+        if self._left is not None:
+            self._left.begin(text)
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, description=text, advance=1 if self._stage else 0)
+            counted = self._left is None and self._stage
+            self._bar.update(self._task, description=text, advance=1 if counted else 0)
         else:
-            self._plain.print(f"tbcad: {text}", markup=False)
+            self._print(text)
         self._stage = text
+
+    def _print(self, text: str) -> None:
+        print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
 
     def detail(self, text: str) -> None:
         """Show a step of the stage, on a terminal only."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, description=f"{self._stage}: {text}")
 
+    def note(self, text: str) -> None:
+        """Print a line that stays."""
+        if self._bar is not None:
+            self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+        else:
+            self._print(text)
+
+
+class SilentStages(Stages):
+    """Stages that nobody is shown."""
+
+    def __init__(self) -> None:
+        """Show nothing."""
+        super().__init__(None, 0)
+
+    def _print(self, text: str) -> None:
+        del text
+
 
 @contextmanager
-def stages(total: int) -> Iterator[Stages]:
-    """Show stages while the block runs; `total` is about their number."""
+def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterator[Stages]:
+    """Show stages while the block runs.
+
+    Args:
+        expected: seconds of each stage, in order, by title; or about the number of stages, and no
+            time left is shown.
+        silent: show nothing.
+    """
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield Stages(None, total)
+    if silent or not console.is_terminal:
+        yield SilentStages() if silent else Stages(None, 0)
         return
+    if isinstance(expected, int):
+        left, total = None, float(expected)
+    else:
+        left = TimeLeft(expected)
+        total = left.total
     columns = (
         SpinnerColumn(),
-        BarColumn(bar_width=24),
+        BarColumn(bar_width=BAR_WIDTH),
         TimeElapsedColumn(),
+        *([_TimeLeftColumn(left)] if left else []),
         TextColumn("{task.description}", markup=False),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        yield Stages(bar, total)
+        yield Stages(bar, total, left)

@@ -15,6 +15,8 @@ from tbcad.cli.app import app
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
 
+INTERRUPTED = 130  # exit code of a command that is stopped from the keyboard
+
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code; bad input is told in one line on stderr."""
@@ -36,7 +38,7 @@ def _show_warning(
 
 def _run(arguments: list[str]) -> int:
     try:
-        return int(app(arguments, prog_name="tbcad", standalone_mode=False) or 0)
+        code = int(app(arguments, prog_name="tbcad", standalone_mode=False) or 0)
     except typer.Exit as stop:
         return stop.exit_code
     except (InputError, typer.TyperException) as error:
@@ -44,8 +46,10 @@ def _run(arguments: list[str]) -> int:
         sys.stderr.write(f"tbcad: {text}\n")
         return 2
     except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    if code == INTERRUPTED:  # as typer returns it, too
         sys.stderr.write("tbcad: stopped; nothing was changed\n")
-        return 130
+    return code
 
 
 def main() -> None:

@@ -1,21 +1,21 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
+from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
+from tbcad.cli.output_mode import Full, Json, Quiet, output_mode
 from tbcad.errors import InputError
 from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
     from tbcad.tolerance.process.process import Process
 
-# With mirrors and manifest; both together take one more: waiting for the shells in parallel.
-BUILD_STAGES = {("shell",): 7, ("prototype",): 9, ("shell", "prototype"): 10}
-VERIFY_STAGES = 9
 DEFAULT_YIELD = 0.99
 
 
@@ -31,7 +31,7 @@ def build(
         str | None,
         typer.Option(
             metavar="N",
-            help="Subdivision of the icosahedron, 1 to 60; mirrors grow with n squared.",
+            help="Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared.",
         ),
     ] = None,
     out: OutReplaced = Path("exports"),
@@ -68,17 +68,25 @@ def build(
     ] = None,
     verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True,
     force: Force = False,
+    full: Full = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> int:
     """Compute the mirrors, build shells and prototype, write STEP, STL and 3MF, and verify them.
 
     Exit code 0: built and verified. 1: built, but the verification fails (the files stay). 2: bad
     input, nothing written.
     """
+    output = output_mode(full, quiet, json)
+    if not verify and output in ("full", "json"):
+        raise InputError(f"--{output} shows a verification: leave --no-verify out")
     from tbcad.api import build as build_files
+    from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
+    started = monotonic()
     asked = parse_parts(parts) if parts is not None else None
     options = list(settings or [])
     options += [f"optics.n={n}"] if n is not None else []
@@ -88,12 +96,16 @@ def build(
     wanted_yield = DEFAULT_YIELD if share is None else share
     chosen = asked or default_parts(spec)
     check_replaceable(out, force)
-    with stages(BUILD_STAGES[chosen] + VERIFY_STAGES * verify + bool(for_process)) as screen:
+    times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
+    with stages(times, silent=quiet) as screen:
         if process is not None:
             from tbcad.tolerance.margin import spec_for_process
 
-            screen.stage(f"margin for {for_process}")
+            screen.stage(margin_stage(process.name))
             spec = spec_for_process(spec, process, wanted_yield, screen.detail)
+            screen.note(
+                f"margin {spec.mirrors.margin_mm:g} mm, for {wanted_yield:.1%} by {for_process}"
+            )
         built = build_files(
             spec,
             out,
@@ -103,15 +115,12 @@ def build(
             progress=screen.stage,
             detail=screen.detail,
         )
-    if for_process is not None:
-        typer.echo(f"margin {spec.mirrors.margin_mm:g} mm, for {wanted_yield:.1%} by {for_process}")
     if built.report is None:
-        typer.echo(f"{out}: built, not verified: run tbcad verify {out}")
+        note = f"{built.note}\n" if built.note else ""
+        typer.echo(f"{note}{out}: built, not verified: run tbcad verify {out}")
         return 0
-    if built.note:
-        typer.echo(built.note)
-    typer.echo(f"{out}: {' and '.join(built.parts)} as STEP, STL and 3MF; mirrors.csv, design.json")
-    built.report.show(report_console())
+    report = replace(built.report, seconds=monotonic() - started)
+    report.show(report_console(), output)
     return 0 if built.passed else 1
 
 
@@ -154,21 +163,30 @@ def verify_command(
         float,
         typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
     ] = 600.0,
+    full: Full = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> int:
     """Verify an export on its files, and write verify.json there.
 
     Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
     """
-    from tbcad_verify.run.verify import VerifyOptions
-
-    from tbcad.api import verify
-
+    output = output_mode(full, quiet, json)
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
+    from tbcad_verify.run.verify import VerifyOptions
+
+    from tbcad.api import as_made, verify
+    from tbcad.cli.stage_times import export_times
+
     options = VerifyOptions(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
-    with stages(VERIFY_STAGES) as screen:
+    started = monotonic()
+    with stages(export_times(folder), silent=quiet) as screen:
+        # Before the verification, which writes: a command that is stopped has changed nothing.
+        made = as_made(folder, screen.stage, screen.detail)
         report = verify(folder, options, progress=screen.stage)
-    report.show(report_console())
+    report = replace(report, as_made=made, seconds=monotonic() - started)
+    report.show(report_console(), output)
     return 0 if report.passed else 1
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -10,14 +11,16 @@ import time
 from pathlib import Path
 
 import pytest
+from tbcad_verify.report.summary import MAX_LINES
 
 from tbcad.cli import run
 from tbcad.doctor import Finding
 from tbcad.version import __version__
 from tests.exported_files import contents, read_csv
 
+STOPPED = "tbcad: stopped; nothing was changed"
 COMMAND = [sys.executable, "-m", "tbcad"]
-STAGES = ("tbcad: verification:", "tbcad: mirrors:", "tbcad: prototype:")
+STAGE = re.compile(r"\[ *\d+ s\] ")
 SHELL = ["--parts", "shell"]
 SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05", *SHELL]
 WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SHELL]
@@ -35,7 +38,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     assert run(arguments) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    lines = [line for line in shown.err.splitlines() if not line.startswith(STAGES)]
+    lines = [line for line in shown.err.splitlines() if not STAGE.match(line)]
     assert len(lines) == 1
     assert lines[0].startswith("tbcad: ")
     return lines[0]
@@ -57,7 +60,9 @@ def test_build_verifies_and_verify_agrees(
     code = run([*WIDE, "--out", str(out)])
     shown = capsys.readouterr()
     assert code == 0, shown.out
-    assert "PASS" in shown.out
+    assert shown.out.startswith("PASS: ")
+    assert "As made (" in shown.out
+    assert len(shown.out.splitlines()) <= MAX_LINES
     assert "Traceback" not in shown.err
     verified = (out / "verify.json").read_bytes()
     assert json.loads(verified)["pass"] is True
@@ -78,7 +83,8 @@ def test_build_with_prototype_is_verified(
     code = run(["build", "--n", "6", *options, "--out", str(out)])
     shown = capsys.readouterr()
     assert code == 0, shown.out
-    assert "prototype: 4 balls" in shown.out
+    assert "see 60 mm or more, on 4 balls too" in shown.out
+    assert len(shown.out.splitlines()) <= MAX_LINES
     verdict = json.loads((out / "verify.json").read_text())
     names = {check["name"] for check in verdict["checks"] if check["pass"]}
     assert names >= {"coverage, spheres", "coverage, balls", "light paths, balls", "ball centres"}
@@ -91,8 +97,11 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
     out = tmp_path / "paper"
     assert run(["build", "--n", "9", "--radius-rule", "paper", *SHELL, "--out", str(out)]) == 1
     shown = capsys.readouterr().out
-    assert "FAIL" in shown
-    assert "short" in shown
+    assert shown.startswith("FAIL: ")
+    assert "virtual cameras see less than 60 mm" in shown
+    assert "coverage, facets" in shown
+    assert "mirrors.radius_rule traced" in shown
+    assert len(shown.splitlines()) <= MAX_LINES
     assert (out / "shell_a.step").exists()
     verdict = json.loads((out / "verify.json").read_text())
     assert verdict["pass"] is False
@@ -107,7 +116,7 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["build", "--n", "99"], ["optics.n", "99", "1 to 60"]),
+        (["build", "--n", "99"], ["optics.n", "99", "2 to 60"]),
         (["build", "--n", "zero"], ["zero"]),
         (["build", "--set", "optics.nn=3"], ["optics.nn", "optics.n"]),
         (["build", "--set", "wall_mm=-1"], ["shell.wall_mm", "-1"]),
@@ -115,7 +124,7 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
         (["build", "--parts", "shel"], ["--parts", "shel", "shell, prototype"]),
         (["build", "--parts", ""], ["--parts", "nothing", "shell, prototype"]),
         (["build", "--parts", "prototype", "--radius-rule", "flat"], ["radius_rule", "traced"]),
-        (["build", "--n", "1"], ["prototype.k", "16", "3 or less", "--parts shell"]),
+        (["build", "--n", "1"], ["optics.n is 1", "2 to 60", "no camera sees"]),
         (["picture", ".", "--of", "cat"], ["cat", "exploded"]),
         (["build", "no-such-design.toml"], ["no-such-design.toml"]),
         (["build", "--wrong-option"], ["--wrong-option"]),
@@ -229,6 +238,7 @@ def test_interrupt_is_reported_in_one_line(tmp_path: Path) -> None:
     build.send_signal(signal.SIGINT)
     _, errors = build.communicate(timeout=60)
     assert build.returncode == 130
+    assert errors.splitlines()[-1] == STOPPED
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []
 

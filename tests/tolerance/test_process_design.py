@@ -71,7 +71,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["build", "--n", "4", "--parts", "shell", "--no-verify", "--out", str(out)]
     assert run([*arguments, "--for-process", "diamond", "--yield", "0.9"]) == 0
     margin = json.loads((out / "design.json").read_text())["spec"]["mirrors"]["margin_mm"]
-    said = capsys.readouterr().out
+    said = capsys.readouterr().err
     assert f"margin {margin:g} mm, for 90.0% by diamond" in said
     assert run([*arguments, "--for-process", "clay"]) == 2
     assert "clay" in capsys.readouterr().err

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
+from tbcad_verify.report.report import Output
+from tbcad_verify.report.text import WIDTH
 from tbcad_verify.run.verify import VerifyOptions, verify
 from tbcad_verify.run.watch import STAGE_LIMIT_S
+from tbcad_verify.types import Progress
 
 ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole
 object, and the parts are those of the record. The result is written to DIR/verify.json.
 Exit status: 0 verified, 1 not verified, 2 DIR is not an export."""
-PIPED_WIDTH = 160  # columns of the table when stdout is no terminal
+INTERRUPTED = 130  # exit status of a program that is stopped from the keyboard
+OUTPUTS = {
+    "full": "print every check, too",
+    "quiet": "print the verdict only",
+    "json": "print the summary as JSON",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Verify a folder, print the table and the verdict.
+    """Verify a folder, print the summary.
 
     Args:
         argv: arguments without the program's name; None: those of the process.
@@ -29,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser("tbcad_verify", description=ABOUT)
     parser.add_argument("folder", metavar="DIR", type=Path, help="a folder that tbcad build wrote")
-    parser.add_argument("-q", "--quiet", action="store_true", help="print the verdict only")
+    for name, text in OUTPUTS.items():
+        flags = [f"--{name}", *(["-q"] if name == "quiet" else [])]
+        parser.add_argument(*flags, action="append_const", dest="output", const=name, help=text)
     parser.add_argument(
         "--printer",
         metavar="NAME|FILE",
@@ -56,23 +67,37 @@ def main(argv: Sequence[str] | None = None) -> int:
         printers=tuple(arguments.printer),
         clients=arguments.clients,
     )
+    outputs = dict.fromkeys(arguments.output or ["summary"])
+    if len(outputs) > 1:
+        return _refused(f"{' and '.join(f'--{name}' for name in outputs)}: give only one of them")
     try:
-        return _verify(arguments.folder, options, arguments.quiet)
+        return _verify(arguments.folder, options, *outputs)
     except BadExport as error:
-        print(f"tbcad_verify: {error}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
+    except KeyboardInterrupt:
+        print("tbcad_verify: stopped; nothing was changed", file=sys.stderr)
+        return INTERRUPTED
 
 
-def _verify(folder: Path, options: VerifyOptions, quiet: bool) -> int:
+def _verify(folder: Path, options: VerifyOptions, output: Output) -> int:
     from rich.console import Console
 
-    report = verify(folder, (lambda _: None) if quiet else _print_stage, options)
-    if quiet:
-        print(report.verdict)
-    else:
-        report.show(Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH))
+    silent = output == "quiet"
+    report = verify(folder, (lambda _: None) if silent else _stage_printer(), options)
+    report.show(Console() if sys.stdout.isatty() else Console(width=WIDTH), output)
     return 0 if report.passed else 1
 
 
-def _print_stage(stage: str) -> None:
-    print(f"verify: {stage}", file=sys.stderr, flush=True)
+def _refused(reason: str) -> int:
+    print(f"tbcad_verify: {reason}", file=sys.stderr)
+    return 2
+
+
+def _stage_printer() -> Progress:
+    started = time.monotonic()
+
+    def show(stage: str) -> None:
+        seconds = time.monotonic() - started
+        print(f"[{seconds:4.0f} s] verify: {stage}", file=sys.stderr, flush=True)
+
+    return show

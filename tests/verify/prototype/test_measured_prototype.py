@@ -36,6 +36,7 @@ from tbcad_verify.prototype.step_files import part_step_checks, read_step_files
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, Unknown
+from tbcad_verify.run.child import Limits
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
 from tests.exported_files import edit_json
@@ -305,7 +306,7 @@ def step_checks(folder: Path, low: list[float], high: list[float]) -> dict[str, 
     """Checks of a stage whose STEP file has a box of these corners."""
     context = context_of(stepped(folder, low, high))
     masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
-    files = read_step_files(context.export, 60)
+    files = read_step_files(context.export, Limits(60))
     return {check.name: check for check in part_step_checks(context.export, masses, files)}
 
 
@@ -335,7 +336,7 @@ def test_one_broken_step_file_leaves_the_others_known(prototype_folder: Path) ->
     good = load(context.export.folder, "stage.step")
     (prototype_folder / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
     bad = load(prototype_folder, "bad.step")
-    found = examine_all([bad, good, bad], 60)
+    found = examine_all([bad, good, bad], Limits(60))
     assert [isinstance(one, StepFile) for one in found] == [False, True, False]
 
 
@@ -357,7 +358,7 @@ def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
     monkeypatch.setattr(step_file, "run", killed)
     context = context_of(stepped(prototype_folder, [-4, -4, -8], [4, 4, -6]))
     good = load(context.export.folder, "stage.step")
-    found = examine_all([good, good], 60)
+    found = examine_all([good, good], Limits(60))
     assert [isinstance(one, StepFile) for one in found] == [True, True]
 
 

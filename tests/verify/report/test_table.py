@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -10,33 +11,41 @@ from tbcad_verify import main
 from tbcad_verify.programs.answers import skipped
 from tbcad_verify.report.checks import Check, at_most, informative, unknown
 from tbcad_verify.report.table import table
+from tbcad_verify.report.text import WIDTH
 
 
 def shown(*checks: Check) -> list[str]:
-    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    console = Console(width=WIDTH, record=True, file=StringIO())
     console.print(table(checks))
-    return [" ".join(line.split()) for line in console.export_text().splitlines()][1:]
+    lines = console.export_text().splitlines()
+    assert max(map(len, lines)) <= WIDTH
+    return [" ".join(line.split()) for line in lines]
 
 
 def test_files_that_agree_share_a_row() -> None:
     a, b = (at_most(("x", file, "mm"), value, 3) for file, value in (("a", 1.5), ("b", 2)))
-    assert shown(a, b) == ["x 2 files pass 1.5 ... 2 3 mm"]
+    assert shown(a, b) == ["2 files", "x pass 1.5 ... 2 <= 3 mm"]
     assert shown(a, at_most(("x", "b", "mm"), 4, 3, "too long")) == [
-        "x a pass 1.5 3 mm",
-        "x b FAIL 4 3 mm too long",
+        "a",
+        "x pass 1.5 <= 3 mm",
+        "b",
+        "x FAIL 4 <= 3 mm",
+        "too long",
     ]
 
 
 def test_states_are_told_apart() -> None:
     name = ("x", "f", "mm")
-    assert shown(unknown(name, "why")) == ["x f unknown mm why"]
-    assert shown(informative(name, 1)) == ["x f info 1 mm"]
-    assert shown(skipped(name, "not installed: y")) == ["x f skipped mm skipped: not installed: y"]
+    assert shown(unknown(name, "why")) == ["f", "x unknown mm", "why"]
+    assert shown(informative(name, 1)) == ["f", "x info 1 mm"]
+    assert shown(skipped(name, "not here: y")) == ["f", "x skipped mm", "skipped: not here: y"]
 
 
 def test_words_from_outside_are_no_markup() -> None:
     assert shown(at_most(("x", "[red]f", "mm"), 2, 1, "[/such] [bold]")) == [
-        "x [red]f FAIL 2 1 mm [/such] [bold]"
+        "[red]f",
+        "x FAIL 2 <= 1 mm",
+        "[/such] [bold]",
     ]
 
 
@@ -44,10 +53,18 @@ def test_absent_programs_are_skipped_in_so_many_words(
     export_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PATH", str(export_folder.parent))
-    assert main([str(export_folder), "--clients"]) == 0
+    assert main([str(export_folder), "--clients", "--full"]) == 0
     said = capsys.readouterr().out
     assert "not installed: apt install prusa-slicer" in said
     assert "questions to other programs skipped" in said
+
+
+def test_long_names_figures_and_words_stay_whole() -> None:
+    words = ("a check with a long name, of many words", "shell_a.stl", "units that nobody expected")
+    name, detail = (words[0], ", ".join(["part_of_the_base.stl"] * 9), words[2]), "word " * 60
+    text = " ".join(shown(at_most(name, 123456.789e-12, 98765.4321e-9, detail)))
+    for word in f"{words[0]} {name[1]} {words[2]} {detail}".split():
+        assert word in text
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "soon"])

@@ -14,6 +14,7 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPContro
 from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.run.child import Limits
 from tbcad_verify.step.kernel import read_solid
 from tbcad_verify.step.step_file import StepFile, examine, load, parse
 from tbcad_verify.step.text import read_text
@@ -109,7 +110,7 @@ def test_two_solids_are_counted(tmp_path: Path) -> None:
 
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
-    found, here = examine(load(tmp_path, file.name), 60), both(file)
+    found, here = examine(load(tmp_path, file.name), Limits(60)), both(file)
     assert found.mass == here.mass
     assert found.faces.names == here.faces.names
 
@@ -117,7 +118,7 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
 def test_what_takes_too_long_is_unknown(tmp_path: Path) -> None:
     blob = load(tmp_path, written(tmp_path, BOX).name)
     with pytest.raises(Unknown, match="no answer within"):
-        examine(blob, 0.05)
+        examine(blob, Limits(0.05))
 
 
 @pytest.mark.parametrize(
@@ -134,7 +135,7 @@ def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
     file = written(tmp_path, BOX)
     file.write_text(change(file.read_text()))  # type: ignore[operator]
     with pytest.raises(Unknown):
-        examine(load(tmp_path, file.name), 60)
+        examine(load(tmp_path, file.name), Limits(60))
 
 
 @pytest.mark.parametrize(

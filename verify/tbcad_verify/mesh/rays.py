@@ -86,7 +86,22 @@ def row_chunks(camera: Camera) -> list[tuple[int, int]]:
     return [(k, min(k + step, camera.height)) for k in range(0, camera.height, step)]
 
 
-def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Results in the items' order, whatever the threads do."""
+def in_threads(
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    stop: Callable[[], None] = lambda: None,
+) -> list[Result]:
+    """Results in the items' order, whatever the threads do.
+
+    Args:
+        work: done on each item.
+        items: what to work on.
+        stop: ends what the threads wait for; called when one fails, or at an interrupt.
+    """
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(work, items))
+        try:
+            return list(pool.map(work, items))
+        except BaseException:
+            stop()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

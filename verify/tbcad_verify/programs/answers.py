@@ -15,7 +15,7 @@ from tbcad_verify.report.checks import (
     CheckName,
     Unknown,
     at_most,
-    finite,
+    exactly,
     informative,
     unknown,
 )
@@ -48,13 +48,6 @@ def is_skipped(check: Check) -> bool:
     return check.measured is None and check.detail.startswith(SKIPPED)
 
 
-def count_check(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
-    """A check that a count has its only allowed value."""
-    name, file, unit = check
-    good = measured == limit
-    return Check(name, file, good, finite(measured), limit, unit, "" if good else detail)
-
-
 def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check:
     """A check that a volume, mm^3, is the same as the mesh's."""
     if not math.isfinite(part.volume + part.volume_error):
@@ -68,7 +61,7 @@ def mesh_checks(
 ) -> list[Check]:
     """One part; the mesh's volume."""
     return [
-        count_check(names[0], parts, 1, "must be one"),
+        exactly(names[0], parts, 1, "must be one"),
         volume_check(names[1], volume, part),
     ]
 
@@ -86,10 +79,10 @@ def solid_checks(
     solids, spheres, volume = names
     count = figures["spheres"]
     return (
-        count_check(solids, figures["solids"], 1, "must be one"),
+        exactly(solids, figures["solids"], 1, "must be one"),
         informative(spheres, count, "no mirrors: any number is allowed")
         if part.spheres is None
-        else count_check(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
+        else exactly(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
         volume_check(volume, figures["volume"], part),
     )
 

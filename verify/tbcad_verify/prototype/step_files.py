@@ -7,6 +7,7 @@ from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Printed
 from tbcad_verify.report.checks import Check, Unknown, guarded
+from tbcad_verify.run.child import Limits
 from tbcad_verify.step.part_checks import CHECKS, PartComparison, names_of, run_checks
 from tbcad_verify.step.step_file import StepFile, examine_all, load
 
@@ -14,12 +15,12 @@ PROCESSES = 2  # each with its share of the files
 CLAIM_SHARE = 1e-5  # see `PartComparison.claim`
 
 
-def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unknown]:
+def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unknown]:
     """The STEP files of a prototype's parts, or why one is not known, by part.
 
     Args:
         export: the record.
-        seconds: longest that reading one process's files may take.
+        limits: of a process that reads some of the files.
 
     Raises:
         BadExport: a file is missing, foreign or truncated.
@@ -29,7 +30,7 @@ def read_step_files(export: Export, seconds: float) -> dict[str, StepFile | Unkn
     blobs = [load(export.folder, part.step) for part in parts]
     order = sorted(range(len(parts)), key=lambda k: (-blobs[k].data.size, k))
     shares = [order[k::PROCESSES] for k in range(PROCESSES) if order[k::PROCESSES]]
-    answers = in_threads(lambda share: examine_all([blobs[k] for k in share], seconds), shares)
+    answers = in_threads(lambda share: examine_all([blobs[k] for k in share], limits), shares)
     return {
         parts[k].name: answer
         for share, some in zip(shares, answers, strict=True)

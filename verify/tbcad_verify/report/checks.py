@@ -12,6 +12,7 @@ import numpy as np
 from tbcad_verify.types import Bools, Floats
 
 CheckName = tuple[str, str, str]  # of a check: name, file, unit
+AT_MOST, AT_LEAST, EXACTLY = "at most", "at least", "exactly"  # what a limit asks of a figure
 T = TypeVar("T")
 MAX_NAMED = 5  # how many offenders a line names
 
@@ -28,6 +29,7 @@ class Check:
         limit: of the figure; None if it informs only.
         unit: of both.
         detail: what exceeds the limit, and by how much; or why it is unknown.
+        bound: whether the figure may be at most, at least or exactly the limit.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Check:
     limit: float | None
     unit: str
     detail: str = ""
+    bound: str = AT_MOST
 
 
 def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
@@ -48,12 +51,17 @@ def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -
         limit: largest allowed.
         detail: kept when it fails.
     """
-    return _limited(check, measured, limit, measured <= limit, detail)
+    return _limited(check, measured, limit, measured <= limit, detail, AT_MOST)
 
 
 def at_least(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure reaches its limit; NaN fails."""
-    return _limited(check, measured, limit, measured >= limit, detail)
+    return _limited(check, measured, limit, measured >= limit, detail, AT_LEAST)
+
+
+def exactly(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
+    """A check that a figure has its only allowed value; NaN fails."""
+    return _limited(check, measured, limit, measured == limit, detail, EXACTLY)
 
 
 def informative(check: CheckName, measured: float, detail: str = "") -> Check:
@@ -152,9 +160,12 @@ def short_list(names: Sequence[str]) -> str:
     return _listed(list(names[:MAX_NAMED]), len(names))
 
 
-def _limited(check: CheckName, measured: float, limit: float, good: bool, detail: str) -> Check:
+def _limited(
+    check: CheckName, measured: float, limit: float, good: bool, detail: str, bound: str
+) -> Check:
     name, file, unit = check
-    return Check(name, file, bool(good), finite(measured), limit, unit, "" if good else detail)
+    shown = "" if good else detail
+    return Check(name, file, bool(good), finite(measured), limit, unit, shown, bound)
 
 
 def _listed(shown: list[str], count: int) -> str:

@@ -8,21 +8,24 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import numpy as np
 from rich.console import Console
 
-from tbcad_verify.programs import is_skipped
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.poses import virtual_cameras
-from tbcad_verify.report.checks import MAX_NAMED, Check, finite, short_list
+from tbcad_verify.report.as_made import AsMade
+from tbcad_verify.report.checks import Check, finite
+from tbcad_verify.report.document import summary_json
+from tbcad_verify.report.printers import printer_lines
+from tbcad_verify.report.summary import summary
 from tbcad_verify.report.table import table
+from tbcad_verify.report.text import WIDTH
+from tbcad_verify.report.verdict import verdict_line
 from tbcad_verify.types import Floats
 
 DIGITS = 9
 NAME = "verify.json"
-NO_SHELL = "no shell in this export"
+Output = Literal["summary", "full", "quiet", "json"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Report:
         printing: a row for each part on each printer.
         shell: whether there is a shell; without one, the mirrors are requirements only.
         prototype: what is known of each ball and stop; None without a prototype.
+        note: what the build says of itself, such as why a part was left out; "" for nothing.
+        folder: where the export lies.
+        seconds: what the command took.
+        as_made: simulated builds of the design; None if nobody simulated any.
     """
 
     target_mm: float
@@ -48,6 +55,10 @@ class Report:
     printing: tuple[dict[str, Any], ...] = ()
     shell: bool = True
     prototype: Mapping[str, Any] | None = None
+    note: str = ""
+    folder: Path | None = None
+    seconds: float | None = None
+    as_made: AsMade | None = None
 
     def __repr__(self) -> str:
         """Return the verdict, not the hundreds of figures."""
@@ -60,8 +71,13 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """One line: PASS or FAIL, and the figures that decide it."""
-        return _pass_line(self) if self.passed else _fail_line(self)
+        """One line: PASS or FAIL, and what decides it."""
+        return verdict_line(self)
+
+    def names_of(self, state: bool | None) -> list[str]:
+        """Names of the checks that passed (True), failed (False) or are unknown (None)."""
+        checks = (*self.checks, *self.programs)
+        return list(dict.fromkeys(check.name for check in checks if check.passed is state))
 
     def to_json(self) -> str:
         """The text of verify.json.
@@ -96,10 +112,35 @@ class Report:
             raise
         return folder / NAME
 
-    def show(self, console: Console) -> None:
-        """Print the table and the verdict."""
-        console.print(table(self.checks + self.programs))
-        console.print(self.verdict, markup=False, highlight=False, soft_wrap=True)
+    def show(self, console: Console, output: Output = "summary") -> None:
+        """Print the result.
+
+        Args:
+            console: to print to.
+            output: "summary" (at most twelve lines), "full" (every check before it), "quiet" (the
+                verdict), or "json" (the summary for other programs).
+        """
+        if output == "full":
+            self._show_all(console)
+        if output in ("summary", "full"):
+            for line in summary(self):
+                console.print(line, highlight=False, soft_wrap=True)
+        else:
+            text = self.verdict if output == "quiet" else summary_json(self)
+            console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def _show_all(self, console: Console) -> None:
+        width = min(console.width, WIDTH)
+        shown = [check for check in self.checks if not self._is_unasked_print(check)]
+        console.print(table((*shown, *self.programs)), width=width)
+        for line in printer_lines(self.printing):
+            console.print(line, markup=False, highlight=False, width=width)
+        console.print()
+
+    def _is_unasked_print(self, check: Check) -> bool:
+        """A line for a part on a printer that nobody asked for: printers are listed apart."""
+        printers = {f"print {row['profile']}" for row in self.printing}
+        return check.limit is None and check.passed is True and check.name in printers
 
 
 def _check_row(check: Check) -> dict[str, Any]:
@@ -128,61 +169,3 @@ def _rounded(value: float | None) -> float | int | None:
     if value is None:
         return None
     return int(value) if float(value).is_integer() else round(float(value), DIGITS)
-
-
-def _pass_line(report: Report) -> str:
-    skipped = sum(map(is_skipped, report.programs))
-    parts = [_shell_line(report)] if report.shell else [NO_SHELL]
-    if report.prototype is not None:
-        parts.append(_prototype_line(report.target_mm, report.prototype))
-    if skipped:
-        parts.append(f"{skipped} questions to other programs skipped")
-    return f"PASS: {'; '.join(parts)}"
-
-
-def _shell_line(report: Report) -> str:
-    mirrors, columns = report.mirrors, report.measured
-    return (
-        f"{len(mirrors)} mirrors, {virtual_cameras(mirrors).count} virtual cameras see "
-        f"{report.target_mm:g} mm or more (facets {np.min(columns['coverage_facet_mm']):.2f}, "
-        f"spheres {np.min(columns['coverage_fitted_mm']):.2f}); nothing blocked; centres within "
-        f"{np.max(columns['centre_error_mm']) * 1e3:.2f} and radii within "
-        f"{np.max(columns['radius_error_mm']) * 1e3:.2f} micrometres of the record"
-    )
-
-
-def _prototype_line(target_mm: float, prototype: Mapping[str, Any]) -> str:
-    balls, stops = prototype["balls"], prototype["stops"]
-    minimum = min(ball["coverage_mm"] for ball in balls)
-    worst = max(ball["centre_error_um"] for ball in balls)
-    return (
-        f"prototype: {len(balls)} balls at {len(stops)} stops show {target_mm:g} mm or "
-        f"more for every mirror ({minimum:.2f}); nothing blocked; pads hold the balls within "
-        f"{worst:.2f} micrometres of the record"
-    )
-
-
-def _fail_line(report: Report) -> str:
-    parts = [] if report.shell else [NO_SHELL]
-    for word, verdict in (("failed", False), ("unknown", None)):
-        checks = (*report.checks, *report.programs)
-        names = dict.fromkeys(check.name for check in checks if check.passed is verdict)
-        parts += [f"{word}: {short_list(list(names))}"] if names else []
-    return f"FAIL: {'; '.join([*_short_of_target(report), *parts])}"
-
-
-def _short_of_target(report: Report) -> list[str]:
-    """How many virtual cameras see too little, and the worst of them."""
-    ids, target = report.mirrors.ids, report.target_mm
-    measured = report.measured
-    coverage = np.fmin(measured["coverage_facet_mm"], measured["coverage_fitted_mm"])
-    virtual = virtual_cameras(report.mirrors)
-    _, first = np.unique(virtual.index, return_index=True)  # a halved mirror is named once
-    short = first[coverage[first] < target]
-    if not short.size:
-        return []
-    worst = short[np.argsort(coverage[short], kind="stable")][:MAX_NAMED].tolist()
-    return [
-        f"{short.size} of {virtual.count} virtual cameras fall short of {target:g} mm",
-        *(f"{ids[k]} sees {coverage[k]:.2f} mm, {target - coverage[k]:.2f} short" for k in worst),
-    ]

@@ -1,41 +1,59 @@
-"""Checks as a table for people."""
+"""All checks as a table for people, 80 columns wide."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
-from rich.markup import escape
+from rich.console import Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
 
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.checks import Check
+from tbcad_verify.report.text import SIGNS, figure
+
+# Columns of a row: check, result, measured, limit with unit. With the gaps they make 80.
+WIDTHS = (26, 7, 21, 23)
+SPAN_DIGITS = 3  # of the smallest and the largest of several figures
+INDENT = 4
+STYLES = {"FAIL": "red", "unknown": "yellow", "skipped": "yellow", "pass": "green"}
 
 
-def table(checks: Sequence[Check]) -> Table:
-    """One row for each check; files with the same result share one."""
-    rows = Table(title=None, box=None, pad_edge=False)
-    for name, side in (
-        ("check", "left"),
-        ("file", "left"),
-        ("", "left"),
-        ("measured", "right"),
-        ("limit", "right"),
-        ("unit", "left"),
-        ("", "left"),
-    ):
-        rows.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
-    for group in _groups(checks):
-        first = group[0]
-        rows.add_row(
-            first.name,
-            escape(first.file) if len(group) == 1 else f"{len(group)} files",
-            _mark(first),
-            _span([check.measured for check in group]),
-            _span([check.limit for check in group]),
-            first.unit,
-            escape(first.detail),
-        )
-    return rows
+def table(checks: Sequence[Check]) -> Group:
+    """One row for each check below the name of its file; files with the same result share one.
+
+    What is to be said about a check is on lines of its own below its row.
+    """
+    return Group(*_renderables(checks))
+
+
+def _renderables(checks: Sequence[Check]) -> Iterator[RenderableType]:
+    for files, groups in groupby(_groups(checks), _files):
+        yield Text(files or "all files", style="bold")
+        for group in groups:
+            yield _row(group)
+            if group[0].detail:
+                yield Padding(Text(group[0].detail), (0, 0, 0, INDENT), expand=False)
+
+
+def _row(group: Sequence[Check]) -> Table:
+    first, state = group[0], _state(group[0])
+    row = Table.grid(padding=(0, 1, 0, 0), pad_edge=False)
+    for width, side in zip(WIDTHS, ("left", "left", "right", "left"), strict=True):
+        row.add_column(width=width, justify=side, overflow="fold")  # type: ignore[arg-type]
+    row.add_row(
+        Text(first.name),
+        Text(state, style=STYLES.get(state, "")),
+        _span([check.measured for check in group]),
+        Text(_limit(group)),
+    )
+    return row
+
+
+def _files(group: Sequence[Check]) -> str:
+    return group[0].file if len(group) == 1 else f"{len(group)} files"
 
 
 def _groups(checks: Sequence[Check]) -> list[list[Check]]:
@@ -49,21 +67,26 @@ def _groups(checks: Sequence[Check]) -> list[list[Check]]:
 
 def _span(values: Sequence[float | None]) -> str:
     """A figure, or the smallest and the largest."""
-    figures = [_figure(value) for value in sorted(value for value in values if value is not None)]
-    return " ... ".join(dict.fromkeys([*figures[:1], *figures[-1:]]))
+    known = sorted({value for value in values if value is not None})
+    if len(known) < 2:
+        return "".join(map(figure, known))
+    ends = (figure(value, SPAN_DIGITS) for value in (known[0], known[-1]))
+    return " ... ".join(dict.fromkeys(ends))
 
 
-def _mark(check: Check) -> str:
+def _limit(group: Sequence[Check]) -> str:
+    """The limit with its sign and unit, or the smallest and the largest."""
+    first = group[0]
+    if first.limit is None:
+        return first.unit
+    return f"{SIGNS[first.bound]} {_span([check.limit for check in group])} {first.unit}".rstrip()
+
+
+def _state(check: Check) -> str:
     if check.passed is None:
-        return "[yellow]unknown[/]"
+        return "unknown"
     if not check.passed:
-        return "[red]FAIL[/]"
+        return "FAIL"
     if is_skipped(check):
-        return "[yellow]skipped[/]"
-    return "info" if check.limit is None else "[green]pass[/]"
-
-
-def _figure(value: float | None) -> str:
-    if value is None:
-        return ""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+        return "skipped"
+    return "info" if check.limit is None else "pass"

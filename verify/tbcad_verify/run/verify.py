@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,12 +17,14 @@ from tbcad_verify.prototype import step_files
 from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
-from tbcad_verify.report.checks import Check, short_list
+from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import NAME, Report
+from tbcad_verify.run.child import Limits
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.step.shell_checks import shell_step_checks
+from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
@@ -66,26 +69,11 @@ def verify(
     """
     for name in options.printers:
         load(name)
-    root = open_folder(Path(folder))
+    started, root = time.monotonic(), open_folder(Path(folder))
     before = stamps(root, listing(root))
     export = read_export(root)
     results = CollectedResults(progress=progress)
-    with ThreadPoolExecutor(1) as pool:
-        # Reading the prototype's STEP files needs none of the stages, and takes as long as they do.
-        step_reading = pool.submit(step_files.read_step_files, export, options.seconds)
-        if options.apart:
-            command = worker_command(root, options.printers)
-            watch(command, stage_titles(export), results, options.seconds)
-        else:
-            run_stages(root, results.add, options.printers)
-        if any(part.step for part in export.parts):
-            results.add(Results(stages=["STEP"]))
-            checks = shell_step_checks(export, results.masses, options.seconds)
-            results.add(Results(checks=checks))
-        if any(part.step for part in export.printed):
-            results.add(Results(stages=["STEP of the prototype"]))
-            checks = step_files.part_step_checks(export, results.masses, step_reading.result())
-            results.add(Results(checks=checks))
+    _run(export, options, results)
     programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
     blank = np.full(len(export.mirrors), np.nan)
@@ -98,6 +86,8 @@ def verify(
         tuple(results.printing),
         shell=bool(export.parts),
         prototype=results.prototype,
+        folder=folder,
+        seconds=time.monotonic() - started,
     )
     if options.write:
         try:
@@ -105,6 +95,39 @@ def verify(
         except OSError as error:
             raise BadExport(f"{root}: {NAME} cannot be written ({error.strerror})") from error
     return report
+
+
+def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> None:
+    """All stages; an interrupt ends the processes that read files, which take long."""
+    limits = Limits(options.seconds)
+    with ThreadPoolExecutor(1) as pool:
+        try:
+            # Reading the prototype's STEP needs none of the stages, and takes as long as they do.
+            prototype = pool.submit(step_files.read_step_files, export, limits)
+            if options.apart:
+                command = worker_command(export.folder, options.printers)
+                watch(command, stage_titles(export), results, options.seconds)
+            else:
+                run_stages(export.folder, results.add, options.printers)
+            _compare_steps(export, results, limits, prototype)
+        except BaseException:
+            limits.stop.set()
+            raise
+
+
+def _compare_steps(
+    export: Export,
+    results: CollectedResults,
+    limits: Limits,
+    prototype: Future[dict[str, StepFile | Unknown]],
+) -> None:
+    if any(part.step for part in export.parts):
+        results.add(Results(stages=["STEP"]))
+        results.add(Results(checks=shell_step_checks(export, results.masses, limits)))
+    if any(part.step for part in export.printed):
+        results.add(Results(stages=["STEP of the prototype"]))
+        files = prototype.result()
+        results.add(Results(checks=step_files.part_step_checks(export, results.masses, files)))
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:

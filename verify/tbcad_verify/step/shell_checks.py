@@ -23,6 +23,7 @@ from tbcad_verify.report.checks import (
     guarded,
     short_list,
 )
+from tbcad_verify.run.child import Limits
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
@@ -61,14 +62,14 @@ class ShellComparison(PartComparison):
 
 
 def shell_step_checks(
-    export: Export, masses: dict[str, MassProperties], seconds: float
+    export: Export, masses: dict[str, MassProperties], limits: Limits
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
     Args:
         export: the record.
         masses: of the meshes, by part.
-        seconds: time limit for reading one file.
+        limits: of the process that reads one file.
 
     Raises:
         BadExport: a file is missing, foreign or truncated.
@@ -82,11 +83,11 @@ def shell_step_checks(
         return guarded(
             names_of(CHECKS, part.step),
             lambda: run_checks(
-                CHECKS, part.step, _comparison(export, part, examine(blob, seconds), mass)
+                CHECKS, part.step, _comparison(export, part, examine(blob, limits), mass)
             ),
         )
 
-    checks = in_threads(of_part, list(zip(parts, blobs, strict=True)))
+    checks = in_threads(of_part, list(zip(parts, blobs, strict=True)), limits.stop.set)
     areas = guarded([AREAS], lambda: [_recorded_areas(export)])
     return areas + [check for some in checks for check in some]
 

@@ -95,19 +95,19 @@ def load(folder: Path, name: str) -> FileBytes:
     return blob
 
 
-def examine(blob: FileBytes, seconds: float) -> StepFile:
+def examine(blob: FileBytes, limits: Limits) -> StepFile:
     """Read the bytes as text and by the kernel, from a private copy.
 
     Raises:
         Unknown: a reading failed, crashed or took too long.
     """
-    file = examine_all([blob], seconds)[0]
+    file = examine_all([blob], limits)[0]
     if isinstance(file, Unknown):
         raise file
     return file
 
 
-def examine_all(blobs: Sequence[FileBytes], seconds: float) -> list[StepFile | Unknown]:
+def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | Unknown]:
     """Read several files in one process, which takes long to start.
 
     Files that it did not read are read again, each in a process of its own, so that a file that
@@ -117,20 +117,20 @@ def examine_all(blobs: Sequence[FileBytes], seconds: float) -> list[StepFile | U
         place = Path(name)
         for k, blob in enumerate(blobs):
             blob.data.tofile(place / f"part{k}.step")
-        reason = _read(place, range(len(blobs)), seconds)
+        reason = _read(place, range(len(blobs)), limits)
         unread = [k for k in range(len(blobs)) if not (place / f"answer{k}.json").exists()]
         reasons = dict.fromkeys(unread, reason)
         if len(blobs) > 1:
-            reasons = {k: _read(place, [k], seconds) for k in unread}
+            reasons = {k: _read(place, [k], limits) for k in unread}
         return [_answer(place / f"answer{k}.json", reasons.get(k, "")) for k in range(len(blobs))]
 
 
-def _read(place: Path, which: Iterable[int], seconds: float) -> str:
+def _read(place: Path, which: Iterable[int], limits: Limits) -> str:
     """Read some files in a child process; why it failed, or empty."""
     pairs = [f"{place}/{word}{k}.{end}" for k in which for word, end in FILES]
     # -P: what lies in the current folder must not be imported.
     command = [sys.executable, "-P", "-m", "tbcad_verify.step", *pairs]
-    outcome = run(command, place, Limits(seconds))
+    outcome = run(command, place, limits)
     return outcome.reason or ("" if outcome.code == 0 else outcome.text.strip().rpartition("\n")[2])
 
 

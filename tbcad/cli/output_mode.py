@@ -1,0 +1,30 @@
+"""How much of a result a command prints: options that exclude each other."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.errors import InputError
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.report import Output
+
+Full = Annotated[bool, typer.Option("--full", help="Print every check before the summary.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON; see verify/README.")]
+
+
+def output_mode(full: bool, quiet: bool, json: bool) -> "Output":
+    """What is to be printed.
+
+    Raises:
+        InputError: more than one thing.
+    """
+    chosen: list[Output] = []
+    chosen += ["full"] if full else []
+    chosen += ["quiet"] if quiet else []
+    chosen += ["json"] if json else []
+    if len(chosen) > 1:
+        given = " and ".join(f"--{name}" for name in chosen)
+        raise InputError(f"{given} exclude each other: give only one of them")
+    return chosen[0] if chosen else "summary"

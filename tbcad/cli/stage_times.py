@@ -1,0 +1,120 @@
+"""How long each stage of a build and of a verification takes, for the estimate of the time left.
+
+Measured: the paper's design (n = 18) on two cores, both parts. The stages of the shell are scaled
+by the number of mirrors, which grows with n squared; those of the prototype, whose number of parts
+hardly depends on n, are not. The pace of the computer at hand is taken from the stages as they end.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
+
+N = 18  # of the design that was measured
+# Shortest duration of a stage, seconds: imports and files take time even with a few mirrors.
+SHORTEST = 0.1
+
+Seconds = dict[str, float]
+
+MIRRORS: Seconds = {"mirrors: radii and cells": 3.0}
+SHELLS: Seconds = {
+    "facets": 2.5,
+    "shell_a: solid": 3.0,
+    "shell_a: files": 6.0,
+    "shell_b: solid": 3.0,
+    "shell_b: files": 6.0,
+}
+PROTOTYPE_PARTS: Seconds = {
+    "prototype: balls, their places, stops": 7.0,
+    "prototype: base": 40.0,
+    "prototype: stage and frame": 9.0,
+    "prototype: caps and coupon": 9.0,
+    "prototype: files": 9.0,
+    "prototype: assembly": 12.0,
+}
+WAIT_FOR_SHELLS: Seconds = {"shells": 1.0}
+MANIFEST: Seconds = {"manifest": 0.5}
+VERIFY: Seconds = {
+    "verification: reading": 1.0,
+    "verification: 3MF": 9.0,
+    "verification: files and record": 0.5,
+    "verification: meshes and mirrors": 6.0,
+    "verification: printability": 4.0,
+}
+VERIFY_SHELLS: Seconds = {
+    "verification: optical setup": 1.5,
+    "verification: coverage": 1.0,
+    "verification: every pixel": 5.0,
+}
+VERIFY_PROTOTYPE: Seconds = {
+    "verification: printed parts": 1.0,
+    "verification: seats": 1.0,
+    "verification: light paths of the balls": 4.0,
+    "verification: swing": 7.0,
+    "verification: printability of the prototype": 2.5,
+}
+VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 25.0}
+VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 2.0}
+AS_MADE: Seconds = {"simulated builds by each process": 3.0}
+MARGIN_SECONDS = 45.0  # a search for the margin of a process
+
+
+def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None) -> Seconds:
+    """Expected seconds of each stage of a build.
+
+    Args:
+        n: subdivision of the icosahedron.
+        parts: what is built.
+        verify: whether it is verified.
+        process: whose margin is searched for, by name; None: none is.
+    """
+    shells = scaled(SHELLS, n) if SHELL in parts else {}
+    prototype = PROTOTYPE_PARTS if PROTOTYPE in parts else {}
+    both = set(PARTS) <= {*parts}
+    made = prototype | scaled(WAIT_FOR_SHELLS, n) if both else shells | prototype
+    margin = {} if process is None else scaled({margin_stage(process): MARGIN_SECONDS}, n)
+    times = margin | scaled(MIRRORS, n) | made | MANIFEST
+    return times | (verify_times(n, parts) | as_made_times(n, parts) if verify else {})
+
+
+def margin_stage(process: str) -> str:
+    """Title of the search for the margin of a process."""
+    return f"margin for {process}"
+
+
+def verify_times(n: int, parts: Sequence[str]) -> Seconds:
+    """Expected seconds of each stage of a verification."""
+    shell, prototype = SHELL in parts, PROTOTYPE in parts
+    times = scaled(VERIFY, n)
+    times |= scaled(VERIFY_SHELLS, n) if shell else {}
+    times |= VERIFY_PROTOTYPE if prototype else {}
+    times |= scaled(VERIFY_SHELL_STEP, n) if shell else {}
+    return times | (VERIFY_PROTOTYPE_STEP if prototype else {})
+
+
+def as_made_times(n: int, parts: Sequence[str]) -> Seconds:
+    """Expected seconds of the simulated builds."""
+    return scaled(AS_MADE, n) if SHELL in parts else {}
+
+
+def scaled(times: Seconds, n: int) -> Seconds:
+    """The times of the paper's design for another number of mirrors."""
+    return {stage: max(SHORTEST, seconds * (n / N) ** 2) for stage, seconds in times.items()}
+
+
+def export_times(folder: Path) -> Seconds:
+    """Expected seconds of the verification of a folder, after its simulated builds."""
+    n, parts = _look_at(folder)
+    return as_made_times(n, parts) | verify_times(n, parts)
+
+
+def _look_at(folder: Path) -> tuple[int, tuple[str, ...]]:
+    """What a folder seems to hold; it may be no export: that is for others to say."""
+    try:
+        document = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+        n = int(document["spec"]["optics"]["n"])
+    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+        n = N
+    files = {SHELL: "shell_a.stl", PROTOTYPE: "prototype.json"}
+    return n, tuple(part for part, name in files.items() if (folder / name).exists())

@@ -1,0 +1,48 @@
+"""The report of one good export, verified once; tests change copies of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tbcad_verify.report.as_made import AsMade, ProcessYield
+from tbcad_verify.report.checks import Check
+from tbcad_verify.report.key_figures import KEY_FIGURES
+from tbcad_verify.report.report import Report
+from tbcad_verify.run.verify import verify
+
+from tests.verify.optical_setups import IN_PROCESS
+from tests.verify.synthetic_export import Cells
+
+YIELDS = (
+    *(("diamond", 0.98, 60.04), ("cnc", 0, 58.9), ("sla", 0, 51.4)),
+    *(("fdm", 0, 42), ("sls", 0, 0)),
+)
+
+
+@pytest.fixture(scope="session")
+def shell_report(synthetic_shells: tuple[Path, Cells]) -> Report:
+    """Of shells only."""
+    report = verify(synthetic_shells[0], options=replace(IN_PROCESS, write=False))
+    return replace(report, folder=Path("exports"))
+
+
+@pytest.fixture(scope="session")
+def long_report(shell_report: Report) -> Report:
+    """Of an export that has every key figure, with large figures and limits."""
+    known = {check.name for check in shell_report.checks}
+    files = ", ".join(f"part_{k}_of_the_prototype.stl" for k in range(12))
+    more = tuple(
+        Check(one.check, files, True, 1234.5678, 12345.678, "mm^3")
+        for one in KEY_FIGURES
+        if one.check not in known
+    )
+    return replace(
+        shell_report,
+        checks=shell_report.checks + more,
+        prototype={"balls": [{}] * 16, "stops": []},
+        seconds=1234.5,
+        as_made=AsMade(50, tuple(ProcessYield(*one) for one in YIELDS)),
+        note="No prototype: " + "it reaches into the light, and there is no place for it; " * 3,
+    )

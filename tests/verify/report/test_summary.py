@@ -1,0 +1,268 @@
+"""The end of a verification: at most twelve lines of 80 columns, whatever was found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from tbcad_verify import main
+from tbcad_verify.programs.answers import skipped
+from tbcad_verify.report.checks import Check
+from tbcad_verify.report.key_figures import KEY_FIGURES, LABEL_WIDTH, key_figures
+from tbcad_verify.report.remedies import ELSE, REMEDIES, UNKNOWN, remedy
+from tbcad_verify.report.report import Output, Report
+from tbcad_verify.report.summary import MAX_LINES
+from tbcad_verify.report.text import WIDTH
+from tbcad_verify.run.verify import verify
+
+from tests.verify.optical_setups import IN_PROCESS
+from tests.verify.prototype.synthetic_prototype import SyntheticPrototype
+from tests.verify.prototype.synthetic_prototype import export as prototype_export
+from tests.verify.synthetic_export import Design, export
+
+LONG = ", ".join(f"a{k:04d} sees {k / 7:.2f} mm" for k in range(40))
+SUMMARY_KEYS = [
+    *("schema", "verdict", "target_mm", "figures", "failed", "as_made", "note", "folder"),
+    "seconds",
+]
+FIGURE_KEYS = ["check", "file", "measured", "bound", "limit", "unit"]
+
+
+def shown(report: Report, output: Output = "summary", terminal: bool = False) -> str:
+    stream = StringIO()
+    report.show(Console(file=stream, width=WIDTH, force_terminal=terminal), output)
+    return stream.getvalue()
+
+
+def fits(text: str) -> list[str]:
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
+    assert not any("\x1b" in line for line in lines)
+    return lines
+
+
+def broken(
+    report: Report, which: Callable[[Check], bool], passed: bool | None = False, detail: str = LONG
+) -> Report:
+    checks = (
+        replace(one, passed=passed, detail=detail) if which(one) else one for one in report.checks
+    )
+    return replace(report, checks=tuple(checks))
+
+
+def test_pass_of_a_shell(shell_report: Report) -> None:
+    lines = fits(shown(shell_report))
+    assert len(lines) <= MAX_LINES
+    assert lines[0] == "PASS: as designed, 89 virtual cameras see 40 mm or more"
+    text = " ".join(lines)
+    figures = {one.label: check for one, check in key_figures(shell_report)}
+    assert {"coverage, spheres", "coverage, facets", "pixels blocked"} <= figures.keys()
+    assert all(label in text for label in figures)
+    assert f"{figures['coverage, spheres'].measured:.4g} >= 40 mm" in text
+    assert "As made: tbcad tolerance FOLDER" in text
+    assert " s; files, and every check in verify.json" in lines[-1]
+
+
+def test_pass_with_all_there_is(long_report: Report) -> None:
+    asked = tuple(skipped((f"gmsh {k}", "x.stl", "mm"), "not installed") for k in range(9))
+    lines = fits(shown(replace(long_report, programs=asked)))
+    assert len(lines) == MAX_LINES
+    assert lines[0].endswith(", on 16 balls too")
+    assert "diamond 98 % 60.0 mm, cnc 0 % 58.9, sla 0 % 51.4, fdm 0 % 42.0" in lines[-6]
+    assert "9 questions to other programs skipped" in lines[-4]
+    assert lines[-3].startswith("No prototype: ")
+    assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
+
+
+def test_every_key_figure_has_room(long_report: Report) -> None:
+    text = "\n".join(fits(shown(replace(long_report, note=""))))
+    assert all(one.label in text for one in KEY_FIGURES)
+    assert max(len(one.label) for one in KEY_FIGURES) <= LABEL_WIDTH
+    assert len({one.label for one in KEY_FIGURES}) == len(KEY_FIGURES)
+
+
+@pytest.mark.parametrize("state", [False, None])
+@pytest.mark.parametrize("every", [1, 2, 5, 17])
+def test_failures_fit(long_report: Report, every: int, state: bool | None) -> None:
+    names = [check.name for check in long_report.checks][::every]
+    report = broken(long_report, lambda check: check.name in names, state)
+    lines = fits(shown(report))
+    assert len(lines) <= MAX_LINES
+    assert lines[0].startswith("FAIL: ")
+    assert fits(shown(report, "quiet")) == lines[:1]
+    explained = [line for line in lines if line.startswith("- ")]
+    rest = [line for line in explained if " more: " in line]
+    counted = int(rest[0].split()[1]) if rest else 0
+    assert counted + len(explained) - len(rest) == len(set(names))
+
+
+def test_a_failure_says_what_where_and_what_to_do(shell_report: Report) -> None:
+    detail = "partly out of the frame: a0007, a0011"
+    report = broken(shell_report, lambda check: check.name == "frame margin", detail=detail)
+    checks = tuple(
+        replace(check, measured=-3.25) if check.name == "frame margin" else check
+        for check in report.checks
+    )
+    lines = fits(shown(replace(report, checks=checks)))
+    assert lines[0] == "FAIL: failed: frame margin"
+    assert lines[1] == f"- frame margin: -3.25 px, at least 0: {detail} ..."
+    assert lines[2] == f"    -> {REMEDIES['frame margin']}"
+    assert "hfov_deg" in lines[2]
+
+
+def test_a_figure_that_just_misses_is_told_from_its_limit(shell_report: Report) -> None:
+    checks = tuple(
+        replace(check, measured=39.9991, passed=False)
+        if check.name == "coverage, facets"
+        else check
+        for check in shell_report.checks
+    )
+    text = shown(replace(shell_report, checks=checks))
+    assert "coverage, facets: 39.9991 mm, at least 40" in text
+
+
+def test_the_worst_comes_first_and_remedies_are_shared(shell_report: Report) -> None:
+    names = ("watertight", "manifest", "coverage, facets", "coverage, spheres", "poses", "folds")
+    lines = fits(shown(broken(shell_report, lambda check: check.name in names)))
+    assert [line.partition(":")[0] for line in lines[1:3]] == [
+        "- coverage, spheres",
+        "- coverage, facets",
+    ]
+    assert lines[3] == f"    -> {REMEDIES['coverage']}"
+    assert "3 more: poses; watertight; folds" in " ".join(lines)
+
+
+def test_a_failing_export(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export(tmp_path / "x", Design(radius=400.0))
+    monkeypatch.chdir(tmp_path)
+    assert main(["x"]) == 1
+    lines = fits(capsys.readouterr().out)
+    assert len(lines) <= MAX_LINES
+    assert "virtual cameras see less than 40 mm" in lines[0]
+    assert "coverage, facets" in " ".join(lines)
+    assert REMEDIES["coverage"] in " ".join(lines)
+    assert lines[-1].endswith(": x")
+
+
+def test_full_shows_every_check_and_ends_like_the_summary(shell_report: Report) -> None:
+    lines = fits(shown(shell_report, "full"))
+    assert "\n".join(lines).endswith(shown(shell_report).rstrip())
+    rows = {line.partition("  ")[0].strip() for line in lines}
+    unasked = {f"print {row['profile']}" for row in shell_report.printing}
+    names = {check.name for check in shell_report.checks} - unasked
+    long_names = {name for name in names if len(name) > 26}
+    assert names - long_names <= rows
+    assert not unasked & rows
+
+
+def test_printers_take_a_line_each_and_parts_share_their_problem(shell_report: Report) -> None:
+    assert shell_report.printing
+    assert "parts can be made" not in shown(shell_report)
+    rows = [
+        {"part": part, "profile": "sla", "material": "resin", "problems": problems}
+        for part, problems in (("a", ["1 mm off: 3"]), ("b", []), ("c", ["1 mm off: 4"]))
+    ]
+    text = shown(replace(shell_report, printing=tuple(rows)), "full")
+    assert "sla (resin): 1 of 3 parts can be made\n  not a, c: 1 mm off\n" in text
+
+
+def test_a_printer_that_was_asked_for_is_a_key_figure(export_folder: Path) -> None:
+    report = verify(export_folder, options=replace(IN_PROCESS, printers=("fdm",), write=False))
+    assert "print fdm" in shown(report)
+
+
+def test_json_has_the_documented_keys(long_report: Report) -> None:
+    document = json.loads(shown(long_report, "json"))
+    assert list(document) == SUMMARY_KEYS
+    assert document["schema"] == "tbcad-verify-summary/1"
+    assert document["verdict"] == "pass"
+    assert document["failed"] == []
+    assert document["folder"] == "exports"
+    assert document["seconds"] == 1234.5
+    assert all(list(figure) == ["label", *FIGURE_KEYS, "pass"] for figure in document["figures"])
+    assert [figure["check"] for figure in document["figures"]] == [one.check for one in KEY_FIGURES]
+    assert document["as_made"]["builds"] == 50
+    assert document["as_made"]["processes"][0] == {
+        "process": "diamond",
+        "yield": 0.98,
+        "coverage_mm": 60.04,
+    }
+    assert {one["bound"] for one in document["figures"]} == {"at least", "at most"}
+
+
+def test_json_of_failures(shell_report: Report) -> None:
+    report = broken(shell_report, lambda check: check.name == "manifest")
+    report = broken(report, lambda check: check.name == "poses", None, "why")
+    document = json.loads(shown(report, "json"))
+    assert document["verdict"] == "fail"
+    assert document["as_made"] is None
+    assert [(one["check"], one["pass"]) for one in document["failed"]] == [
+        ("manifest", False),
+        ("poses", None),
+    ]
+    keys = [*FIGURE_KEYS, "pass", "detail", "remedy"]
+    assert all(list(one) == keys for one in document["failed"])
+    assert document["failed"][1]["remedy"] == UNKNOWN
+
+
+def test_json_keys_are_documented() -> None:
+    text = (Path(__file__).parents[3] / "verify" / "README.md").read_text(encoding="utf-8")
+    section = text.partition("## The summary as JSON")[2].partition("\n## ")[0]
+    for key in (
+        *SUMMARY_KEYS,
+        *FIGURE_KEYS,
+        "label",
+        "pass",
+        "detail",
+        "remedy",
+        "builds",
+        "yield",
+    ):
+        assert f"`{key}`" in section, key
+
+
+def test_colour_is_for_terminals(shell_report: Report) -> None:
+    assert shown(shell_report, terminal=True).startswith("\x1b[1;32mPASS")
+    failing = broken(shell_report, lambda check: check.name == "manifest")
+    assert shown(failing, terminal=True).startswith("\x1b[1;31mFAIL")
+
+
+def test_every_check_has_a_remedy_that_fits(shell_report: Report, tmp_path: Path) -> None:
+    folder = prototype_export(tmp_path / "x", SyntheticPrototype())
+    checks = (*shell_report.checks, *verify(folder, options=IN_PROCESS).checks)
+    failing = [replace(check, passed=False) for check in checks if check.limit is not None]
+    assert [check.name for check in failing if remedy(check) == ELSE] == []
+    for text in (*REMEDIES.values(), UNKNOWN, ELSE):
+        assert len(f"    -> {text}") <= WIDTH
+
+
+@pytest.mark.parametrize("words", [["--full", "--quiet"], ["--json", "-q"], ["--json", "--full"]])
+def test_outputs_exclude_each_other(
+    words: list[str], export_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(export_folder), *words]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert "only one of them" in shown.err
+    assert not (export_folder / "verify.json").exists()
+
+
+def test_figures_that_nobody_could_measure(shell_report: Report) -> None:
+    blank = {name: np.full_like(column, np.nan) for name, column in shell_report.measured.items()}
+    checks = tuple(
+        replace(check, passed=None, measured=None, detail="took more than 1 s")
+        for check in shell_report.checks
+    )
+    lines = fits(shown(replace(shell_report, checks=checks, measured=blank)))
+    assert len(lines) <= MAX_LINES
+    assert lines[0].startswith("FAIL: unknown: ")
+    assert UNKNOWN in " ".join(lines)

@@ -1,0 +1,54 @@
+"""What manufacturing errors leave of a design: simulated by others, shown with the verification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+COMMAND = "tbcad tolerance FOLDER"
+NOT_SIMULATED = f"As made: {COMMAND} simulates builds with manufacturing errors"
+
+
+@dataclass(frozen=True)
+class ProcessYield:
+    """Simulated builds by one manufacturing process.
+
+    Attributes:
+        process: its name.
+        share: of the builds whose every virtual camera sees the whole object.
+        coverage_mm: median of the builds' minimum coverage.
+    """
+
+    process: str
+    share: float
+    coverage_mm: float
+
+
+@dataclass(frozen=True)
+class AsMade:
+    """Simulated builds of one design, without any new search for its margin.
+
+    Attributes:
+        builds: number of simulated builds by each process.
+        processes: the largest coverage first; empty if they could not be simulated.
+        reason: why not.
+    """
+
+    builds: int = 0
+    processes: tuple[ProcessYield, ...] = ()
+    reason: str = ""
+
+
+def as_made_lines(made: AsMade | None) -> list[str]:
+    """The same in words; without simulated builds, the command that makes them."""
+    if made is None:
+        return [NOT_SIMULATED]
+    if not made.processes:
+        return [f"As made: not simulated, {made.reason}"]
+    first, *others = made.processes
+    figures = [f"{first.process} {100 * first.share:.0f} % {first.coverage_mm:.1f} mm"]
+    figures += [f"{one.process} {100 * one.share:.0f} % {one.coverage_mm:.1f}" for one in others]
+    return [
+        f"As made ({made.builds} simulated builds): yield and median minimum coverage by process",
+        f"  {', '.join(figures)}",
+        f"  larger yield: tbcad build --for-process NAME; causes: {COMMAND}",
+    ]

@@ -1,0 +1,80 @@
+"""What to do about a check that failed: one table."""
+
+from __future__ import annotations
+
+from tbcad_verify.report.checks import Check
+
+_DAMAGED = "a file was changed or damaged after the build: build again"
+_RECORD = "the record is not what was built: build again"
+_MESH = "the mesh is not as it was written: build again, and do not repair it"
+_MIRROR = "the mesh is off the record: build again, with a smaller chord_error_mm"
+_SEES = "mirrors.radius_rule traced, a larger margin_mm, a smaller chord_error_mm"
+_BALLS = "a larger mirrors.margin_mm, or more balls: prototype.k"
+_SPACE = "more clearance: keys in [prototype.base], [prototype.stage], [prototype.frame]"
+_LEDS = "move LEDs or stage: keys in [prototype.stage]"
+_PLAN = "the plan was changed after the build: build again"
+_PRINT = "another --printer, or other keys of [shell] and [printer]"
+_STEP = "the STEP file differs from record or mesh: build again, else report it"
+_PROGRAM = "this program reads the file otherwise: see --full, try its present version"
+
+# The remedy for a check is that of the longest beginning of its name in this table.
+REMEDIES = {
+    "3MF": _DAMAGED,
+    "manifest": _DAMAGED,
+    "requirements": _RECORD,
+    "prototype requirements": _RECORD,
+    "ids": _RECORD,
+    "poses": _RECORD,
+    "figures": _RECORD,
+    "directions": _RECORD,
+    "cell areas": _RECORD,
+    "watertight": _MESH,
+    "facets": _MESH,
+    "signed volume": _MESH,
+    "components": _MESH,
+    "manifold3d": _MESH,
+    "folds": _MESH,
+    "mirrors found": _MESH,
+    "form error": _MIRROR,
+    "centre error": _MIRROR,
+    "radius error": _MIRROR,
+    "surface error": _MIRROR,
+    "coverage": _SEES,
+    "mirrors visible": _SEES,
+    "light paths": "parts stand in the light: a thinner flange or wall, keys of [shell]",
+    "object clearance": "a smaller optics.capture_diameter_mm, or a larger optics.semi_minor_mm",
+    "pixels, minimum": "fewer mirrors (--n), or more pixels: camera.width_px, height_px",
+    "frame margin": "mirrors are out of the picture: a larger camera.hfov_deg",
+    "ball": _RECORD,
+    "ball centres": _MESH,
+    "balls clear": _MESH,
+    "pads": _MESH,
+    "cap": _MESH,
+    "cells": _BALLS,
+    "coverage, balls": _BALLS,
+    "light paths, balls": _SPACE,
+    "swing": _SPACE,
+    "parts apart": _SPACE,
+    "balls apart": _SPACE,
+    "assembly": "prototype.glb differs from the parts: build again",
+    "leds": _LEDS,
+    "plan": _PLAN,
+    "print pose": _RECORD,
+    "on the bed": _RECORD,
+    "print": _PRINT,
+    "step": _STEP,
+    "freecad": _PROGRAM,
+    "gmsh": _PROGRAM,
+    "prusa": _PROGRAM,
+    "admesh": _PROGRAM,
+}
+UNKNOWN = "it could not be measured: verify again, with a larger --time-limit"
+ELSE = "build again; if it stays, report it with verify.json"
+
+
+def remedy(check: Check) -> str:
+    """What to do about a check that did not pass."""
+    if check.passed is None:
+        return UNKNOWN
+    matching = [name for name in REMEDIES if check.name.startswith(name)]
+    return REMEDIES[max(matching, key=len)] if matching else ELSE
