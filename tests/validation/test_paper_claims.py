@@ -75,23 +75,28 @@ def test_short_axis_is_the_semi_minor_one() -> None:
 # Table II
 
 
+@pytest.fixture(scope="module")
+def pitch() -> float:
+    return best_pitch(load_spec(None))
+
+
 @pytest.mark.parametrize("row", ROWS, ids=str)
-def test_second_column_of_table_ii_is_a_number_of_mirrors(row: BalancedSensor) -> None:
+def test_second_column_of_table_ii_is_a_number_of_mirrors(
+    row: BalancedSensor, pitch: float
+) -> None:
     """Mirrors of both arrays whose apex is in the frame, at one pitch for all four rows.
 
     764, 1688, 3472 and 6602: three exact, 3474 off by one pair of mirrors, which is the smallest
     step of the count. One angle is fitted to four numbers.
     """
-    spec = load_spec(None)
-    count = apices_in_frame(spec, row.n, best_pitch(spec))
+    count = apices_in_frame(load_spec(None), row.n, pitch)
     paper = row.average_of_virtual_camera_resolution
     assert abs(count - paper) <= 2
     assert paper < mirrors_of_both_arrays(row.n) < 1.01 * paper
 
 
-def test_three_rows_of_the_second_column_are_exact() -> None:
+def test_three_rows_of_the_second_column_are_exact(pitch: float) -> None:
     spec = load_spec(None)
-    pitch = best_pitch(spec)
     assert 17 < np.degrees(pitch) < 19
     off = [
         apices_in_frame(spec, row.n, pitch) - row.average_of_virtual_camera_resolution
