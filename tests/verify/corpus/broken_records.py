@@ -16,11 +16,13 @@ from tests.verify.corpus.record_changes import (
     cell,
     centre,
     coat,
+    coverage,
     cut_line,
     design,
     exchange,
     figure,
     first_part,
+    flange,
     foot,
     half,
     json_file,
@@ -28,6 +30,7 @@ from tests.verify.corpus.record_changes import (
     lines,
     loose,
     mirror,
+    mirror_spec,
     mirrors,
     no_meshes,
     nothing_asked,
@@ -36,6 +39,7 @@ from tests.verify.corpus.record_changes import (
     radius,
     second_column,
     second_key,
+    shell_spec,
     shift_camera,
     shift_one,
     skew,
@@ -97,6 +101,32 @@ RECORDS: tuple[Mutation, ...] = (
     ),
     fails("the foot 10 um higher", JSON, design(foot), "step cells"),
     fails("another n in the spec", JSON, design(subdivision), "directions", "without a mirror"),
+    fails("a mirror's coverage", TABLE, mirror(coverage), "recorded coverage"),
+    *(
+        fails(f"a wall of {mm:g} mm", JSON, design(shell_spec(wall_mm=mm)), "step wall", "3.000 mm")
+        for mm in (1.0, 2.9, 9.0)
+    ),
+    fails("20 bolts", JSON, design(flange("seam_flange", bolts=20)), "step holes", "not 20"),
+    fails("no dowels", JSON, design(flange("foot_flange", dowels=0)), "step holes", "not 0"),
+    fails(
+        "bolts of 10 mm", JSON, design(flange("foot_flange", bolt_hole_mm=10.0)), "step holes", "10"
+    ),
+    fails(
+        "a flange of 9 mm",
+        JSON,
+        design(flange("seam_flange", thickness_mm=9.0)),
+        "step holes",
+        "not 9",
+    ),
+    *(
+        fails(f"radius rule: {what}", JSON, design(mirror_spec(**keys)), "radius rule", "by rule")
+        for what, keys in (
+            ("paper", {"radius_rule": "paper"}),
+            ("flat", {"radius_rule": "flat"}),
+            ("another margin", {"margin_mm": 1.0}),
+            ("larger mirrors", {"max_radius_widths": 100.0}),
+        )
+    ),
     fails("a mesh error of 5 mm", JSON, design(loose(5.0)), "requirements", "mesh error"),
     refused(
         "a mesh error of 50 mm",

@@ -144,6 +144,26 @@ def second_key(key: str, value: str) -> Callable[[bytes], bytes]:
     return lambda data: data.replace(b"{", f'{{"{key}": {value},'.encode(), 1)
 
 
+def shell_spec(**keys: object) -> Callable[[Design], None]:
+    """Keys of the section [shell]."""
+    return lambda value: value["spec"]["shell"].update(keys)
+
+
+def flange(name: str, **keys: object) -> Callable[[Design], None]:
+    """Keys of a flange's section."""
+    return lambda value: value["spec"]["shell"][name].update(keys)
+
+
+def mirror_spec(**keys: object) -> Callable[[Design], None]:
+    """Keys of the section [mirrors]."""
+    return lambda value: value["spec"]["mirrors"].update(keys)
+
+
+def coverage(one: Row) -> None:
+    """What a mirror is said to see, 5 per cent too much."""
+    one["coverage_mm"] *= 1.05
+
+
 def cell(one: Row) -> None:
     """A cell's area wrong by a ten thousandth."""
     one["cell_area_mm2"] *= 1.0001

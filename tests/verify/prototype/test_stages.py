@@ -53,7 +53,7 @@ def failures(folder: Path) -> dict[str, Check]:
 
 def judged(report: Report) -> Report:
     """A report without the checks of what the synthetic prototype has not."""
-    assert {check.name for check in report.checks} >= NOT_MADE
+    assert {check.name for check in report.checks} >= NOT_MADE - {"radius rule"}
     return replace(report, checks=tuple(c for c in report.checks if c.name not in NOT_MADE))
 
 

@@ -39,6 +39,7 @@ from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import PARTS_LIST, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
+from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
     attempt,
     check_names,
@@ -83,6 +84,8 @@ def verify_prototype(
     context = PrototypeContext(export, prototype)
     sink(Results(stages=[RECORD]))
     sink(Results(checks=records.checks(context) + plan_checks.checks(context)))
+    if not export.parts:  # else the shell's STEP files bring this check
+        sink(Results(checks=guarded([RULE], lambda: [rule_check(export)])))
     sink(Results(stages=[PARTS]))
     pairs = list(zip(prototype.parts, facets, strict=True))
     parts = in_threads(lambda pair: measure_part(*pair), pairs)

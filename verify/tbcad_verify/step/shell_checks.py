@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
-from tbcad_verify.record.export import Export, Part
+from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
     at_most,
     each_at_most,
     guarded,
+    require,
     short_list,
 )
 from tbcad_verify.run.child import Limits
+from tbcad_verify.step.casing import Casing, hole_faults, read_casing, wall
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
@@ -39,6 +42,9 @@ from tbcad_verify.types import Floats, Ints
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
 CELL_SHARE = 1e-6  # of a cell's area
 MIDDLE_MM = 1e-5
+WALL_MM = 1e-3  # the deepest point may lie between corners
+COVERAGE_MM = 0.1  # spheres fitted to coarse facets, and outlines between their corners
+COVERAGE = ("recorded coverage", "mirrors.csv", "mm")
 AREAS = ("cell areas", "mirrors.csv", "of the area")
 
 
@@ -52,6 +58,9 @@ class ShellComparison(PartComparison):
         coating_mm: that is not part of the solid.
         face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
         cells: (m,) in closed form.
+        casing: back and holes.
+        export: the record.
+        camera: that the shell is for.
     """
 
     mirrors: Mirrors
@@ -59,10 +68,16 @@ class ShellComparison(PartComparison):
     coating_mm: float
     face: Ints
     cells: ClosedFormCells
+    casing: Casing
+    export: Export
+    camera: Camera
 
 
 def shell_step_checks(
-    export: Export, masses: dict[str, MassProperties], limits: Limits
+    export: Export,
+    masses: dict[str, MassProperties],
+    limits: Limits,
+    coverage: Floats | None = None,
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
@@ -70,6 +85,7 @@ def shell_step_checks(
         export: the record.
         masses: of the meshes, by part.
         limits: of the process that reads one file.
+        coverage: (M,) mm, as measured on spheres.
 
     Raises:
         BadExport: a file is missing, foreign or truncated.
@@ -83,12 +99,14 @@ def shell_step_checks(
         return guarded(
             names_of(CHECKS, part.step),
             lambda: run_checks(
-                CHECKS, part.step, _comparison(export, part, examine(blob, limits), mass)
+                CHECKS, part.step, _comparison(export, part, blob, examine(blob, limits), mass)
             ),
         )
 
     checks = in_threads(of_part, list(zip(parts, blobs, strict=True)), limits.stop.set)
     areas = guarded([AREAS], lambda: [_recorded_areas(export)])
+    areas += guarded([RULE], lambda: [rule_check(export)])
+    areas += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
     return areas + [check for some in checks for check in some]
 
 
@@ -101,8 +119,15 @@ def _recorded_areas(export: Export) -> Check:
     return _worst_of(AREAS, mirrors.ids, error, CELL_SHARE, "of its area off")
 
 
+def _recorded_coverage(export: Export, coverage: Floats | None) -> Check:
+    """Coverage as recorded, against what rays found."""
+    measured = require(coverage, "coverage was not measured")
+    error = np.abs(export.mirrors.coverage_mm - measured)
+    return _worst_of(COVERAGE, export.mirrors.ids, error, COVERAGE_MM, "mm")
+
+
 def _comparison(
-    export: Export, part: Part, file: StepFile, mass: MassProperties | None
+    export: Export, part: Part, blob: FileBytes, file: StepFile, mass: MassProperties | None
 ) -> ShellComparison:
     mine = export.mirrors.camera == part.camera
     mirrors = export.mirrors.take(np.flatnonzero(mine))
@@ -118,6 +143,9 @@ def _comparison(
         coating_mm=export.coating_mm,
         face=np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
         cells=cells_of_export(export, part.camera),
+        casing=read_casing(blob.text(), frozenset(mirrors.ids)),
+        export=export,
+        camera=export.cameras[part.camera],
     )
 
 
@@ -189,6 +217,20 @@ def _front_volume(name: CheckName, shell: ShellComparison) -> Check:
     )
 
 
+def _wall(name: CheckName, shell: ShellComparison) -> Check:
+    """Material behind the deepest valley, as the spec has it."""
+    asked = shell.export.spec.shell.wall_mm
+    measured = wall(shell.casing, shell.camera, shell.export.semi_minor_mm)
+    detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
+    return at_most(name, abs(measured - asked), WALL_MM, detail)
+
+
+def _holes(name: CheckName, shell: ShellComparison) -> Check:
+    """Bolt and dowel holes, as the spec has them."""
+    faults = hole_faults(shell.casing, shell.export.spec.shell, shell.export.foot_z_mm)
+    return at_most(name, len(faults), 0, short_list(faults))
+
+
 def _of(shell: ShellComparison, column: NDArray[Any]) -> NDArray[Any]:
     """(m, ...) the faces' figures in the order of the mirrors; NaN or empty for none."""
     values = column[shell.face].copy()
@@ -211,5 +253,7 @@ CHECKS: Checks = {
     "step cells": ("of the area", _areas),
     "step cell centroids": ("mm", _centroids),
     "step front volume": ("of the volume", _front_volume),
+    "step wall": ("mm", _wall),
+    "step holes": ("faults", _holes),
     **MASS_CHECKS,
 }

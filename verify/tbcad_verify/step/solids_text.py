@@ -227,12 +227,13 @@ def _solid(table: StepTable, solid: int) -> TextSolid:
         if table.kinds.get(one) == "VERTEX_POINT"
     ]
     corners = np.array(points).reshape(-1, 3)
-    faces = [_round_face(table, one) for one in reached if table.kinds.get(one) == "ADVANCED_FACE"]
+    faces = [round_face(table, one) for one in reached if table.kinds.get(one) == "ADVANCED_FACE"]
     order = np.lexsort(corners.T[::-1])
     return TextSolid(corners[order], tuple(face for face in faces if face))
 
 
-def _round_face(table: StepTable, face: int) -> RoundFace | None:
+def round_face(table: StepTable, face: int) -> RoundFace | None:
+    """A face, by its number, if it is a cylinder's or sphere's."""
     surface = table.references(face)[-1]
     kind = ROUND.get(table.kinds[surface])
     if kind is None:

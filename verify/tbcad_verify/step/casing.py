@@ -1,0 +1,144 @@
+"""What closes a shell behind its mirrors: wall and holes, measured in the STEP file's text.
+
+The back is a spheroid, both of whose semi-axes are the ellipsoid's and one length more. The wall is
+its least distance from the spheroid of the same kind through the deepest valley between mirrors:
+points of both meridians are compared, not support functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tbcad_verify.record.export import Camera
+from tbcad_verify.record.spec import FlangeSpec, ShellSpec
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.solids_text import TEXT, Hole, StepTable, holes, round_face
+from tbcad_verify.types import Floats
+
+AXIAL_MM = 1e-6  # of the spheroid's centre, axis and semi-axes
+HOLE_MM = 1e-6  # of radii, depths and places
+MERIDIAN = 20_000  # points on a quarter of an ellipse
+HALVINGS = 60
+
+
+@dataclass(frozen=True)
+class Casing:
+    """Back and holes of one shell.
+
+    Attributes:
+        semi_axes: of the back along the axis and across it, mm.
+        centre: (3,) of the back, mm.
+        axis: (3,) unit, of the back.
+        valleys: (V, 3) corners of the mirrors, mm.
+        holes: round, by diameter, from the spec.
+    """
+
+    semi_axes: tuple[float, float]
+    centre: Floats
+    axis: Floats
+    valleys: Floats
+    holes: tuple[Hole, ...]
+
+
+def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
+    """Find the back, the mirrors' corners and all round holes.
+
+    Args:
+        text: of the STEP file.
+        mirrors: names of the mirrors' faces.
+
+    Raises:
+        Unknown: there is no back, more than one, or no spheroid.
+    """
+    table = StepTable(text)
+    try:
+        backs = table.of("SURFACE_OF_REVOLUTION")
+        if len(backs) != 1:
+            raise Unknown(f"{len(backs)} surfaces of revolution, where the back is one")
+        curve, place = table.references(backs[0])[:2]
+        if table.kinds[curve] != "ELLIPSE":
+            raise Unknown("the back is no spheroid")
+        centre, axis = table.placement(place)
+        major, minor = table.numbers(curve)[-2:]
+        faces = table.of("ADVANCED_FACE")
+        names = {one: TEXT.findall(table.bodies[one])[0] for one in faces}
+        corners = {
+            point
+            for one, name in names.items()
+            if name in mirrors
+            for point in table.reached(one)
+            if table.kinds.get(point) == "VERTEX_POINT"
+        }
+        valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
+        found = [round_face(table, one) for one in faces if names[one] not in mirrors]
+    except (LookupError, ValueError) as error:
+        raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
+    hollow = tuple(face for face in found if face and face.kind == "cylinder" and face.hollow)
+    radii = sorted({round(face.radius, 6) for face in hollow})
+    bores = tuple(hole for radius in radii for hole in holes(hollow, radius, HOLE_MM))
+    return Casing((major, minor), centre, axis, np.array(valleys).reshape(-1, 3), bores)
+
+
+def wall(casing: Casing, camera: Camera, semi_minor: float) -> float:
+    """Least material behind the deepest valley, mm.
+
+    Raises:
+        Unknown: the back is not the spheroid that belongs to the camera.
+    """
+    focal = camera.pinhole / 2
+    own = np.array([float(np.hypot(semi_minor, np.linalg.norm(focal))), semi_minor])
+    outer = np.array(casing.semi_axes)
+    along = abs(float(casing.axis @ focal)) / float(np.linalg.norm(focal))
+    beyond = outer - own
+    if max(np.abs(casing.centre - focal).max(), 1 - along, abs(np.ptp(beyond))) > AXIAL_MM:
+        raise Unknown("the back is another spheroid than the camera's")
+    inner = own + _deepest(casing, own, float(beyond.max()))
+    angle = np.linspace(0, np.pi / 2, MERIDIAN)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    distance = np.asarray(cKDTree(circle * outer).query(circle * inner)[0])
+    return float(distance.min())
+
+
+def _deepest(casing: Casing, own: Floats, most: float) -> float:
+    """By how much a spheroid must be longer than the ellipsoid to hold all valleys, mm."""
+    offset = casing.valleys - casing.centre
+    along = offset @ casing.axis
+    across = np.linalg.norm(offset - along[:, None] * casing.axis, axis=1)
+    places = np.column_stack([along, across])
+    low, high = -float(own.min()) / 2, most
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        inside = ((places / (own + middle)) ** 2).sum(axis=1).max() <= 1
+        low, high = (low, middle) if inside else (middle, high)
+    return high
+
+
+def hole_faults(casing: Casing, spec: ShellSpec, foot_mm: float) -> list[str]:
+    """What is wrong with the holes: number, diameter, direction, depth and place."""
+    faults: list[str] = []
+    left = list(casing.holes)
+    flanges = (("seam", 0, spec.seam_flange, 0.0), ("foot", 2, spec.foot_flange, foot_mm))
+    for name, axis, flange, face in flanges:
+        mine = [hole for hole in left if abs(hole.axis[axis]) > 1 - HOLE_MM]
+        left = [hole for hole in left if abs(hole.axis[axis]) <= 1 - HOLE_MM]
+        faults += [f"{name} flange: {fault}" for fault in _flange_faults(mine, flange, axis, face)]
+    return faults + [f"a hole of {2 * hole.radius:g} mm in no flange" for hole in left]
+
+
+def _flange_faults(found: list[Hole], flange: FlangeSpec, axis: int, face: float) -> list[str]:
+    wanted = [flange.bolt_hole_mm] * flange.bolts + [flange.dowel_hole_mm] * flange.dowels
+    have = [2 * hole.radius for hole in found]
+    faults = []
+    for diameter in sorted({*wanted, *(round(one, 6) for one in have)}):
+        number = sum(abs(one - diameter) <= HOLE_MM for one in have)
+        if number != wanted.count(diameter):
+            faults.append(f"{number} holes of {diameter:g} mm, not {wanted.count(diameter)}")
+    for hole in found:
+        # The middle of the hole is the middle of the flange, which begins at its joining face.
+        depth = abs(abs(hole.point[axis] - face) - flange.thickness_mm / 2)
+        if max(abs(hole.depth - flange.thickness_mm), depth) > HOLE_MM:
+            faults.append(f"a hole {hole.depth:g} mm deep, not {flange.thickness_mm:g}")
+    return faults
