@@ -123,9 +123,13 @@ def _compare_steps(
 ) -> None:
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        results.add(Results(checks=shell_step_checks(
-            export, results.masses, limits, results.mirrors.get("coverage_fitted_mm")
-        )))
+        results.add(
+            Results(
+                checks=shell_step_checks(
+                    export, results.masses, limits, results.mirrors.get("coverage_fitted_mm")
+                )
+            )
+        )
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
         files = prototype.result()
