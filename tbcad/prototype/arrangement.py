@@ -4,7 +4,7 @@ Number of balls, angle of the pads and hold are chosen together: the first combi
 of preference, in which balls, seats, base, stage and frame have room.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,26 +138,42 @@ def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterato
                 yield chosen, error
             else:
                 seated = True
-                yield from _frame_attempts(chosen, layout, parts)
+                if not (yield from _frame_attempts(chosen, layout, parts)):
+                    return
         if seated:
             return
 
 
-def _frame_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterator[Outcome]:
-    """Outcomes for a base whose seats have room."""
+def _frame_attempts(
+    spec: Spec, layout: PrototypeLayout, parts: Parts
+) -> Generator[Outcome, None, bool]:
+    """Outcomes for a base whose seats have room.
+
+    Returns:
+        Whether other pads may help: not where the frame alone has no room.
+    """
     for boss in spec.prototype.base.hub_bosses_mm:
         chosen = _with_base(spec, hub_boss_mm=boss)
         base = base_layout(chosen.prototype.base, layout)
+        try:
+            estimate = _estimated_drive(chosen, layout, base, parts)
+        except SpecError as error:  # whatever boss and pads
+            yield chosen, error
+            return False
         keep_out = _keep_out(chosen, layout, base)
         try:
             chosen, stage = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
             yield chosen, error
-            return
+            return True
         try:
-            yield chosen, _arranged(chosen, layout, base, keep_out, stage, parts)
+            arrangement = _arranged(chosen, layout, base, estimate, keep_out, stage, parts)
         except SpecError as error:
             yield chosen, error
+        else:
+            yield chosen, arrangement
+            return True
+    return False
 
 
 def _staged(
@@ -188,16 +204,23 @@ def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
 
 
+def _estimated_drive(
+    spec: Spec, layout: PrototypeLayout, base: BaseLayout, parts: Parts
+) -> tuple[BaseBalance, Drive]:
+    carrier = carrier_masses(base, spec.printer.density_g_cm3)
+    return balance_and_drive(layout, base, carrier, spec, parts)
+
+
 def _arranged(
     spec: Spec,
     layout: PrototypeLayout,
     base: BaseLayout,
+    estimate: tuple[BaseBalance, Drive],
     keep_out: KeepOut,
     stage: StageLayout,
     parts: Parts,
 ) -> Arrangement:
-    carrier = carrier_masses(base, spec.printer.density_g_cm3)
-    balance, drive = balance_and_drive(layout, base, carrier, spec, parts)
+    balance, drive = estimate
     frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     return Arrangement(
         spec=spec,
