@@ -17,13 +17,15 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 
 from tbcad.cad.brep import Solid
+from tbcad.formats.native_files import check_complete, incomplete
 
+END = b"END-ISO-10303-21;"  # of every STEP file
 # A fixed time stamp: the file's bytes then depend on the design alone.
 TIME_STAMP = "2022-11-01T00:00:00"
 
 
 class StepError(RuntimeError):
-    """The kernel did not write a STEP file: a fault of tbcad or of the disk."""
+    """The kernel cannot translate a solid: a fault of tbcad."""
 
 
 def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
@@ -37,6 +39,7 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
 
     Raises:
         StepError: when the kernel fails.
+        OSError: when the file cannot be written in full.
     """
     STEPControl_Controller.Init_s()
     configure(pcurves)
@@ -50,7 +53,8 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
     _name_product(writer, solid.name)
     write_header(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
-        raise StepError(f"{path.name}: the kernel cannot write the file")
+        raise incomplete(path)
+    check_complete(path, END)
 
 
 def configure(pcurves: bool) -> None:

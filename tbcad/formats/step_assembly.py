@@ -14,6 +14,8 @@ from OCP.TCollection import TCollection_HAsciiString
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
+from tbcad.formats.native_files import check_complete, incomplete
+from tbcad.formats.step import END as STEP_END
 from tbcad.formats.step import StepError, configure, write_header
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
@@ -26,6 +28,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
 
     Raises:
         StepError: when the kernel fails.
+        OSError: when the file cannot be written in full.
     """
     _, document = toCAF(_tree(name, groups), True)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
@@ -39,7 +42,8 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     write_header(step_writer, name)
     colours = _colours(step_writer, [body for group in groups for body in group.bodies])
     if writer.Write(str(path)) != IFSelect_RetDone:
-        raise StepError(f"{path.name}: the kernel cannot write the file")
+        raise incomplete(path)
+    check_complete(path, STEP_END)
     text, end, rest = path.read_text(encoding="ascii").rpartition(END)
     path.write_text(text + colours + end + rest, encoding="ascii")
 

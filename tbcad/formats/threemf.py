@@ -7,12 +7,17 @@ import lib3mf
 import numpy as np
 
 from tbcad.cad.mesh import Mesh
+from tbcad.formats.native_files import check_complete, incomplete
 
 DECIMALS = 6
+ZIP_END = b"PK\x05\x06"  # begins the last record of a zip
 
 
 def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     """Write one named object.
+
+    Raises:
+        OSError: when the file cannot be written in full.
 
     The library makes up identifiers, which would differ each time; they are derived from the name.
     """
@@ -35,7 +40,11 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     model.SetBuildUUID(_identifier(name, "build"))
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(DECIMALS)
-    writer.WriteToFile(str(path))
+    try:
+        writer.WriteToFile(str(path))
+    except lib3mf.ELib3MFException as error:
+        raise incomplete(path) from error
+    check_complete(path, ZIP_END)
 
 
 def _identifier(name: str, what: str) -> str:

@@ -60,7 +60,14 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
             target = _target(out)
             _make_parents(target.parent, undo)
             new = _open_new(out, target, force, undo)
-        yield new
+        try:
+            yield new
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise InputError(
+                f"{out} cannot be written: {reason}: make room on the disk, or choose another "
+                "folder; nothing was changed"
+            ) from error
         with write_errors_as_input_errors(out):
             _finish(out, new, force)
 

@@ -19,6 +19,7 @@ from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.run import stages
+from tbcad_verify.run.child import Limits
 from tbcad_verify.step import shell_checks
 
 
@@ -60,9 +61,11 @@ class _Once:
 
 
 def _shown(value: Any) -> object:
-    """A solid by its corners; all else as it is."""
+    """A solid by its corners, limits by their time; all else as it is."""
     if isinstance(value, AxialSolid):
         return value.name, hashlib.sha256(value.profile.tobytes()).hexdigest()
+    if isinstance(value, Limits):
+        return value.seconds
     if isinstance(value, manifold3d.Manifold):
         return hashlib.sha256(value.to_mesh64().vert_properties.tobytes()).hexdigest()
     return value
