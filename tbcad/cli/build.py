@@ -67,6 +67,14 @@ def build(
         ),
     ] = None,
     verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Only show what would be built: mirrors, balls, masses, time and estimates of "
+            "printing and cost; seconds, and nothing is written.",
+        ),
+    ] = False,
     force: Force = False,
     full: Full = False,
     quiet: Quiet = False,
@@ -78,7 +86,7 @@ def build(
     input, nothing written.
     """
     output = output_mode(full, quiet, json)
-    if not verify and output in ("full", "json"):
+    if not verify and not dry_run and output in ("full", "json"):
         raise InputError(f"--{output} shows a verification: leave --no-verify out")
     from tbcad.api import build as build_files
     from tbcad.cli.stage_times import build_times, margin_stage
@@ -95,7 +103,8 @@ def build(
     process = _process(for_process, share)
     wanted_yield = DEFAULT_YIELD if share is None else share
     chosen = asked or default_parts(spec)
-    check_replaceable(out, force)
+    if not dry_run:
+        check_replaceable(out, force)
     times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
     with stages(times, silent=quiet) as screen:
         if process is not None:
@@ -106,6 +115,10 @@ def build(
             screen.note(
                 f"margin {spec.mirrors.margin_mm:g} mm, for {wanted_yield:.1%} by {for_process}"
             )
+        if dry_run:
+            from tbcad.cli.dry_run import show_overview
+
+            return show_overview(spec, asked, output, screen)
         built = build_files(
             spec,
             out,

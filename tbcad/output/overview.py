@@ -84,7 +84,7 @@ class Overview:
         spec: the design's, with a value for every key that is chosen.
         mirrors: number, of both cameras.
         virtual_cameras: number; mirrors halved by the seam make one together.
-        radius_mm: minimum and maximum of the mirrors, without planar ones.
+        radius_mm: minimum and maximum; None with planar mirrors.
         minimum_coverage_mm: diameter that every mirror shows.
         view_angle_deg: of the cameras' lenses, across the columns.
         shell_prints: both halves; None without shells.
@@ -95,7 +95,7 @@ class Overview:
     spec: Spec
     mirrors: int
     virtual_cameras: int
-    radius_mm: tuple[float, float]
+    radius_mm: tuple[float, float] | None
     minimum_coverage_mm: float
     view_angle_deg: float
     shell_prints: Print | None
@@ -121,11 +121,12 @@ def overview(
                 raise
             note = f"no prototype: {error}"
     radius = half.mirrors.radius
+    planar = bool(np.isnan(radius).any())
     return Overview(
         spec=arrangement.spec if arrangement else design.spec,
         mirrors=2 * len(half),
         virtual_cameras=2 * len(half) - int((half.u[:, 0] == 0).sum()),
-        radius_mm=(float(np.nanmin(radius)), float(np.nanmax(radius))),
+        radius_mm=None if planar else (float(radius.min()), float(radius.max())),
         minimum_coverage_mm=float(half.coverage.min()),
         view_angle_deg=design.spec.camera.hfov_deg,
         shell_prints=_shells(design) if SHELL in parts else None,
