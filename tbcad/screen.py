@@ -1,6 +1,7 @@
 """Progress of a long command: a bar on a terminal, plain lines elsewhere."""
 
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from time import monotonic
@@ -28,6 +29,11 @@ PRIOR_SHARE = 0.1
 def report_console() -> Console:
     """Where results are printed."""
     return Console() if sys.stdout.isatty() else Console(width=WIDTH)
+
+
+def paragraph(text: str) -> str:
+    """Text in lines of WIDTH columns at most, but for words that are longer: paths stay whole."""
+    return textwrap.fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 class TimeLeft:

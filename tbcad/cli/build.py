@@ -6,6 +6,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from rich.markup import escape
 
 from tbcad.cli.app import app
 from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
@@ -14,9 +15,11 @@ from tbcad.errors import InputError
 from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
+    from tbcad.doctor import Finding
     from tbcad.tolerance.process.process import Process
 
 DEFAULT_YIELD = 0.99
+FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
 
 
 @app.command()
@@ -231,14 +234,22 @@ def picture(
 @app.command()
 def doctor() -> int:
     """Check that this Python environment has all that tbcad needs, and say how to repair it."""
-    from rich.console import Console
-    from rich.table import Table
-
     from tbcad.doctor import diagnose
 
     findings = diagnose()
-    table = Table("", "what", "found", "what to do", box=None)
     for finding in findings:
-        table.add_row("ok" if finding.ok else "NO", finding.name, finding.detail, finding.remedy)
-    Console().print(table)
+        _show_finding(finding)
     return 0 if all(finding.ok for finding in findings) else 1
+
+
+def _show_finding(finding: "Finding") -> None:
+    """Show what was found, and below it, after an arrow, what to do."""
+    from rich.table import Table
+
+    row = Table.grid(padding=(0, 1))
+    for width in FINDING_WIDTHS:
+        row.add_column(width=width, overflow="fold")
+    row.add_row("ok" if finding.ok else "NO", escape(finding.name), escape(finding.detail))
+    if finding.remedy:
+        row.add_row("", "->", escape(finding.remedy))
+    report_console().print(row, highlight=False)

@@ -18,7 +18,7 @@ from tbcad.cli.options import (
     Scheduler,
     Settings,
 )
-from tbcad.screen import report_console, stages
+from tbcad.screen import paragraph, report_console, stages
 
 if TYPE_CHECKING:
     from tbcad.simulate.study.study import Study
@@ -237,14 +237,16 @@ def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
         screen.stage("study: files")
         files = write_study(result, out)
     _show(result)
-    typer.echo(f"{out}: {', '.join(file.name for file in files)}")
+    typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
     return 0
 
 
 def _show(result: "Study") -> None:
     from rich.table import Table
 
-    table = Table("quantity", "tbcad", "the paper", "where in the paper", box=None)
+    table = Table(box=None)
+    for heading in ("quantity", "tbcad", "the paper", "where in the paper"):
+        table.add_column(heading, overflow="fold")
     for quantity, unit, ours, paper, where in result.summary.rows:
         table.add_row(str(quantity), _shown(ours, unit), _shown(paper, unit), str(where))
     report_console().print(table)

@@ -7,7 +7,7 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
-from tbcad.screen import stages
+from tbcad.screen import paragraph, stages
 
 
 @app.command()
@@ -66,6 +66,6 @@ def tolerance(
         )
         more = {"tolerance.json": json_text(analysis).encode()}
         files = write_study(tolerance_study(analysis), out, more)
-    typer.echo(summary_text(analysis))
-    typer.echo(f"{out}: {', '.join(file.name for file in files)}")
+    typer.echo(paragraph(summary_text(analysis)))
+    typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
     return 0

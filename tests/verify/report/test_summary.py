@@ -13,6 +13,7 @@ import pytest
 from rich.console import Console
 from tbcad_verify import main
 from tbcad_verify.programs.answers import skipped
+from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.key_figures import KEY_FIGURES, LABEL_WIDTH, key_figures
 from tbcad_verify.report.remedies import ELSE, REMEDIES, UNKNOWN, remedy
@@ -74,10 +75,16 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
-    assert "diamond 98 % 60.0 mm, cnc 0 % 58.9, sla 0 % 51.4, fdm 0 % 42.0" in lines[-6]
+    assert "diamond 98% 60, cnc 0% 58.9, sla 0% 51.4, fdm 0% 42" in lines[-6]
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
+
+
+def test_processes_that_are_all_good_fit(long_report: Report) -> None:
+    good = (ProcessYield(name, 1.0, 123.456) for name in ("diamond", "cnc", "sla", "fdm", "sls"))
+    lines = fits(shown(replace(long_report, as_made=AsMade(50, tuple(good)))))
+    assert "  diamond 100% 123, cnc 100% 123, sla 100% 123, fdm 100% 123, sls 100% 123" in lines
 
 
 def test_every_key_figure_has_room(long_report: Report) -> None:

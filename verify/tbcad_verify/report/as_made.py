@@ -44,11 +44,9 @@ def as_made_lines(made: AsMade | None) -> list[str]:
         return [NOT_SIMULATED]
     if not made.processes:
         return [f"As made: not simulated, {made.reason}"]
-    first, *others = made.processes
-    figures = [f"{first.process} {100 * first.share:.0f} % {first.coverage_mm:.1f} mm"]
-    figures += [f"{one.process} {100 * one.share:.0f} % {one.coverage_mm:.1f}" for one in others]
+    figures = [f"{one.process} {one.share:.0%} {one.coverage_mm:.3g}" for one in made.processes]
     return [
-        f"As made ({made.builds} simulated builds): yield and median minimum coverage by process",
+        f"As made ({made.builds} simulated builds): yield, and median minimum coverage in mm",
         f"  {', '.join(figures)}",
         f"  larger yield: tbcad build --for-process NAME; causes: {COMMAND}",
     ]

@@ -10,12 +10,12 @@ _MESH = "the mesh is not as it was written: build again, and do not repair it"
 _MIRROR = "the mesh is off the record: build again, with a smaller chord_error_mm"
 _SEES = "mirrors.radius_rule traced, a larger margin_mm, a smaller chord_error_mm"
 _BALLS = "a larger mirrors.margin_mm, or more balls: prototype.k"
-_SPACE = "more clearance: keys in [prototype.base], [prototype.stage], [prototype.frame]"
+_SPACE = "more clearance: keys of [prototype.base], .stage and .frame"
 _LEDS = "move LEDs or stage: keys in [prototype.stage]"
 _PLAN = "the plan was changed after the build: build again"
 _PRINT = "another --printer, or other keys of [shell] and [printer]"
 _STEP = "the STEP file differs from record or mesh: build again, else report it"
-_PROGRAM = "this program reads the file otherwise: see --full, try its present version"
+_PROGRAM = "the program reads the file otherwise: see --full, try its newest version"
 
 # The remedy for a check is that of the longest beginning of its name in this table.
 REMEDIES = {
