@@ -119,7 +119,7 @@ def _seat(context: PrototypeContext, base: Mesh, k: int) -> MeasuredSeat:
         centre = touching_sphere([p.normal for p in pads], [p.offset for p in pads], radius)
     except Unknown as error:
         return MeasuredSeat(np.full(3, np.nan), -np.inf, -np.inf, str(error))
-    margin = min(_margin(base, pad, centre) for pad in pads) - INSIDE * pad_radius
+    margin = min(_margin(base, pad, centre) - INSIDE * _radius(base, pad) for pad in pads)
     others = np.setdiff1d(near, np.concatenate([pad.facets for pad in pads]))
     return MeasuredSeat(centre, margin, distance_to_facets(centre, base, others) - radius)
 
@@ -189,6 +189,11 @@ def _sides(mesh: Mesh, facets: Ints) -> tuple[Ints, Ints]:
     """(3 F,) half-edges of some facets, and the facet beyond each; -1 for none."""
     half = (3 * facets[:, None] + np.arange(3)).ravel()
     return half, mesh.twin[half] // 3
+
+
+def _radius(mesh: Mesh, pad: Pad) -> float:
+    """Radius of a disc of the pad's area, mm: the recorded one might be of any size."""
+    return float(np.sqrt(norm(mesh.area[:, pad.facets]).sum() / 2 / np.pi))
 
 
 def _margin(mesh: Mesh, pad: Pad, centre: Floats) -> float:

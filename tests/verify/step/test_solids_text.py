@@ -1,0 +1,96 @@
+"""Solids read from STEP text: holes of shapes whose sizes are known, and a shell's casing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.casing import Casing, hole_faults, read_casing, wall
+from tbcad_verify.step.solids_text import holes, read_solids
+
+SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
+
+
+@pytest.fixture(scope="module")
+def sample() -> Export:
+    return read_export(SAMPLE)
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return (SAMPLE / "shell_a.step").read_text()
+
+
+@pytest.fixture(scope="module")
+def casing(sample: Export, text: str) -> Casing:
+    return read_casing(text, frozenset(sample.mirrors.ids))
+
+
+def test_a_solid_has_its_product_name_and_corners(text: str) -> None:
+    found = read_solids(text)
+    assert list(found) == ["shell_a"]
+    corners = found["shell_a"].corners
+    assert (np.lexsort(corners.T[::-1]) == np.arange(len(corners))).all()
+    assert corners[:, 0].min() == pytest.approx(0, abs=1e-9)
+
+
+def test_holes_are_those_of_the_design(sample: Export, text: str) -> None:
+    faces, shell = read_solids(text)["shell_a"].faces, sample.spec.shell
+    for diameter, count in (
+        (shell.seam_flange.bolt_hole_mm, shell.seam_flange.bolts + shell.foot_flange.bolts),
+        (shell.seam_flange.dowel_hole_mm, shell.seam_flange.dowels + shell.foot_flange.dowels),
+    ):
+        found = holes(faces, diameter / 2, 1e-6)
+        assert len(found) == count
+        assert {round(hole.depth, 6) for hole in found} == {shell.seam_flange.thickness_mm}
+        assert {round(hole.radius, 6) for hole in found} == {diameter / 2}
+    assert holes(faces, 1.0, 1e-6) == []
+
+
+def test_the_middle_of_a_hole_is_in_its_flange(casing: Casing, sample: Export) -> None:
+    seam = [hole for hole in casing.holes if abs(hole.axis[0]) > 0.5]
+    half = sample.spec.shell.seam_flange.thickness_mm / 2
+    assert {round(float(hole.point[0]), 6) for hole in seam} == {half}
+
+
+def test_the_wall_is_the_design_s(casing: Casing, sample: Export) -> None:
+    measured = wall(casing, sample.cameras["a"], sample.semi_minor_mm)
+    assert measured == pytest.approx(sample.spec.shell.wall_mm, abs=1e-5)
+    with pytest.raises(Unknown, match="another spheroid"):
+        wall(casing, sample.cameras["b"], sample.semi_minor_mm)
+    with pytest.raises(Unknown, match="another spheroid"):
+        wall(casing, sample.cameras["a"], sample.semi_minor_mm + 0.01)
+
+
+@pytest.mark.parametrize(
+    ("flange", "key", "value", "words"),
+    [
+        ("seam_flange", "bolts", 7, "seam flange: 6 holes of 4.3 mm, not 7"),
+        ("foot_flange", "bolts", 4, "foot flange: 5 holes of 4.3 mm, not 4"),
+        ("foot_flange", "dowels", 3, "foot flange: 2 holes of 4 mm, not 3"),
+        ("seam_flange", "bolt_hole_mm", 4.31, "seam flange: 0 holes of 4.31 mm, not 6"),
+        ("foot_flange", "thickness_mm", 5.01, "foot flange: a hole 5 mm deep, not 5.01"),
+    ],
+)
+def test_other_holes_are_faults(
+    casing: Casing, sample: Export, flange: str, key: str, value: float, words: str
+) -> None:
+    shell = sample.spec.shell
+    assert hole_faults(casing, shell, sample.foot_z_mm) == []
+    other = getattr(shell, flange).model_copy(update={key: value})
+    faults = hole_faults(casing, shell.model_copy(update={flange: other}), sample.foot_z_mm)
+    assert words in faults
+
+
+def test_a_flange_elsewhere_is_a_fault(casing: Casing, sample: Export) -> None:
+    assert hole_faults(casing, sample.spec.shell, sample.foot_z_mm + 0.01)
+
+
+def test_what_is_no_shell_is_unknown(text: str) -> None:
+    with pytest.raises(Unknown, match="0 surfaces of revolution"):
+        read_casing(text.replace("SURFACE_OF_REVOLUTION", "PLANE"), frozenset())
+    with pytest.raises(Unknown, match="no product's"):
+        read_solids(text.replace("PRODUCT(", "PRODUCTS("))
