@@ -55,7 +55,7 @@ def capture_area(
         "capture-area",
         tuple(figure for record in records for figure in _figures(record)),
         (table,),
-        (Panel(title, "n", "mm", tuple(curves)),),
+        (Panel(title, "subdivision n", "diameter seen whole, mm", tuple(curves)),),
     )
 
 

@@ -176,7 +176,7 @@ def _radius_panel(halves: dict[str, MirrorArray]) -> Panel:
         named = f"{label}: correlation of log radius {correlation(np.log(radius), polar):.3f}"
         series.append(Series(named, np.degrees(polar), radius, style))
     title = "Radius of the mirrors"
-    return Panel(title, "polar angle about the axis, degrees", "mm", tuple(series), "y")
+    return Panel(title, "polar angle about the axis, degrees", "radius, mm", tuple(series), "y")
 
 
 def _pixel_panel(mirrors: Table) -> Panel:
