@@ -178,7 +178,7 @@ def prototype_command(
 
 @study.command("low-pass")
 def low_pass_command(
-    folder: Annotated[Path, typer.Argument(help="Folder written by tbcad build.")],
+    folder: Exports,
     out: Out = STUDIES,
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
