@@ -14,7 +14,8 @@ from tbcad.types import Floats, Ints, Progress
 # A hundredth of a millimetre would do; verification's figures are steadier with an exact design.
 CONVERGED_MM = 1e-4
 MAX_ITERATIONS = 400
-MAX_HALVINGS = 12
+# Designs that settle need none; each costs as much as a step, and further ones have never helped.
+MAX_HALVINGS = 4
 # Mirrors that an error names at most.
 NAMED_MIRRORS = 5
 

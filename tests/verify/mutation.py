@@ -2,9 +2,9 @@
 
 python tests/verify/mutation.py [--count 40] [--seed 1] [--module WORD ...] [--seconds 300]
 
-Each mutation is made in a private copy of `verify/`, which tests import instead of it.
-A mutation that no test notices survives, and is printed with its line. A survivor wants a test, or a
-line in verify/README.md that says why it changes nothing.
+Each mutation is made in a private copy of `verify/`, which the tests import. One that no test
+notices survives, and is printed with its line: it wants a test, or a line in verify/README.md that
+says why it changes nothing.
 """
 
 from __future__ import annotations
@@ -107,12 +107,13 @@ def survives(change: Change, seconds: float) -> bool:
         shutil.copytree(PACKAGE, copy)
         (copy / change.module).write_text(mutated(change))
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
-        paths = os.pathsep.join([place, str(ROOT)])
+        # pyproject.toml puts the real package first.
+        command += ["-o", f"pythonpath={ROOT} {place}"]
         try:
             done = subprocess.run(
                 [*command, *TESTS[change.module]],
                 cwd=ROOT,
-                env={**os.environ, "PYTHONPATH": paths},
+                env={**os.environ, "PYTHONPATH": place},
                 capture_output=True,
                 timeout=seconds,
                 check=False,

@@ -58,6 +58,18 @@ def test_the_program_of_the_plan_has_no_fault(context: PrototypeContext) -> None
     assert said(context, context.prototype.program) == ""
 
 
+def test_another_axis_has_its_own_settings(context: PrototypeContext) -> None:
+    """A controller with more axes takes A, and numbers its settings by the axis."""
+    text = context.prototype.program.replace(" X", " A")
+    for number in (100, 110, 120):
+        text = text.replace(f"${number}=", f"${number + 3}=")
+    spec = context.export.spec
+    motion = spec.prototype.motion.model_copy(update={"axis": "A"})
+    prototype = spec.prototype.model_copy(update={"motion": motion})
+    export = replace(context.export, spec=spec.model_copy(update={"prototype": prototype}))
+    assert said(replace(context, export=export), text) == ""
+
+
 def once(old: str, new: str) -> Callable[[str], str]:
     return lambda text: text.replace(old, new, 1)
 

@@ -93,7 +93,7 @@ def wall(casing: Casing, camera: Camera, semi_minor: float) -> float:
     outer = np.array(casing.semi_axes)
     along = abs(float(casing.axis @ focal)) / float(np.linalg.norm(focal))
     beyond = outer - own
-    if max(np.abs(casing.centre - focal).max(), 1 - along, abs(np.ptp(beyond))) > AXIAL_MM:
+    if max(np.abs(casing.centre - focal).max(), abs(1 - along), abs(np.ptp(beyond))) > AXIAL_MM:
         raise Unknown("the back is another spheroid than the camera's")
     inner = own + _deepest(casing, own, float(beyond.max()))
     angle = np.linspace(0, np.pi / 2, MERIDIAN)
