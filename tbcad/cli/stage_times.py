@@ -49,6 +49,7 @@ VERIFY_SHELLS: Seconds = {
 }
 VERIFY_PROTOTYPE: Seconds = {
     "verification: prototype's record": 0.1,
+    "verification: parts and purchases": 0.1,
     "verification: printed parts": 1.0,
     "verification: seats": 1.0,
     "verification: light paths of the balls": 4.0,

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.report.summary import MAX_LINES
 from tbcad_verify.run.stages import SHELL_STAGES
 
@@ -175,6 +176,7 @@ def test_expected_times_grow_with_the_mirrors() -> None:
     shells = build_times(18, ("shell",), verify=True, process=None)
     assert not any("prototype" in title for title in shells)
     assert {f"verification: {title}" for title in SHELL_STAGES} <= shells.keys()
+    assert {f"verification: {title}" for title in PROTOTYPE_STAGES} <= small.keys()
     assert "simulated builds by each process" in shells
 
 
