@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,13 @@ import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.casing import Casing, hole_faults, read_casing, wall
-from tbcad_verify.step.solids_text import holes, read_solids
+from tbcad_verify.step.solids_text import (
+    Hole,
+    RoundFace,
+    distance_to_line,
+    holes,
+    read_solids,
+)
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 
@@ -94,3 +101,31 @@ def test_what_is_no_shell_is_unknown(text: str) -> None:
         read_casing(text.replace("SURFACE_OF_REVOLUTION", "PLANE"), frozenset())
     with pytest.raises(Unknown, match="no product's"):
         read_solids(text.replace("PRODUCT(", "PRODUCTS("))
+
+
+def test_distance_to_a_line() -> None:
+    z = np.array([0.0, 0.0, 1.0])
+    assert distance_to_line(np.array([4.0, 6.0, 9.0]), np.array([1.0, 2.0, 5.0]), z) == 5
+
+
+def test_faces_of_one_hole_are_counted_once_and_of_two_twice() -> None:
+    """Half shells of one bore, and a second bore on the same axis beyond a gap."""
+
+    def face(low: float, high: float, sign: float = 1.0, hollow: bool = True) -> RoundFace:
+        point, axis = np.array([1.0, 2.0, 5.0]), np.array([0.0, 0.0, sign])
+        span = (low, high) if sign > 0 else (-high, -low)
+        return RoundFace("cylinder", point, axis, 2.0, hollow, span)
+
+    one = holes((face(0, 3), face(0, 3, -1.0)), 2.0, 1e-6)
+    assert [(hole.depth, hole.point.tolist()) for hole in one] == [(3, [1, 2, 6.5])]
+    assert [hole.depth for hole in holes((face(0, 3), face(2, 4)), 2.0, 1e-6)] == [4]
+    assert [hole.depth for hole in holes((face(5, 9), face(0, 3)), 2.0, 1e-6)] == [3, 4]
+    assert holes((face(0, 3, hollow=False),), 2.0, 1e-6) == []
+
+
+def test_a_hole_in_no_flange_is_a_fault(casing: Casing, sample: Export) -> None:
+    axis = np.array([0.0, 1.0, 0.0])
+    extra = Hole(np.zeros(3), axis, 2.0, 5.0)
+    other = replace(casing, holes=(*casing.holes, extra))
+    faults = hole_faults(other, sample.spec.shell, sample.foot_z_mm)
+    assert faults == ["a hole of 4 mm in no flange"]
