@@ -1,6 +1,7 @@
 """3MF: vertices and triangles in a zip, millimetres, the same bytes for the same mesh."""
 
 from pathlib import Path
+from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
 import lib3mf
@@ -26,14 +27,7 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     model.SetUnit(lib3mf.ModelUnit.MilliMeter)
     part = model.AddMeshObject()
     part.SetName(name)
-    part.SetGeometry(
-        (lib3mf.Position * len(mesh.vertices)).from_buffer_copy(
-            np.ascontiguousarray(mesh.vertices, dtype=np.float32).tobytes()
-        ),
-        (lib3mf.Triangle * len(mesh.triangles)).from_buffer_copy(
-            np.ascontiguousarray(mesh.triangles, dtype=np.uint32).tobytes()
-        ),
-    )
+    _set_geometry(wrapper, part, mesh)
     item = model.AddBuildItem(part, wrapper.GetIdentityTransform())
     part.SetUUID(_identifier(name, "part"))
     item.SetUUID(_identifier(name, "item"))
@@ -45,6 +39,25 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     except lib3mf.ELib3MFException as error:
         raise incomplete(path) from error
     check_complete(path, ZIP_END)
+
+
+def _set_geometry(wrapper: Any, part: Any, mesh: Mesh) -> None:
+    """Hand the mesh over as it is in memory.
+
+    The library's own method makes an object of each vertex and triangle first.
+    """
+    vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float32)
+    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.uint32)
+    call = wrapper.lib.lib3mf_meshobject_setgeometry
+    _, _, points, _, corners = call.argtypes
+    code = call(
+        part._handle,
+        len(vertices),
+        vertices.ctypes.data_as(points),
+        len(triangles),
+        triangles.ctypes.data_as(corners),
+    )
+    wrapper.checkError(part, code)
 
 
 def _identifier(name: str, what: str) -> str:

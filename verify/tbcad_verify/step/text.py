@@ -6,14 +6,13 @@ properties are therefore taken from the text.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from steputils import p21
+from tbcad_verify.step.part21 import Entities, Enumeration, Typed, Value, read_entities
 
 Row = dict[str, Any]
-Entities = Mapping[str, Any]
 
 SURFACES = {"SPHERICAL_SURFACE": "sphere", "PLANE": "plane"}
 TRIPLES = ("CARTESIAN_POINT", "DIRECTION")
@@ -32,69 +31,72 @@ def read_text(path: Path) -> Row:
         ValueError: the text is no STEP file, or an entity lacks what its kind must have.
     """
     try:
-        table = _entities(p21.readfile(str(path)))
+        # Names are ASCII; the standard writes all other characters in ASCII too.
+        table = read_entities(path.read_bytes().decode("ascii"))
         return {
-            "solids": [str(item.params[0]) for item in _of(table, "MANIFOLD_SOLID_BREP")],
-            "faces": [_face(table, item) for item in _of(table, "ADVANCED_FACE")],
+            "solids": [str(name) for _, (name, *_) in table.of("MANIFOLD_SOLID_BREP")],
+            "faces": [_face(table, face) for _, face in table.of("ADVANCED_FACE")],
             "properties": _properties(table),
         }
-    except (p21.ParseError, LookupError, TypeError, AttributeError, RecursionError) as error:
+    except (LookupError, TypeError, UnicodeDecodeError, RecursionError) as error:
         raise ValueError(f"broken STEP text ({type(error).__name__}: {error})") from error
 
 
-def _entities(file: Any) -> dict[str, Any]:
-    """Simple entities by their number; complex ones carry units only."""
-    return {
-        reference: instance.entity
-        for section in file.data
-        for reference, instance in section.instances.items()
-        if hasattr(instance, "entity")
-    }
-
-
-def _of(table: Entities, kind: str) -> Iterator[Any]:
-    return (item for item in table.values() if item.name == kind)
-
-
-def _face(table: Entities, face: Any) -> Row:
-    surface = table[face.params[2]]
-    row: Row = {"name": str(face.params[0]), "kind": SURFACES.get(surface.name, "other")}
+def _face(table: Entities, face: list[Value]) -> Row:
+    name, _, reference, forward = face
+    kind, surface = table.name(reference), table.parameters(reference)
+    row: Row = {"name": str(name), "kind": SURFACES.get(kind, "other")}
     if row["kind"] == "other":
         return row
-    row["forward"] = face.params[3] == ".T."
-    place = table[surface.params[1]]
-    row["point"] = _numbers(table[place.params[1]])
+    row["forward"] = forward == Enumeration("T")
+    place = table.parameters(surface[1])
+    row["point"] = _numbers(table, place[1])
     if row["kind"] == "sphere":
-        return row | {"radius": float(surface.params[2])}
-    return row | {"axis": _numbers(table[place.params[2]])}
+        return row | {"radius": _number(surface[2])}
+    return row | {"axis": _numbers(table, place[2])}
 
 
-def _numbers(entity: Any) -> list[float]:
-    if entity.name not in TRIPLES:
-        raise ValueError(f"broken STEP text: {entity.name} where a point or direction must be")
-    return [float(value) for value in entity.params[1]]
+def _numbers(table: Entities, reference: Value) -> list[float]:
+    if (name := table.name(reference)) not in TRIPLES:
+        raise ValueError(f"broken STEP text: {name} where a point or direction must be")
+    return [_number(value) for value in _items(table.parameters(reference)[1])]
+
+
+def _number(value: Value) -> float:
+    if not isinstance(value, float):
+        raise ValueError(f"broken STEP text: {value!r} where a number must be")
+    return value
+
+
+def _items(value: Value) -> Iterable[Value]:
+    if not isinstance(value, list):
+        raise ValueError(f"broken STEP text: {value!r} where a list must be")
+    return value
 
 
 def _properties(table: Entities) -> Row:
     """Values under every property definition called a geometric validation property."""
     definitions = {
-        reference
-        for reference, item in table.items()
-        if item.name == "PROPERTY_DEFINITION" and item.params[0] == "geometric validation property"
+        number
+        for number, (name, *_) in table.of("PROPERTY_DEFINITION")
+        if name == "geometric validation property"
     }
     properties: Row = {}
-    for link in _of(table, "PROPERTY_DEFINITION_REPRESENTATION"):
-        if link.params[0] in definitions:
-            for item in (table[reference] for reference in table[link.params[1]].params[1]):
-                key = PROPERTIES.get(str(item.params[0]))
+    for _, (definition, representation) in table.of("PROPERTY_DEFINITION_REPRESENTATION"):
+        if getattr(definition, "number", None) in definitions:
+            for reference in _items(table.parameters(representation)[1]):
+                key = PROPERTIES.get(str(table.parameters(reference)[0]))
                 if key in properties:
                     raise ValueError(f"broken STEP text: {key} is claimed twice")
                 if key:
-                    properties[key] = _value(item)
+                    properties[key] = _claim(table, reference)
     return properties
 
 
-def _value(item: Any) -> float | list[float]:
-    if item.name == "CARTESIAN_POINT":
-        return _numbers(item)
-    return float(item.params[1].param)
+def _claim(table: Entities, reference: Value) -> float | list[float]:
+    if table.name(reference) == "CARTESIAN_POINT":
+        return _numbers(table, reference)
+    measure = table.parameters(reference)[1]
+    if not isinstance(measure, Typed):
+        raise ValueError(f"broken STEP text: {measure!r} where a measure must be")
+    return _number(measure.values[0])
