@@ -74,7 +74,8 @@ def _corners(name: str, path: Path) -> NDArray[np.float32]:
     if not part.GetVertexCount() or not part.GetTriangleCount():
         raise BadExport(f"{name}: a mesh without triangles; {AGAIN}")
     points = _rows(part, "getvertices", part.GetVertexCount(), np.float32)
-    return points[_rows(part, "gettriangleindices", part.GetTriangleCount(), np.uint32)]
+    corners = _rows(part, "gettriangleindices", part.GetTriangleCount(), np.uint32)
+    return np.asarray(points[corners], np.float32)
 
 
 def _rows(part: Any, function: str, count: int, kind: type[np.generic]) -> NDArray[Any]:
