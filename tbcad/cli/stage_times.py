@@ -1,8 +1,9 @@
 """How long each stage of a build and of a verification takes, for the estimate of the time left.
 
 Measured: the paper's design (n = 18) on two cores, both parts. The stages of the shell are scaled
-by the number of mirrors, which grows with n squared, but for a fixed share; those of the prototype, whose number of parts
-hardly depends on n, are not. The pace of the computer at hand is taken from the stages as they end.
+by the number of mirrors, which grows with n squared, but for a fixed share; those of the prototype,
+whose number of parts hardly depends on n, are not. The pace of the computer at hand is taken from
+the stages as they end.
 """
 
 import json

@@ -169,9 +169,8 @@ def test_expected_times_grow_with_the_mirrors() -> None:
     small, large = (build_times(n, PARTS, verify=True, process="cnc") for n in (6, 36))
     assert list(small) == list(large)
     assert next(iter(small)) == "margin for cnc"
-    assert large["verification: STEP"] == pytest.approx(
-        4 * verify_times(18, PARTS)["verification: STEP"]
-    )
+    measured = verify_times(18, PARTS)["verification: STEP"]
+    assert 3 * measured < large["verification: STEP"] < 4 * measured
     assert small["prototype: base"] == large["prototype: base"]
     shells = build_times(18, ("shell",), verify=True, process=None)
     assert not any("prototype" in title for title in shells)
