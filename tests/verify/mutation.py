@@ -76,7 +76,8 @@ def mutated(change: Change) -> str:
     """The module's text with the change."""
     tree = ast.parse((PACKAGE / change.module).read_text())
     node = next(one for k, one in enumerate(ast.walk(tree)) if k == change.index)
-    _changed(node)
+    if _changed(node) != change.what:
+        raise SystemExit(f"{change.module} was edited while mutations of it were tried")
     return ast.unparse(tree)
 
 
