@@ -100,7 +100,7 @@ def test_hopeless_targets_name_the_mirrors() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(
-    n=st.integers(1, 10),
+    n=st.integers(2, 10),
     x=st.floats(60, 250),
     y=st.floats(-30, 30),
     z=st.floats(-250, -60),

@@ -109,7 +109,7 @@ def test_the_command_refuses_in_one_line(
     before = files_of(export_folder)
     assert main([str(export_folder)]) == 2
     out = capsys.readouterr()
-    (last,) = [line for line in out.err.splitlines() if not line.startswith("verify: ")]
+    (last,) = [line for line in out.err.splitlines() if not line.startswith("[")]
     assert "shell_b.stl: missing" in last
     assert out.out == ""
     assert files_of(export_folder) == before
