@@ -8,6 +8,7 @@ import numpy as np
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.solids import centroid
+from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.primitives import Component
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.arrangement import Arrangement, arrangements, balance_and_drive
@@ -108,6 +109,8 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
     printer, parts = spec.printer, arrangement.parts
     progress("prototype: base")
     carrier = carrier_parts(base, arrangement.split, printer)
+    for part in carrier:
+        check_read_back(part.name, part.shape)
     masses = _masses(carrier, printer.density_g_cm3)
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
