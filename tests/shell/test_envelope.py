@@ -56,6 +56,6 @@ def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     assert "lower bolts" in str(caught.value)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 30])
+@pytest.mark.parametrize("n", [2, 3, 5, 30])
 def test_every_n_gets_an_envelope(n: int) -> None:
     assert shell_envelope(design(load_spec(None, [f"n={n}"]))).back.offset > 0

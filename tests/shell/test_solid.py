@@ -11,7 +11,6 @@ from tests.helpers import area, volume
 @pytest.mark.parametrize(
     "options",
     [
-        ["n=1"],
         ["n=2"],
         ["n=5"],
         ["n=6"],
