@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from OCP.Standard import Standard_Failure
+from OCP.StdFail import StdFail_NotDone
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.solids import centroid
@@ -32,7 +34,8 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Progress
 
-MAX_MODELS = 4  # arrangements whose solids are tried
+# Arrangements whose solids are tried, and how many of them with the same number of balls.
+MAX_MODELS, MAX_PADS = 6, 2
 CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
 COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
 
@@ -92,13 +95,15 @@ def build_prototype_model(
     progress("prototype: balls, their places, stops")
     errors: dict[tuple[int, float], Exception] = {}
     for arrangement in arrangements(design):
-        seats = len(arrangement.layout), arrangement.base.seats.tilt
-        if seats in errors:
+        balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
+        if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
         try:
             return _model(arrangement, progress)
         except (SpecError, InvalidSolidError) as error:
-            errors[seats] = error
+            errors[balls, tilt] = error
+        except (Standard_Failure, StdFail_NotDone) as error:
+            errors[balls, tilt] = InvalidSolidError(f"the CAD kernel fails: {error}")
         if len(errors) == MAX_MODELS:
             break
     raise next(iter(errors.values()))
