@@ -14,7 +14,7 @@ from tbcad.cad.solids import volume
 from tbcad.formats.step import write_step
 
 MAX_GAP_MM = 1e-5
-VOLUME_ERROR = 1e-6  # as a share of the volume
+VOLUME_ERROR = 1e-5  # as a share of the volume; the kernel integrates to some 2e-6
 MAXIMUM = 1  # of the tolerances in a shape
 
 
