@@ -53,8 +53,8 @@ def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
     Raises:
         Unknown: there is no back, more than one, or no spheroid.
     """
-    table = StepTable(text)
     try:
+        table = StepTable(text)
         backs = table.of("SURFACE_OF_REVOLUTION")
         if len(backs) != 1:
             raise Unknown(f"{len(backs)} surfaces of revolution, where the back is one")
