@@ -24,7 +24,6 @@ from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.section import AUTO
 from tbcad.spec.sizes import led_places
-from tbcad.types import Progress
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
@@ -59,14 +58,8 @@ class Arrangement:
     parts: Parts
 
 
-def arrangements(
-    design: MirrorDesign, progress: Progress = lambda _: None
-) -> Iterator[Arrangement]:
+def arrangements(design: MirrorDesign) -> Iterator[Arrangement]:
     """Every arrangement that has room, the preferred first.
-
-    Args:
-        design: the mirrors.
-        progress: called with what is tried.
 
     Raises:
         SpecError: at the end, when there was none; it names the cause in the preferred one, and
@@ -75,7 +68,7 @@ def arrangements(
     tried: list[int] = []
     first_error: SpecError | None = None
     found = False
-    for spec, outcome in _attempts(design, progress):
+    for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, Arrangement):
             found = True
@@ -86,9 +79,9 @@ def arrangements(
         raise SpecError(f"{first_error}{_remedy(design, tried)}") from None
 
 
-def arrange(design: MirrorDesign, progress: Progress = lambda _: None) -> Arrangement:
+def arrange(design: MirrorDesign) -> Arrangement:
     """The preferred arrangement; raises as `arrangements`."""
-    return next(arrangements(design, progress))
+    return next(arrangements(design))
 
 
 def balance_and_drive(
@@ -111,12 +104,11 @@ Outcome = tuple[Spec, Arrangement | SpecError]
 """What was tried, and its arrangement or why it has none."""
 
 
-def _attempts(design: MirrorDesign, progress: Progress) -> Iterator[Outcome]:
+def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
     """Outcomes for every number of balls."""
     parts = load_parts()
     for k in ball_counts(design.spec, design):
         spec = _with(design.spec, k=k)
-        progress(f"{k} balls, their places, stops")
         try:
             layout = prototype_layout(spec, design, k)
         except SpecError as error:

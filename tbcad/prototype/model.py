@@ -119,8 +119,9 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
     masses = _masses(carrier, printer.density_g_cm3)
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
-    stage, keep_out = arrangement.stage, arrangement.keep_out
-    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
+    stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
+    if drive != arrangement.drive:  # the mass of the solids asks for another
+        frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     static = [
         *_components("stage", stage.components, printer),
         *_components("frame", frame.printed, printer),
