@@ -187,7 +187,7 @@ def build(
     mirrors = design(chosen, detail=detail)
     with replacing(out, force) as folder:
         export = write_export(mirrors, folder, asked, progress, optional_prototype=parts is None)
-        made = Design(export.spec, mirrors.halves)
+        finished = Design(export.spec, mirrors.halves)
         report = None
         if verify:
             # The files are read back before they replace the old ones.
@@ -195,10 +195,10 @@ def build(
                 _verify(folder, progress=progress),
                 folder=out,
                 note=export.note,
-                as_made=_as_made(made, export.parts, progress, detail),
+                as_made=_as_made(finished, export.parts, progress, detail),
                 seconds=monotonic() - started,
             )
-    return Build(out, made, export.parts, export.note, report)
+    return Build(out, finished, export.parts, export.note, report)
 
 
 def _as_made(

@@ -9,7 +9,7 @@ import typer
 
 from tbcad.cli.stage_times import build_times
 from tbcad.mirrors.array import design
-from tbcad.output.overview import Overview, Print, PrototypeOverview, overview
+from tbcad.output.overview import Overview, PrintEstimate, PrototypeOverview, overview
 from tbcad.output.parts import PROTOTYPE, default_parts
 from tbcad.screen import Stages
 from tbcad.spec.design import Spec
@@ -79,7 +79,7 @@ def _prototype_lines(found: PrototypeOverview) -> Iterator[str]:
     yield f"  printed parts   {_print_text(found.prints)}"
 
 
-def _print_text(found: Print) -> str:
+def _print_text(found: PrintEstimate) -> str:
     return (
         f"{found.volume_cm3:.0f} cm3, about {found.mass_g:.0f} g, {found.hours:.0f} h, "
         f"{found.price:.0f} EUR by FDM"

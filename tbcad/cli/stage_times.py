@@ -75,9 +75,9 @@ def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None)
     shells = scaled(SHELLS, n) if SHELL in parts else {}
     prototype = PROTOTYPE_PARTS if PROTOTYPE in parts else {}
     both = set(PARTS) <= {*parts}
-    made = prototype | scaled(WAIT_FOR_SHELLS, n) if both else shells | prototype
+    solids = prototype | scaled(WAIT_FOR_SHELLS, n) if both else shells | prototype
     margin = {} if process is None else scaled({margin_stage(process): MARGIN_SECONDS}, n)
-    times = margin | scaled(MIRRORS, n) | made | MANIFEST
+    times = margin | scaled(MIRRORS, n) | solids | MANIFEST
     return times | (verify_times(n, parts) | as_made_times(n, parts) if verify else {})
 
 

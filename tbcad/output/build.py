@@ -61,7 +61,7 @@ def write_export(
     else:
         shell_envelope(design)  # refuses flanges that do not fit before anything is built
         with in_background(write_shells, design, folder):
-            export = _prototype_beside_shells(design, folder, progress, optional_prototype)
+            export = _prototype_with_shells(design, folder, progress, optional_prototype)
             progress("shells")
     write_record(folder, replace(design, spec=export.spec), SHELL in parts)
     progress("manifest")
@@ -69,7 +69,7 @@ def write_export(
     return export
 
 
-def _prototype_beside_shells(
+def _prototype_with_shells(
     design: MirrorDesign, folder: Path, progress: Progress, optional: bool
 ) -> Export:
     try:

@@ -29,7 +29,7 @@ MM3_PER_CM3 = 1000.0
 
 
 @dataclass(frozen=True)
-class Print:
+class PrintEstimate:
     """An estimate of what is printed.
 
     Attributes:
@@ -73,7 +73,7 @@ class PrototypeOverview:
     ball_price: float
     turning_mass_g: float
     motor: str
-    prints: Print
+    prints: PrintEstimate
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Overview:
     radius_mm: tuple[float, float] | None
     minimum_coverage_mm: float
     view_angle_deg: float
-    shell_prints: Print | None
+    shell_prints: PrintEstimate | None
     prototype: PrototypeOverview | None
     note: str
 
@@ -135,11 +135,11 @@ def overview(
     )
 
 
-def _shells(design: MirrorDesign) -> Print:
+def _shells(design: MirrorDesign) -> PrintEstimate:
     spec = design.spec.model_copy(update={"mesh": COARSE})
     mesh = camera_a_mesh(MirrorDesign(spec, design.halves))
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
-    return _print(2 * float(np.einsum("tx,tx->", a, np.cross(b, c))) / 6, design.spec)
+    return _print_estimate(2 * float(np.einsum("tx,tx->", a, np.cross(b, c))) / 6, design.spec)
 
 
 def _prototype(arrangement: Arrangement) -> PrototypeOverview:
@@ -155,7 +155,7 @@ def _prototype(arrangement: Arrangement) -> PrototypeOverview:
         ball_price=layout.mass_g / 1000 * BALLS_PER_KG,
         turning_mass_g=arrangement.balance.mass_g,
         motor=arrangement.drive.motor.name,
-        prints=_print(_printed_volume(arrangement), arrangement.spec),
+        prints=_print_estimate(_printed_volume(arrangement), arrangement.spec),
     )
 
 
@@ -173,7 +173,9 @@ def _component_volume(component: Component) -> float:
     return max(added - removed, 0.0)
 
 
-def _print(volume_mm3: float, spec: Spec) -> Print:
+def _print_estimate(volume_mm3: float, spec: Spec) -> PrintEstimate:
     volume_cm3 = volume_mm3 / MM3_PER_CM3
     mass = volume_cm3 * FILLED * spec.printer.density_g_cm3
-    return Print(volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, mass / 1000 * FILAMENT_PER_KG)
+    return PrintEstimate(
+        volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, mass / 1000 * FILAMENT_PER_KG
+    )
