@@ -8,12 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
+from tbcad_verify.mesh.holes import round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.segments import creases, measure_edges, rounding
 from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.shell.files import camera_a_mesh
+from tbcad.spec.load import load_spec
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells, Design, export, facets_of, stl
 
@@ -120,7 +124,7 @@ def closed_cap(radius: float, warp: float) -> Mesh:
 def test_concave_edges_inside_a_sphere_do_not_split_it(radius: float) -> None:
     mesh = closed_cap(radius, 0.12)
     edges = measure_edges(mesh)
-    inside = edges.half[creases(edges) & (edges.angle < 0)]
+    inside = edges.half[creases(mesh, edges) & (edges.angle < 0)]
     assert inside.size > 20  # or the test tests nothing
     found = recover(mesh, PINHOLE, 30)
     assert found.mirror.sum() == 1
@@ -184,6 +188,51 @@ def test_a_countersink_is_no_mirror() -> None:
     assert (found.segments.label[:60] == tip).all()
     assert found.fits.form[tip] < 1e-6
     assert not found.mirror.any()
+
+
+def shell(camera: list[float], semi_minor: float, capture: float) -> tuple[MirrorDesign, Mesh]:
+    """Camera a's half of a design of n = 3, in 32-bit floats as in its STL."""
+    options = [f"camera_mm={camera}", f"semi_minor_mm={semi_minor}"]
+    designed = design(load_spec(None, ["n=3", f"capture_diameter_mm={capture}", *options]))
+    mesh = camera_a_mesh(designed)
+    points = mesh.vertices.astype(np.float32).astype(np.float64)
+    return designed, indexed_mesh(points, mesh.triangles.astype(np.int32))
+
+
+@pytest.mark.parametrize(
+    ("camera", "semi_minor", "capture"),
+    [([61.3, 0, -51.4], 82.6, 35), ([39.3, 0, -99.8], 70.9, 51), ([58.9, 0, -58.2], 101.2, 78.3)],
+)
+def test_strips_of_a_hole_are_no_mirrors(
+    camera: list[float], semi_minor: float, capture: float
+) -> None:
+    """Strips of holes in the flanges face camera and object, and would send light there."""
+    designed, mesh = shell(camera, semi_minor, capture)
+    found = recover(mesh, np.array(camera), capture / 2)
+    assert found.mirror.sum() == len(designed.halves[0])
+    strips = found.segments.label[round_holes(mesh, measure_edges(mesh)).wall]
+    assert strips.size > 500
+    assert not found.mirror[strips].any()
+
+
+@pytest.mark.parametrize(
+    ("camera", "semi_minor", "capture"),
+    [([231.2, 0, -84.1], 53.8, 20), ([197.6, 0, -113.5], 91.2, 26.2)],
+)
+def test_a_mirror_ends_where_the_foot_goes_on_smoothly(
+    camera: list[float], semi_minor: float, capture: float
+) -> None:
+    """The lowest mirror bends into the plane of the foot by less than some mirrors' own facets."""
+    designed, mesh = shell(camera, semi_minor, capture)
+    edges = measure_edges(mesh)
+    found = recover(mesh, np.array(camera), capture / 2)
+    assert found.mirror.sum() == len(designed.halves[0])
+    foot = (mesh.points[mesh.faces][:, :, 2] == np.float32(designed.halves[0].foot)).all(axis=1)
+    mirror = found.mirror[found.segments.label]
+    one, two = edges.half // 3, mesh.twin[edges.half] // 3
+    border = (foot[one] & mirror[two]) | (mirror[one] & foot[two])
+    assert 0.1 < edges.angle[border].min() < 0.2
+    assert creases(mesh, edges)[border].all()
 
 
 def test_rounding_never_makes_a_crease() -> None:

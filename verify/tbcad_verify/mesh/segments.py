@@ -1,8 +1,9 @@
 """Segmentation of a mesh along its creases into smooth patches; mirrors need not be known.
 
-Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat;
-the valley between two mirrors is concave, and a wall meets a mirror at a large angle. What keeps
-"little" from "concave" is only the rounding of the vertices to float32, and that is known: it can
+Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat; the
+valley between two mirrors is concave. A wall may meet a mirror at any convex angle, large or little;
+but it is flat, and what is flat over many facets is no part of a sphere. What keeps "little" from
+"concave" and from "flat" is only the rounding of the vertices to float32, and that is known: it can
 tilt a facet by no more than its leverage over the facet's height.
 """
 
@@ -18,11 +19,15 @@ from tbcad_verify.mesh.mesh import Mesh, connected_groups, paired_half_edges
 from tbcad_verify.mesh.vectors import chunks, cross, dot, norm, unit
 from tbcad_verify.types import Bools, Floats
 
-# A concave edge is a crease beyond this and the rounding. Flat mirrors at n = 60 meet at 0.003.
+# A concave edge is a crease beyond this and the rounding, and so is the edge of a flat region. Flat
+# mirrors at n = 60 meet at 0.003.
 CONCAVE_RAD = 1e-3
 # A convex one beyond this: facets of a mirror differ by 2 sqrt(2 chord error / radius), 0.1 at
-# most for 0.01 mm on the smallest mirrors; walls meet mirrors at 0.36 or more from n = 2 on.
+# most for 0.01 mm on the smallest mirrors.
 SHARP_RAD = 0.2
+# Facets of a flat region, at least. On a sphere two facets may be flat together, as halves of a
+# quad, but hardly more: corners that lie both on it and on a plane lie on one circle.
+FLAT_FACETS = 6
 # If rounding can change an edge's angle by more than this, it must not join two patches.
 BLIND_RAD = 0.05
 # Two facets that lie back to back, closer than this to a full turn: the surface is folded over.
@@ -88,11 +93,20 @@ def rounding(mesh: Mesh) -> float:
     return math.sqrt(3) / 2 * float(np.spacing(np.float32(np.abs(mesh.points).max())))
 
 
-def creases(edges: Edges) -> Bools:
+def creases(mesh: Mesh, edges: Edges) -> Bools:
     """(E,) the edges that part two patches."""
-    concave = edges.angle < -(CONCAVE_RAD + edges.noise)
+    bent = np.abs(edges.angle) > CONCAVE_RAD + edges.noise
     sharp = edges.angle > SHARP_RAD + edges.noise
-    return np.asarray(concave | sharp | (edges.noise > BLIND_RAD))
+    blind = edges.noise > BLIND_RAD
+    return np.asarray(bent & ((edges.angle < 0) | sharp | _beside_flat(mesh, edges)) | blind)
+
+
+def _beside_flat(mesh: Mesh, edges: Edges) -> Bools:
+    """(E,) whether a facet of an edge belongs to a flat region; edges inside one count too."""
+    flat = edges.half[(np.abs(edges.angle) <= edges.noise) & (edges.noise <= BLIND_RAD)]
+    count, region = connected_groups(len(mesh.faces), flat // 3, mesh.twin[flat] // 3)
+    large = (np.bincount(region, minlength=count) >= FLAT_FACETS)[region]
+    return np.asarray(large[edges.half // 3] | large[mesh.twin[edges.half] // 3])
 
 
 def count_folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
@@ -108,7 +122,7 @@ def count_folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
 
 def segment_mesh(mesh: Mesh, edges: Edges) -> Segmentation:
     """Join facets over all edges that are no creases."""
-    smooth = edges.half[~creases(edges)]
+    smooth = edges.half[~creases(mesh, edges)]
     count, label = connected_groups(len(mesh.faces), smooth // 3, mesh.twin[smooth] // 3)
     return Segmentation(label, count)
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh import rays
+from tbcad_verify.mesh.holes import RoundHoles, round_holes
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Mesh, connected_groups, facet_volumes, paired_half_edges
 from tbcad_verify.mesh.segments import Edges, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.holes import RoundHoles, round_holes
 from tbcad_verify.printing.orientations import PartHull, part_hull
 from tbcad_verify.printing.walls import WallThickness, wall_thickness
 from tbcad_verify.types import Floats

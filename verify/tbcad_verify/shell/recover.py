@@ -7,9 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.fits import SurfaceFits
+from tbcad_verify.mesh.holes import round_holes
 from tbcad_verify.mesh.merge import MIN_VERTICES, merge_splinters
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.segments import Segmentation, count_folds, measure_edges, segment_mesh
+from tbcad_verify.mesh.segments import (
+    Edges,
+    Segmentation,
+    count_folds,
+    measure_edges,
+    segment_mesh,
+)
 from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import dot, joined, norm
 from tbcad_verify.types import Bools, Floats
@@ -47,7 +54,7 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
     """Find the mirrors of one part, from triangles alone.
 
     A mirror is a patch of a bulging sphere, or of a plane that sends the camera's light into the
-    capture sphere; in either case it faces both the camera and the object.
+    capture sphere and is not a strip of a round hole's wall; it faces both the camera and the object.
 
     Args:
         mesh: the part.
@@ -56,7 +63,10 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
     """
     edges = measure_edges(mesh)
     segments, fits = merge_splinters(mesh, edges, segment_mesh(mesh, edges))
-    return Recovery(segments, fits, _judge(fits, pinhole, radius_mm), count_folds(edges))
+    mirror = _judge(fits, pinhole, radius_mm)
+    if (mirror & _planes(fits)).any():
+        mirror &= ~_hole_walls(mesh, edges, segments)
+    return Recovery(segments, fits, mirror, count_folds(edges))
 
 
 def join_recoveries(parts: list[Recovery]) -> Recovery:
@@ -90,5 +100,17 @@ def _judge(fits: SurfaceFits, pinhole: Floats | None, radius_mm: float) -> Bools
     # Some of its light lands: what leaves the middle may miss by the patch's own image.
     image = fits.extent * (1 + norm(middle) / norm(incoming))
     lands = norm(middle - along * outgoing) <= radius_mm + image
-    bulges, plane = (fits.sag > FLAT_MM) & (fits.count >= MIN_VERTICES), np.abs(fits.sag) <= FLAT_MM
-    return np.asarray(follows_fit(fits) & facing[0] & facing[1] & (bulges | (plane & lands)))
+    bulges = (fits.sag > FLAT_MM) & (fits.count >= MIN_VERTICES)
+    found = bulges | (_planes(fits) & lands)
+    return np.asarray(follows_fit(fits) & facing[0] & facing[1] & found)
+
+
+def _planes(fits: SurfaceFits) -> Bools:
+    return np.asarray(np.abs(fits.sag) <= FLAT_MM)
+
+
+def _hole_walls(mesh: Mesh, edges: Edges, segments: Segmentation) -> Bools:
+    """(K,) the patches in walls of round holes: each facet of a coarse cylinder is a plane."""
+    walls = np.zeros(segments.count, dtype=np.bool_)
+    walls[segments.label[round_holes(mesh, edges).wall]] = True
+    return walls

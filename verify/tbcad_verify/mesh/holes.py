@@ -33,12 +33,14 @@ class RoundHoles:
         middle: (3, H) mm, at half depth.
         axis: (3, H) unit, of either sign.
         depth: (H,) mm, of the cylinder.
+        wall: the facets of all their walls, ascending.
     """
 
     diameter: Floats
     middle: Floats
     axis: Floats
     depth: Floats
+    wall: Ints
 
     @property
     def smallest(self) -> int | None:
@@ -156,7 +158,13 @@ def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
     good &= widest_gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
     low, high = _extent(dot(axis[:, group], corner), group, patches.count)
     middle = centre[0] * sides[0] + centre[1] * sides[1] + (low + high) / 2 * axis
-    return RoundHoles(2 * radius[good], middle[:, good], axis[:, good], (high - low)[good])
+    return RoundHoles(
+        2 * radius[good],
+        middle[:, good],
+        axis[:, good],
+        (high - low)[good],
+        patches.facet[good[patches.group]],
+    )
 
 
 def _extent(along: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:

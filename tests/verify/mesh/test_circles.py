@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.printing.holes import fit_circles, widest_gaps
+from tbcad_verify.mesh.holes import fit_circles, widest_gaps
 
 
 def test_circles_of_uneven_points() -> None:
