@@ -1,10 +1,10 @@
 """Segmentation of a mesh along its creases into smooth patches; mirrors need not be known.
 
-Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat; the
-valley between two mirrors is concave. A wall may meet a mirror at any convex angle, large or little;
-but it is flat, and what is flat over many facets is no part of a sphere. What keeps "little" from
-"concave" and from "flat" is only the rounding of the vertices to float32, and that is known: it can
-tilt a facet by no more than its leverage over the facet's height.
+Inside a mirror, which bulges, every edge is convex by the little angle of its facets, or flat;
+the valley between two mirrors is concave. A wall may meet a mirror at any convex angle; but it is
+flat, and what is flat over many facets is no part of a sphere. What keeps "little" from "concave"
+and from "flat" is only the rounding of the vertices to float32, and that is known: it can tilt a
+facet by no more than its leverage over the facet's height.
 """
 
 from __future__ import annotations

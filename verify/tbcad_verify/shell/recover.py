@@ -54,7 +54,7 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
     """Find the mirrors of one part, from triangles alone.
 
     A mirror is a patch of a bulging sphere, or of a plane that sends the camera's light into the
-    capture sphere and is not a strip of a round hole's wall; it faces both the camera and the object.
+    capture sphere and is no strip of a round hole's wall; it faces both the camera and the object.
 
     Args:
         mesh: the part.
