@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tests.verify.corpus.facets import HALVES
+from tests.verify.corpus.mesh_casings import aside, closed, dented_back, widened
+from tests.verify.corpus.mesh_casings import grown as grown_back
 from tests.verify.corpus.mesh_changes import (
     INCH,
     ascii_stl,
@@ -40,7 +42,7 @@ from tests.verify.corpus.mesh_changes import (
     warped,
     without,
 )
-from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.mutation import Mutation, fails, only, refused
 from tests.verify.corpus.patches import fan, pushed
 
 BOTH = "STL, 3MF"
@@ -61,6 +63,13 @@ MESHES: tuple[Mutation, ...] = (
     fails(
         "a mirror of too few facets", BOTH, mesh(lambda c, e: fan(c, e[0]), 1), "coverage, facets"
     ),
+    # The STEP is right, and so little material is moved that its volume agrees.
+    only(fails("a bolt hole 50 um too wide", BOTH, mesh(widened), "mesh holes", "of 4.35 mm")),
+    only(fails("a bolt hole 50 um aside", BOTH, mesh(aside), "mesh holes", "0.05 mm from its")),
+    only(fails("a bolt hole missing", BOTH, mesh(closed), "mesh holes", "4 holes of 4.3 mm")),
+    only(fails("a dent in the back", BOTH, mesh(dented_back), "mesh wall", "the spec has 3")),
+    fails("a wall of 1 mm in the mesh", BOTH, mesh(grown_back(-2)), "mesh wall", "spec has 3"),
+    fails("a wall of 9 mm in the mesh", BOTH, mesh(grown_back(6)), "mesh wall", "spec has 3"),
     fails("a crack, one last place wide", BOTH, mesh(cracked), "watertight", "open"),
     fails("a facet missing", BOTH, mesh(without(1)), "watertight", "3 open"),
     fails("a mirror's facets missing", BOTH, mesh(opened, 1), "mirrors found", "missing"),

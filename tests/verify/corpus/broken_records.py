@@ -118,6 +118,13 @@ RECORDS: tuple[Mutation, ...] = (
         "step holes",
         "not 9",
     ),
+    fails(
+        "a flange wider by 1 mm",
+        JSON,
+        design(flange("foot_flange", width_mm=13.0)),
+        "step holes",
+        "from its place",
+    ),
     *(
         fails(f"radius rule: {what}", JSON, design(mirror_spec(**keys)), "radius rule", "by rule")
         for what, keys in (

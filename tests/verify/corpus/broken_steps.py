@@ -16,6 +16,7 @@ from tests.verify.corpus.step_changes import (
     cut_with_end,
     dropped,
     hole,
+    hole_aside,
     inches,
     middle,
     misnamed,
@@ -100,6 +101,7 @@ STEPS: tuple[Mutation, ...] = (
     ),
     fails("STEP: an edge 1 mm beside its corners", KIND, whole(crooked), "step gaps"),
     fails("STEP: a hole 20 um too wide", KIND, whole(hole), "step properties", "volume"),
+    fails("STEP: a hole 50 um aside", KIND, whole(hole_aside), "step holes", "0.05 mm from its"),
     fails("STEP: the back 5 um off", KIND, whole(back), "step properties", "volume"),
     fails(
         "STEP claims another volume",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 # Breaks a copy of a good export in place, and returns what the message must name (mirrors, files).
@@ -26,6 +26,7 @@ class Mutation:
         during: the stage at whose beginning the job is done; empty: before the verification.
         signed: the manifest is written anew, so that measuring and not hashing must catch it.
         heavy: wants gigabytes of memory; not for every test run.
+        alone: no other check may fail.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Mutation:
     during: str = ""
     signed: bool = True
     heavy: bool = False
+    alone: bool = False
 
 
 def fails(name: str, kind: str, job: Job, checks: str | tuple[str, ...], *words: str) -> Mutation:
@@ -48,3 +50,8 @@ def fails(name: str, kind: str, job: Job, checks: str | tuple[str, ...], *words:
 def refused(name: str, kind: str, job: Job, *words: str) -> Mutation:
     """A mutation after which the folder is no export."""
     return Mutation(name, kind, job, 2, (), words)
+
+
+def only(mutation: Mutation) -> Mutation:
+    """The same, of which no other check may say anything."""
+    return replace(mutation, alone=True)

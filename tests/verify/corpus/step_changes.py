@@ -164,20 +164,30 @@ def hole(entities: Entities) -> None:
     """One hole 0.02 mm too wide, its edges with it."""
     number = all_of(entities, "CYLINDRICAL_SURFACE")[0]
     radius = entities[number].rpartition(",")[2]
-    owner = next(n for n in all_of(entities, "ADVANCED_FACE") if f"#{number}," in entities[n])
-    for one in {number, *circles_of(entities, owner)}:
+    for one in {number, *below(entities, _owner(entities, number), "CIRCLE")}:
         if entities[one].endswith(f",{radius}"):
             shift(entities, one, 0.01)
 
 
-def circles_of(entities: Entities, owner: int) -> set[int]:
-    """All circles below a face."""
+def hole_aside(entities: Entities) -> None:
+    """One hole 0.05 mm along its flange: its points belong to it alone."""
+    owner = _owner(entities, all_of(entities, "CYLINDRICAL_SURFACE")[0])
+    for point in below(entities, owner, "CARTESIAN_POINT"):
+        shift(entities, point, 0.05, 1)
+
+
+def _owner(entities: Entities, surface: int) -> int:
+    return next(n for n in all_of(entities, "ADVANCED_FACE") if f"#{surface}," in entities[n])
+
+
+def below(entities: Entities, owner: int, kind: str) -> set[int]:
+    """All entities of a kind that a face consists of."""
     found: set[int] = set()
     rest = [owner]
     while rest:
-        below = references(entities[rest.pop()])
-        found |= {n for n in below if entities[n].startswith("CIRCLE(")}
-        rest += [n for n in below if not entities[n].startswith(("CIRCLE(", "APPLICATION"))]
+        parts = references(entities[rest.pop()])
+        found |= {n for n in parts if entities[n].startswith(f"{kind}(")}
+        rest += [n for n in parts if not entities[n].startswith("APPLICATION")]
     return found
 
 

@@ -84,6 +84,8 @@ def _verdict(mutation: Mutation, words: list[str], checks: Sequence[Check]) -> t
     mine = [c for c in bad if c.name in mutation.checks and (c.passed is None) == mutation.unknown]
     if not mine and mutation.status:
         return 1, said, f"none of {', '.join(mutation.checks)} says so"
+    if mutation.alone and len(mine) < len(bad):
+        return 1, said, "another check says so too"
     return int(bool(bad)), said, _missing(words, "; ".join(check.detail for check in mine))
 
 

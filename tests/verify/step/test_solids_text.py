@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.casing import Casing, hole_faults, read_casing, wall
+from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.solids_text import (
-    Hole,
     RoundFace,
     distance_to_line,
     holes,
@@ -72,30 +70,6 @@ def test_the_wall_is_the_design_s(casing: Casing, sample: Export) -> None:
         wall(casing, sample.cameras["a"], sample.semi_minor_mm + 0.01)
 
 
-@pytest.mark.parametrize(
-    ("flange", "key", "value", "words"),
-    [
-        ("seam_flange", "bolts", 7, "seam flange: 6 holes of 4.3 mm, not 7"),
-        ("foot_flange", "bolts", 4, "foot flange: 5 holes of 4.3 mm, not 4"),
-        ("foot_flange", "dowels", 3, "foot flange: 2 holes of 4 mm, not 3"),
-        ("seam_flange", "bolt_hole_mm", 4.31, "seam flange: 0 holes of 4.31 mm, not 6"),
-        ("foot_flange", "thickness_mm", 5.01, "foot flange: a hole 5 mm deep, not 5.01"),
-    ],
-)
-def test_other_holes_are_faults(
-    casing: Casing, sample: Export, flange: str, key: str, value: float, words: str
-) -> None:
-    shell = sample.spec.shell
-    assert hole_faults(casing, shell, sample.foot_z_mm) == []
-    other = getattr(shell, flange).model_copy(update={key: value})
-    faults = hole_faults(casing, shell.model_copy(update={flange: other}), sample.foot_z_mm)
-    assert words in faults
-
-
-def test_a_flange_elsewhere_is_a_fault(casing: Casing, sample: Export) -> None:
-    assert hole_faults(casing, sample.spec.shell, sample.foot_z_mm + 0.01)
-
-
 def test_what_is_no_shell_is_unknown(text: str) -> None:
     with pytest.raises(Unknown, match="0 surfaces of revolution"):
         read_casing(text.replace("SURFACE_OF_REVOLUTION", "PLANE"), frozenset())
@@ -121,11 +95,3 @@ def test_faces_of_one_hole_are_counted_once_and_of_two_twice() -> None:
     assert [hole.depth for hole in holes((face(0, 3), face(2, 4)), 2.0, 1e-6)] == [4]
     assert [hole.depth for hole in holes((face(5, 9), face(0, 3)), 2.0, 1e-6)] == [3, 4]
     assert holes((face(0, 3, hollow=False),), 2.0, 1e-6) == []
-
-
-def test_a_hole_in_no_flange_is_a_fault(casing: Casing, sample: Export) -> None:
-    axis = np.array([0.0, 1.0, 0.0])
-    extra = Hole(np.zeros(3), axis, 2.0, 5.0)
-    other = replace(casing, holes=(*casing.holes, extra))
-    faults = hole_faults(other, sample.spec.shell, sample.foot_z_mm)
-    assert faults == ["a hole of 4 mm in no flange"]

@@ -17,7 +17,7 @@ from tbcad_verify.types import Floats
 GRAVITY = 9.80665  # m/s^2, standard
 MOTORS_NMM = {"NEMA17-40": 450.0, "NEMA17-48": 590.0, "NEMA17-60": 650.0, "STAGE-60": 300.0}
 STAGE_RATIO = 90.0
-EFFICIENCY = {"nema17-belt": 0.95, "nema17-direct": 1.0, "stage-60": 1.0}
+EFFICIENCY = {"nema17-belt": 0.95, "nema17-direct": 1.0, "stage-60": 0.3}
 FULL_STEPS = 200.0
 STEPS_PER_PERIOD = 4.0  # full steps in a period of a stepper's torque
 PITCH_MM, RIM_MM = 2.0, 1.5  # of GT2; of a wheel's rim over the pitch circle

@@ -29,8 +29,8 @@ TRAVEL_MM = 5.0 + HOLE_MM  # of a bracket's screw in its slot, to either side
 UPRIGHT_SCREWS = 8  # of the head and of two feet, each with a nut in the slot
 LEAST_GRIP_MM = 4.0  # of a screw beyond the flange
 MOTOR_SCREWS = 4
-WHEEL_INSERTS = 4  # of the hub, for the wheel
-LOCK_SCREWS = {"set-screws": 2, "clamp": 1}
+HUB_INSERTS = {"nema17-belt": 4, "nema17-direct": 4, "stage-60": 0}  # for wheel or coupling
+LOCK_SCREWS = {"set-screws": 2, "clamp": 1}  # of a shaft, each with an insert
 CUT = ", cut to "  # of what is bought longer
 SHARE = 1e-9  # of figures that follow from others
 CAP_SHARE = 0.75  # of a cap's volume that is left beside its magnet's pocket
@@ -119,12 +119,12 @@ def _bought(context: PrototypeContext, solids: Solids) -> dict[str, int]:
 def _fasteners(context: PrototypeContext, solids: Solids) -> dict[str, int]:
     """Quantities of parts whose lengths are chosen, by a pattern of their names."""
     prototype, spec = context.prototype, context.export.spec.prototype
-    base, belt = spec.base, spec.base.drive == "nema17-belt"
+    base, stage = spec.base, spec.base.drive == "stage-60"
     inserts = solids.count(base.insert_hole_mm / 2)
-    lock = LOCK_SCREWS[base.lock] if belt else 0
-    joints = inserts - WHEEL_INSERTS - lock if belt else 0
+    lock = 0 if stage else LOCK_SCREWS[base.lock]
     set_screws = lock if base.lock == "set-screws" else 0
-    motor = MOTOR_SCREWS + joints + lock - set_screws
+    # Every other insert is a joint's, with a screw of its own.
+    in_base = inserts - HUB_INSERTS[base.drive] - set_screws
     in_plate = len(prototype.plate_holes) if prototype.plate_holes else 0
     found = {
         r"TNUT-M5-\d+": UPRIGHT_SCREWS,
@@ -133,11 +133,13 @@ def _fasteners(context: PrototypeContext, solids: Solids) -> dict[str, int]:
         r"M4x\d+": 1,
         r"INSERT-M3": inserts,
         r"UNC1/4-20x[\d.]+": int(spec.camera_diameter_mm > 0),
-        r"GT2-\d+-\d+": int(belt),
+        r"GT2-\d+-\d+": int(base.drive == "nema17-belt"),
         r"DOWEL-\S+": solids.count((base.dowel_mm + base.dowel_press_mm) / 2),
         r"SET-M3x\d+": 1 + set_screws,
+        r"M3x\d+": in_base + (0 if stage else MOTOR_SCREWS),
+        r"M6x\d+": MOTOR_SCREWS if stage else 0,
     }
-    return found | {r"M6x\d+" if base.drive == "stage-60" else r"M3x\d+": motor}
+    return {pattern: quantity for pattern, quantity in found.items() if quantity}
 
 
 def _row_faults(

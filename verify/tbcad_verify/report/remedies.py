@@ -41,6 +41,8 @@ REMEDIES = {
     "manifold3d": _MESH,
     "folds": _MESH,
     "mirrors found": _MESH,
+    "mesh wall": _MESH,
+    "mesh holes": _MESH,
     "form error": _MIRROR,
     "centre error": _MIRROR,
     "radius error": _MIRROR,

@@ -15,7 +15,8 @@ from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
 from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
-from tbcad_verify.printing.part_measures import measure
+from tbcad_verify.printing.holes import RoundHoles
+from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.prototype.stages import PRINTING, verify_prototype
@@ -34,6 +35,7 @@ from tbcad_verify.shell.integrity import (
     mesh_checks,
     record_checks,
 )
+from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import Recovery, recover
 from tbcad_verify.types import Floats
@@ -113,11 +115,14 @@ def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> 
     facets[: len(export.parts)] = []  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
+    holes = {}
     for shell in shells:
-        _assess_printing(shell, profiles, bool(printers), sink)
+        measures = _assess_printing(shell, profiles, bool(printers), sink)
+        if measures:
+            holes[shell.part.name] = measures.holes
 
     if export.parts:
-        _trace_shells(export, shells, sink)
+        _trace_shells(export, shells, holes, sink)
     if export.prototype:
         measured = verify_prototype(export, export.prototype, facets, sink)
         sink(Results(stages=[PRINTING]))
@@ -162,23 +167,33 @@ def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
 
 def _assess_printing(
     measured: ShellPart | MeasuredPart, profiles: list[Profile], required: bool, sink: ResultSink
-) -> None:
+) -> PartMeasures | None:
+    """The checks of all printers; what was measured for them, if it could be."""
     stl, reason = measured.part.stl, measured.reason
+    mesh, mass, topology = measured.mesh, measured.mass, measured.topology
+    measures, lost = attempt(
+        lambda: measure(
+            require(mesh, reason), require(topology, reason).status, require(mass, reason)
+        )
+    )
 
     def work() -> list[Check]:
-        topology = require(measured.topology, reason)
-        shape = measure(
-            require(measured.mesh, reason), topology.status, require(measured.mass, reason)
-        )
+        shape = require(measures, lost)
         prints = [assess(stl, shape, profile) for profile in profiles]
         sink(Results(printing=[to_row(one) for one in prints]))
         return [print_check(one, required) for one in prints]
 
     sink(Results(checks=guarded([print_name(stl, profile) for profile in profiles], work)))
+    return measures
 
 
-def _trace_shells(export: Export, shells: list[ShellPart], sink: ResultSink) -> None:
-    """The optical stages: mirrors against the record, coverage, and every pixel."""
+def _trace_shells(
+    export: Export,
+    shells: list[ShellPart],
+    holes: Mapping[str, RoundHoles],
+    sink: ResultSink,
+) -> None:
+    """The optical stages: mirrors against the record, the casing, coverage, and every pixel."""
     files = ", ".join(part.stl for part in export.parts)
 
     def report(
@@ -193,6 +208,8 @@ def _trace_shells(export: Export, shells: list[ShellPart], sink: ResultSink) -> 
         lambda: mirrors_found.checks(require(setup, no_setup), files),
         mirrors_found.columns(setup) if setup else {},
     )
+    casing = guarded(casing_names(export), lambda: casing_checks(require(setup, no_setup), holes))
+    sink(Results(checks=casing))
 
     sink(Results(stages=[COVERAGE]))
     covered, not_covered = attempt(lambda: coverage.measure(require(setup, no_setup)))

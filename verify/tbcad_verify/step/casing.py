@@ -13,13 +13,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.record.export import Camera
-from tbcad_verify.record.spec import FlangeSpec, ShellSpec
+from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.solids_text import TEXT, Hole, StepTable, holes, round_face
+from tbcad_verify.step.solids_text import TEXT, StepTable, holes, round_face
 from tbcad_verify.types import Floats
 
 AXIAL_MM = 1e-6  # of the spheroid's centre, axis and semi-axes
-HOLE_MM = 1e-6  # of radii, depths and places
+HOLE_MM = 1e-6  # of radii and places along an axis
 MERIDIAN = 20_000  # points on a quarter of an ellipse
 HALVINGS = 60
 
@@ -114,31 +114,3 @@ def _deepest(casing: Casing, own: Floats, most: float) -> float:
         inside = ((places / (own + middle)) ** 2).sum(axis=1).max() <= 1
         low, high = (low, middle) if inside else (middle, high)
     return high
-
-
-def hole_faults(casing: Casing, spec: ShellSpec, foot_mm: float) -> list[str]:
-    """What is wrong with the holes: number, diameter, direction, depth and place."""
-    faults: list[str] = []
-    left = list(casing.holes)
-    flanges = (("seam", 0, spec.seam_flange, 0.0), ("foot", 2, spec.foot_flange, foot_mm))
-    for name, axis, flange, face in flanges:
-        mine = [hole for hole in left if abs(hole.axis[axis]) > 1 - HOLE_MM]
-        left = [hole for hole in left if abs(hole.axis[axis]) <= 1 - HOLE_MM]
-        faults += [f"{name} flange: {fault}" for fault in _flange_faults(mine, flange, axis, face)]
-    return faults + [f"a hole of {2 * hole.radius:g} mm in no flange" for hole in left]
-
-
-def _flange_faults(found: list[Hole], flange: FlangeSpec, axis: int, face: float) -> list[str]:
-    wanted = [flange.bolt_hole_mm] * flange.bolts + [flange.dowel_hole_mm] * flange.dowels
-    have = [2 * hole.radius for hole in found]
-    faults = []
-    for diameter in sorted({*wanted, *(round(one, 6) for one in have)}):
-        number = sum(abs(one - diameter) <= HOLE_MM for one in have)
-        if number != wanted.count(diameter):
-            faults.append(f"{number} holes of {diameter:g} mm, not {wanted.count(diameter)}")
-    for hole in found:
-        # The middle of the hole is the middle of the flange, which begins at its joining face.
-        depth = abs(abs(hole.point[axis] - face) - flange.thickness_mm / 2)
-        if max(abs(hole.depth - flange.thickness_mm), depth) > HOLE_MM:
-            faults.append(f"a hole {hole.depth:g} mm deep, not {flange.thickness_mm:g}")
-    return faults

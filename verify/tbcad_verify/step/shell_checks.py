@@ -14,6 +14,7 @@ from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.files import FileBytes
+from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
@@ -26,7 +27,7 @@ from tbcad_verify.report.checks import (
     short_list,
 )
 from tbcad_verify.run.child import Limits
-from tbcad_verify.step.casing import Casing, hole_faults, read_casing, wall
+from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
@@ -43,6 +44,7 @@ SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
 CELL_SHARE = 1e-6  # of a cell's area
 MIDDLE_MM = 1e-5
 WALL_MM = 1e-3  # the deepest point may lie between corners
+HOLE_LIMITS = HoleLimits(size=1e-6, place=1e-3)  # lengths along a section are sums of chords
 COVERAGE_MM = 0.1  # spheres fitted to coarse facets, and outlines between their corners
 COVERAGE = ("recorded coverage", "mirrors.csv", "mm")
 AREAS = ("cell areas", "mirrors.csv", "of the area")
@@ -227,7 +229,9 @@ def _wall(name: CheckName, shell: ShellComparison) -> Check:
 
 def _holes(name: CheckName, shell: ShellComparison) -> Check:
     """Bolt and dowel holes, as the spec has them."""
-    faults = hole_faults(shell.casing, shell.export.spec.shell, shell.export.foot_z_mm)
+    beyond = shell.casing.semi_axes[1] - shell.export.semi_minor_mm
+    wanted = flanges(shell.export, shell.camera, beyond)
+    faults = hole_faults(shell.casing.holes, wanted, HOLE_LIMITS)
     return at_most(name, len(faults), 0, short_list(faults))
 
 

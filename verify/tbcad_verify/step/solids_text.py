@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.part21 import read_entities
 from tbcad_verify.types import Floats
@@ -57,23 +58,6 @@ class TextSolid:
 
     corners: Floats
     faces: tuple[RoundFace, ...]
-
-
-@dataclass(frozen=True)
-class Hole:
-    """A round hole: coaxial hollow faces of one radius that follow each other.
-
-    Attributes:
-        point: (3,) mm, on the axis.
-        axis: (3,) unit; its sign has no meaning.
-        radius: mm.
-        depth: mm.
-    """
-
-    point: Floats
-    axis: Floats
-    radius: float
-    depth: float
 
 
 class StepTable:
@@ -146,7 +130,7 @@ def read_solids(text: str) -> dict[str, TextSolid]:
 
 
 def holes(faces: tuple[RoundFace, ...], radius: float, tolerance: float) -> list[Hole]:
-    """Round holes of a radius, each once, however many faces it has.
+    """Round holes of a radius, each once: coaxial hollow faces that follow each other.
 
     Args:
         faces: of one solid.

@@ -1,0 +1,124 @@
+"""Wall and holes measured on a mesh: a built shell, and the same with other corners."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, mesh_from_facets
+from tbcad_verify.mesh.segments import measure_edges
+from tbcad_verify.mesh.stl import read_facets
+from tbcad_verify.printing.holes import RoundHoles, round_holes
+from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.shell.mesh_casing import (
+    MeshCasing,
+    casing_checks,
+    casing_names,
+    measure_casing,
+)
+from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
+from tbcad_verify.shell.recover import recover
+
+SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
+
+
+@pytest.fixture(scope="module")
+def sample() -> Export:
+    return read_export(SAMPLE)
+
+
+@pytest.fixture(scope="module")
+def meshes(sample: Export) -> list[Mesh]:
+    return [mesh_from_facets(read_facets(sample.folder, part.stl)[0]) for part in sample.parts]
+
+
+@pytest.fixture(scope="module")
+def setup(sample: Export, meshes: list[Mesh]) -> OpticalSetup:
+    return of_meshes(sample, meshes)
+
+
+@pytest.fixture(scope="module")
+def holes(sample: Export, meshes: list[Mesh]) -> dict[str, RoundHoles]:
+    return {
+        part.name: round_holes(mesh, measure_edges(mesh))
+        for part, mesh in zip(sample.parts, meshes, strict=True)
+    }
+
+
+def of_meshes(export: Export, meshes: list[Mesh]) -> OpticalSetup:
+    radius, pairs = export.target_mm / 2, list(zip(meshes, export.parts, strict=True))
+    found = [recover(mesh, pinhole_of(export, part), radius) for mesh, part in pairs]
+    return set_up(export, meshes, found)
+
+
+def test_the_sample_is_as_designed(setup: OpticalSetup, holes: dict[str, RoundHoles]) -> None:
+    found = casing_checks(setup, holes)
+    assert [(one.name, one.file, one.unit) for one in found] == casing_names(setup.export)
+    assert [one.passed for one in found] == [True] * 4
+    assert [one.name for one in found] == ["mesh wall", "mesh holes"] * 2
+    # Of a limit of 0.001 mm.
+    assert max(one.measured or 0 for one in found) < 1e-4
+
+
+def test_the_wall_between_spheres_and_spheroids() -> None:
+    sphere = MeshCasing(np.array([100.0, 100.0]), 2.0, 5.0, 4.5)
+    assert sphere.walls() == pytest.approx((2.5, 3.0), abs=1e-12)
+    # Parallel planes touch two convex bodies where they are nearest: support functions.
+    angle = np.linspace(0, np.pi / 2, 100_001)
+    support = [np.hypot((140 + by) * np.cos(angle), (100 + by) * np.sin(angle)) for by in (2, 9)]
+    long = MeshCasing(np.array([140.0, 100.0]), 2.0, 9.0, 9.0)
+    assert long.walls()[1] == pytest.approx((support[1] - support[0]).min(), abs=1e-6)
+
+
+@pytest.mark.parametrize("by", [-1.1e-2, 1.1e-2])
+def test_another_wall_is_a_fault(
+    setup: OpticalSetup, holes: dict[str, RoundHoles], by: float
+) -> None:
+    spec = setup.export.spec
+    shell = spec.shell.model_copy(update={"wall_mm": spec.shell.wall_mm + by})
+    other = replace(setup.export, spec=spec.model_copy(update={"shell": shell}))
+    walls = [
+        one for one in casing_checks(replace(setup, export=other), holes) if "wall" in one.name
+    ]
+    assert [one.passed for one in walls] == [False] * 2
+    assert walls[0].measured == pytest.approx(abs(by), abs=1e-4)
+    assert "the wall is 3.000 mm" in walls[0].detail
+
+
+def test_a_dent_behind_a_valley_is_found_in_its_half_alone(
+    sample: Export, meshes: list[Mesh], setup: OpticalSetup, holes: dict[str, RoundHoles]
+) -> None:
+    camera = sample.cameras["a"].pinhole
+    normal = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)  # of the ellipsoid, across its axis
+    points = meshes[0].points.copy()
+    middle = camera / 2 + (sample.semi_minor_mm + measure_casing(setup, 0).beyond) * normal
+    dent = np.linalg.norm(points - middle, axis=1) < 15
+    points[dent & ((points - camera / 2) @ normal > sample.semi_minor_mm)] -= 0.1 * normal
+    dented = of_meshes(sample, [indexed_mesh(points, meshes[0].faces), meshes[1]])
+    found = casing_checks(dented, holes)
+    assert [one.passed for one in found] == [False, True, True, True]
+    assert found[0].measured == pytest.approx(0.1, rel=0.05)
+
+
+def test_holes_elsewhere_are_faults(setup: OpticalSetup, holes: dict[str, RoundHoles]) -> None:
+    right = holes["shell_a"]
+    moved = right.middle + np.array([[0], [0.01], [0]])
+    wrong = {**holes, "shell_a": replace(right, middle=moved)}
+    found = {(one.file, one.name): one.passed for one in casing_checks(setup, wrong)}
+    assert found["shell_a.stl", "mesh holes"] is False
+    assert found["shell_b.stl", "mesh holes"] is True
+    exchanged = {"shell_a": holes["shell_b"], "shell_b": right}
+    assert [one.passed for one in casing_checks(setup, exchanged)] == [True, False] * 2
+
+
+def test_without_holes_or_mirrors_it_is_unknown(
+    setup: OpticalSetup, holes: dict[str, RoundHoles]
+) -> None:
+    some = {"shell_b": holes["shell_b"]}
+    assert [one.passed for one in casing_checks(setup, some)] == [None, None, True, True]
+    no_mirrors = replace(setup.match, segment=np.full_like(setup.match.segment, -1))
+    found = casing_checks(replace(setup, match=no_mirrors), holes)
+    assert [one.passed for one in found] == [None] * 4
+    assert "no ray from a valley" in found[0].detail

@@ -1,0 +1,189 @@
+"""Where the holes of a shell's flanges belong, worked out from the spec and the back.
+
+Bolts and dowels lie at even distances along a section of a spheroid that is half a flange's width
+larger than the back: the seam flange's in the plane of its far face, the foot flange's in the plane
+of the foot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad_verify.record.export import Camera, Export
+from tbcad_verify.record.spec import FlangeSpec
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.types import Floats
+
+X, Y, Z = range(3)
+PARALLEL = 1e-6  # of a hole's axis and its flange's
+SAMPLES = 20_001  # points on a section
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A round hole.
+
+    Attributes:
+        point: (3,) mm, on the axis at half depth.
+        axis: (3,) unit; its sign has no meaning.
+        radius: mm.
+        depth: mm.
+    """
+
+    point: Floats
+    axis: Floats
+    radius: float
+    depth: float
+
+
+@dataclass(frozen=True)
+class Flange:
+    """A flange with the H holes that it should have.
+
+    Attributes:
+        name: "seam" or "foot".
+        axis: of the holes, X or Z.
+        thickness: mm.
+        middle: (H, 3) mm, of each hole at half depth.
+        diameter: (H,) mm.
+    """
+
+    name: str
+    axis: int
+    thickness: float
+    middle: Floats
+    diameter: Floats
+
+
+@dataclass(frozen=True)
+class HoleLimits:
+    """By how much holes may be off.
+
+    Attributes:
+        size: of diameter and depth, mm.
+        place: mm.
+    """
+
+    size: float
+    place: float
+
+
+def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flange]:
+    """Both flanges of one camera's half.
+
+    Args:
+        export: the record.
+        camera: of the half.
+        beyond: by how much the back's semi-axes exceed the ellipsoid's, mm.
+
+    Raises:
+        Unknown: the back does not reach the flanges.
+    """
+    seam, foot = export.spec.shell.seam_flange, export.spec.shell.foot_flange
+    low, across = export.foot_z_mm, seam.thickness_mm
+    side = np.array([np.sign(camera.pinhole[X]), 1.0, 1.0])  # of camera b's half: its mirror image
+    pinhole, semi_minor = side * camera.pinhole, export.semi_minor_mm
+    semi_axes = np.array([np.hypot(semi_minor, np.linalg.norm(pinhole) / 2), semi_minor]) + beyond
+
+    def line(flange: FlangeSpec, axis: int, at: float, least: float, end: float) -> Floats:
+        section = _section(semi_axes + flange.width_mm / 2, pinhole, axis, at)
+        return _even(section, least, end, flange.bolts + flange.dowels)
+
+    on_seam = line(seam, X, across, low + foot.thickness_mm, seam.width_mm)
+    on_foot = line(foot, Z, low, across + seam.width_mm / 2, foot.width_mm / 2)
+    return (
+        _flange("seam", X, seam, on_seam, across / 2, side),
+        _flange("foot", Z, foot, on_foot, low + foot.thickness_mm / 2, side),
+    )
+
+
+def hole_faults(found: Sequence[Hole], wanted: Sequence[Flange], limits: HoleLimits) -> list[str]:
+    """What is wrong with the holes of a half: number, diameter, direction, depth and place."""
+    faults: list[str] = []
+    for flange in wanted:
+        mine = [hole for hole in found if _is_along(hole, flange)]
+        faults += [f"{flange.name} flange: {fault}" for fault in _faults(mine, flange, limits)]
+    return faults + [
+        f"a hole of {2 * hole.radius:g} mm in no flange"
+        for hole in found
+        if not any(_is_along(hole, flange) for flange in wanted)
+    ]
+
+
+def _section(semi_axes: Floats, pinhole: Floats, axis: int, at: float) -> Floats:
+    """(S, 2) a spheroid's section at x or z: y and the other coordinate, up and down again.
+
+    Raises:
+        Unknown: the plane misses it.
+    """
+    major, minor = semi_axes
+    way, centre = pinhole / np.linalg.norm(pinhole), pinhole / 2
+    form = (np.eye(3) - np.outer(way, way)) / minor**2 + np.outer(way, way) / major**2
+    plane, height = [Y, Z - axis], at - centre[axis]
+    inner, mixed = form[np.ix_(plane, plane)], form[plane, axis] * height
+    middle = -np.linalg.solve(inner, mixed)
+    rest = 1 - form[axis, axis] * height**2 - mixed @ middle
+    if rest <= 0:
+        raise Unknown("the back does not reach its flange")
+    turn = np.linspace(-np.pi, np.pi, SAMPLES)
+    spoke = np.column_stack([np.sin(turn), np.cos(turn)])
+    length = np.sqrt(rest / np.einsum("ni,ij,nj->n", spoke, inner, spoke))
+    return np.asarray(centre[plane] + middle + length[:, None] * spoke)
+
+
+def _even(section: Floats, least: float, end: float, count: int) -> Floats:
+    """(H, 2) places at even distances along the part of a section above a least coordinate.
+
+    Raises:
+        Unknown: nothing is above it.
+    """
+    above = np.flatnonzero(section[:, 1] > least)
+    if not above.size or above[0] == 0 or above[-1] == len(section) - 1:
+        raise Unknown("the back does not reach its flange")
+    steps = np.linalg.norm(np.diff(section, axis=0), axis=1)
+    along = np.concatenate([[0], np.cumsum(steps)])
+    first, last = ([above[0] - 1, above[0]], [above[-1] + 1, above[-1]])
+    start, stop = (np.interp(least, section[k, 1], along[k]) for k in (first, last))
+    places = np.linspace(start + end, stop - end, count)
+    return np.column_stack([np.interp(places, along, column) for column in section.T])
+
+
+def _flange(
+    name: str, axis: int, spec: FlangeSpec, places: Floats, height: float, side: Floats
+) -> Flange:
+    """Put the holes at half depth, dowels near the ends and evenly between."""
+    middle = places[:, [1, 0, 1]]
+    middle[:, axis] = height
+    diameter = np.full(len(middle), spec.bolt_hole_mm)
+    dowels = np.round(np.linspace(1, len(middle) - 2, spec.dowels)).astype(int)
+    diameter[dowels] = spec.dowel_hole_mm
+    return Flange(name, axis, spec.thickness_mm, side * middle, diameter)
+
+
+def _is_along(hole: Hole, flange: Flange) -> bool:
+    return abs(float(hole.axis[flange.axis])) > 1 - PARALLEL
+
+
+def _faults(found: Sequence[Hole], flange: Flange, limits: HoleLimits) -> Iterator[str]:
+    have = np.array([2 * hole.radius for hole in found])
+    for diameter in sorted({*flange.diameter.tolist(), *_others(have, flange, limits.size)}):
+        number = int((np.abs(have - diameter) <= limits.size).sum())
+        wanted = int((flange.diameter == diameter).sum())
+        if number != wanted:
+            yield f"{number} holes of {diameter:g} mm, not {wanted}"
+    for hole in found:
+        if abs(hole.depth - flange.thickness) > limits.size:
+            yield f"a hole {hole.depth:g} mm deep, not {flange.thickness:g}"
+        same = np.abs(flange.diameter - 2 * hole.radius) <= limits.size
+        off = np.linalg.norm(flange.middle[same] - hole.point, axis=1).min(initial=np.inf)
+        if limits.place < off < np.inf:
+            yield f"a hole of {2 * hole.radius:g} mm is {off:.3g} mm from its place"
+
+
+def _others(have: Floats, flange: Flange, size: float) -> list[float]:
+    """Diameters that no hole of a flange should have."""
+    known = np.abs(have[:, None] - flange.diameter).min(axis=1, initial=np.inf) <= size
+    return [float(one) for one in np.unique(have[~known].round(6))]

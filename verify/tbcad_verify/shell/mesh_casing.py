@@ -1,0 +1,203 @@
+"""What closes a shell behind its mirrors, measured on its mesh: wall and holes.
+
+Rays start at the valleys between mirrors and leave through the back, along the normal of the
+ellipsoid. The facets that they meet say how far the back is beyond the ellipsoid, the valleys how
+deep the mirrors reach; the wall is what is left between, as long as a ray needs for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad_verify.mesh.rays import first_hits
+from tbcad_verify.mesh.segments import rounding
+from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.printing.holes import RoundHoles
+from tbcad_verify.record.export import Camera, Export, Part
+from tbcad_verify.record.flange_holes import Hole, HoleLimits, flanges, hole_faults
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    check_names,
+    guarded,
+    require,
+    short_list,
+)
+from tbcad_verify.shell.optics import OpticalSetup
+from tbcad_verify.types import Bools, Floats
+
+# Corners of facets are on the exact surfaces, but for float32: its rounding comes on top.
+WALL_MM, SIZE_MM, PLACE_MM = 1e-3, 1e-3, 2e-3
+ROUNDINGS = 8
+SQUARE_COS = math.cos(math.radians(30))  # of a ray and the back's normal; a joining face has less
+LIFT_MM = 1e-3  # by which rays start below the valley
+MERIDIAN = 2001  # rays between two spheroids
+HALVINGS = 60
+NOT_MEASURED = "holes were not looked for: see the checks of printers"
+CHECKS = {"mesh wall": "mm", "mesh holes": "faults"}
+
+
+@dataclass(frozen=True)
+class Valleys:
+    """Corners of one part's mesh where mirrors meet.
+
+    Attributes:
+        point: (3, V) mm.
+        inner: (V,) whether only mirrors meet there, and no joining face.
+    """
+
+    point: Floats
+    inner: Bools
+
+
+@dataclass(frozen=True)
+class MeshCasing:
+    """Where a half's mirrors end and its back begins.
+
+    Attributes:
+        semi_axes: of the camera's ellipsoid along its axis and across it, (2,) mm.
+        deepest: by how much the ellipsoid must grow to hold all valleys, mm.
+        beyond: by how much to be the back, mm: half of its corners are within.
+        nearest: the same, where the back is nearest.
+    """
+
+    semi_axes: Floats
+    deepest: float
+    beyond: float
+    nearest: float
+
+    def walls(self) -> tuple[float, float]:
+        """Material behind the deepest valley where the back is nearest, and otherwise, mm."""
+        return self._wall(self.nearest), self._wall(self.beyond)
+
+    def _wall(self, beyond: float) -> float:
+        """Length of the shortest ray between two spheroids, at right angles to the inner, mm."""
+        angle = np.linspace(0, np.pi / 2, MERIDIAN)
+        circle = np.stack([np.cos(angle), np.sin(angle)])
+        inner, outer = ((self.semi_axes + more)[:, None] for more in (self.deepest, beyond))
+        start, way = inner * circle / outer, circle / inner
+        way /= np.hypot(*way) * outer
+        # The ray and the outer spheroid, both scaled so that this is a circle.
+        a, b, c = (way**2).sum(axis=0), (way * start).sum(axis=0), (start**2).sum(axis=0) - 1
+        return float(((np.sqrt(b * b - a * c) - b) / a).min())
+
+
+def casing_checks(setup: OpticalSetup, holes: Mapping[str, RoundHoles]) -> list[Check]:
+    """Wall and holes of every camera's half that has a STEP, against the spec.
+
+    Args:
+        setup: all parts.
+        holes: found in each part's mesh, by the name of the part.
+    """
+    return [
+        check
+        for number, part in enumerate(setup.export.parts)
+        if _is_cased(setup.export, part)
+        for check in _of_part(setup, number, holes.get(part.name))
+    ]
+
+
+def casing_names(export: Export) -> list[CheckName]:
+    """Name, file and unit of these checks."""
+    halves = [part for part in export.parts if _is_cased(export, part)]
+    return [name for part in halves for name in check_names(CHECKS, part.stl)]
+
+
+def _is_cased(export: Export, part: Part) -> bool:
+    """Whether a part is a camera's half with its casing: what is a mesh only may have none."""
+    return bool(part.step) and part.camera in export.cameras
+
+
+def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
+    """Valleys and back of one part.
+
+    Args:
+        setup: all parts.
+        number: of the part.
+
+    Raises:
+        Unknown: no mirrors meet, or no ray leaves through a back.
+    """
+    export = setup.export
+    camera = export.cameras[export.parts[number].camera]
+    focal = float(np.linalg.norm(camera.pinhole)) / 2
+    semi_axes = np.array([np.hypot(export.semi_minor_mm, focal), export.semi_minor_mm])
+    valleys = _valleys(setup, number)
+    back = _back(setup, valleys, camera)
+    if not back.size:
+        raise Unknown("no ray from a valley between mirrors leaves through a back")
+    deepest = float(_beyond(semi_axes, camera, valleys.point).max())
+    beyond = _beyond(semi_axes, camera, back)
+    return MeshCasing(semi_axes, deepest, float(np.median(beyond)), float(beyond.min()))
+
+
+def _of_part(setup: OpticalSetup, number: int, found: RoundHoles | None) -> list[Check]:
+    export, part = setup.export, setup.export.parts[number]
+    wall, holes = check_names(CHECKS, part.stl)
+    asked, blur = export.spec.shell.wall_mm, ROUNDINGS * rounding(setup.mesh)
+
+    def work() -> list[Check]:
+        casing = measure_casing(setup, number)
+        measured = max(casing.walls(), key=lambda one: abs(one - asked))
+        detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
+        wanted = flanges(export, export.cameras[part.camera], casing.beyond)
+        limits = HoleLimits(SIZE_MM + blur, PLACE_MM + blur)
+        faults = hole_faults(_each(require(found, NOT_MEASURED)), wanted, limits)
+        return [
+            at_most(wall, abs(measured - asked), WALL_MM + blur, detail),
+            at_most(holes, len(faults), 0, short_list(faults)),
+        ]
+
+    return guarded([wall, holes], work)
+
+
+def _each(found: RoundHoles) -> list[Hole]:
+    return [
+        Hole(point, axis, float(diameter) / 2, float(depth))
+        for point, axis, diameter, depth in zip(
+            found.middle.T, found.axis.T, found.diameter, found.depth, strict=True
+        )
+    ]
+
+
+def _valleys(setup: OpticalSetup, number: int) -> Valleys:
+    """Corners of edges that have another mirror of the part on each side."""
+    mesh, label = setup.mesh, setup.recovery.segments.label
+    mine = setup.part[label] == number
+    mirror = np.where(mine, setup.owner()[label], -1)
+    half = np.flatnonzero(np.repeat(mirror >= 0, 3) & (mesh.twin >= 0))
+    one, two = mirror[half // 3], mirror[mesh.twin[half] // 3]
+    half = half[(two >= 0) & (one != two)]
+    corner = np.unique(mesh.faces[half // 3, half % 3])
+    joining = np.zeros(len(mesh.points), dtype=np.bool_)
+    joining[mesh.faces[mine & (mirror < 0)]] = True
+    return Valleys(np.ascontiguousarray(mesh.points[corner].T), ~joining[corner])
+
+
+def _back(setup: OpticalSetup, valleys: Valleys, camera: Camera) -> Floats:
+    """(3, B) corners of the facets through which rays from inner valleys leave, mm."""
+    start = valleys.point[:, valleys.inner]
+    way = unit(unit(start) + unit(start - camera.pinhole[:, None]))
+    facet = first_hits(setup.scene, start + LIFT_MM * way, way)
+    square = dot(np.take(setup.scene.planes[:, :3], facet, axis=0).T, way) > SQUARE_COS
+    corners = np.unique(setup.mesh.faces[facet[(facet >= 0) & square]])
+    return np.ascontiguousarray(setup.mesh.points[corners].T)
+
+
+def _beyond(semi_axes: Floats, camera: Camera, point: Floats) -> Floats:
+    """(N,) by how much both semi-axes must grow for the spheroid to pass through points, mm."""
+    offset = point - camera.pinhole[:, None] / 2
+    along = dot(offset, unit(camera.pinhole[:, None]))
+    across = np.sqrt(np.maximum(dot(offset, offset) - along**2, 0))
+    low, high = np.full(along.size, -semi_axes[1] / 2), norm(offset)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        out = (along / (semi_axes[0] + middle)) ** 2 + (across / (semi_axes[1] + middle)) ** 2 > 1
+        low, high = np.where(out, middle, low), np.where(out, high, middle)
+    return high
