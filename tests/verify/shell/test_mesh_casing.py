@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tbcad_verify.mesh.holes import RoundHoles, round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, mesh_from_facets
 from tbcad_verify.mesh.segments import measure_edges
 from tbcad_verify.mesh.stl import read_facets
-from tbcad_verify.printing.holes import RoundHoles, round_holes
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.shell.mesh_casing import (
     MeshCasing,

@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.mass import MassProperties, mass_properties
 from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_facets
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
 from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
-from tbcad_verify.printing.holes import RoundHoles
 from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart

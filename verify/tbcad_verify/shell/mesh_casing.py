@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.rays import first_hits
 from tbcad_verify.mesh.segments import rounding
 from tbcad_verify.mesh.vectors import dot, norm, unit
-from tbcad_verify.printing.holes import RoundHoles
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.flange_holes import Hole, HoleLimits, flanges, hole_faults
 from tbcad_verify.report.checks import (
