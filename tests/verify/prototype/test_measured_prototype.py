@@ -32,12 +32,12 @@ from tbcad_verify.prototype.measured_parts import (
     of_roles,
 )
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
-from tbcad_verify.prototype.step_files import part_step_checks, read_step_files
+from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, Unknown
 from tbcad_verify.run.child import Limits
-from tbcad_verify.step.step_file import StepFile, examine_all, load
+from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tests.exported_files import edit_json
 from tests.verify.prototype.synthetic_prototype import (
@@ -338,28 +338,6 @@ def test_one_broken_step_file_leaves_the_others_known(prototype_folder: Path) ->
     bad = load(prototype_folder, "bad.step")
     found = examine_all([bad, good, bad], Limits(60))
     assert [isinstance(one, StepFile) for one in found] == [False, True, False]
-
-
-def test_a_step_file_that_kills_its_reader_leaves_the_others_known(
-    prototype_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from tbcad_verify.step import step_file
-
-    real = step_file.run
-
-    def killed(command, place, limits):  # type: ignore[no-untyped-def]
-        if len(command) > 6:  # all files at once
-            return step_file.run.__wrapped__(command, place, limits)
-        return real(command, place, limits)
-
-    killed.__wrapped__ = lambda command, place, limits: real(  # type: ignore[attr-defined]
-        [command[0], "-c", "import os; os.abort()"], place, limits
-    )
-    monkeypatch.setattr(step_file, "run", killed)
-    context = context_of(stepped(prototype_folder, [-4, -4, -8], [4, 4, -6]))
-    good = load(context.export.folder, "stage.step")
-    found = examine_all([good, good], Limits(60))
-    assert [isinstance(one, StepFile) for one in found] == [True, True]
 
 
 def test_the_bend_of_a_cube_is_its_edges(context: PrototypeContext) -> None:

@@ -278,11 +278,11 @@ def test_checks_hold_their_limits() -> None:
 
 def test_the_verification_shares_no_code_with_what_it_verifies() -> None:
     root = Path(tbcad_verify.__file__).parent
-    kernel = root / "step" / "kernel.py"  # run apart, and never for the optical checks
+    kernel = root / "step" / "kernel"  # run apart, and never for the optical checks
     for path in root.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             roots = {name.split(".")[0] for name in names}
             assert not roots & {"tbcad", "build123d", "cadquery"}, path
-            assert path == kernel or "OCP" not in roots, path
+            assert path.parent == kernel or "OCP" not in roots, path

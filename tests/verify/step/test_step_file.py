@@ -15,8 +15,8 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits
-from tbcad_verify.step.kernel import read_solid
-from tbcad_verify.step.step_file import StepFile, examine, load, parse
+from tbcad_verify.step.kernel.reading import read_solid
+from tbcad_verify.step.step_file import StepFile, examine_all, known, load, parse
 from tbcad_verify.step.text import read_text
 
 
@@ -42,6 +42,10 @@ BOX = box((-5, -10, -15), (5, 10, 15))
 
 def both(file: Path) -> StepFile:
     return parse(read_text(file), read_solid(file))
+
+
+def examine(folder: Path, name: str, limits: Limits) -> StepFile:
+    return known(examine_all([load(folder, name)], limits)[0])
 
 
 def test_box_in_closed_form(tmp_path: Path) -> None:
@@ -110,15 +114,15 @@ def test_two_solids_are_counted(tmp_path: Path) -> None:
 
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
-    found, here = examine(load(tmp_path, file.name), Limits(60)), both(file)
+    found, here = examine(tmp_path, file.name, Limits(60)), both(file)
     assert found.mass == here.mass
     assert found.faces.names == here.faces.names
 
 
 def test_what_takes_too_long_is_unknown(tmp_path: Path) -> None:
-    blob = load(tmp_path, written(tmp_path, BOX).name)
+    file = written(tmp_path, BOX)
     with pytest.raises(Unknown, match="no answer within"):
-        examine(blob, Limits(0.05))
+        examine(tmp_path, file.name, Limits(0.05))
 
 
 @pytest.mark.parametrize(
@@ -135,7 +139,7 @@ def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
     file = written(tmp_path, BOX)
     file.write_text(change(file.read_text()))  # type: ignore[operator]
     with pytest.raises(Unknown):
-        examine(load(tmp_path, file.name), Limits(60))
+        examine(tmp_path, file.name, Limits(60))
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
-from tbcad_verify.prototype import step_files
+from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
@@ -24,7 +24,7 @@ from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.step.shell_checks import shell_step_checks
-from tbcad_verify.step.step_file import StepFile
+from tbcad_verify.step.step_file import StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
@@ -102,14 +102,14 @@ def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> N
     limits = Limits(options.seconds)
     with ThreadPoolExecutor(1) as pool:
         try:
-            # Reading the prototype's STEP needs none of the stages, and takes as long as they do.
-            prototype = pool.submit(step_files.read_step_files, export, limits)
+            # Reading STEP files needs none of the stages, and takes as long as they do.
+            files = pool.submit(read_step_files, export, limits)
             if options.apart:
                 command = worker_command(export.folder, options.printers)
                 watch(command, stage_titles(export), results, options.seconds)
             else:
                 run_stages(export.folder, results.add, options.printers)
-            _compare_steps(export, results, limits, prototype)
+            _compare_steps(export, results, files)
         except BaseException:
             limits.stop.set()
             raise
@@ -118,22 +118,22 @@ def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> N
 def _compare_steps(
     export: Export,
     results: CollectedResults,
-    limits: Limits,
-    prototype: Future[dict[str, StepFile | Unknown]],
+    read: Future[dict[str, StepFile | Unknown]],
 ) -> None:
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
+        files = read.result()
         results.add(
             Results(
                 checks=shell_step_checks(
-                    export, results.masses, limits, results.mirrors.get("coverage_fitted_mm")
+                    export, results.masses, files, results.mirrors.get("coverage_fitted_mm")
                 )
             )
         )
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files = prototype.result()
-        results.add(Results(checks=step_files.part_step_checks(export, results.masses, files)))
+        files = read.result()
+        results.add(Results(checks=part_step_checks(export, results.masses, files)))
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:

@@ -5,28 +5,27 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.record.export import Camera, Export, Part
-from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
+    Unknown,
     at_most,
     each_at_most,
     guarded,
     require,
     short_list,
 )
-from tbcad_verify.run.child import Limits
 from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
@@ -37,7 +36,7 @@ from tbcad_verify.step.part_checks import (
     run_checks,
 )
 from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export
-from tbcad_verify.step.step_file import StepFile, examine, load
+from tbcad_verify.step.step_file import StepFile, known, load
 from tbcad_verify.types import Floats, Ints
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
@@ -78,7 +77,7 @@ class ShellComparison(PartComparison):
 def shell_step_checks(
     export: Export,
     masses: dict[str, MassProperties],
-    limits: Limits,
+    files: dict[str, StepFile | Unknown],
     coverage: Floats | None = None,
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
@@ -86,30 +85,24 @@ def shell_step_checks(
     Args:
         export: the record.
         masses: of the meshes, by part.
-        limits: of the process that reads one file.
+        files: as read, by part.
         coverage: (M,) mm, as measured on spheres.
-
-    Raises:
-        BadExport: a file is missing, foreign or truncated.
     """
-    parts = [part for part in export.parts if part.step]
-    blobs = [load(export.folder, part.step) for part in parts]
 
-    def of_part(pair: tuple[Part, FileBytes]) -> list[Check]:
-        part, blob = pair
-        mass = masses.get(part.name)
-        return guarded(
-            names_of(CHECKS, part.step),
-            lambda: run_checks(
-                CHECKS, part.step, _comparison(export, part, blob, examine(blob, limits), mass)
-            ),
-        )
+    def of_part(part: Part) -> list[Check]:
+        file, mass = files[part.name], masses.get(part.name)
+        return run_checks(CHECKS, part.step, _comparison(export, part, known(file), mass))
 
-    checks = in_threads(of_part, list(zip(parts, blobs, strict=True)), limits.stop.set)
+    checks = [
+        check
+        for part in export.parts
+        if part.step
+        for check in guarded(names_of(CHECKS, part.step), partial(of_part, part))
+    ]
     areas = guarded([AREAS], lambda: [_recorded_areas(export)])
     areas += guarded([RULE], lambda: [rule_check(export)])
     areas += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
-    return areas + [check for some in checks for check in some]
+    return areas + checks
 
 
 def _recorded_areas(export: Export) -> Check:
@@ -129,7 +122,7 @@ def _recorded_coverage(export: Export, coverage: Floats | None) -> Check:
 
 
 def _comparison(
-    export: Export, part: Part, blob: FileBytes, file: StepFile, mass: MassProperties | None
+    export: Export, part: Part, file: StepFile, mass: MassProperties | None
 ) -> ShellComparison:
     mine = export.mirrors.camera == part.camera
     mirrors = export.mirrors.take(np.flatnonzero(mine))
@@ -145,7 +138,7 @@ def _comparison(
         coating_mm=export.coating_mm,
         face=np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
         cells=cells_of_export(export, part.camera),
-        casing=read_casing(blob.text(), frozenset(mirrors.ids)),
+        casing=read_casing(load(export.folder, part.step).text(), frozenset(mirrors.ids)),
         export=export,
         camera=export.cameras[part.camera],
     )

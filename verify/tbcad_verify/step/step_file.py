@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
@@ -24,6 +26,9 @@ MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 EXACT_KINDS = ("sphere", "plane")
 FILES = (("part", "step"), ("answer", "json"))
+PROCESSES = min(os.cpu_count() or 1, 4)  # read files at the same time, 0.2 GB each
+# -P: what lies in the current folder must not be imported.
+READER = ("-P", "-m", "tbcad_verify.step")
 
 Row = dict[str, Any]
 
@@ -95,42 +100,47 @@ def load(folder: Path, name: str) -> FileBytes:
     return blob
 
 
-def examine(blob: FileBytes, limits: Limits) -> StepFile:
-    """Read the bytes as text and by the kernel, from a private copy.
+def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unknown]:
+    """The STEP files of all parts, or why one is not known, by part.
+
+    Args:
+        export: the record.
+        limits: of the reading of one file.
 
     Raises:
-        Unknown: a reading failed, crashed or took too long.
+        BadExport: a file is missing, foreign or truncated.
     """
-    file = examine_all([blob], limits)[0]
-    if isinstance(file, Unknown):
-        raise file
-    return file
+    parts = [part for part in (*export.parts, *export.printed) if part.step]
+    files = examine_all([load(export.folder, part.step) for part in parts], limits)
+    return {part.name: file for part, file in zip(parts, files, strict=True)}
 
 
 def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | Unknown]:
-    """Read several files in one process, which takes long to start.
+    """Read the bytes of files as text and by the kernel, from private copies.
 
-    Files that it did not read are read again, each in a process of its own, so that a file that
-    crashes or stops the reader does not make the others unknown.
+    The kernel takes long to load: one process loads it, and a fork of that process reads each
+    file, so that one that crashes or stops its reader does not make the others unknown.
+
+    Args:
+        blobs: the files.
+        limits: of the reading of one file.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
         place = Path(name)
         for k, blob in enumerate(blobs):
             blob.data.tofile(place / f"part{k}.step")
-        reason = _read(place, range(len(blobs)), limits)
-        unread = [k for k in range(len(blobs)) if not (place / f"answer{k}.json").exists()]
-        reasons = dict.fromkeys(unread, reason)
-        if len(blobs) > 1:
-            reasons = {k: _read(place, [k], limits) for k in unread}
-        return [_answer(place / f"answer{k}.json", reasons.get(k, "")) for k in range(len(blobs))]
+        # The largest first, so that no process is left with a large one at the end.
+        order = sorted(range(len(blobs)), key=lambda k: (-blobs[k].data.size, k))
+        reason = _read(place, order, limits) if blobs else ""
+        return [_answer(place / f"answer{k}.json", reason) for k in range(len(blobs))]
 
 
-def _read(place: Path, which: Iterable[int], limits: Limits) -> str:
-    """Read some files in a child process; why it failed, or empty."""
-    pairs = [f"{place}/{word}{k}.{end}" for k in which for word, end in FILES]
-    # -P: what lies in the current folder must not be imported.
-    command = [sys.executable, "-P", "-m", "tbcad_verify.step", *pairs]
-    outcome = run(command, place, limits)
+def _read(place: Path, order: Sequence[int], limits: Limits) -> str:
+    """Read files in a child process; why it failed, or empty."""
+    pairs = [f"{place}/{word}{k}.{end}" for k in order for word, end in FILES]
+    command = [sys.executable, *READER, str(limits.seconds), str(PROCESSES), *pairs]
+    # Loading the kernel, and one file after the other.
+    outcome = run(command, place, replace(limits, seconds=limits.seconds * (1 + len(order))))
     return outcome.reason or ("" if outcome.code == 0 else outcome.text.strip().rpartition("\n")[2])
 
 
@@ -141,6 +151,17 @@ def _answer(path: Path, reason: str) -> StepFile | Unknown:
     if "refused" in value:
         return Unknown(str(value["refused"]))
     return parse(value["text"], value["solid"])
+
+
+def known(file: StepFile | Unknown) -> StepFile:
+    """A file that was read.
+
+    Raises:
+        Unknown: it was not.
+    """
+    if isinstance(file, Unknown):
+        raise file
+    return file
 
 
 def parse(text: Row, solid: Row) -> StepFile:
