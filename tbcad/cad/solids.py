@@ -4,6 +4,7 @@ Booleans take lists: one general fuse of many bodies is faster than one after th
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from cadquery import Shape
@@ -23,6 +24,7 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
@@ -32,6 +34,7 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeSphere,
 )
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
@@ -48,6 +51,26 @@ ANGLE = 0.2
 SAME_MM = 1e-6
 # Booleans of more shapes than this are done in threads.
 FEW = 8
+
+
+@dataclass(frozen=True)
+class SolidProperties:
+    """What integrals over a homogeneous solid give.
+
+    Attributes:
+        volume: mm^3.
+        area: of the surface, mm^2.
+        centroid: x, y and z, mm.
+    """
+
+    volume: float
+    area: float
+    centroid: tuple[float, float, float]
+
+    def mirrored(self) -> "SolidProperties":
+        """Those of the mirror image in the plane x = 0."""
+        x, y, z = self.centroid
+        return SolidProperties(self.volume, self.area, (-x, y, z))
 
 
 def polygon(points: Floats) -> TopoDS_Face:
@@ -178,9 +201,13 @@ def volume(shape: TopoDS_Shape) -> float:
     return float(Shape.cast(shape).Volume())
 
 
-def centroid(shape: TopoDS_Shape) -> Floats:
-    """Centre of gravity of a homogeneous solid, mm, (3,)."""
-    return np.array(Shape.centerOfMass(Shape.cast(shape)).toTuple())
+def properties(shape: TopoDS_Shape) -> SolidProperties:
+    """Volume, area and centroid by the kernel's integrals, which take seconds for a shell."""
+    inside, surface = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, inside)
+    BRepGProp.SurfaceProperties_s(shape, surface)
+    centre = inside.CentreOfMass()
+    return SolidProperties(inside.Mass(), surface.Mass(), (centre.X(), centre.Y(), centre.Z()))
 
 
 def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-from OCP.BRepGProp import BRepGProp
-from OCP.GProp import GProp_GProps
+from OCP.gp import gp_Pnt
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
@@ -17,6 +16,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 
 from tbcad.cad.brep import Solid
+from tbcad.cad.solids import SolidProperties, properties
 from tbcad.formats.native_files import check_complete, incomplete
 
 END = b"END-ISO-10303-21;"  # of every STEP file
@@ -28,7 +28,9 @@ class StepError(RuntimeError):
     """The kernel cannot translate a solid: a fault of tbcad."""
 
 
-def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
+def write_step(
+    path: Path, solid: Solid, pcurves: bool = False, known: SolidProperties | None = None
+) -> None:
     """Write one solid as AP214 in millimetres.
 
     Args:
@@ -36,6 +38,7 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
         solid: with the names of its faces, which become the names of the advanced faces; its
             volume, area and centroid go along as validation properties.
         pcurves: write curves in the surfaces' parameters too; readers make their own.
+        known: the solid's properties; None: they are worked out.
 
     Raises:
         StepError: when the kernel fails.
@@ -49,7 +52,7 @@ def write_step(path: Path, solid: Solid, pcurves: bool = False) -> None:
     finder = writer.WS().TransferWriter().FinderProcess()
     for name, face in solid.faces:
         _name(finder, face, name)
-    _validation_properties(writer, solid.shape)
+    _validation_properties(writer, solid.shape, known or properties(solid.shape))
     _name_product(writer, solid.name)
     write_header(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
@@ -73,19 +76,18 @@ def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:
     item.SetName(TCollection_HAsciiString(name))
 
 
-def _validation_properties(writer: STEPControl_Writer, solid: TopoDS_Solid) -> None:
+def _validation_properties(
+    writer: STEPControl_Writer, solid: TopoDS_Solid, known: SolidProperties
+) -> None:
     """Volume, area and centroid, for readers to compare with what they have read.
 
     Source: CAx-IF, Recommended Practices for Geometric and Assembly Validation Properties.
     """
-    volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(solid, volume)
-    BRepGProp.SurfaceProperties_s(solid, area)
-    properties = STEPConstruct_ValidationProps(writer.WS())
+    validation = STEPConstruct_ValidationProps(writer.WS())
     written = (
-        properties.AddVolume(solid, volume.Mass())
-        and properties.AddArea(solid, area.Mass())
-        and properties.AddCentroid(solid, volume.CentreOfMass())
+        validation.AddVolume(solid, known.volume)
+        and validation.AddArea(solid, known.area)
+        and validation.AddCentroid(solid, gp_Pnt(*known.centroid))
     )
     if not written:
         raise StepError("the kernel cannot write the validation properties")

@@ -10,7 +10,7 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError, Solid
-from tbcad.cad.solids import volume
+from tbcad.cad.solids import SolidProperties, volume
 from tbcad.formats.step import write_step
 
 MAX_GAP_MM = 1e-5
@@ -18,30 +18,34 @@ VOLUME_ERROR = 1e-5  # as a share of the volume; the kernel integrates to some 2
 MAXIMUM = 1  # of the tolerances in a shape
 
 
-def check_read_back(name: str, shape: TopoDS_Solid) -> None:
+def check_read_back(name: str, shape: TopoDS_Solid, known: SolidProperties) -> None:
     """Refuse a solid that its file does not keep, although the kernel takes it for valid.
 
     A boolean with faces that graze each other can leave edges that are off their faces. The
     tolerances in memory do not tell: they are up to a hundred times too large.
 
+    Args:
+        name: of the part.
+        shape: the solid.
+        known: its properties.
+
     Raises:
         InvalidSolidError: as said.
     """
-    again = _read_back(name, shape)
+    again = _read_back(name, shape, known)
     gap = ShapeAnalysis_ShapeTolerance().Tolerance(again, MAXIMUM)
     if gap > MAX_GAP_MM:
         raise InvalidSolidError(f"{name}: its edges are up to {gap:.2g} mm off its faces")
-    expected = volume(shape)
     if not BRepCheck_Analyzer(again).IsValid() or (
-        abs(volume(again) - expected) > VOLUME_ERROR * expected
+        abs(volume(again) - known.volume) > VOLUME_ERROR * known.volume
     ):
         raise InvalidSolidError(f"{name}: its STEP file does not give the same valid solid")
 
 
-def _read_back(name: str, shape: TopoDS_Solid) -> TopoDS_Shape:
+def _read_back(name: str, shape: TopoDS_Solid, known: SolidProperties) -> TopoDS_Shape:
     with tempfile.TemporaryDirectory(prefix="tbcad-") as folder:
         file = Path(folder) / "part.step"
-        write_step(file, Solid(name, shape, ()))
+        write_step(file, Solid(name, shape, ()), known=known)
         reader = STEPControl_Reader()
         if reader.ReadFile(str(file)) != IFSelect_RetDone:
             raise InvalidSolidError(f"{name}: the kernel cannot read its own STEP file")

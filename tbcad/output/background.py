@@ -2,6 +2,8 @@
 
 import multiprocessing
 import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -24,8 +26,7 @@ def in_background(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
         RuntimeError: its process ended before it was done.
     """
     others = multiprocessing.active_children()
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, spawn, initializer=_ignore_interrupts) as pool:
+    with ProcessPoolExecutor(1, _context(), initializer=_ignore_interrupts) as pool:
         result = pool.submit(work, *arguments)
         try:
             yield
@@ -38,6 +39,15 @@ def in_background(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
             for process in set(multiprocessing.active_children()) - set(others):
                 process.kill()
             raise
+
+
+def _context() -> multiprocessing.context.BaseContext:
+    """A copy of this process, which has loaded all libraries, where that is safe.
+
+    A copy has no other threads: what they hold locked would stay locked in it.
+    """
+    alone = sys.platform == "linux" and threading.active_count() == 1
+    return multiprocessing.get_context("fork" if alone else "spawn")
 
 
 def _ignore_interrupts() -> None:

@@ -41,6 +41,11 @@ class SweptSection:
     low: float
     high: float
 
+    @property
+    def azimuths(self) -> tuple[float, float]:
+        """The range that it reaches."""
+        return self.low, self.high
+
 
 @dataclass(frozen=True)
 class KeepOut:
@@ -84,11 +89,18 @@ class KeepOut:
         local = _cylindrical(self.frame, points)
         balls = np.column_stack([self.centre, 0 * self.radius])
         from_balls = norm(_from_range(local, self.swung) - balls) - self.radius
-        distances = [from_balls.min(axis=1)]
+        nearest: Floats = from_balls.min(axis=1)
+        places = {
+            azimuths: _from_range(local, np.array([azimuths]))[:, 0]
+            for azimuths in dict.fromkeys(section.azimuths for section in self.sections)
+        }
         for section in self.sections:
-            place = _from_range(local, np.array([[section.low, section.high]]))[:, 0]
-            distances.append(np.hypot(_to_polygon(place[:, :2], section.polygon), place[:, 2]))
-        return np.asarray(np.min(distances, axis=0))
+            place = places[section.azimuths]
+            # The box round a section is cheap to measure, and mostly farther than the nearest.
+            near = np.hypot(_to_box(place[:, :2], section.polygon), place[:, 2]) < nearest
+            across = _to_polygon(place[near, :2], section.polygon)
+            nearest[near] = np.minimum(nearest[near], np.hypot(across, place[near, 2]))
+        return nearest
 
 
 def keep_out_volume(
@@ -213,6 +225,12 @@ def _to_cones(points: Floats, cones: RoundCones) -> Floats:
     foot = np.clip((along - out * shrink / straight) / length, 0, 1)
     radius = cones.start_radius + foot * (cones.end_radius - cones.start_radius)
     return np.asarray(np.hypot(along - foot * length, out) - radius)
+
+
+def _to_box(points: Floats, polygon: Floats) -> Floats:
+    """Distance (n,) of points (n, 2) to the box round a polygon (p, 2), 0 inside."""
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    return norm(np.maximum(0, np.maximum(low - points, points - high)))
 
 
 def _to_polygon(points: Floats, polygon: Floats) -> Floats:

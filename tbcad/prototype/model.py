@@ -9,7 +9,6 @@ from OCP.Standard import Standard_Failure
 from OCP.StdFail import StdFail_NotDone
 
 from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.solids import centroid
 from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.primitives import Component
 from tbcad.mirrors.array import MirrorDesign
@@ -115,7 +114,7 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
     progress("prototype: base")
     carrier = carrier_parts(base, arrangement.split, printer)
     for part in carrier:
-        check_read_back(part.name, part.shape)
+        check_read_back(part.name, part.shape, part.properties)
     masses = _masses(carrier, printer.density_g_cm3)
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
@@ -150,7 +149,7 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
 
 def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:
     mass = [part.mass_g(density) for part in parts]
-    return PointMasses(np.array(mass), np.array([centroid(part.shape) for part in parts]))
+    return PointMasses(np.array(mass), np.array([part.properties.centroid for part in parts]))
 
 
 def _caps(base: BaseLayout, layout: PrototypeLayout) -> Iterator[PrintedPart]:

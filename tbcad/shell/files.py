@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import one_solid
+from tbcad.cad.solids import one_solid, properties
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
@@ -26,14 +26,15 @@ def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda
     """
     envelope = shell_envelope(design)
     progress("facets")
-    mesh = camera_a_mesh(design, envelope)
+    mesh, known = camera_a_mesh(design, envelope), None
     for half in design.halves:
         files = shell_record(half)
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, half, envelope)
         progress(f"{files['name']}: files")
         own_mesh = mesh.mirrored() if half.camera_id == "b" else mesh
-        write_step(folder / files["step"], solid, design.spec.step.pcurves)
+        known = known.mirrored() if known else properties(solid.shape)
+        write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
         write_stl(folder / files["stl"], own_mesh)
         write_3mf(folder / files["3mf"], files["name"], own_mesh)
 

@@ -139,6 +139,8 @@ class BaseSpec(Section):
     """Play on the diameter of a dowel in the hole on the other side."""
     coupon_offsets_mm: Offsets = (-0.1, 0.0, 0.1)
     """Distances by which the coupon's pads are moved away from the ball."""
+    coupon_sizes: int = Field(3, ge=1, le=99)
+    """Sizes of body that have seats on the coupon: from the largest to the smallest, evenly."""
 
     @property
     def pad_angles_deg(self) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.solids import cylinder, one_solid
+from tbcad.cad.solids import cylinder, one_solid, properties
 from tbcad.formats import step_read_back
 from tbcad.formats.step_read_back import check_read_back
 
@@ -22,7 +22,7 @@ def read_instead(monkeypatch: pytest.MonkeyPatch, shape: TopoDS_Shape) -> None:
 
 
 def test_a_whole_solid_passes() -> None:
-    check_read_back("rod", rod(20.0))
+    check_read_back("rod", rod(20.0), properties(rod(20.0)))
 
 
 def test_gaps_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,10 +30,10 @@ def test_gaps_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ShapeFix_ShapeTolerance().SetTolerance(loose, 2e-5)
     read_instead(monkeypatch, loose)
     with pytest.raises(InvalidSolidError, match=r"rod: its edges are up to 2e-05 mm off"):
-        check_read_back("rod", rod(20.0))
+        check_read_back("rod", rod(20.0), properties(rod(20.0)))
 
 
 def test_another_volume_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     read_instead(monkeypatch, rod(20.001))
     with pytest.raises(InvalidSolidError, match="not give the same valid solid"):
-        check_read_back("rod", rod(20.0))
+        check_read_back("rod", rod(20.0), properties(rod(20.0)))

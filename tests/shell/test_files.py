@@ -1,10 +1,12 @@
 import hashlib
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tbcad.cad.solids import properties
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import write_export
@@ -45,6 +47,23 @@ def test_step_round_trip(exported: Path, small_design: MirrorDesign, which: int)
     assert set(content.faces) == {name for name, _ in built.faces}
     assert content.kinds["StepGeom_SphericalSurface"] == len(half)
     assert sum(content.kinds.values()) == len(built.faces)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_validation_properties_are_those_of_the_solid(
+    exported: Path, small_design: MirrorDesign, which: int
+) -> None:
+    """Those of camera b's shell come by symmetry from camera a's."""
+    half = small_design.halves[which]
+    text = "".join((exported / f"shell_{half.camera_id}.step").read_text().split())
+    expected = properties(camera_solid(small_design, half).shape)
+    number = r"\(([-+.E0-9]+)\)"
+    assert float(re.findall(f"VOLUME_MEASURE{number}", text)[0]) == pytest.approx(expected.volume)
+    assert float(re.findall(f"AREA_MEASURE{number}", text)[0]) == pytest.approx(expected.area)
+    (point,) = re.findall(r"CARTESIAN_POINT\('centrepoint',\(([^)]*)\)\)", text)
+    centre = [float(x) for x in point.split(",")]
+    assert centre == pytest.approx(expected.centroid, abs=1e-6)
+    assert abs(centre[1]) < 1e-5 < abs(centre[0])
 
 
 def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: MirrorDesign) -> None:

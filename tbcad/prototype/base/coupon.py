@@ -1,4 +1,4 @@
-"""The coupon: one seat for each size of body at several offsets of the pads, to try the fit.
+"""The coupon: seats for a few sizes of body at several offsets of the pads, to try the fit.
 
 A seat is on a bar that only joins it to the others, and is no thicker than on the carrier: a wall
 round cup and pocket, with a cone of 45 degrees between them that prints without support.
@@ -61,7 +61,7 @@ Place = tuple[CouponRow, Floats]
 
 
 def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
-    """Plates with a seat for each size and each offset of the pads, as few as the bed allows.
+    """Plates with a seat for each chosen size and each offset of the pads, few as the bed allows.
 
     Raises:
         SpecError: when a single seat is larger than the bed.
@@ -76,11 +76,10 @@ def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
 
 
 def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec) -> list[CouponRow]:
-    """A row for each size, the largest first; several where the bed is too narrow for one."""
-    sizes, first = np.unique(np.round(seats.radius, DECIMALS), return_index=True)
+    """A row for each chosen size, the largest first; several where the bed is too narrow."""
     width = float(usable_size(printer)[0])
     rows = []
-    for k in first[np.argsort(-sizes)].tolist():
+    for k in _seats_to_try(seats, spec):
         row = _row(seats, spec, k, spec.coupon_offsets_mm)
         count = max(int((width - row.first) / row.cell), 1)
         rows += [
@@ -88,6 +87,13 @@ def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec) -> list[Coup
             for start in range(0, len(spec.coupon_offsets_mm), count)
         ]
     return rows
+
+
+def _seats_to_try(seats: Seats, spec: BaseSpec) -> list[int]:
+    """A seat of each chosen size, from the largest to the smallest, evenly in their order."""
+    sizes, first = np.unique(np.round(seats.radius, DECIMALS), return_index=True)
+    chosen = np.linspace(len(sizes) - 1, 0, min(spec.coupon_sizes, len(sizes)))
+    return [int(seat) for seat in first[np.round(chosen).astype(int)]]
 
 
 def _row(seats: Seats, spec: BaseSpec, k: int, offsets: tuple[float, ...]) -> CouponRow:

@@ -59,7 +59,7 @@ def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> None:
     """STEP as assembled, STL and 3MF on the printer's bed."""
     names, mesh = _file_names(part), part_mesh(part, spec.mesh.structure_error_mm)
     solid = Solid(part.name, part.solid.shape, ())
-    write_step(folder / names["step"], solid, spec.step.pcurves)
+    write_step(folder / names["step"], solid, spec.step.pcurves, part.solid.properties)
     write_stl(folder / names["stl"], mesh)
     write_3mf(folder / names["3mf"], part.name, mesh)
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, moved, one_solid, volume
+from tbcad.cad.solids import SolidProperties, meshed, moved, one_solid, properties, solids
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
 from tbcad.spec.errors import SpecError
@@ -40,12 +41,17 @@ class PlacedSolid:
     @property
     def on_bed(self) -> TopoDS_Solid:
         """The part as it is printed: above z = 0, about the middle of the bed."""
-        return one_solid(self.name, moved(self.shape, self.axes, self.origin))
+        return solids(moved(self.shape, self.axes, self.origin))[0]
+
+    @cached_property
+    def properties(self) -> SolidProperties:
+        """Volume, area and centroid in its place."""
+        return properties(self.shape)
 
     @property
     def volume(self) -> float:
         """Volume, mm^3."""
-        return volume(self.shape)
+        return self.properties.volume
 
     def mass_g(self, density: float) -> float:
         """Mass when printed solid, grams, for a density in g/cm^3."""

@@ -15,13 +15,13 @@ from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
 from tbcad.cad.solids import (
-    centroid,
     cut,
     cylinder,
     faces,
     fused,
     one_solid,
     plane_faces,
+    properties,
     volume,
     volume_by_meshes,
 )
@@ -46,7 +46,7 @@ from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh, bounds
 
 UP = np.array([0.0, 0.0, 1.0])
-SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2))
+SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2), coupon_sizes=99)
 PRINTER = PrinterSpec()
 
 
@@ -386,6 +386,18 @@ class TestCoupon:
         sizes = len(rows) * len(SPEC.coupon_offsets_mm)
         assert np.isin(np.round(area, 5), np.round(np.pi * seats.pad**2, 5)).sum() == 3 * sizes
 
+    @pytest.mark.parametrize("count", [1, 2, 3])
+    def test_a_few_sizes_reach_from_the_largest_to_the_smallest(
+        self, base: BaseLayout, count: int
+    ) -> None:
+        seats = base.seats
+        rows = coupon_rows(seats, BaseSpec(coupon_sizes=count), PRINTER)
+        tried = list(dict.fromkeys(seats.radius[row.seat] for row in rows))
+        assert len(tried) == count
+        assert tried == sorted(tried, reverse=True)
+        assert tried[0] == seats.radius.max()
+        assert tried[-1] == (seats.radius.min() if count > 1 else seats.radius.max())
+
     def test_walls_are_thick_enough(self, base: BaseLayout, plates: list[PlacedSolid]) -> None:
         """Nowhere from a cup or pocket outward is there less than on the carrier."""
         seats = base.seats
@@ -441,7 +453,7 @@ class TestRelief:
         (solid,) = relief(sign, 5.0, 0.6, 0.4, np.eye(3), np.zeros(3))
         squares = "".join(SIGNS[sign]).count("#")
         assert volume(one_solid(sign, solid)) == pytest.approx(squares)
-        assert centroid(solid)[2] == pytest.approx(0.1)
+        assert properties(solid).centroid[2] == pytest.approx(0.1)
 
     def test_holes_are_loops(self) -> None:
         assert [len(loop) for loop in loops(SIGNS["8"])] == [4, 4, 4]

@@ -140,6 +140,7 @@ class BaseSpec(Strict):
     coupon_offsets_mm: Annotated[
         list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=1, max_length=9)
     ]
+    coupon_sizes: int = Field(ge=1, le=99)
 
 
 class MotionSpec(Strict):
