@@ -5,7 +5,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, one_solid, plane_faces, volume
+from tbcad.cad.solids import meshed, one_solid, plane_faces, volume, without_cavities
 from tbcad.geometry.vectors import norm
 from tbcad.types import Floats
 
@@ -17,7 +17,7 @@ VOLUME_ERROR = 1e-3
 def checked(
     name: str, shape: TopoDS_Shape, expected: float, contacts: Floats, radius: Floats
 ) -> TopoDS_Solid:
-    """The one solid that a shape must be, of a volume (mm^3), with its pads.
+    """The one solid without cavities that a shape must be, of a volume (mm^3), with its pads.
 
     Args:
         name: for errors.
@@ -29,7 +29,7 @@ def checked(
     Raises:
         InvalidSolidError: when it is something else.
     """
-    solid = one_solid(name, shape)
+    solid = without_cavities(one_solid(name, shape))
     check_mesh(name, meshed(solid, COARSE_MM))  # a face may be valid and yet have no mesh
     check_volume(name, solid, expected)
     check_pads(name, solid, contacts, radius)

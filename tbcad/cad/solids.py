@@ -20,10 +20,12 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeSolid,
     BRepBuilderAPI_MakeVertex,
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
@@ -194,6 +196,14 @@ def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
     if not BRepCheck_Analyzer(found[0]).IsValid():
         raise InvalidSolidError(f"{name}: the kernel's check finds the solid invalid")
     return found[0]
+
+
+def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
+    """The solid within the outermost faces.
+
+    Bodies that touch can close in a crumb of air between them, which no printer could empty.
+    """
+    return BRepBuilderAPI_MakeSolid(BRepClass3d.OuterShell_s(solid)).Solid()
 
 
 def volume(shape: TopoDS_Shape) -> float:

@@ -24,6 +24,7 @@ from tbcad.cad.solids import (
     properties,
     volume,
     volume_by_meshes,
+    without_cavities,
 )
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
@@ -445,6 +446,21 @@ class TestCoupon:
         base = base_layout(BaseSpec(), prototype)
         with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
             coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)))
+
+
+class TestCavities:
+    def test_only_they_are_filled(self) -> None:
+        axis = np.array([0.0, 0.0, 1.0])
+        rod = cylinder(np.zeros(3), axis, 5.0, 20.0)
+        bore = cylinder(np.zeros(3), axis, 1.0, 20.0)
+        cavity = cylinder(5 * axis, axis, 1.0, 2.0)
+        bored, hollow = (
+            one_solid("bored", cut(rod, [bore])),
+            one_solid("hollow", cut(rod, [cavity])),
+        )
+        assert volume(hollow) == pytest.approx(volume(rod) - 2 * np.pi)
+        assert volume(without_cavities(hollow)) == pytest.approx(volume(rod))
+        assert volume(without_cavities(bored)) == pytest.approx(volume(bored))
 
 
 class TestRelief:
