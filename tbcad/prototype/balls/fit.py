@@ -7,7 +7,6 @@ import numpy as np
 
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.ball_light import ball_poses, pixel_counts, used_outlines
-from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
@@ -86,33 +85,40 @@ def _pixels(half: MirrorArray, outline: Floats) -> Floats:
 
 
 def ball_alternatives(
-    spec: Spec, half: MirrorArray, groups: MirrorGroups, catalogue: Catalogue
+    spec: Spec, half: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
 ) -> list[dict[str, Any]]:
     """What each rule costs, for groups of camera a's mirrors: records for prototype.json.
 
     pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
     within the moved cells, and mirrors_below_target counts those whose coverage is less.
+
+    Args:
+        spec: the design.
+        half: camera a's mirrors.
+        groups: of them.
+        balls: chosen by the spec's own rule, from the catalogue that all rules choose from.
+        fit: of these balls.
     """
-    candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
-    return [
-        _alternative(name, candidates, spec.prototype.model_copy(update=rule), catalogue)
-        for name, rule in SELECTION_RULES.items()
-    ]
+    target = spec.optics.capture_diameter_mm
+    candidates = ball_candidates(half, groups, target)
+
+    def alternative(rule: dict[str, Any]) -> tuple[Balls, BallFit]:
+        ruled = spec.prototype.model_copy(update=rule)
+        if ruled == spec.prototype:
+            return balls, fit
+        other = choose_balls(candidates, ruled, balls.catalogue)
+        return other, ball_fit(candidates, other, ruled)
+
+    return [_record(name, *alternative(rule), target) for name, rule in SELECTION_RULES.items()]
 
 
-def _alternative(
-    name: str, candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue
-) -> dict[str, Any]:
-    balls = choose_balls(candidates, spec, catalogue)
-    fit = ball_fit(candidates, balls, spec)
+def _record(name: str, balls: Balls, fit: BallFit, target: float) -> dict[str, Any]:
     return {
         "name": name,
         "pixels": float(fit.pixels.sum()),
         "pixels_kept_share": fit.kept_share,
         "coverage_mm": float(fit.coverage.min()),
-        "mirrors_below_target": int(
-            (fit.coverage < candidates.target - COVERAGE_ROUNDING_MM).sum()
-        ),
+        "mirrors_below_target": int((fit.coverage < target - COVERAGE_ROUNDING_MM).sum()),
         "balls_mass_g": float(balls.mass_g.sum()),
         "caps": int(balls.cap.sum()),
     }

@@ -82,7 +82,7 @@ def document(built: PrototypeModel) -> dict[str, Any]:
         "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
         "alternatives": ball_alternatives(
-            built.spec, layout.half, layout.groups, layout.balls.catalogue
+            built.spec, layout.half, layout.groups, layout.balls, layout.fit
         ),
         "seats": _seats(built),
         "parts": [_part_record(part) for part in built.printed],

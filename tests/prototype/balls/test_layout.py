@@ -118,12 +118,10 @@ class TestBalls:
 
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)
-        alternatives = {
-            c["name"]: c
-            for c in ball_alternatives(
-                spec, prototype.half, prototype.groups, prototype.balls.catalogue
-            )
-        }
+        rows = ball_alternatives(
+            spec, prototype.half, prototype.groups, prototype.balls, prototype.fit
+        )
+        alternatives = {row["name"]: row for row in rows}
         assert alternatives["cover, with caps"]["pixels_kept_share"] == pytest.approx(
             prototype.fit.kept_share
         )
@@ -133,6 +131,16 @@ class TestBalls:
             < alternatives["cover, with caps"]["pixels_kept_share"]
         )
         assert alternatives["nearest, with caps"]["mirrors_below_target"] > 10
+
+    def test_costs_do_not_depend_on_which_was_chosen(self, small_design: MirrorDesign) -> None:
+        spec, prototype = small_design.spec, small(small_design)
+        groups = (prototype.half, prototype.groups)
+        limits = spec.prototype.model_copy(update={"snap": "nearest", "caps": False})
+        candidates = ball_candidates(*groups, spec.optics.capture_diameter_mm)
+        balls = choose_balls(candidates, limits, prototype.balls.catalogue)
+        nearest = spec.model_copy(update={"prototype": limits})
+        chosen = ball_alternatives(nearest, *groups, balls, ball_fit(candidates, balls, limits))
+        assert chosen == ball_alternatives(spec, *groups, prototype.balls, prototype.fit)
 
 
 class TestPlaces:
