@@ -172,9 +172,12 @@ def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> N
         assert (angle[own] < 1.08 * far).all()  # a corner between two directions stands out
 
 
-def test_first_mirrors_by_brute_force(context: PrototypeContext) -> None:
-    shell = pinhole_cells.mirror_spheres(context)
-    d = np.random.default_rng(3).normal(size=(3, 4000)) + np.array([[-1.0], [0], [2]])
+@pytest.mark.parametrize("rays_together", [1, 80])
+def test_first_mirrors_by_brute_force(context: PrototypeContext, rays_together: int) -> None:
+    """Of rays that go everywhere, and of bundles, for which most mirrors are out of reach."""
+    shell, random = pinhole_cells.mirror_spheres(context), np.random.default_rng(3)
+    d = random.normal(size=(3, 4000 // rays_together)) + np.array([[-1.0], [0], [2]])
+    d = d.repeat(rays_together, axis=1) + 0.03 * random.normal(size=(3, 4000))
     found = pinhole_cells.first_mirrors(shell, d)
     assert (found >= 0).sum() > 100
     for k in range(0, 4000, 7):

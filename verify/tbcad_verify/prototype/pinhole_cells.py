@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.rays import in_threads, pixel_rows
-from tbcad_verify.mesh.vectors import chunks, dot, tangent_basis, unit
+from tbcad_verify.mesh.vectors import chunks, dot, norm, tangent_basis, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Bools, Floats, Ints
@@ -22,7 +22,8 @@ NEIGHBOURS = 20
 HALVINGS = 34
 MAX_ANGLE = 1.2  # rad, from a mirror's apex to its outline, as the pinhole sees them
 INSIDE = 0.98  # of the angle to the outline, where the mirror itself must be seen
-CHUNK = 1 << 12  # rays against all spheres at once
+CHUNK = 1 << 6  # neighbouring rays, as a rule, against the spheres near them
+SLACK = 1e-6  # rad: cosines near 1 are off by rounding
 PIXELS = 100_000  # of the sensor are sampled, about
 
 
@@ -116,8 +117,12 @@ def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
 
     Beyond the seam and below the foot there is no mirror.
     """
+    toward = shell.centre - shell.pinhole[:, None]
+    # A sphere about the pinhole is met by all rays.
+    sine = np.where(norm(toward) > shell.radius, shell.radius / norm(toward), np.nan)
+    half = np.nan_to_num(np.arcsin(sine), nan=np.pi) + SLACK
     parts = chunks(d.shape[1], CHUNK)
-    first = in_threads(lambda part: _first(shell, d[:, part]), parts)
+    first = in_threads(lambda part: _first(shell, unit(toward), half, d[:, part]), parts)
     return np.concatenate([np.zeros(0, dtype=np.int64), *first])
 
 
@@ -129,19 +134,36 @@ def sampled_pixels(camera: Camera) -> tuple[Floats, int]:
     return np.concatenate(directions, axis=1), step
 
 
-def _first(shell: MirrorSpheres, d: Floats) -> Ints:
-    offset = shell.pinhole[:, None] - shell.centre
+def _first(shell: MirrorSpheres, toward: Floats, half: Floats, d: Floats) -> Ints:
+    some = _near(toward, half, d)
+    offset, radius = shell.pinhole[:, None] - shell.centre[:, some], shell.radius[some]
     # No BLAS, whose rounding depends on the number of threads.
     b = np.einsum("in,im->nm", d, offset, optimize=False)
     square = dot(d, d)[:, None]
-    under = b * b - square * (dot(offset, offset) - shell.radius**2)
+    under = b * b - square * (dot(offset, offset) - radius**2)
     with np.errstate(invalid="ignore"):
         reach = np.where(under >= 0, -b - np.sqrt(under), np.inf)
     mirror = reach.argmin(axis=1)
     nearest = reach[np.arange(mirror.size), mirror] / square[:, 0]
     point = shell.pinhole[:, None] + np.where(np.isfinite(nearest), nearest, 0) * d
     good = np.isfinite(nearest) & (shell.side * point[0] >= 0) & (point[2] >= shell.foot)
-    return np.where(good, mirror, -1)
+    return np.where(good, some[mirror], -1)
+
+
+def _near(toward: Floats, half: Floats, d: Floats) -> Ints:
+    """Spheres that any of rays d may meet, at least one: those in the cone about all rays.
+
+    Args:
+        toward: (3, m) unit directions of the centres.
+        half: (m,) angles between them and the spheres' outlines, rad.
+        d: (3, N) directions.
+    """
+    rays = unit(d)
+    axis = unit(rays.sum(axis=1, keepdims=True))
+    spread = float(np.arccos(np.clip(dot(axis, rays).min(), -1, 1)))
+    reach = np.cos(np.minimum(half + spread, np.pi))
+    near = np.flatnonzero(dot(axis, toward) >= reach)
+    return near if near.size else np.zeros(1, dtype=np.int64)
 
 
 def _neighbours(shell: MirrorSpheres) -> Ints:

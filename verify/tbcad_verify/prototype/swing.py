@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -60,6 +61,11 @@ class AxialSolid:
     solid: Any
     reach: float
     profile: Floats
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The profile's points, to be searched."""
+        return cKDTree(self.profile)
 
 
 @dataclass(frozen=True)
@@ -175,10 +181,15 @@ def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSoli
 def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
     """Distance that two solids keep at any angle about the axis, mm; may be negative.
 
-    No point of a facet is farther from a corner than 1/sqrt(3) of its longest edge.
+    It is infinite where it is more than `SEARCH_MM`. No point of a facet is farther from a corner
+    than 1/sqrt(3) of its longest edge.
     """
-    distance = np.asarray(cKDTree(one.profile).query(two.profile)[0])
-    return float(distance.min()) - 2 * GRAIN_MM / float(np.sqrt(3))
+    between = 2 * GRAIN_MM / float(np.sqrt(3))
+    farthest = SEARCH_MM + between
+    low, high = one.profile.min(axis=0) - farthest, one.profile.max(axis=0) + farthest
+    near = two.profile[((two.profile >= low) & (two.profile <= high)).all(axis=1)]
+    distance = one.tree.query(near, distance_upper_bound=farthest)[0]
+    return float(np.min(distance, initial=np.inf)) - between
 
 
 def _solids(parts: list[MeasuredPart], *roles: str) -> NamedSolids:
