@@ -186,7 +186,7 @@ def test_first_mirrors_by_brute_force(context: PrototypeContext, rays_together: 
         for j in range(shell.radius.size):
             away = shell.pinhole - shell.centre[:, j]
             b, c = away @ unit, away @ away - shell.radius[j] ** 2
-            if b * b > c and -b - np.sqrt(b * b - c) < best:
+            if b < 0 and b * b > c and -b - np.sqrt(b * b - c) < best:
                 best, which = -b - np.sqrt(b * b - c), j
         point = shell.pinhole + best * unit if which >= 0 else np.full(3, np.nan)
         good = which >= 0 and point[0] >= 0 and point[2] >= shell.foot

@@ -140,9 +140,11 @@ def _first(shell: MirrorSpheres, toward: Floats, half: Floats, d: Floats) -> Int
     # No BLAS, whose rounding depends on the number of threads.
     b = np.einsum("in,im->nm", d, offset, optimize=False)
     square = dot(d, d)[:, None]
-    under = b * b - square * (dot(offset, offset) - radius**2)
+    power = dot(offset, offset) - radius**2
+    under = b * b - square * power
+    met = (under >= 0) & ((b <= 0) | (power <= 0))  # and not behind the pinhole
     with np.errstate(invalid="ignore"):
-        reach = np.where(under >= 0, -b - np.sqrt(under), np.inf)
+        reach = np.where(met, -b - np.sqrt(under), np.inf)
     mirror = reach.argmin(axis=1)
     nearest = reach[np.arange(mirror.size), mirror] / square[:, 0]
     point = shell.pinhole[:, None] + np.where(np.isfinite(nearest), nearest, 0) * d

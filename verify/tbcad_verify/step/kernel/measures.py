@@ -19,6 +19,7 @@ from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopoDS import TopoDS_Face
 
+from tbcad_verify.step.kernel.arcs import between_arcs
 from tbcad_verify.step.kernel.topology import triple
 from tbcad_verify.types import Floats
 
@@ -51,12 +52,27 @@ def measure_face(face: TopoDS_Face, origin: Floats) -> tuple[Row, Floats]:
         The figures as plain numbers, and (4,) the volume between face and origin and its first
         moment about the origin.
     """
-    moments, surface = _moments(face), BRepAdaptor_Surface(face)
+    surface = BRepAdaptor_Surface(face)
+    moments = _of_sphere(face, surface) or moments_of(face)
     row = {"area": moments.area, "centroid": moments.middle.tolist(), **_figures(face, surface)}
     return row, _enclosed(face, surface, moments, origin)
 
 
-def _moments(face: TopoDS_Face) -> AreaMoments:
+def _of_sphere(face: TopoDS_Face, surface: BRepAdaptor_Surface) -> AreaMoments | None:
+    """Of a sphere between arcs; None for other faces."""
+    if surface.GetType() != GeomAbs_Sphere or not surface.Sphere().Position().Direct():
+        return None
+    centre = np.array(triple(surface.Sphere().Location()))
+    found = between_arcs(face, centre, surface.Sphere().Radius())
+    if found is None:
+        return None
+    area, first, second = found
+    offset = first / area
+    return AreaMoments(area, centre + offset, second - area * np.outer(offset, offset))
+
+
+def moments_of(face: TopoDS_Face) -> AreaMoments:
+    """Of any face, integrated by the kernel."""
     measured = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, measured)
     inertia = measured.MatrixOfInertia()
