@@ -6,6 +6,7 @@ import numpy as np
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import FLIP_X
+from tbcad.mirrors.clearance import check_clearance
 from tbcad.mirrors.radii import RadiusProblem, solve_radii
 from tbcad.optics import flat
 from tbcad.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
@@ -127,6 +128,7 @@ def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
         SpecError: when the spec's mirrors cannot be made; it names them.
     """
     half = _half_a(spec, progress)
+    check_clearance(spec, half, _half_a)
     hfov = round(float(np.degrees(half.camera.hfov)), HFOV_DIGITS)
     camera = spec.camera.model_copy(update={"hfov_deg": hfov})
     return MirrorDesign(spec.model_copy(update={"camera": camera}), (half, half.mirrored()))
@@ -160,7 +162,7 @@ def _in_half_a(u: Floats) -> Bools:
     return np.asarray((u[:, 0] >= 0) & (u[:, 2] >= 0))
 
 
-def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
+def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = numbered_directions(optics.n)

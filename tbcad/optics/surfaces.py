@@ -69,6 +69,17 @@ class Surfaces:
         """Gradient of f_i at x (..., 3); on the surface itself the unit normal toward the light."""
         return self.normal[i] + self.curvature[i][..., None] * (x - self.apex[i])
 
+    def first_reach(self, i: Ints, origin: Floats, ray: Floats) -> Floats:
+        """How many lengths of rays (..., 3) from an origin (3,) lie before surfaces i (...).
+
+        The origin is on their light's side. The root of f(origin + s ray) = 0 is written so that it
+        holds for planes too; it is NaN for rays that miss.
+        """
+        k, squared = self.curvature[i], dot(ray, ray)
+        value = self.value(i, np.broadcast_to(origin, ray.shape))
+        slope = dot(ray, self.gradient(i, np.broadcast_to(origin, ray.shape)))
+        return np.asarray(2 * value / (np.sqrt(slope**2 - 2 * k * squared * value) - slope))
+
     def projected(self, i: Ints, x: Floats) -> Floats:
         """Points x (k, 3) moved onto the spheres i (k,) along their radii."""
         centre = self.centre[i]

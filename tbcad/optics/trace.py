@@ -14,16 +14,21 @@ SAMPLES = 9
 ROUNDS = 3
 
 
+def cell_sides(cells: Cells) -> tuple[Ints, Ints]:
+    """Mirror (e,) and arc (e,) of each side of a cell."""
+    arc, which = np.nonzero(cells.arcs.faces < cells.mirrors)
+    return cells.arcs.faces[arc, which], arc
+
+
 def limiting_sides(cells: Cells) -> tuple[Ints, Ints]:
     """Mirror (e,) and arc (e,) of each side of a cell that limits what its mirror covers.
 
     The cut of a halved mirror does not: its other half belongs to the other camera and shares its
     virtual camera, so the cut itself does not limit the two together.
     """
-    faces = cells.arcs.faces
-    arc, which = np.nonzero(faces < cells.mirrors)
-    mirror, other = faces[arc, which], faces[arc, 1 - which]
-    limiting = ~(cells.halved[mirror] & (other == cells.seam))
+    mirror, arc = cell_sides(cells)
+    cut = (cells.arcs.faces[arc] == cells.seam).any(axis=1)
+    limiting = ~(cells.halved[mirror] & cut)
     return mirror[limiting], arc[limiting]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
+from tbcad.shell.cell_middles import means, middles
 from tbcad.shell.cell_outlines import CellOutlines, cell_outlines, segment_counts
 from tbcad.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
@@ -56,22 +57,16 @@ def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
 
 def _planar(outlines: CellOutlines) -> Facets:
     """Fans about the cells' middles: any triangulation of a plane is exact."""
-    middle = _means(outlines.points, outlines.cell)
+    middle = means(outlines.points, outlines.cell)
     hub = len(outlines.vertices) + outlines.cell
     fans = np.column_stack([outlines.vertex[outlines.following], outlines.vertex, hub])
     return Facets(np.concatenate([outlines.vertices, middle]), fans, outlines.cell, outlines)
 
 
-def _means(points: Floats, cell: Ints) -> Floats:
-    """Mean of the points of each cell, (m, 3)."""
-    counts = np.bincount(cell)[:, None]
-    return np.column_stack([np.bincount(cell, weights=points[:, k]) for k in range(3)]) / counts
-
-
 def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Floats) -> Facets:
     """A strip along each outline, then rings of quads, then a fan about the middle."""
     mirrors, cell, edge = cells.mirror_surfaces, outlines.cell, outlines.points
-    middle = mirrors.projected(np.arange(cells.mirrors), _means(edge, cell))
+    middle = middles(outlines, mirrors)
     reach = norm(edge - middle[cell])
     first = np.unique(cell, return_index=True)[1]
     farthest, nearest = (limit.reduceat(reach, first) for limit in (np.maximum, np.minimum))

@@ -19,6 +19,7 @@ from tbcad.spec.sizes import with_sizes
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
 FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
 MAX_HFOV = 170  # degrees
+MAX_SEMI_MINOR = 5000.0
 
 
 def _current(value: object) -> object:
@@ -52,7 +53,7 @@ class OpticsSpec(Section):
     """Diameter of the capture sphere, which every virtual camera must see whole."""
     camera_mm: Point = (100.0, 0.0, -100.0)
     """Pinhole of camera a; camera b is its mirror image in the plane x = 0."""
-    semi_minor_mm: float = Field(100.0, ge=1, le=5000)
+    semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
     """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole."""
 
 

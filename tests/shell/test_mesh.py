@@ -54,10 +54,20 @@ def test_facets_lie_on_their_spheres_within_the_chord_error(small_design: Mirror
     assert depth.max() < small_design.spec.mesh.chord_error_mm
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 7])
-def test_all_facets_face_the_light(n: int) -> None:
-    """At n = 3 and 5 the foot cuts cells in corners so sharp that a mitred strip would fold."""
-    mirrors = design(load_spec(None, [f"n={n}"]))
+INWARD_FOOT = (
+    ["n=2", "camera_mm=[191.1, 0, -156.1]", "semi_minor_mm=72.5", "capture_diameter_mm=23.4"],
+    ["n=3", "camera_mm=[163.6, 0, -127]", "semi_minor_mm=67.9", "capture_diameter_mm=24.6"],
+)
+
+
+@pytest.mark.parametrize("options", [*([f"n={n}"] for n in range(2, 8)), *INWARD_FOOT], ids=str)
+def test_all_facets_face_the_light(options: list[str]) -> None:
+    """At n = 3 and 5 the foot cuts cells in corners so sharp that a mitred strip would fold.
+
+    In long ellipsoids a cell's side at the foot bends so far inward that not all of the outline is
+    in sight of its points' mean.
+    """
+    mirrors = design(load_spec(None, options))
     facets, surfaces = facets_of(mirrors), mirrors.halves[0].modelled_cells.surfaces
     corner = facets.vertices[facets.triangles]
     toward_light = surfaces.gradient(facets.mirror, corner.mean(axis=1))

@@ -15,7 +15,10 @@ from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
+from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.record import write_record
+from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import camera_a_mesh
 from tbcad.spec.load import load_spec
 from tests.verify.optical_setups import optical_setup_of
@@ -201,7 +204,11 @@ def shell(camera: list[float], semi_minor: float, capture: float) -> tuple[Mirro
 
 @pytest.mark.parametrize(
     ("camera", "semi_minor", "capture"),
-    [([61.3, 0, -51.4], 82.6, 35), ([39.3, 0, -99.8], 70.9, 51), ([58.9, 0, -58.2], 101.2, 78.3)],
+    [
+        ([61.3, 0, -51.4], 82.6, 35),
+        ([162.6, 0, -102.7], 117.1, 66.1),
+        ([76.6, 0, -54.9], 94.8, 35.3),
+    ],
 )
 def test_strips_of_a_hole_are_no_mirrors(
     camera: list[float], semi_minor: float, capture: float
@@ -233,6 +240,26 @@ def test_a_mirror_ends_where_the_foot_goes_on_smoothly(
     border = (foot[one] & mirror[two]) | (mirror[one] & foot[two])
     assert 0.1 < edges.angle[border].min() < 0.2
     assert creases(mesh, edges)[border].all()
+
+
+def test_a_long_mirror_is_found_where_its_camera_sees_its_apex(tmp_path: Path) -> None:
+    """The lowest mirror reaches so far outward that other mirrors' middles are nearer its apex."""
+    optics = ["camera_mm=[231.2, 0, -84.1]", "semi_minor_mm=53.8", "capture_diameter_mm=20"]
+    designed = design(load_spec(None, ["n=3", *optics]))
+    mesh = camera_a_mesh(designed)
+    write_stl(tmp_path / "shell_a.stl", mesh)
+    write_stl(tmp_path / "shell_b.stl", mesh.mirrored())
+    for half in "ab":
+        (tmp_path / f"shell_{half}.step").touch()
+        (tmp_path / f"shell_{half}.3mf").touch()
+    write_record(tmp_path, designed, shells=True)
+    write_manifest(tmp_path)
+    setup = optical_setup_of(tmp_path)
+    mirror = setup.export.mirrors.ids.index("a0022")
+    middles = setup.recovery.fits.middle[:, setup.match.segment]
+    apex = setup.export.mirrors.columns("px", 3)[:, mirror]
+    assert np.linalg.norm(middles - apex[:, None], axis=0).argmin() != mirror
+    assert all(check.passed for check in checks(setup, "x"))
 
 
 def test_rounding_never_makes_a_crease() -> None:

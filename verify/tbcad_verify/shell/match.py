@@ -13,7 +13,7 @@ from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import chunks, norm, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.shell.recover import FLAT_MM, Recovery
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.types import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,24 @@ class Match:
 
 
 def match(
-    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, camera: NDArray[np.str_], coating_mm: float
+    mirrors: Mirrors,
+    recovery: Recovery,
+    mesh: Mesh,
+    camera: NDArray[np.str_],
+    seen: Ints,
+    coating_mm: float,
 ) -> Match:
     """Pair mirrors and patches that are each other's nearest, camera by camera.
+
+    The middle of a long patch may be nearer to another mirror's apex. So of what is left a mirror
+    gets the patch that its camera sees at its apex.
 
     Args:
         mirrors: the record.
         recovery: all parts' patches, K.
         mesh: all parts.
         camera: (K,) the camera that each patch's part is for.
+        seen: (M,) the patch that each mirror's camera sees in line with its apex; -1 for none.
         coating_mm: the coat that the mesh does not show.
     """
     segment = np.full(len(mirrors), -1, dtype=np.intp)
@@ -56,6 +65,7 @@ def match(
         segment[rows] = _mutual(
             mirrors.columns("px", 3)[:, rows], recovery.fits.middle[:, patches], patches
         )
+    segment = _with_seen(segment, seen, recovery.mirror)
     extra = np.setdiff1d(np.flatnonzero(recovery.mirror), segment)
     centre, radius = centre_and_radius_errors(mirrors, recovery.fits, segment, coating_mm)
     blur = np.where(mirrors.flat | (segment < 0), 0.0, recovery.fits.blur[segment])
@@ -110,6 +120,18 @@ def _surface_errors(
             x = np.take(mesh.points, mesh.faces[facets[part], k], axis=0).T
             np.maximum.at(worst, mine, np.abs(surfaces.height(x)))
     return worst
+
+
+def _with_seen(segment: Ints, seen: Ints, mirror: Bools) -> Ints:
+    """Patches of mirrors (M,) with those added that one unpaired mirror alone is seen on."""
+    free = mirror.copy()
+    free[segment[segment >= 0]] = False
+    rows = np.flatnonzero((segment < 0) & (seen >= 0))
+    rows = rows[free[seen[rows]]]
+    patch, first, count = np.unique(seen[rows], return_index=True, return_counts=True)
+    result = segment.copy()
+    result[rows[first[count == 1]]] = patch[count == 1]
+    return result
 
 
 def _mutual(apex: Floats, middle: Floats, patches: Ints) -> Ints:

@@ -8,14 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh, join_meshes
-from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.rays import RayScene, build_scene, first_hits
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
 from tbcad_verify.shell.recover import Recovery, join_recoveries
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Floats, Ints
+
+# The apex of a halved mirror is on the cut; this much beside it only one half is seen.
+ASIDE_MM = 0.01
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,9 @@ def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Op
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
-    found = match(export.mirrors, recovery, mesh, camera, export.coating_mm)
+    scene = build_scene(mesh)
+    seen = _patches_at_apices(export, scene, recovery, camera)
+    found = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)
     mirrors = recovery.fits.surfaces.take(found.segment).coated(export.coating_mm)
     return OpticalSetup(
         export,
@@ -118,9 +123,24 @@ def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Op
         part,
         found,
         virtual_cameras(export.mirrors),
-        build_scene(mesh),
+        scene,
         mirrors,
     )
+
+
+def _patches_at_apices(
+    export: Export, scene: RayScene, recovery: Recovery, camera: NDArray[np.str_]
+) -> Ints:
+    """(M,) the patch that each mirror's own camera sees in line with its apex; -1 for none."""
+    names, apex = export.mirrors.camera, export.mirrors.columns("px", 3)
+    patches = np.full(len(names), -1)
+    for key, one in export.cameras.items():
+        mine = np.flatnonzero(names == key)
+        target = apex[:, mine] + [[np.sign(one.pinhole[0]) * ASIDE_MM], [0], [0]]
+        facet = first_hits(scene, one.pinhole[:, None], target - one.pinhole[:, None])
+        patch = np.where(facet >= 0, recovery.segments.label[facet], -1)
+        patches[mine] = np.where((facet >= 0) & (camera[patch] == key), patch, -1)
+    return patches
 
 
 def pinhole_of(export: Export, part: Part) -> Floats | None:

@@ -1,0 +1,116 @@
+"""Whether the object stands in its own light, and with which sizes it would not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from scipy.optimize import brentq
+
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.optics.object_light import closest_passage, passing_distances
+from tbcad.spec.design import MAX_SEMI_MINOR, OpticsSpec, Spec
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from tbcad.mirrors.array import MirrorArray
+
+Solve = Callable[[Spec], "MirrorArray"]
+Size = Callable[[OpticsSpec, "MirrorArray", float], float | None]
+
+# Sizes are tried until one clears: the first that is computed mostly does.
+TRIES = 5
+STEPS_PER_MM = 10  # of the sizes tried
+
+
+def check_clearance(spec: Spec, half: MirrorArray, solve: Solve) -> None:
+    """Refuse a design whose object stands between its mirrors and the camera.
+
+    Args:
+        spec: of the design.
+        half: camera a's mirrors.
+        solve: the mirrors of another spec, to try remedies.
+
+    Raises:
+        SpecError: with the mirror, and sizes with which the light passes the object.
+    """
+    radius = spec.optics.capture_diameter_mm / 2
+    distance, mirror = _passage(spec.optics, half)
+    if distance >= radius:
+        return
+    raise SpecError(
+        f"the object stands in its own light: on the way from mirror {half.ids[mirror]} to the "
+        f"camera light passes {distance:.4g} mm from the object's centre, closer than the capture "
+        f"sphere's radius of {radius:.4g} mm: {_remedies(spec, half, solve)}"
+    )
+
+
+def _remedies(spec: Spec, half: MirrorArray, solve: Solve) -> str:
+    sizes: dict[str, tuple[Size, str]] = {
+        "capture_diameter_mm": (_smaller_sphere, "less"),
+        "semi_minor_mm": (_wider_ellipsoid, "more"),
+    }
+    tried = [
+        f"optics.{key} {value:g} or {which}"
+        for key, (size, which) in sizes.items()
+        if (value := _size_that_clears(spec, half, solve, key, size))
+    ]
+    if not tried:
+        return "make optics.capture_diameter_mm smaller or bring optics.camera_mm farther away"
+    return f"make {', or '.join(tried)} ({'both ' if len(tried) > 1 else ''}tried)"
+
+
+def _size_that_clears(
+    spec: Spec, half: MirrorArray, solve: Solve, key: str, size: Size
+) -> float | None:
+    """The size nearest to the spec's that was tried and clears, mm; None where none was found."""
+    tried = spec
+    for _ in range(TRIES):
+        value = size(spec.optics, half, _spread(tried.optics, half))
+        if value is None:
+            return None
+        tried = spec.model_copy(update={"optics": spec.optics.model_copy(update={key: value})})
+        try:
+            half = solve(tried)
+        except SpecError:
+            return None
+        if _passage(tried.optics, half)[0] >= tried.optics.capture_diameter_mm / 2:
+            return value
+    return None
+
+
+def _passage(optics: OpticsSpec, half: MirrorArray) -> tuple[float, int]:
+    return closest_passage(half.cells, half.ellipsoid.pinhole, optics.capture_diameter_mm / 2)
+
+
+def _apex_passage(ellipsoid: Ellipsoid, u: Floats) -> float:
+    """Smallest distance from the origin of the ways between the camera and all apices, mm."""
+    return float(passing_distances(ellipsoid.pinhole, ellipsoid.apices(u)).min())
+
+
+def _spread(optics: OpticsSpec, half: MirrorArray) -> float:
+    """How much closer light in use passes than that of the apices, a mm of capture diameter.
+
+    It hardly depends on the sizes, so a size that clears follows from the apices in closed form.
+    """
+    apices = _apex_passage(half.ellipsoid, half.u)
+    return (apices - _passage(optics, half)[0]) / optics.capture_diameter_mm
+
+
+def _smaller_sphere(_: OpticsSpec, half: MirrorArray, spread: float) -> float | None:
+    diameter = _apex_passage(half.ellipsoid, half.u) / (0.5 + spread)
+    return math.floor(diameter * STEPS_PER_MM) / STEPS_PER_MM or None
+
+
+def _wider_ellipsoid(optics: OpticsSpec, half: MirrorArray, spread: float) -> float | None:
+    needed = optics.capture_diameter_mm * (0.5 + spread)
+
+    def spare(semi_minor: float) -> float:
+        return _apex_passage(Ellipsoid(half.ellipsoid.pinhole, semi_minor), half.u) - needed
+
+    if spare(MAX_SEMI_MINOR) < 0:
+        return None
+    semi_minor = brentq(spare, optics.semi_minor_mm, MAX_SEMI_MINOR)
+    return math.ceil(semi_minor * STEPS_PER_MM) / STEPS_PER_MM
