@@ -389,24 +389,27 @@ def write_photographs(
 
 def analyse(
     exports: Path | str,
-    process: str = "sla",
+    process: str | None = None,
     object_file: Path | str | None = None,
     *,
     settings: Settings = (),
     options: "ToleranceOptions | None" = None,
     progress: Progress = silent,
     detail: Progress = silent,
+    answer: Progress = silent,
 ) -> "Analysis":
     """Simulate many builds by a manufacturing process, and find what limits their yield.
 
     Args:
         exports: folder that `build` wrote.
-        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file.
+        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file; by default "sla", and the
+            yields of all built-in processes are compared.
         object_file: mesh that is photographed for the sharpness; None for a built-in knot.
         settings: "kind=value" texts that change errors of the process.
-        options: number of builds, wanted yield, seed ...
+        options: number of builds, wanted yield, seed, whether margins are searched for ...
         progress: called with the name of each stage.
         detail: called with the state of a stage.
+        answer: called with the yield, in words, as soon as it is known.
 
     Raises:
         InputError: export or process cannot be read, or mirrors are planar.
@@ -415,11 +418,13 @@ def analyse(
     from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.tolerance.analysis import ToleranceOptions
     from tbcad.tolerance.analysis import analyse as analyse_export
-    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
+    from tbcad.tolerance.stages import RECORD
 
     asked = options or ToleranceOptions()
-    made_by = load_process(process, option_texts(settings))
-    progress("record of the export")
+    asked = asked if process else replace(asked, every_process=True)
+    made_by = load_process(process or DEFAULT_PROCESS, option_texts(settings))
+    progress(RECORD)
     export = read_export(Path(exports))
     subject = load_or_built_in(object_file, export.capture_mm)
-    return analyse_export(export, made_by, subject, asked, progress, detail)
+    return analyse_export(export, made_by, subject, asked, progress, detail, answer)

@@ -109,11 +109,11 @@ def scaled(times: Seconds, n: int) -> Seconds:
 
 def export_times(folder: Path) -> Seconds:
     """Expected seconds of the verification of a folder, after its simulated builds."""
-    n, parts = _look_at(folder)
+    n, parts = look_at(folder)
     return as_made_times(n, parts) | verify_times(n, parts)
 
 
-def _look_at(folder: Path) -> tuple[int, tuple[str, ...]]:
+def look_at(folder: Path) -> tuple[int, tuple[str, ...]]:
     """What a folder seems to hold; it may be no export: that is for others to say."""
     try:
         document = json.loads((folder / "design.json").read_text(encoding="utf-8"))

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.early_checks import check_is_export
 from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
 from tbcad.screen import paragraph, stages
 
@@ -14,12 +15,21 @@ from tbcad.screen import paragraph, stages
 def tolerance(
     folder: Exports,
     process: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="How it is made: fdm, sls, sla, cnc, diamond, or a TOML file.",
+            help="How it is made: fdm, sls, sla, cnc, diamond, or a TOML file. By default sla, and "
+            "the yields of all of them are compared.",
         ),
-    ] = "sla",
+    ] = None,
+    margins: Annotated[
+        bool,
+        typer.Option(
+            "--margins",
+            help="Also search for the minimum margin on the coverage with which each process "
+            "reaches the yield, as tbcad build --for-process does; some 10 s a process.",
+        ),
+    ] = False,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,18 +53,23 @@ def tolerance(
 
     Writes tolerance.json, tables, notes and plots.
     """
-    from tbcad.tolerance.process.process import load_process
+    from tbcad.cli.tolerance_times import tolerance_times
+    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
 
     changes = list(settings or [])
-    load_process(process, changes)  # refused before the heavy libraries are loaded
+    name = load_process(process or DEFAULT_PROCESS, changes).name
+    check_is_export(folder)  # as the process, refused before the heavy libraries are loaded
     from tbcad.api import analyse
     from tbcad.simulate.study.study import check_study_folder, write_study
     from tbcad.tolerance.analysis import ToleranceOptions
     from tbcad.tolerance.report import json_text, summary_text, tolerance_study
+    from tbcad.tolerance.stages import TABLES
 
-    options = ToleranceOptions(builds, seed, share, calibrated_mrad / 1000, scheduler)
+    options = ToleranceOptions(
+        builds, seed, share, calibrated_mrad / 1000, scheduler, margins=margins
+    )
     check_study_folder(out)
-    with stages(6) as screen:
+    with stages(tolerance_times(folder, name, builds, process is None, margins)) as screen:
         analysis = analyse(
             folder,
             process,
@@ -63,7 +78,9 @@ def tolerance(
             options=options,
             progress=screen.stage,
             detail=screen.detail,
+            answer=screen.note,
         )
+        screen.stage(TABLES)
         more = {"tolerance.json": json_text(analysis).encode()}
         files = write_study(tolerance_study(analysis), out, more)
     typer.echo(paragraph(summary_text(analysis)))

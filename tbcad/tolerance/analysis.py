@@ -1,26 +1,26 @@
 """Effect of a manufacturing process on a design: yield, sensitivity, and the margin needed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any
 
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import Exported
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
-from tbcad.tolerance.margin import Margin, check_yield, margin
+from tbcad.tolerance.margin import Margin, SolvedDesigns, check_yield, margin
 from tbcad.tolerance.montecarlo.builds import (
     AnyResult,
     Case,
     CoverageResult,
     MonteCarloCase,
     ShellResult,
+    WorstCase,
     YieldEstimate,
     estimate_yield,
     simulate,
@@ -36,6 +36,15 @@ from tbcad.tolerance.montecarlo.sensitivity import (
 from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
 from tbcad.tolerance.prototype.windows import PrototypeCase, prototype_model
+from tbcad.tolerance.stages import (
+    EVERY_PROCESS,
+    MARGINS,
+    PICTURES,
+    PROTOTYPES,
+    SINGLE_ERRORS,
+    builds_stage,
+)
+from tbcad.tolerance.yield_text import yield_sentence
 from tbcad.types import Floats, Progress
 
 # Simulated builds in each step of a search; the process itself has as many as asked for.
@@ -55,6 +64,8 @@ class ToleranceOptions:
         wanted_yield: share of the builds that must be good, above 0, below 1.
         calibration_residual: error of a mirror's direction after calibration, radians, below 0.1.
         scheduler: address of a Dask scheduler; None for this machine's cores.
+        every_process: whether the yields of all built-in processes are compared.
+        margins: whether the margins are searched for that the processes need.
 
     Raises:
         InputError: a value is not allowed.
@@ -65,6 +76,8 @@ class ToleranceOptions:
     wanted_yield: float = 0.99
     calibration_residual: float = 0.5e-3
     scheduler: str | None = None
+    every_process: bool = False
+    margins: bool = False
 
     def __post_init__(self) -> None:
         """Check all values."""
@@ -86,12 +99,14 @@ class ProcessOption:
     Attributes:
         name: of the process.
         estimate: yield with the design as it is.
-        margin: that it needs for the wanted yield.
+        margin: that it needs for the wanted yield; None where it was not searched for.
+        builds: number of simulated builds that the yield is of.
     """
 
     name: str
     estimate: YieldEstimate
-    margin: Margin
+    margin: Margin | None
+    builds: int = SEARCH_BUILDS
 
 
 @dataclass(frozen=True)
@@ -119,8 +134,8 @@ class Analysis:
         edge_models: the same for the fast model.
         result: of the simulated builds.
         single_errors: effect of each kind of error by itself, the largest loss first.
-        process_options: every built-in process.
-        margin: that this process needs.
+        process_options: every built-in process, or this one alone.
+        margin: that this process needs; None where it was not searched for.
         sharpness: of pictures.
         prototype: None where the export has none.
     """
@@ -133,7 +148,7 @@ class Analysis:
     result: ShellResult
     single_errors: tuple[SingleErrorEffect, ...]
     process_options: tuple[ProcessOption, ...]
-    margin: Margin
+    margin: Margin | None
     sharpness: Sharpness
     prototype: PrototypeYield | None
 
@@ -157,8 +172,9 @@ def analyse(
     options: ToleranceOptions,
     progress: Progress,
     detail: Progress,
+    answer: Progress = lambda _: None,
 ) -> Analysis:
-    """Simulate many builds of an export by a process, and search for the margin that it needs.
+    """Simulate many builds of an export by a process, and find what limits their yield.
 
     Args:
         export: the design as it was written.
@@ -167,27 +183,34 @@ def analyse(
         options: number of builds, wanted yield, seed ...
         progress: called with each stage.
         detail: called with the steps of a stage.
+        answer: called with the yield, in words, as soon as it is known.
 
     Raises:
         InputError: mirrors are planar, or the scheduler cannot be reached.
     """
     _refuse_planar(export)
     errors = process_errors(process, export.spec.mirrors.coating_um)
-    simulator = _Simulator(export, options, edge_models(export.reflectors))
-    progress(f"{options.builds} simulated builds by {process.name}")
+    simulator = _Simulator(export, options, edge_models(export.reflectors), detail)
+    progress(builds_stage(options.builds, process.name))
     result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
-    progress("each kind of error by itself")
+    answer(yield_sentence(process, result.worst, export.capture_mm))
+    progress(SINGLE_ERRORS)
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
     single_errors = _single_errors(simulator, errors, worst, detail)
-    progress("every process, and the margin it needs")
-    process_options = tuple(_process_option(simulator, name, worst, detail) for name in BUILT_IN)
-    own_margin = _margin(simulator, process, process_options, detail)
-    progress("pictures")
+    own = ProcessOption(
+        process.name, estimate_yield(result.worst, export.capture_mm), None, options.builds
+    )
+    process_options = _process_options(simulator, own, worst, progress)
+    own_margin = None
+    if options.margins:
+        progress(MARGINS)
+        process_options, own_margin = _margins(simulator, process, process_options)
+    progress(PICTURES)
     sharp = _sharpness(simulator, errors, scene_object, detail)
     prototype = None
     if (export.folder / "prototype.json").is_file():
-        progress("prototypes")
+        progress(PROTOTYPES)
         prototype = _prototype_yield(simulator, errors)
     return Analysis(
         process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
@@ -210,19 +233,28 @@ class _Simulator:
     export: Exported
     options: ToleranceOptions
     edge_models: EdgeModels
+    detail: Progress
 
     def all_builds(self, case: Case[AnyResult]) -> AnyResult:
         """Result of as many builds as asked for."""
-        return simulate(case, self.options.builds, self._run_batches)
+        total, done = self.options.builds, 0
 
-    def worst_coverage(self, errors: Errors, design: MirrorDesign | None = None) -> Floats:
+        def report(batch: range) -> None:
+            nonlocal done
+            done += len(batch)
+            self.detail(f"{done} of {total}")
+
+        return simulate(case, total, partial(self._run_batches, report=report))
+
+    def worst_coverage(self, errors: Errors, models: EdgeModels | None = None) -> Floats:
         """Minimum coverage of the builds of a search, of the export or of another design."""
-        models = edge_models(reflectors(design)) if design else self.edge_models
-        case = MonteCarloCase(models, errors, self.options.seed)
+        case = WorstCase(models or self.edge_models, errors, self.options.seed)
         return simulate(case, SEARCH_BUILDS, self._run_batches).worst
 
-    def _run_batches(self, case: Any, batches: Sequence[range]) -> list[Any]:
-        return schedule.run_units(case, batches, self.options.scheduler)
+    def _run_batches(
+        self, case: Any, batches: Sequence[range], report: Callable[[range], None] = lambda _: None
+    ) -> list[Any]:
+        return schedule.run_units(case, batches, self.options.scheduler, report)
 
 
 def _single_errors(
@@ -237,27 +269,47 @@ def _single_errors(
     return tuple(sorted(effects, key=lambda one: -one.loss))
 
 
-def _process_option(
-    simulator: _Simulator, name: str, worst: WorstCoverage, detail: Progress
-) -> ProcessOption:
-    export, process = simulator.export, load_process(name)
-    detail(name)
-    errors = process_errors(process, export.spec.mirrors.coating_um)
-    estimate = estimate_yield(worst(errors), export.capture_mm)
-    needed = _margin(simulator, process, (), lambda text: detail(f"{name}: {text}"))
-    return ProcessOption(name, estimate, needed)
+def _process_options(
+    simulator: _Simulator, own: ProcessOption, worst: WorstCoverage, progress: Progress
+) -> tuple[ProcessOption, ...]:
+    """Every process with its yield, or the one that was asked for."""
+    if not simulator.options.every_process:
+        return (own,)
+    progress(EVERY_PROCESS)
+    return tuple(_process_option(simulator, name, worst) for name in BUILT_IN)
 
 
-def _margin(
-    simulator: _Simulator, process: Process, known: Sequence[ProcessOption], detail: Progress
-) -> Margin:
-    """Margin that a process needs, from the built-in processes if it is one of them."""
-    for option in known:
-        if load_process(option.name) == process:
-            return option.margin
+def _process_option(simulator: _Simulator, name: str, worst: WorstCoverage) -> ProcessOption:
+    export = simulator.export
+    simulator.detail(name)
+    errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
+    return ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None)
+
+
+def _margins(
+    simulator: _Simulator, process: Process, compared: Sequence[ProcessOption]
+) -> tuple[tuple[ProcessOption, ...], Margin]:
+    """The same processes with the margins that they need, and the margin of the one asked for."""
+    designs = SolvedDesigns()
+    if not simulator.options.every_process:
+        own = _margin(simulator, process, designs)
+        return tuple(replace(option, margin=own) for option in compared), own
+    options = tuple(
+        replace(option, margin=_margin(simulator, load_process(option.name), designs))
+        for option in compared
+    )
+    known = [option.margin for option in options if load_process(option.name) == process]
+    return options, next(filter(None, known), None) or _margin(simulator, process, designs)
+
+
+def _margin(simulator: _Simulator, process: Process, designs: SolvedDesigns) -> Margin:
     spec, wanted = simulator.export.spec, simulator.options.wanted_yield
     errors = process_errors(process, spec.mirrors.coating_um)
-    return margin(spec, errors, wanted, simulator.worst_coverage, detail)
+    detail = simulator.detail
+    return margin(
+        spec, errors, wanted, simulator.worst_coverage,
+        lambda text: detail(f"{process.name}: {text}"), designs,
+    )  # fmt: skip
 
 
 def _sharpness(
@@ -277,8 +329,5 @@ def _sharpness(
 def _prototype_yield(simulator: _Simulator, errors: Errors) -> PrototypeYield:
     export = simulator.export
     model = prototype_model(export.reflectors, read_plan(export))
-    uncalibrated, calibrated = (
-        simulator.all_builds(PrototypeCase(model, errors, simulator.options.seed, calibrated))
-        for calibrated in (False, True)
-    )
-    return PrototypeYield(uncalibrated, calibrated)
+    result = simulator.all_builds(PrototypeCase(model, errors, simulator.options.seed))
+    return PrototypeYield(result.uncalibrated, result.calibrated)

@@ -5,7 +5,7 @@ from tbcad_verify.report.as_made import AsMade, ProcessYield
 
 from tbcad.errors import InputError
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, estimate_yield, simulate
+from tbcad.tolerance.montecarlo.builds import WorstCase, estimate_yield, simulate
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.process.process import BUILT_IN, load_process, process_errors
 from tbcad.types import Progress
@@ -43,7 +43,7 @@ def _process_yield(
 ) -> ProcessYield:
     errors = process_errors(load_process(name), coating_um)
     try:
-        worst = simulate(MonteCarloCase(models, errors, SEED), BUILDS).worst
+        worst = simulate(WorstCase(models, errors, SEED), BUILDS).worst
     except InputError:  # errors larger than the radius of a mirror
         return ProcessYield(name, 0.0, 0.0)
     share = estimate_yield(worst, capture_mm).share

@@ -6,18 +6,18 @@ from math import ceil
 
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.sweep import spec_with
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, coverage_at_yield, simulate
+from tbcad.tolerance.montecarlo.builds import WorstCase, coverage_at_yield, simulate
 from tbcad.tolerance.montecarlo.draws import Errors
-from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.process.process import Process, process_errors
 from tbcad.types import Floats, Progress
 
-WorstCoverageOfDesign = Callable[[Errors, MirrorDesign], Floats]
+WorstCoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
 """Minimum coverage, mm, (s,), of builds of a design with some errors."""
 
 MAX_TRIES = 6
@@ -43,6 +43,30 @@ class Margin:
     reason: str = ""
 
 
+class SolvedDesigns:
+    """Fast models of designs with several margins, each solved once for all processes."""
+
+    def __init__(self) -> None:
+        """Begin without any design."""
+        self._models: dict[Spec, EdgeModels | SpecError] = {}
+
+    def of(self, spec: Spec) -> EdgeModels:
+        """The fast model of a design.
+
+        Raises:
+            SpecError: the design cannot be made.
+        """
+        if spec not in self._models:
+            try:
+                self._models[spec] = edge_models(reflectors(design(spec)))
+            except SpecError as error:
+                self._models[spec] = error
+        found = self._models[spec]
+        if isinstance(found, SpecError):
+            raise found
+        return found
+
+
 def check_yield(wanted_yield: float) -> None:
     """Refuse a share of good builds that is not between 0 and 1.
 
@@ -59,6 +83,7 @@ def margin(
     wanted_yield: float,
     worst: WorstCoverageOfDesign,
     progress: Progress = lambda _: None,
+    designs: SolvedDesigns | None = None,
 ) -> Margin:
     """The minimum margin with which the wanted share of builds covers enough.
 
@@ -68,15 +93,17 @@ def margin(
         wanted_yield: share of good builds.
         worst: simulates builds.
         progress: called with each margin.
+        designs: that other searches have solved; those of this one are added.
 
     The loss of the worst camera hardly depends on the margin, so each try starts from the loss of
     the last one; smaller mirrors lose a little more, hence several tries.
     """
+    designs = designs or SolvedDesigns()
     target, tried, share = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm, 0.0
     for _ in range(MAX_TRIES):
         progress(f"margin {tried:.2f} mm")
         try:
-            seen = worst(errors, design(with_margin(spec, tried)))
+            seen = worst(errors, designs.of(with_margin(spec, tried)))
         except SpecError as error:
             return Margin(None, share, f"mirrors of margin {tried:.2f} mm: {error}")
         share = float((seen >= target).mean())
@@ -121,8 +148,8 @@ def spec_for_process(
     return with_margin(spec, needed.mm)
 
 
-def _worst_coverage(errors: Errors, design: MirrorDesign) -> Floats:
-    case = MonteCarloCase(edge_models(reflectors(design)), errors, SEED)
+def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:
+    case = WorstCase(models, errors, SEED)
     return simulate(case, BUILDS, schedule.run_units).worst
 
 

@@ -9,14 +9,17 @@ import numpy as np
 
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.tables import Record, Table
-from tbcad.tolerance.analysis import SEARCH_BUILDS, Analysis
-from tbcad.tolerance.montecarlo.builds import CoverageResult, YieldEstimate, estimate_yield
+from tbcad.tolerance.analysis import Analysis
+from tbcad.tolerance.margin import Margin
+from tbcad.tolerance.montecarlo.builds import CoverageResult, estimate_yield
 from tbcad.tolerance.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
 from tbcad.tolerance.process.process import ErrorSpec, Process
+from tbcad.tolerance.yield_text import percent, yield_sentence
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
+NOT_SEARCHED = "not searched for: add --margins"
 QUANTILES = (0.01, 0.05, 0.5)
 NOTES = (
     "Coverage of a virtual camera: twice the minimum distance from the object's centre of all rays "
@@ -44,7 +47,7 @@ ERROR_COLUMNS = (
 def summary_text(analysis: Analysis) -> str:
     """The result in one paragraph."""
     sentences = (
-        _yield_sentence(analysis),
+        yield_sentence(analysis.process, analysis.result.worst, analysis.target),
         _largest_loss_sentence(analysis),
         _margin_sentence(analysis),
         _processes_sentence(analysis),
@@ -52,16 +55,6 @@ def summary_text(analysis: Analysis) -> str:
         _prototype_sentence(analysis),
     )
     return " ".join(filter(None, sentences))
-
-
-def _yield_sentence(analysis: Analysis) -> str:
-    process, worst = analysis.process, analysis.result.worst
-    return (
-        f"Built by {process.name} ({process.title}), {_percent(analysis.estimate)} of the builds "
-        f"cover {analysis.target:g} mm with every virtual camera; the worst camera of a build "
-        f"covers {np.median(worst):.2f} mm (median; 1 % cover less than "
-        f"{np.quantile(worst, 0.01):.2f})."
-    )
 
 
 def _largest_loss_sentence(analysis: Analysis) -> str:
@@ -102,6 +95,8 @@ def _wanted(analysis: Analysis) -> str:
 
 def _margin_sentence(analysis: Analysis) -> str:
     needed = analysis.margin
+    if needed is None:
+        return ""
     if needed.mm is None:
         return f"No margin was found that is enough: {needed.reason}."
     return (
@@ -111,11 +106,25 @@ def _margin_sentence(analysis: Analysis) -> str:
 
 
 def _processes_sentence(analysis: Analysis) -> str:
-    margins = {option.name: option.margin.mm for option in analysis.process_options}
+    """Of all processes the yields, and the margins if they were searched for."""
+    if len(analysis.process_options) < 2:
+        return ""
+    yields = (f"{one.name} {one.estimate.share:.1%}" for one in analysis.process_options)
+    text = f"Good builds, of {analysis.process_options[0].builds} each: {', '.join(yields)}."
+    return text if analysis.margin is None else f"{text} {_margins_sentence(analysis)}"
+
+
+def _margins_sentence(analysis: Analysis) -> str:
+    margins = {option.name: _margin(option.margin)[0] for option in analysis.process_options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
     text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
     return text + (f"; none was found for {' and '.join(none)}." if none else ".")
+
+
+def _margin(margin: Margin | None) -> tuple[float | None, str]:
+    """Margin, mm, and why there is none."""
+    return (None, NOT_SEARCHED) if margin is None else (margin.mm, margin.reason)
 
 
 def _sharpness_sentence(analysis: Analysis) -> str:
@@ -130,7 +139,7 @@ def _prototype_sentence(analysis: Analysis) -> str:
     if analysis.prototype is None:
         return ""
     without, with_it = (
-        _percent(estimate_yield(result.worst, analysis.target))
+        percent(estimate_yield(result.worst, analysis.target))
         for result in (analysis.prototype.uncalibrated, analysis.prototype.calibrated)
     )
     return f"Prototype: {without} good without calibration, {with_it} with it."
@@ -154,8 +163,8 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
         "wanted_yield": analysis.options.wanted_yield,
         **_result_dict(analysis.result, analysis.target),
         "single_errors": _error_table(analysis).records(),
-        "margin_needed_mm": analysis.margin.mm,
-        "margin_reason": analysis.margin.reason,
+        "margin_needed_mm": _margin(analysis.margin)[0],
+        "margin_reason": _margin(analysis.margin)[1],
         "processes": _process_table(analysis).records(),
         "ssim": {
             "designed": float(sharp.designed.mean()),
@@ -210,7 +219,7 @@ def _figures(analysis: Analysis) -> tuple[Figure, ...]:
         Figure("good builds", "%", 100 * analysis.estimate.share),
         Figure("worst camera, median", "mm", float(np.median(worst))),
         Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01))),
-        Figure("margin needed", "mm", analysis.margin.mm),
+        *([Figure("margin needed", "mm", analysis.margin.mm)] if analysis.margin else []),
         *losses,
         *yields,
     )
@@ -251,12 +260,12 @@ def _process_table(analysis: Analysis) -> Table:
     records: list[Record] = [
         {
             "process": option.name,
-            "builds": SEARCH_BUILDS,
+            "builds": option.builds,
             "yield": option.estimate.share,
             "yield_low": option.estimate.low,
             "yield_high": option.estimate.high,
-            "margin_needed_mm": option.margin.mm,
-            "reason": option.margin.reason,
+            "margin_needed_mm": _margin(option.margin)[0],
+            "reason": _margin(option.margin)[1],
         }
         for option in analysis.process_options
     ]
@@ -282,7 +291,3 @@ def _rms(offset: Floats) -> float:
     """Root mean square, mm, of the rays that meet their mirror; 0 where none does."""
     met = offset[np.isfinite(offset)]
     return float(np.sqrt((met**2).mean())) if met.size else 0.0
-
-
-def _percent(estimate: YieldEstimate) -> str:
-    return f"{estimate.share:.1%} ({estimate.low:.1%} to {estimate.high:.1%})"

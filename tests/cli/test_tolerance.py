@@ -66,7 +66,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def written(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("tolerance") / "new" / "folder"
-    assert run(["tolerance", str(export), *FEW, "--out", str(out)]) == 0
+    assert run(["tolerance", str(export), *FEW, "--margins", "--out", str(out)]) == 0
     return out
 
 
@@ -134,23 +134,57 @@ class TestWritten:
         before, mine = contents(written), written / "notes-of-mine.txt"
         mine.write_text("mine")
         monkeypatch.setattr("tbcad.schedule.cores", lambda: 1)
-        assert run(["tolerance", str(export), *FEW, "--out", str(written)]) == 0
+        assert run(["tolerance", str(export), *FEW, "--margins", "--out", str(written)]) == 0
         assert mine.read_text() == "mine"
         mine.unlink()
         assert contents(written) == before
 
     def test_other_process_and_seed(self, bare: Path, tmp_path: Path) -> None:
         """A process of one's own: with a change it is no longer the built-in one."""
-        arguments = ["tolerance", str(bare), *FEW, "--process", "diamond", "--seed", "7"]
+        arguments = [
+            "tolerance",
+            str(bare),
+            *FEW,
+            "--process",
+            "diamond",
+            "--seed",
+            "7",
+            "--margins",
+        ]
         arguments += ["--set", "facets_mm.mean=1", "--calibrated-mrad", "0"]
         assert run([*arguments, "--out", str(tmp_path)]) == 0
         read = json.loads((tmp_path / "tolerance.json").read_text())
         assert read["process"]["facets_mm"]["mean"] == 1
         assert read["process"]["facets_mm"]["source"] == "set by an option"
         assert (read["seed"], read["ssim"]["calibration_residual_mrad"]) == (7, 0)
-        sla, diamond = (one["margin_needed_mm"] for one in read["processes"])
-        assert diamond < 1 < read["margin_needed_mm"] < sla
+        (only,) = read["processes"]
+        assert only["margin_needed_mm"] == read["margin_needed_mm"] > 1
         assert read["yield"]["share"] == 0
+        assert (only["process"], only["builds"], only["yield"]) == ("diamond", 20, 0)
+
+    def test_margins_only_where_asked(self, written: Path, export: Path, tmp_path: Path) -> None:
+        """All else is as with them."""
+        assert run(["tolerance", str(export), *FEW, "--out", str(tmp_path)]) == 0
+        plain, searched = (
+            json.loads((folder / "tolerance.json").read_text()) for folder in (tmp_path, written)
+        )
+        assert plain["margin_needed_mm"] is None
+        assert "--margins" in plain["margin_reason"]
+        assert "argin" not in plain["summary"]
+        for key in plain.keys() - {"summary", "margin_needed_mm", "margin_reason", "processes"}:
+            assert plain[key] == searched[key]
+        for one, other in zip(plain["processes"], searched["processes"], strict=True):
+            assert (one["process"], one["yield"]) == (other["process"], other["yield"])
+
+    def test_yield_is_said_first(
+        self, bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert run(["tolerance", str(bare), *FEW, "--process", "cnc", "--out", str(tmp_path)]) == 0
+        shown = capsys.readouterr()
+        lines = shown.err.splitlines()
+        told = next(k for k, line in enumerate(lines) if "of the builds cover 60 mm" in line)
+        assert told < next(k for k, line in enumerate(lines) if "each kind of error" in line)
+        assert lines[told].split("] ")[1] in " ".join(shown.out.split())
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,22 @@ from math import ceil
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.margin import LARGEST_MARGIN_MM, STEP_MM, Margin, margin, with_margin
+from tbcad.tolerance.margin import (
+    LARGEST_MARGIN_MM,
+    STEP_MM,
+    Margin,
+    SolvedDesigns,
+    margin,
+    with_margin,
+)
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
-from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.process.process import load_process, process_errors
 
 TARGET = 60.0
@@ -39,9 +46,16 @@ def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "tbcad.tolerance.margin.design", lambda spec: OnlySpec(spec.mirrors.margin_mm)
     )
+    as_model(monkeypatch)
 
 
-def losing(loss: Loss) -> Callable[[Errors, MirrorDesign], np.ndarray]:
+def as_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take a made-up design for its fast model."""
+    for name in ("reflectors", "edge_models"):
+        monkeypatch.setattr(f"tbcad.tolerance.margin.{name}", lambda made: made)
+
+
+def losing(loss: Loss) -> Callable[[Errors, EdgeModels], np.ndarray]:
     """Coverage of builds that see the target and the margin but for what they lose."""
     return lambda _, made: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
 
@@ -95,7 +109,7 @@ class TestMadeUpLosses:
         wanted = float(generator.uniform(0.2, 0.999))
         told: list[float] = []
 
-        def worst(_: Errors, __: MirrorDesign) -> np.ndarray:
+        def worst(_: Errors, __: EdgeModels) -> np.ndarray:
             seen = TARGET + generator.normal(0.3, 0.5, 50)
             told.append(float((seen >= TARGET).mean()))
             return seen
@@ -127,6 +141,28 @@ class TestMadeUpLosses:
         assert told == ["margin 0.60 mm", "margin 1.24 mm"]
 
 
+def test_designs_are_solved_once_for_all_processes(
+    spec: Spec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also those that cannot be made."""
+    solved: list[float] = []
+
+    def solving(spec: Spec) -> OnlySpec:
+        solved.append(spec.mirrors.margin_mm)
+        if spec.mirrors.margin_mm > 2:
+            raise SpecError("mirrors overlap")
+        return OnlySpec(spec.mirrors.margin_mm)
+
+    monkeypatch.setattr("tbcad.tolerance.margin.design", solving)
+    as_model(monkeypatch)
+    designs = SolvedDesigns()
+    for loss in (1.0, 1.5, 2.5, 2.5):
+        shared = margin(spec, Errors(), 0.99, losing(steady(loss)), designs=designs)
+        assert shared == margin(spec, Errors(), 0.99, losing(steady(loss)))
+    alone = [0.6, 1.0, 0.6, 1.5, 0.6, 2.5, 0.6, 2.5]
+    assert sorted(solved) == sorted([*alone, 0.6, 1.0, 1.5, 2.5])
+
+
 def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     def refusing(spec: Spec) -> OnlySpec:
         if spec.mirrors.margin_mm > 1:
@@ -134,6 +170,7 @@ def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch
         return OnlySpec(spec.mirrors.margin_mm)
 
     monkeypatch.setattr("tbcad.tolerance.margin.design", refusing)
+    as_model(monkeypatch)
     found = margin(spec, Errors(), 0.99, losing(steady(np.array([0.5, 2.0, 2.0, 2.0]))))
     assert (found.mm, found.share) == (None, 0.25)
     assert found.reason == "mirrors of margin 2.00 mm: mirrors overlap"
@@ -154,8 +191,7 @@ class TestRealDesigns:
     """Made anew with the margin that was found, and with builds of the same numbers."""
 
     @staticmethod
-    def worst(errors: Errors, made: MirrorDesign) -> np.ndarray:
-        models = edge_models(reflectors(made))
+    def worst(errors: Errors, models: EdgeModels) -> np.ndarray:
         return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
     @pytest.mark.parametrize(
@@ -168,7 +204,8 @@ class TestRealDesigns:
 
         def share(mm: float) -> float:
             options = [f"n={n}", f"mirrors.margin_mm={mm:.2f}"]
-            return float((self.worst(made, design(load_spec(None, options))) >= TARGET).mean())
+            models = edge_models(reflectors(design(load_spec(None, options))))
+            return float((self.worst(made, models) >= TARGET).mean())
 
         assert share(found.mm) == found.share >= wanted
         assert share(found.mm - 2 * STEP_MM) < wanted

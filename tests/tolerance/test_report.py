@@ -157,14 +157,35 @@ class TestWords:
 
     def test_processes(self, analysis: Analysis) -> None:
         assert (
+            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
             "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
             "none was found for fdm."
         ) in summary_text(analysis)
         every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
         assert "diamond with 0.56 mm." in every
         assert "none" not in every
-        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1]))
+        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
         assert "Margins needed for 99%: none found; none was found for fdm." in none
+
+    def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
+        options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
+        plain = replace(analysis, margin=None, process_options=options)
+        said = summary_text(plain)
+        assert "diamond 100.0%." in said
+        assert "argin" not in said
+        read = json.loads(json_text(plain))
+        assert read["margin_needed_mm"] is None
+        assert read["margin_reason"] == "not searched for: add --margins"
+        assert all(row["reason"] == read["margin_reason"] for row in rows_of(plain, "processes"))
+        names = {str(row[0]) for row in tolerance_study(plain).summary.rows}
+        assert "margin needed" not in names
+
+    def test_one_process_is_compared_with_none(self, analysis: Analysis) -> None:
+        alone = replace(PROCESS_OPTIONS[1], builds=BUILDS)
+        one = replace(analysis, process_options=(alone,))
+        assert "Good builds, of" not in summary_text(one)
+        (row,) = rows_of(one, "processes")
+        assert (row["process"], row["builds"]) == ("sla", str(BUILDS))
 
     def test_pictures(self, analysis: Analysis) -> None:
         assert "SSIM 0.850 as designed, 0.650 without calibration, 0.790 with it." in summary_text(

@@ -7,6 +7,7 @@ import numpy as np
 from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, surface_tables, view_tables
+from tbcad.tolerance.montecarlo.edge_samples import RIGHT
 from tbcad.types import Bools, Floats, Ints
 
 
@@ -27,18 +28,33 @@ class MirrorCoverage:
     pixels: Floats
 
 
-def mirror_coverage(half: EdgeModel, draws: ShellDraws) -> MirrorCoverage:
-    """Coverage of each mirror of one half, for s builds."""
-    outlines, pairs = np.empty((len(draws), len(half), 3)), half.pairs
-    tables = zip(surface_tables(half, draws), view_tables(half, draws), strict=True)
-    for build, (surfaces, view) in enumerate(tables):
-        outlines[build] = trace_cell_edges(
-            *(surfaces, pairs.pair, pairs.offset, pairs.face, pairs.reach),
-            *(half.halved, view, half.screen),
-        )
+def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False) -> MirrorCoverage:
+    """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
+    outlines = _outlines(half, draws, worst_only)
     area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
     crossings = outlines[..., CROSSINGS].astype(np.int64)
     return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
+
+
+def _outlines(half: EdgeModel, draws: ShellDraws, worst_only: bool) -> Floats:
+    """What `trace_cell_edges` finds in s builds, (s, m, 3)."""
+    outlines = np.empty((len(draws), len(half), 3))
+    surfaces, views = surface_tables(half, draws), view_tables(half, draws)
+    if worst_only:  # pictures do not count: cameras that only turn see the same
+        views[:, RIGHT:] = views[:1, RIGHT:]
+    for build in range(len(draws)):
+        if build > 0 and _same(build, surfaces, views):
+            outlines[build] = outlines[build - 1]
+            continue
+        outlines[build] = trace_cell_edges(
+            surfaces[build], half.pairs.arrays, half.halved, views[build], half.screen, worst_only
+        )
+    return outlines
+
+
+def _same(build: int, *tables: Floats) -> bool:
+    """Whether a build is the same as the one before it."""
+    return all(np.array_equal(table[build - 1], table[build]) for table in tables)
 
 
 def virtual_camera_numbers(halved: Bools) -> Ints:
@@ -56,22 +72,27 @@ def virtual_camera_numbers(halved: Bools) -> Ints:
 
 
 def coverage(
-    edge_models: EdgeModels, draws: tuple[ShellDraws, ShellDraws]
+    edge_models: EdgeModels, draws: tuple[ShellDraws, ShellDraws], worst_only: bool = False
 ) -> tuple[Floats, Floats]:
     """Exact coverage diameter (mm) and pixels of v virtual cameras in s builds, two of (s, v).
 
     The halves of a mirror on the seam count together: the smaller diameter, all pixels. A mirror
     without a cell, or whose image does not surround the object's centre, covers nothing.
+
+    Args:
+        edge_models: both halves as designed.
+        draws: errors of each half.
+        worst_only: only the minimum diameter of each build is exact, the others are not below
+            theirs; and no pixels. It takes less time.
     """
-    halves = [mirror_coverage(half, drawn) for half, drawn in zip(edge_models, draws, strict=True)]
     camera = virtual_camera_numbers(edge_models[1].halved)
     shape = (len(draws[0]), int(camera.max()) + 1)
     diameter, crossings, pixels = np.full(shape, np.inf), np.zeros(shape, int), np.zeros(shape)
-    losses = [drawn.facets[:, None] for drawn in draws]
-    diameters = [half.diameter - loss for half, loss in zip(halves, losses, strict=True)]
-    place = np.arange(shape[0])[:, None], camera
-    np.minimum.at(diameter, place, np.concatenate(diameters, axis=1))
-    np.add.at(crossings, place, np.concatenate([half.crossings for half in halves], axis=1))
-    np.add.at(pixels, place, np.concatenate([half.pixels for half in halves], axis=1))
+    for half, drawn, of_half in zip(edge_models, draws, np.split(camera, 2), strict=True):
+        seen, place = mirror_coverage(half, drawn, worst_only), np.s_[:, of_half]
+        of_mirrors = seen.diameter - drawn.facets[:, None]
+        diameter[place] = np.minimum(diameter[place], of_mirrors)
+        crossings[place] += seen.crossings
+        pixels[place] += seen.pixels
     surrounds = (crossings % 2 == 1) & np.isfinite(diameter)
     return np.where(surrounds, np.maximum(diameter, 0.0), 0.0), pixels

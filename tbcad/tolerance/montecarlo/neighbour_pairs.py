@@ -1,6 +1,7 @@
 """Pairs of mirrors that may share an edge, and the faces that may cover it, for any errors."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -13,6 +14,9 @@ from tbcad.types import Floats, Ints
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
 # faces of a pair cover what lies between there and the cells.
 REACH = 1.5
+
+
+PairArrays: TypeAlias = tuple[Ints, Ints, Ints, Floats]
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,11 @@ class NeighbourPairs:
     face: Ints
     reach: Floats
 
+    @property
+    def arrays(self) -> PairArrays:
+        """All of them, for compiled code."""
+        return self.pair, self.offset, self.face, self.reach
+
 
 def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     """All pairs that are neighbours or share a neighbour as designed.
@@ -43,10 +52,9 @@ def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     nearby = csr_array(adjacency + adjacency @ adjacency)
     first, second = coo_array(nearby).coords
     pair = np.column_stack([first, second])[(first < second) & (first < m)].astype(np.int64)
-    rows = [_cutting_faces(nearby, cells.surfaces, m, *ends) for ends in pair.tolist()]
-    offset = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
+    offset, face = _cutting_faces(nearby, cells.surfaces, m, pair)
     reach_mm = REACH * np.append(_cell_radii(cells), [0, 0])[pair].max(axis=1)
-    return NeighbourPairs(pair, offset.astype(np.int64), np.concatenate(rows), reach_mm)
+    return NeighbourPairs(pair, offset, face, reach_mm)
 
 
 def _cell_radii(cells: Cells) -> Floats:
@@ -67,9 +75,17 @@ def _adjacency(cells: Cells) -> csr_array:
     return csr_array(coo_array((np.ones(len(both), dtype=np.int64), both.T), shape=size))
 
 
-def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, i: int, j: int) -> Ints:
-    faces = nearby.indices[nearby.indptr[i] : nearby.indptr[i + 1]].astype(np.int64)
-    faces = faces[(faces != i) & (faces != j)]
-    apart = surfaces.apex[faces][:, None] - surfaces.apex[[i, j if j < m else i]]
-    distance = np.linalg.norm(apart, axis=2).sum(axis=1)
-    return np.asarray(faces[np.argsort(np.where(faces < m, distance, 0.0), kind="stable")])
+def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, pair: Ints) -> tuple[Ints, Ints]:
+    """Where the faces of each pair (e, 2) begin, (e + 1,), and the faces: see NeighbourPairs."""
+    first, second = pair.T
+    count = np.diff(nearby.indptr)[first]
+    of_pair = np.repeat(np.arange(len(pair)), count)
+    place = np.arange(len(of_pair)) - np.repeat(np.cumsum(count) - count, count)
+    face = nearby.indices[nearby.indptr[first][of_pair] + place].astype(np.int64)
+    other = (face != first[of_pair]) & (face != second[of_pair])
+    of_pair, face = of_pair[other], face[other]
+    ends = np.where(pair < m, pair, first[:, None])[of_pair]
+    distance = norm(surfaces.apex[face][:, None] - surfaces.apex[ends]).sum(axis=1)
+    order = np.lexsort((np.where(face < m, distance, 0.0), of_pair))
+    offset = np.searchsorted(of_pair, np.arange(len(pair) + 1))
+    return np.asarray(offset, dtype=np.int64), np.asarray(face[order])

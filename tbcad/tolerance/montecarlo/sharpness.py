@@ -13,11 +13,13 @@ from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.parallel import in_threads
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
-from tbcad.simulate.study.viewpoints import view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -76,14 +78,14 @@ def sharpness(
         progress: called with each build.
     """
     designed = _light_field(cameras, scene, reference.capture_mm)
-    rows = [_ssim(designed, scene, reference)]
+    rows = [_ssim(designed, reference)]
     for k in range(len(builds[0])):
         progress(f"build {k + 1} of {len(builds[0])}")
         a, b = (built_reflector(at, draws, k) for at, draws in zip(cameras, builds, strict=True))
         built = _light_field((a, b), scene, reference.capture_mm)
         calibrated = _with_residual(built, residual, (seed, k))
         for light_field in (_with_rays_of(designed, built), calibrated):
-            rows.append(_ssim(light_field, scene, reference))
+            rows.append(_ssim(light_field, reference))
     table = np.array(rows)
     return Sharpness(table[0], table[1::2], table[2::2])
 
@@ -168,8 +170,10 @@ def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> d
     return {**frame.planes, "direction": unit.astype(np.float32)}
 
 
-def _ssim(source: LightField, scene: Scene, reference: ReferenceViews) -> Floats:
+def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
     """SSIM of each view, (v,)."""
-    tiles, views = MirrorTiles(source), reference.views
-    quality = view_quality(tiles, scene, views, reference.truths, "nearest", lambda _: None)
-    return quality["ssim"]
+    tiles = MirrorTiles(source)
+    pictures = [synthesise(tiles, view, "nearest").image for view in reference.views]
+    pairs = zip(reference.truths, pictures, strict=True)
+    qualities = in_threads(lambda pair: image_quality(*pair), pairs)
+    return np.array([quality.ssim for quality in qualities])

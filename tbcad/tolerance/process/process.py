@@ -28,6 +28,7 @@ from tbcad.spec.section import Section
 from tbcad.tolerance.montecarlo.draws import Distribution, Error, Errors
 
 BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
+DEFAULT_PROCESS = "sla"
 RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
 MICROMETRE = 1e-3  # mm
 BY_USER = "set by an option"

@@ -4,8 +4,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled
-from tbcad.tolerance.montecarlo.cell_edges import crosses_half_axis
+from tbcad.simulate.parallel import compiled_loop
+from tbcad.tolerance.montecarlo.edge_samples import MAX_FALL, crosses_half_axis, rise_beside
 from tbcad.tolerance.vectors import (
     Vector,
     cross,
@@ -24,13 +24,19 @@ STEPS = 60
 COSINE_TOLERANCE = 1e-14
 # Rays of a side; the search for the minimum begins with every COARSE-th of them.
 COARSE = 16
-SIDE_SAMPLES = 8 * COARSE + 1
+COARSE_SAMPLES = 9
+SIDE_SAMPLES = (COARSE_SAMPLES - 1) * COARSE + 1
+# Places from one quantity of the coarse samples to the next. Rows: distance squared, and place in
+# the picture about the highlight.
+STRIDE = 16
+MISS, RIGHT, DOWN = 0, 1, 2
+# Columns of a sampled side: the minimum sample, its number, and what the minimum is not below.
+MINIMUM, BEST, BOUND, SIDE_COLUMNS = 0, 1, 2, 3
 
 
-@compiled
+@compiled_loop
 def minimum_miss_distances(
-    side: Floats,
-    first: Ints,
+    sides: tuple[Floats, Floats, Ints],
     outward: Floats,
     highlight: Floats,
     lens: Floats,
@@ -41,8 +47,8 @@ def minimum_miss_distances(
     """Minimum distance from the object's centre of the rays through each window's outline.
 
     Args:
-        side: camera directions along all sides, at even parameters, (e, SIDE_SAMPLES, 3).
-        first: number of each mirror's first side, (m + 1,).
+        sides: camera directions along all sides, at even parameters, (e, SIDE_SAMPLES, 3); some of
+            them, see `coarse_directions`; and the number of each mirror's first side, (m + 1,).
         outward: for each mirror a camera direction from the window's inside to its outline, (m, 3).
         highlight: see `highlights`, (m, 3).
         lens: matrices that turn camera directions, as rows, into true ones, (m, 3, 3).
@@ -54,28 +60,85 @@ def minimum_miss_distances(
         mm, (m,); infinite where all rays miss the ball, zero where the outline does not surround
         the point of the ball that shows the object's centre.
     """
-    result, image = np.zeros(len(radius)), np.empty((2, 2))
+    side, coarse, first = sides
+    result, found = np.zeros(len(radius)), np.empty((np.diff(first).max(), SIDE_COLUMNS))
+    samples = np.empty((3, STRIDE))
     for i in range(len(radius)):
         axis = vector(highlight[i])
         toward = _true_direction(outward[i], lens[i])
         right = unit(plus_scaled(toward, -dot(axis, toward), axis))
         down = cross(axis, right)
-        minimum, crossings = inf, 0
-        for e in range(first[i], first[i + 1]):
-            for k in range(0, side.shape[1], COARSE):
-                direction = _true_direction(side[e, k], lens[i])
-                place = image[(k // COARSE) % 2]
-                place[0], place[1] = dot(direction, right), dot(direction, down)
-                if k > 0:
-                    before = image[(k // COARSE - 1) % 2]
-                    crossings += crosses_half_axis(before, place)
-            found = _minimum_of_side(side[e], lens[i], pinhole, centre[i], radius[i])
-            minimum = min(minimum, found)
-        result[i] = sqrt(minimum) if crossings % 2 == 1 else 0.0
+        crossings, limit, count = 0, inf, first[i + 1] - first[i]
+        for k in range(count):
+            e = first[i] + k
+            _sample_side(coarse[e], lens[i], pinhole, centre[i], radius[i], right, down, samples)
+            crossings += _crossings(samples)
+            _put_minimum(found[k], samples[MISS])
+            limit = min(limit, found[k, MINIMUM])
+        if crossings % 2 == 0:
+            continue
+        minimum = inf
+        for k in range(count):
+            if found[k, MINIMUM] == inf or not found[k, BOUND] > limit:
+                best, low = int(found[k, BEST]), found[k, MINIMUM]
+                refined = _minimum_of_side(
+                    side[first[i] + k], best, low, lens[i], pinhole, centre[i], radius[i]
+                )
+                minimum = min(minimum, refined)
+        result[i] = sqrt(minimum)
     return result
 
 
-@compiled
+def coarse_directions(side: Floats) -> Floats:
+    """Every COARSE-th direction of sides (e, SIDE_SAMPLES, 3), x, y and z apart, (e, 3, STRIDE)."""
+    result = np.zeros((len(side), 3, STRIDE))
+    result[:, :, :COARSE_SAMPLES] = side[:, ::COARSE].swapaxes(1, 2)
+    return result
+
+
+@compiled_loop
+def _sample_side(
+    coarse: Floats,
+    lens: Floats,
+    pinhole: Floats,
+    centre: Floats,
+    radius: float,
+    right: Vector,
+    down: Vector,
+    samples: Floats,
+) -> None:
+    """Fill in distances squared of a side's rays, and the places of their directions."""
+    x, y, z = vector(lens[:, 0]), vector(lens[:, 1]), vector(lens[:, 2])
+    camera, ball = vector(pinhole), vector(centre)
+    for k in range(COARSE_SAMPLES):
+        d = coarse[0, k], coarse[1, k], coarse[2, k]
+        direction = unit((dot(d, x), dot(d, y), dot(d, z)))
+        samples[MISS, k] = _miss_along(direction, camera, ball, radius)
+        samples[RIGHT, k], samples[DOWN, k] = dot(direction, right), dot(direction, down)
+
+
+@compiled_loop
+def _crossings(samples: Floats) -> int:
+    """How often a side's line crosses the half line from the highlight to the right."""
+    count = 0
+    for k in range(COARSE_SAMPLES - 1):
+        here, there = samples[:, k], samples[:, k + 1]
+        count += crosses_half_axis(here[RIGHT], here[DOWN], there[RIGHT], there[DOWN])
+    return count
+
+
+@compiled_loop
+def _put_minimum(side: Floats, miss: Floats) -> None:
+    """Fill in a side's minimum sample, its number, and what the minimum is not below."""
+    best = 0
+    for k in range(1, COARSE_SAMPLES):
+        if miss[k] < miss[best]:
+            best = k
+    side[MINIMUM], side[BEST] = miss[best], best * COARSE
+    side[BOUND] = miss[best] - MAX_FALL * rise_beside(miss, COARSE_SAMPLES, best)
+
+
+@compiled_loop
 def highlights(pinhole: Floats, centre: Floats, radius: Floats) -> Floats:
     """Unit directions (m, 3) in which a camera sees the object's centre in balls.
 
@@ -111,14 +174,14 @@ def highlights(pinhole: Floats, centre: Floats, radius: Floats) -> Floats:
     return result
 
 
-@compiled
+@compiled_loop
 def _normal(to_object: Vector, to_camera: Vector, share: float) -> Vector:
     """Unit vector between two."""
     zero = (0.0, 0.0, 0.0)
     return unit(plus_scaled(plus_scaled(zero, 1 - share, to_object), share, to_camera))
 
 
-@compiled
+@compiled_loop
 def _cosine_difference(normal: Vector, camera: Vector, centre: Vector, radius: float) -> float:
     """Cosine between a ball's normal and the direction to the object, less that for the camera."""
     point = plus_scaled(centre, radius, normal)
@@ -127,7 +190,7 @@ def _cosine_difference(normal: Vector, camera: Vector, centre: Vector, radius: f
     return to_object - dot(normal, away) / sqrt(dot(away, away))
 
 
-@compiled
+@compiled_loop
 def _true_direction(direction: Floats, lens: Floats) -> Vector:
     """True unit direction of a camera direction."""
     d = vector(direction)
@@ -136,21 +199,22 @@ def _true_direction(direction: Floats, lens: Floats) -> Vector:
     )
 
 
-@compiled
+@compiled_loop
 def _minimum_of_side(
-    side: Floats, lens: Floats, pinhole: Floats, centre: Floats, radius: float
+    side: Floats,
+    best: int,
+    minimum: float,
+    lens: Floats,
+    pinhole: Floats,
+    centre: Floats,
+    radius: float,
 ) -> float:
     """Minimum distance squared of the rays along one side (n, 3).
 
-    The minimum of every COARSE-th ray, then of ever closer ones about it, and at last on the
-    parabola through its neighbours.
+    From the minimum of every COARSE-th ray, of this number, by ever closer ones about it, and at
+    last on the parabola through its neighbours.
     """
     last = len(side) - 1
-    best, minimum = 0, inf
-    for k in range(0, last + 1, COARSE):
-        value = _miss(side[k], lens, pinhole, centre, radius)
-        if value < minimum:
-            best, minimum = k, value
     step = COARSE // 2
     while step > 0:
         middle = best
@@ -170,20 +234,24 @@ def _minimum_of_side(
     return minimum
 
 
-@compiled
+@compiled_loop
 def _miss(direction: Floats, lens: Floats, pinhole: Floats, centre: Floats, radius: float) -> float:
+    """Distance squared from the origin of a ray after a ball; see `_miss_along`."""
+    return _miss_along(_true_direction(direction, lens), vector(pinhole), vector(centre), radius)
+
+
+@compiled_loop
+def _miss_along(ray: Vector, camera: Vector, ball: Vector, radius: float) -> float:
     """Distance squared from the origin of a ray after a ball; infinite where it misses the ball.
 
     Infinite also where the ray goes away from the object, as in tbcad.optics.ball_light.
     """
-    ray, camera = _true_direction(direction, lens), vector(pinhole)
-    from_ball = minus(camera, vector(centre))
+    from_ball = minus(camera, ball)
     along = -dot(from_ball, ray)
     root = radius * radius - dot(from_ball, from_ball) + along * along
-    if root < 0:
-        return inf
-    reach = along - sqrt(root)
+    reach = along - sqrt(max(root, 0.0))
     normal = divided(plus_scaled(from_ball, reach, ray), radius)
     point = plus_scaled(camera, reach, ray)
     ahead = dot(point, reflect(ray, normal))
-    return inf if ahead > 0 else dot(point, point) - ahead * ahead
+    distance = dot(point, point) - ahead * ahead
+    return inf if (root < 0) | (ahead > 0) else distance

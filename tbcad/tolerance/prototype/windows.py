@@ -9,6 +9,7 @@ Both runs are described in the frame of the prototype, with the object turned in
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,7 +26,12 @@ from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
-from tbcad.tolerance.prototype.rays import SIDE_SAMPLES, highlights, minimum_miss_distances
+from tbcad.tolerance.prototype.rays import (
+    SIDE_SAMPLES,
+    coarse_directions,
+    highlights,
+    minimum_miss_distances,
+)
 from tbcad.types import Bools, Floats, Ints
 
 HALVES = (0, 1)
@@ -40,6 +46,7 @@ class RunWindows:
         stop: number of its stop, (m,).
         side: unit directions along the sides of all windows, mirror after mirror,
             (e, SIDE_SAMPLES, 3).
+        coarse: see tbcad.tolerance.prototype.rays.coarse_directions.
         first: number of each mirror's first side, (m + 1,).
         middle: unit directions of the mirrors' apices, (m, 3).
         outward: directions from there to the outline, away from the seam where it halves, (m, 3).
@@ -49,6 +56,7 @@ class RunWindows:
     ball: Ints
     stop: Ints
     side: Floats
+    coarse: Floats
     first: Ints
     middle: Floats
     outward: Floats
@@ -78,6 +86,12 @@ class PrototypeModel:
         """Which balls are made instead of purchased, (k,)."""
         return np.asarray(self.plan.body_radius < self.plan.radius)
 
+    @cached_property
+    def designed_rays(self) -> list[tuple[Floats, Floats]]:
+        """Of each run without errors: see `_middle_rays`."""
+        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, len(self.plan.angle))
+        return [_middle_rays(run, run_pose(self, exact, 0, k)) for k, run in enumerate(self.runs)]
+
 
 def prototype_model(reflectors: tuple[Reflector, Reflector], plan: Plan) -> PrototypeModel:
     """The fast model of both cameras and the plan."""
@@ -101,7 +115,36 @@ def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
     halved = run.reflector.mirrors.apex[:, 0] == 0
     outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
     outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
-    return RunWindows(run.ball, run.stop, side, first, middle, outward, halved)
+    return RunWindows(
+        run.ball, run.stop, side, coarse_directions(side), first, middle, outward, halved
+    )
+
+
+@dataclass(frozen=True)
+class PrototypeResult:
+    """Coverage and pointing errors of s prototypes: see CoverageResult.
+
+    Attributes:
+        coverage: with designed windows, mm, (s, v).
+        offset: likewise, mm, (s, 2 m).
+        calibrated_coverage: with windows where the balls are, mm, (s, v).
+        calibrated_offset: likewise, mm, (s, 2 m).
+    """
+
+    coverage: Floats
+    offset: Floats
+    calibrated_coverage: Floats
+    calibrated_offset: Floats
+
+    @property
+    def uncalibrated(self) -> CoverageResult:
+        """Builds that are assumed to be the designed one."""
+        return CoverageResult(self.coverage, self.offset)
+
+    @property
+    def calibrated(self) -> CoverageResult:
+        """The same builds, with camera and balls known, so that every window is at its ball."""
+        return CoverageResult(self.calibrated_coverage, self.calibrated_offset)
 
 
 @dataclass(frozen=True)
@@ -112,19 +155,18 @@ class PrototypeCase:
         model: the prototype as designed.
         errors: of the process.
         seed: of all builds.
-        calibrated: whether camera and balls are known, so that every window is moved to its ball.
     """
 
     model: PrototypeModel
     errors: Errors
     seed: int
-    calibrated: bool = False
 
-    def __call__(self, builds: range) -> CoverageResult:
+    def __call__(self, builds: range) -> PrototypeResult:
         """Result of the builds of these numbers."""
         stops = len(self.model.plan.angle)
         draws = draw_prototypes(self.errors, self.seed, builds, self.model.is_cap, stops)
-        return CoverageResult(*coverage_and_offsets(self.model, draws, self.calibrated))
+        uncalibrated, calibrated = coverage_and_offsets(self.model, draws)
+        return PrototypeResult(*uncalibrated, *calibrated)
 
 
 @dataclass(frozen=True)
@@ -187,36 +229,41 @@ def _shortest_rotations(start: Floats, end: Floats) -> Floats:
 
 
 def coverage_and_offsets(
-    model: PrototypeModel, draws: PrototypeDraws, calibrated: bool = False
-) -> tuple[Floats, Floats]:
-    """Coverage and pointing errors of s prototypes, with designed or with calibrated windows.
+    model: PrototypeModel, draws: PrototypeDraws
+) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """Coverage and pointing errors of s prototypes, with designed and with calibrated windows.
 
     Returns:
         Coverage diameter of v virtual cameras, mm, (s, v): twice the minimum distance from the
         object's centre of all rays camera -> edge of the window -> reflected; zero where the
         window does not contain the centre's image; the smaller of a mirror's halves at the seam.
         Then the distance at the object between the ray in the middle of each window and the
-        designed ray, square to that, mm; infinite without a ball, (s, 2 m).
+        designed ray, square to that, mm; infinite without a ball, (s, 2 m). Then both again, with
+        calibrated windows.
     """
-    diameter = np.full((len(draws), int(model.virtual.max()) + 1), np.inf)
-    offset = np.empty((len(draws), len(model.virtual)))
-    exact = draw_prototypes(Errors(), 0, [0], model.is_cap, len(model.plan.angle))
-    designed = [_middle_rays(run, run_pose(model, exact, 0, k)) for k, run in enumerate(model.runs)]
+    v, m = int(model.virtual.max()) + 1, len(model.virtual)
+    uncalibrated, calibrated = (
+        (np.empty((len(draws), v)), np.empty((len(draws), m))) for _ in range(2)
+    )
     for build in range(len(draws)):
         poses = [run_pose(model, draws, build, half) for half in HALVES]
-        if calibrated:
-            poses = [calibrated_pose(model, half, poses[half]) for half in HALVES]
-        pairs = list(zip(model.runs, poses, strict=True))
-        coverage = np.concatenate([_coverage(*pair) for pair in pairs])
-        np.minimum.at(diameter[build], model.virtual, coverage)
-        rays = zip(map(_middle_rays, model.runs, poses), designed, strict=True)
-        offset[build] = np.concatenate([_offsets(*pair) for pair in rays])
-    return diameter, offset
+        known = [calibrated_pose(model, half, poses[half]) for half in HALVES]
+        uncalibrated[0][build], uncalibrated[1][build] = _seen(model, poses)
+        calibrated[0][build], calibrated[1][build] = _seen(model, known)
+    return uncalibrated, calibrated
+
+
+def _seen(model: PrototypeModel, poses: list[RunPose]) -> tuple[Floats, Floats]:
+    pairs = list(zip(model.runs, poses, strict=True))
+    diameter = np.full(int(model.virtual.max()) + 1, np.inf)
+    np.minimum.at(diameter, model.virtual, np.concatenate([_coverage(*pair) for pair in pairs]))
+    rays = zip(map(_middle_rays, model.runs, poses), model.designed_rays, strict=True)
+    return diameter, np.concatenate([_offsets(*pair) for pair in rays])
 
 
 def _coverage(run: RunWindows, pose: RunPose) -> Floats:
     return 2 * minimum_miss_distances(
-        *(run.side, run.first, run.outward),
+        *((run.side, run.coarse, run.first), run.outward),
         *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
     )
 

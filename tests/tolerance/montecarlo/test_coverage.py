@@ -11,10 +11,12 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
+from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
 from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_model
 from tests.tolerance.exact_builds import surrounded
+from tests.tolerance.montecarlo.every_edge import every_edge
 
 
 def none(halves: EdgeModels, builds: int = 1) -> tuple[ShellDraws, ShellDraws]:
@@ -115,6 +117,58 @@ def test_errors_larger_than_a_mirror_are_refused(halves: EdgeModels) -> None:
     draws = draw(Errors(sphere_radius=Error(0, -1e3)), 1, range(1), len(halves[0]))
     with pytest.raises(InputError, match=r"sphere_radius_um.*make the errors smaller"):
         coverage(halves, draws)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 0.02, 0.1, 0.4])
+class TestSlowWay:
+    """The faces and the parts of edges that are passed over change no bit."""
+
+    @staticmethod
+    def draws(halves: EdgeModels, size: float) -> tuple[ShellDraws, ShellDraws]:
+        errors = Errors(
+            sphere_centre=Error(size),
+            sphere_radius=Error(size),
+            camera_shift=Error(5 * size),
+            scale_axis=Error(size / 20),
+            facets=Error(size),
+        )
+        return draw(errors, 5, range(4), len(halves[0]))
+
+    def test_same_coverage_as_with_every_edge(self, halves: EdgeModels, size: float) -> None:
+        for half, drawn in zip(halves, self.draws(halves, size), strict=True):
+            slow, fast = every_edge(half, drawn), mirror_coverage(half, drawn)
+            assert np.array_equal(fast.diameter, 2 * np.sqrt(slow[..., MISS_SQUARED]))
+            assert np.array_equal(fast.crossings, slow[..., CROSSINGS])
+            scale = (drawn.focal[:, None] / half.view.pixel_pitch) ** 2
+            assert np.array_equal(fast.pixels, np.abs(slow[..., AREA]) * scale)
+
+    def test_same_minimum_where_only_that_is_asked(self, halves: EdgeModels, size: float) -> None:
+        draws = self.draws(halves, size)
+        whole, worst = (coverage(halves, draws, only)[0] for only in (False, True))
+        assert np.array_equal(worst.min(axis=1), whole.min(axis=1))
+        assert (worst >= whole - 1e-9).all()
+
+
+def test_builds_that_see_the_same_are_computed_once(
+    halves: EdgeModels, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Turned cameras see other pictures of the same coverage, and facets come afterwards."""
+    traced: list[None] = []
+
+    def counting(*of: object) -> np.ndarray:
+        traced.append(None)
+        return trace_cell_edges(*of)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("tbcad.tolerance.montecarlo.coverage.trace_cell_edges", counting)
+    for errors, once in (
+        (Errors(camera_tilt=Error(0.01), camera_focal=Error(0.01), facets=Error(0.3)), True),
+        (Errors(shell_tilt=Error(0.001)), False),
+    ):
+        draws = draw(errors, 1, range(3), len(halves[0]))
+        traced.clear()
+        worst = coverage(halves, draws, worst_only=True)[0].min(axis=1)
+        assert len(traced) == (2 if once else 6)
+        assert np.array_equal(worst, coverage(halves, draws)[0].min(axis=1))
 
 
 def test_no_builds(halves: EdgeModels) -> None:

@@ -18,12 +18,21 @@ from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import CoverageResult, simulate
 from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
-from tbcad.tolerance.prototype.rays import highlights
+from tbcad.tolerance.prototype.rays import (
+    COARSE,
+    _minimum_of_side,
+    _miss,
+    highlights,
+    minimum_miss_distances,
+)
 from tbcad.tolerance.prototype.windows import (
     PrototypeCase,
     PrototypeModel,
+    PrototypeResult,
+    calibrated_pose,
     coverage_and_offsets,
     prototype_model,
+    run_pose,
 )
 from tests.prototype_exports import plan_of
 
@@ -126,14 +135,14 @@ def balls(
 def coverage_of(
     model: PrototypeModel, draws: PrototypeDraws, calibrated: bool = False
 ) -> np.ndarray:
-    return coverage_and_offsets(model, draws, calibrated)[0]
+    return coverage_and_offsets(model, draws)[calibrated][0]
 
 
 class TestCoverage:
     def test_without_errors_it_is_the_record(
         self, model: PrototypeModel, layout: PrototypeLayout
     ) -> None:
-        diameter, offset = coverage_and_offsets(model, draws_of(model, 1))
+        diameter, offset = coverage_and_offsets(model, draws_of(model, 1))[0]
         m = len(layout.half)
         assert diameter[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
@@ -206,9 +215,8 @@ class TestMotions:
         """A ball moved by e across the plane of incidence turns its normal by e / r there, the
         ray by 2 cos(i) as much across that plane: 2 rho cos(i) e / r at the distance rho."""
         delta = 1e-6
-        _, offset = coverage_and_offsets(
-            model, draws_of(model, 1, rotation_angle=Error(mean=delta))
-        )
+        draws = draws_of(model, 1, rotation_angle=Error(mean=delta))
+        _, offset = coverage_and_offsets(model, draws)[0]
         rho, axis = norm(plan.apex), plan.frame[0]
         sideways = delta * norm(np.cross(axis, plan.centre))
         cosine = -(plan.normal * plan.apex).sum(axis=1) / rho
@@ -221,7 +229,7 @@ class TestMotions:
         draws = draws_of(model, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
         exact = coverage_of(model, draws_of(model, 1))
         fixed = coverage_of(model, draws)
-        known, offset = coverage_and_offsets(model, draws, calibrated=True)
+        known, offset = coverage_and_offsets(model, draws)[1]
         assert known == pytest.approx(exact, abs=1e-6)
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
@@ -232,6 +240,45 @@ class TestMotions:
             coverage_of(model, draws, calibrated=known).min(axis=1) for known in (False, True)
         )
         assert (fixed < known).all()
+
+
+class TestSearchForTheMinimum:
+    @pytest.mark.parametrize("calibrated", [False, True])
+    @pytest.mark.parametrize("size", [0.0, 0.2, 1.0, 5.0])
+    def test_same_as_on_every_side(
+        self, model: PrototypeModel, size: float, calibrated: bool
+    ) -> None:
+        """The sides that are not searched hold no minimum: the same bits as of all of them."""
+        scaled = {kind: Error(size * error.spread) for kind, error in SPREAD.items()}
+        draws = draws_of(model, 2, **scaled)
+        for build, half in ((0, 0), (1, 1)):
+            run, pose = model.runs[half], run_pose(model, draws, build, half)
+            pose = calibrated_pose(model, half, pose) if calibrated else pose
+            at = (pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius)
+            fast = minimum_miss_distances((run.side, run.coarse, run.first), run.outward, *at)
+            slow = every_side_searched(run.side, run.first, *at[1:])
+            assert (fast > 0).any()
+            assert np.array_equal(fast[fast > 0], slow[fast > 0])
+
+
+def every_side_searched(
+    side: np.ndarray,
+    first: np.ndarray,
+    lens: np.ndarray,
+    pinhole: np.ndarray,
+    centre: np.ndarray,
+    radius: np.ndarray,
+) -> np.ndarray:
+    """Minimum miss distance of each window, each of its sides searched to the end."""
+    result = np.empty(len(radius))
+    for i in range(len(radius)):
+        at, found = (lens[i], pinhole, centre[i], float(radius[i])), [np.inf]
+        for one in side[first[i] : first[i + 1]]:
+            coarse = [_miss(ray, *at) for ray in one[::COARSE]]
+            best = int(np.argmin(coarse))
+            found.append(_minimum_of_side(one, COARSE * best, coarse[best], *at))
+        result[i] = np.sqrt(min(found))
+    return result
 
 
 class TestDraws:
@@ -257,7 +304,7 @@ class TestMonteCarlo:
     def test_later_builds_continue_earlier_ones(self, model: PrototypeModel) -> None:
         case = PrototypeCase(model, Errors(**SPREAD), 5)
         whole, later = simulate(case, 23), simulate(case, 6, first=17)
-        for field in fields(CoverageResult):
+        for field in fields(PrototypeResult):
             expected = getattr(whole, field.name)[17:]
             assert (getattr(later, field.name) == expected).all()
 

@@ -1,0 +1,177 @@
+"""Rays through evenly spaced points of an edge, all of an edge at once: compiled.
+
+The samples lie side by side in one array, quantity after quantity, so that the loops over them
+become vector instructions of the processor. The points are those of both mirrors at the edge.
+"""
+
+from tbcad.simulate.parallel import compiled_loop
+from tbcad.tolerance.montecarlo.visible_edges import (
+    APEX,
+    BEND,
+    CURVATURE,
+    NORMAL,
+    OUTWARD,
+    START,
+    TANGENT,
+)
+from tbcad.tolerance.vectors import Vector, cross, dot, minus, plus_scaled, vector
+from tbcad.types import Floats
+
+# Samples of an edge, and places from one quantity of the samples to the next.
+SAMPLES = 9
+STRIDE = 16
+# Quantities, the first three and the last of three numbers: the point before its shell is scaled,
+# and after; the ray to it; the ray that is reflected there.
+POINT, SCALED, RAY, REFLECTED = 0, 3 * STRIDE, 6 * STRIDE, 9 * STRIDE
+# Quantities of one number: the reflected ray's distance squared from the object's centre, its
+# place on the screen, the point's place in the picture.
+DISTANCE, SCREEN_X, SCREEN_Y = 12 * STRIDE, 13 * STRIDE, 14 * STRIDE
+PICTURE_X, PICTURE_Y = 15 * STRIDE, 16 * STRIDE
+PLACES = 17 * STRIDE
+# Rows of a view; axes of a screen.
+PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
+FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
+# A parabola falls below its minimum sample by an eighth of the rise to the samples beside it at
+# most. The distance squared along an edge is smooth; four times as much is certain.
+MAX_FALL = 0.5
+
+
+@compiled_loop
+def _get(samples: Floats, quantity: int, s: int) -> Vector:
+    first = quantity + s
+    return samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE]
+
+
+@compiled_loop
+def _put(samples: Floats, quantity: int, s: int, value: Vector) -> None:
+    first = quantity + s
+    samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE] = value
+
+
+@compiled_loop
+def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: Floats) -> None:
+    """Fill in points, and rays to them, for parameters from low to high.
+
+    Args:
+        edge: see tbcad.tolerance.montecarlo.visible_edges.find_edge.
+        low: first parameter.
+        high: last parameter.
+        view: see tbcad.tolerance.montecarlo.cell_edges.trace_cell_edges.
+        samples: to be filled in, (PLACES,).
+    """
+    start, tangent, outward = vector(edge, START), vector(edge, TANGENT), vector(edge, OUTWARD)
+    bend, scale, pinhole = edge[BEND], vector(view[SCALE]), vector(view[PINHOLE])
+    for s in range(SAMPLES):
+        t = low + (high - low) * s / (SAMPLES - 1)
+        w = 1 + bend * bend * t * t / 4
+        chord = plus_scaled(start, t / w, tangent)
+        point = plus_scaled(chord, -bend * t * t / 2 / w, outward)
+        _put(samples, POINT, s, point)
+        point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
+        _put(samples, SCALED, s, point)
+        _put(samples, RAY, s, minus(point, pinhole))
+
+
+@compiled_loop
+def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
+    """Fill in the rays that a surface (7,) reflects at the points, and their distances squared."""
+    apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
+    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
+    for s in range(SAMPLES):
+        gradient = plus_scaled(normal, curvature, minus(_get(samples, POINT, s), apex))
+        across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
+        ray = _get(samples, RAY, s)
+        # Neither the normal nor the ray has to be of unit length.
+        out = plus_scaled(ray, -(2 * dot(ray, across) / dot(across, across)), across)
+        moment = cross(minus(_get(samples, SCALED, s), middle), out)
+        _put(samples, REFLECTED, s, out)
+        samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
+
+
+@compiled_loop
+def screen_crossings(view: Floats, screen: Floats, samples: Floats) -> int:
+    """How often the reflected line on a screen crosses the positive half of its first axis."""
+    middle, facing = vector(view[OBJECT]), vector(screen[FACING])
+    first, second = vector(screen[FIRST_AXIS]), vector(screen[SECOND_AXIS])
+    for s in range(SAMPLES):
+        out, from_object = _get(samples, REFLECTED, s), minus(_get(samples, SCALED, s), middle)
+        image = plus_scaled(from_object, -dot(from_object, facing) / dot(out, facing), out)
+        samples[SCREEN_X + s] = dot(image, first)
+        samples[SCREEN_Y + s] = dot(image, second)
+    count = 0
+    for s in range(SAMPLES - 1):
+        a, b = SCREEN_X + s, SCREEN_Y + s
+        count += crosses_half_axis(samples[a], samples[b], samples[a + 1], samples[b + 1])
+    return count
+
+
+@compiled_loop
+def crosses_half_axis(x: float, y: float, next_x: float, next_y: float) -> bool:
+    """Whether the line between two points crosses the positive half of the first axis."""
+    if (y > 0) == (next_y > 0):
+        return False
+    return bool(x + y / (y - next_y) * (next_x - x) > 0)
+
+
+@compiled_loop
+def picture_area(view: Floats, samples: Floats) -> float:
+    """Area between the picture's centre and the points' line in it, by Richardson's rule."""
+    right, down, forward = vector(view[RIGHT]), vector(view[DOWN]), vector(view[FORWARD])
+    for s in range(SAMPLES):
+        ray = _get(samples, RAY, s)
+        depth = dot(ray, forward)
+        samples[PICTURE_X + s] = dot(ray, right) / depth
+        samples[PICTURE_Y + s] = dot(ray, down) / depth
+    fine, coarse = 0.0, 0.0
+    for s in range(SAMPLES - 1):
+        fine += _parallelogram(samples, s, s + 1)
+    for s in range(0, SAMPLES - 2, 2):
+        coarse += _parallelogram(samples, s, s + 2)
+    return (4 * fine - coarse) / 6
+
+
+@compiled_loop
+def _parallelogram(samples: Floats, a: int, b: int) -> float:
+    area: float = (
+        samples[PICTURE_X + a] * samples[PICTURE_Y + b]
+        - samples[PICTURE_Y + a] * samples[PICTURE_X + b]
+    )
+    return area
+
+
+@compiled_loop
+def least_sample(samples: Floats) -> int:
+    """Number of the sample with the minimum distance."""
+    least = 0
+    for s in range(1, SAMPLES):
+        if samples[DISTANCE + s] < samples[DISTANCE + least]:
+            least = s
+    return least
+
+
+@compiled_loop
+def lower_bound(samples: Floats, least: int) -> float:
+    """What no distance squared between the samples is below; `least`: see `least_sample`."""
+    distances = samples[DISTANCE:]
+    bound: float = distances[least] - MAX_FALL * rise_beside(distances, SAMPLES, least)
+    return bound
+
+
+@compiled_loop
+def rise_beside(values: Floats, count: int, least: int) -> float:
+    """Rise from the minimum of even samples to the greater of the two samples nearest to it."""
+    first = min(max(least - 1, 0), count - 3)
+    rise: float = max(values[first], values[first + 1], values[first + 2]) - values[least]
+    return rise
+
+
+@compiled_loop
+def parabola_minimum(samples: Floats) -> float:
+    """Minimum of the distances squared, on the parabola through its neighbours."""
+    best = least_sample(samples)
+    minimum: float = samples[DISTANCE + best]
+    if best in (0, SAMPLES - 1):
+        return minimum
+    before, after = samples[DISTANCE + best - 1], samples[DISTANCE + best + 1]
+    bend, slope = before - 2 * minimum + after, after - before
+    return max(minimum - (slope * slope / (8 * bend) if bend > 0 else 0.0), 0.0)
