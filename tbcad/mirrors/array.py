@@ -182,6 +182,8 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
         min_curvature=1 / (spec.mirrors.max_radius_widths * half_width),
         target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
     )
+    # Radii take long: no frame holds the mirrors if none holds their apices.
+    _view_angle_deg(spec.camera, ellipsoid.pinhole, problem.mirrors.apex)
     cells, coverage = solve_radii(spec.mirrors.radius_rule, problem, progress)
     polar, azimuth = ellipsoid.polar_azimuth(u)
     return MirrorArray(
@@ -203,14 +205,26 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
 
 def _camera(sensor: CameraSpec, pinhole: Floats, corners: Floats) -> Camera:
     """The camera in front of the corners (k, 3) of all cells, mm."""
-    width, height, hfov = sensor.width_px, sensor.height_px, sensor.hfov_deg
-    if hfov == FIT and (hfov := fitting_view_angle_deg(pinhole, corners, width, height)) > MAX_HFOV:
+    hfov = np.radians(_view_angle_deg(sensor, pinhole, corners))
+    return fitted_camera(pinhole, corners, sensor.width_px, sensor.height_px, float(hfov))
+
+
+def _view_angle_deg(sensor: CameraSpec, pinhole: Floats, points: Floats) -> float:
+    """The spec's angle of view, or the smallest that holds points (k, 3), mm.
+
+    Raises:
+        SpecError: no lens has it.
+    """
+    if sensor.hfov_deg != FIT:
+        return float(sensor.hfov_deg)
+    hfov = fitting_view_angle_deg(pinhole, points, sensor.width_px, sensor.height_px)
+    if hfov > MAX_HFOV:
         raise SpecError(
             f"no lens takes in all mirrors: camera.hfov_deg would have to be {hfov:.0f}, allowed "
             f"is up to {MAX_HFOV:g}: bring optics.camera_mm farther from the origin, or make "
             "optics.semi_minor_mm smaller"
         )
-    return fitted_camera(pinhole, corners, width, height, float(np.radians(hfov)))
+    return hfov
 
 
 def _bounding_planes(u: Floats, half_width: Floats) -> Surfaces:

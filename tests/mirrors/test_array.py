@@ -98,6 +98,15 @@ def test_hopeless_targets_name_the_mirrors() -> None:
     assert "change optics.n" in str(caught.value)
 
 
+def test_mirrors_that_no_lens_takes_in_are_refused_before_their_radii_are_searched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Some hundred steps, each as long as a design of few mirrors."""
+    monkeypatch.setattr("tbcad.mirrors.array.solve_radii", None)
+    with pytest.raises(SpecError, match=r"no lens takes in all mirrors: .* have to be 180"):
+        mirrors_of("n=18", "camera_mm=[100, 0, -20]", "capture_diameter_mm=20")
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     n=st.integers(2, 10),

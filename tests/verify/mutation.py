@@ -1,6 +1,6 @@
 """Mutation of the verification itself: single lines changed, and the tests that should notice.
 
-python tests/verify/mutation.py [--count 40] [--seed 1] [--module WORD ...] [--seconds 300]
+python tests/verify/mutation.py [--count 54] [--seed 1] [--module WORD ...] [--jobs 1]
 
 Each mutation is made in a private copy of `verify/`, which the tests import. One that no test
 notices survives, and is printed with its line: it wants a test, or a line in verify/README.md that
@@ -18,20 +18,46 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "verify" / "tbcad_verify"
 # Modules whose changes are looked for, and the tests that should notice them.
+PRINTING = ["tests/verify/printing"]
+MEASURES = ["tests/verify/printing/test_part_measures.py"]
+GCODE = ["tests/verify/prototype/test_gcode.py"]
+PROTOTYPE = ["tests/verify/prototype/test_measured_prototype.py"]
+CASING = ["tests/verify/shell/test_mesh_casing.py"]
 TESTS: dict[str, list[str]] = {
+    "mesh/fits.py": ["tests/verify/mesh"],
+    "mesh/holes.py": ["tests/verify/mesh/test_circles.py", *MEASURES, *CASING],
+    "mesh/lines.py": ["tests/verify/mesh"],
+    "mesh/mesh.py": ["tests/verify/mesh"],
+    "mesh/rays.py": [*CASING, *MEASURES],
+    "mesh/segments.py": ["tests/verify/mesh", "tests/verify/shell/test_recovery.py"],
+    "mesh/surfaces.py": ["tests/verify/mesh"],
     "mesh/threemf_structure.py": ["tests/verify/corpus/test_files.py", "-m", "corpus", "-k", "3MF"],
-    "prototype/gcode_lines.py": ["tests/verify/prototype/test_gcode.py"],
-    "prototype/gcode_machine.py": ["tests/verify/prototype/test_gcode.py"],
-    "prototype/gcode_checks.py": ["tests/verify/prototype/test_gcode.py"],
-    "step/solids_text.py": ["tests/verify/step/test_solids_text.py"],
-    "step/casing.py": ["tests/verify/step/test_solids_text.py"],
+    "printing/assessment.py": PRINTING,
+    "printing/placement.py": PRINTING,
+    "printing/walls.py": MEASURES,
+    "prototype/gcode_checks.py": GCODE,
+    "prototype/gcode_lines.py": GCODE,
+    "prototype/gcode_machine.py": GCODE,
+    "prototype/record_checks.py": ["tests/verify/prototype/test_stages.py"],
+    "prototype/seats.py": PROTOTYPE,
+    "record/columns.py": ["tests/verify/record/test_bad_input.py"],
+    "record/flange_holes.py": ["tests/verify/record/test_flange_holes.py"],
+    "record/poses.py": ["tests/verify/record/test_poses.py"],
     "record/radius_rule.py": ["tests/verify/record/test_radius_rule.py"],
+    "record/spec.py": ["tests/verify/record/test_spec.py"],
+    "report/checks.py": ["tests/verify/report/test_checks.py"],
+    "shell/mesh_casing.py": CASING,
+    "step/casing.py": ["tests/verify/step/test_solids_text.py"],
+    "step/part21.py": ["tests/verify/step/test_part21.py"],
+    "step/solids_text.py": ["tests/verify/step/test_solids_text.py"],
+    "step/sphere_union.py": ["tests/verify/step/test_sphere_union.py"],
 }
 COMPARISONS = {
     ast.Lt: ast.GtE,
@@ -127,9 +153,10 @@ def survives(change: Change, seconds: float) -> bool:
 def main() -> int:
     """Make mutations, and print those that survive."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--count", type=int, default=40, help="mutations")
+    parser.add_argument("--count", type=int, default=54, help="mutations")
     parser.add_argument("--seed", type=int, default=1, help="of the choice")
     parser.add_argument("--module", nargs="+", default=[""], help="words in modules' paths")
+    parser.add_argument("--jobs", type=int, default=1, help="mutations at a time")
     parser.add_argument("--seconds", type=float, default=300, help="limit of one mutation's tests")
     options = parser.parse_args()
     every = [
@@ -138,14 +165,20 @@ def main() -> int:
         if any(word in module for word in options.module)
         for change in changes(module)
     ]
-    some = random.Random(options.seed).sample(every, min(options.count, len(every)))
+    dice = random.Random(options.seed)
+    dice.shuffle(every)
+    # One of each module, then the second of each ..., so that no module is passed over.
+    modules = [change.module for change in every]
+    rank = {change: modules[:k].count(change.module) for k, change in enumerate(every)}
+    some = sorted(every, key=rank.__getitem__)[: options.count]
     alive = 0
-    for change in some:
-        survivor = survives(change, options.seconds)
-        alive += survivor
-        line = (PACKAGE / change.module).read_text().splitlines()[change.line - 1].strip()
-        mark = "SURVIVES" if survivor else "caught  "
-        print(f"{mark} {change.module}:{change.line} {change.what}: {line}", flush=True)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        outcomes = pool.map(lambda change: survives(change, options.seconds), some)
+        for change, survivor in zip(some, outcomes, strict=True):
+            alive += survivor
+            line = (PACKAGE / change.module).read_text().splitlines()[change.line - 1].strip()
+            mark = "SURVIVES" if survivor else "caught  "
+            print(f"{mark} {change.module}:{change.line} {change.what}: {line}", flush=True)
     print(f"{len(some) - alive} of {len(some)} caught")
     return int(alive > 0)
 

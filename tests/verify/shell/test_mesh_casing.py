@@ -16,6 +16,7 @@ from tbcad_verify.shell.mesh_casing import (
     MeshCasing,
     casing_checks,
     casing_names,
+    find_valleys,
     measure_casing,
 )
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
@@ -122,3 +123,18 @@ def test_without_holes_or_mirrors_it_is_unknown(
     found = casing_checks(replace(setup, match=no_mirrors), holes)
     assert [one.passed for one in found] == [None] * 4
     assert "no ray from a valley" in found[0].detail
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_valleys_are_corners_of_two_mirrors_or_more(setup: OpticalSetup, number: int) -> None:
+    """The sample's mirrors are planes."""
+    mirrors = setup.export.mirrors
+    mine = mirrors.camera == setup.export.parts[number].camera
+    apex, normal = (mirrors.columns(key, 3)[:, mine] for key in ("px", "nx"))
+    valleys = find_valleys(setup, number)
+    height = np.abs(normal.T @ valleys.point - (normal * apex).sum(axis=0)[:, None])
+    assert ((height < 1e-4).sum(axis=0) >= 2).all()
+    low = valleys.point[2] - setup.export.foot_z_mm
+    joining = np.minimum(np.abs(valleys.point[0]), low) < 1e-4
+    assert (valleys.inner == ~joining).all()
+    assert joining.any()

@@ -274,4 +274,5 @@ def test_rounding_never_makes_a_crease() -> None:
     assert np.abs(edges.angle).max() > 1e-5
     sure = edges.noise < 0.05
     assert (np.abs(edges.angle) <= edges.noise)[sure].all()
+    assert not creases(mesh, edges)[sure].any()
     assert rounding(mesh) < 2e-5

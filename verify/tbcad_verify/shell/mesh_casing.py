@@ -128,7 +128,7 @@ def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
     camera = export.cameras[export.parts[number].camera]
     focal = float(np.linalg.norm(camera.pinhole)) / 2
     semi_axes = np.array([np.hypot(export.semi_minor_mm, focal), export.semi_minor_mm])
-    valleys = _valleys(setup, number)
+    valleys = find_valleys(setup, number)
     back = _back(setup, valleys, camera)
     if not back.size:
         raise Unknown("no ray from a valley between mirrors leaves through a back")
@@ -166,7 +166,7 @@ def _each(found: RoundHoles) -> list[Hole]:
     ]
 
 
-def _valleys(setup: OpticalSetup, number: int) -> Valleys:
+def find_valleys(setup: OpticalSetup, number: int) -> Valleys:
     """Corners of edges that have another mirror of the part on each side."""
     mesh, label = setup.mesh, setup.recovery.segments.label
     mine = setup.part[label] == number
