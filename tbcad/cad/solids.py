@@ -5,10 +5,13 @@ Booleans take lists: one general fuse of many bodies is faster than one after th
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 from cadquery import Shape
 from manifold3d import Manifold, Mesh64, OpType
+from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_BooleanOperation,
@@ -37,9 +40,9 @@ from OCP.BRepPrimAPI import (
 )
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 from OCP.TopTools import TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
@@ -165,6 +168,22 @@ def _boolean(
     if not operation.IsDone():
         raise InvalidSolidError("the kernel cannot join or cut these solids")
     return operation.Shape()
+
+
+def to_bytes(shape: TopoDS_Shape) -> bytes:
+    """A shape as bytes from which it can be read again exactly."""
+    with NamedTemporaryFile(prefix="tbcad-") as file:  # streams of Python's lose large shapes
+        BinTools.Write_s(shape, file.name)
+        return Path(file.name).read_bytes()
+
+
+def from_bytes(data: bytes) -> TopoDS_Shape:
+    """A shape from its bytes."""
+    shape = TopoDS_Shape()
+    with NamedTemporaryFile(prefix="tbcad-") as file:
+        Path(file.name).write_bytes(data)
+        BinTools.Read_s(shape, file.name)
+    return TopoDS.Solid_s(shape) if shape.ShapeType() == TopAbs_SOLID else shape
 
 
 def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tbcad.background import Submit, background_process
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
-from tbcad.output.background import in_background
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.files.write import export_prototype
@@ -57,11 +57,13 @@ def write_export(
         write_shells(design, folder, progress)
         export = Export(design.spec, (SHELL,))
     elif SHELL not in parts:
-        export = Export(export_prototype(design, folder, progress), (PROTOTYPE,))
+        with background_process() as submit:
+            export = Export(export_prototype(design, folder, progress, submit), (PROTOTYPE,))
     else:
         shell_envelope(design)  # refuses flanges that do not fit before anything is built
-        with in_background(write_shells, design, folder):
-            export = _prototype_with_shells(design, folder, progress, optional_prototype)
+        with background_process() as submit:
+            submit(write_shells, design, folder)
+            export = _prototype_with_shells(design, folder, progress, submit, optional_prototype)
             progress("shells")
     write_record(folder, replace(design, spec=export.spec), SHELL in parts)
     progress("manifest")
@@ -70,10 +72,10 @@ def write_export(
 
 
 def _prototype_with_shells(
-    design: MirrorDesign, folder: Path, progress: Progress, optional: bool
+    design: MirrorDesign, folder: Path, progress: Progress, submit: Submit, optional: bool
 ) -> Export:
     try:
-        return Export(export_prototype(design, folder, progress), PARTS)
+        return Export(export_prototype(design, folder, progress, submit), PARTS)
     except (SpecError, InvalidSolidError) as error:
         if optional:
             return Export(design.spec, (SHELL,), f"no prototype: {error}")

@@ -8,6 +8,7 @@ import numpy as np
 from OCP.Standard import Standard_Failure
 from OCP.StdFail import StdFail_NotDone
 
+from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.primitives import Component
@@ -80,12 +81,17 @@ class PrototypeModel:
 
 
 def build_prototype_model(
-    design: MirrorDesign, progress: Progress = lambda _: None
+    design: MirrorDesign, progress: Progress = lambda _: None, submit: Submit = at_once
 ) -> PrototypeModel:
     """Arrange the prototype of a design and build its solids.
 
     Where the kernel fails with the preferred arrangement, other pads and numbers of balls are
     tried: another hub's boss would leave the same faces grazing each other.
+
+    Args:
+        design: the mirrors.
+        progress: called with each stage.
+        submit: takes what can be done meanwhile.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -98,7 +104,7 @@ def build_prototype_model(
         if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
         try:
-            return _model(arrangement, progress)
+            return _model(arrangement, progress, submit)
         except (SpecError, InvalidSolidError) as error:
             errors[balls, tilt] = error
         except (Standard_Failure, StdFail_NotDone) as error:
@@ -108,14 +114,13 @@ def build_prototype_model(
     raise next(iter(errors.values()))
 
 
-def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
+def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> PrototypeModel:
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
     printer, parts = spec.printer, arrangement.parts
     progress("prototype: base")
     carrier = carrier_parts(base, arrangement.split, printer)
-    for part in carrier:
-        check_read_back(part.name, part.shape, part.properties)
     masses = _masses(carrier, printer.density_g_cm3)
+    faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
     stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
@@ -132,6 +137,9 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
         *static,
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in coupon_plates(base, printer)),
     )
+    for fault in faults:
+        if fault.result():
+            raise InvalidSolidError(fault.result())
     return PrototypeModel(
         spec=spec,
         layout=layout,
@@ -145,6 +153,15 @@ def _model(arrangement: Arrangement, progress: Progress) -> PrototypeModel:
         parts=parts,
         capture_radius=spec.optics.capture_diameter_mm / 2,
     )
+
+
+def carrier_fault(part: PlacedSolid) -> str:
+    """What is wrong with a piece of the carrier that its STEP file does not keep, or nothing."""
+    try:
+        check_read_back(part.name, part.shape, part.properties)
+    except InvalidSolidError as error:
+        return str(error)
+    return ""
 
 
 def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tbcad.background import Submit, at_once
 from tbcad.cad.brep import Solid
 from tbcad.formats.csv_table import write_table
 from tbcad.formats.glb import write_glb
@@ -29,9 +30,18 @@ BALLS_FILE = "balls.csv"
 
 
 def export_prototype(
-    design: MirrorDesign, folder: Path, progress: Progress = lambda _: None
+    design: MirrorDesign,
+    folder: Path,
+    progress: Progress = lambda _: None,
+    submit: Submit = at_once,
 ) -> Spec:
     """Build the prototype and write all of its files into a folder.
+
+    Args:
+        design: the mirrors.
+        folder: to write into.
+        progress: called with each stage.
+        submit: takes what can be done meanwhile.
 
     Returns:
         The design's spec with what was chosen for the prototype.
@@ -40,17 +50,20 @@ def export_prototype(
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    built = build_prototype_model(design, progress)
-    spec = built.spec
+    built = build_prototype_model(design, progress, submit)
+    spec, layout = built.spec, built.layout
     progress("prototype: files")
+    chosen = (layout.half, layout.groups, layout.balls, layout.fit)
+    alternatives = submit(ball_alternatives, spec, *chosen)
     for part in built.printed:
-        _write_part(folder, part, spec)
+        submit(_write_part, folder, part, spec)
     _write_tables(built, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
     write_assembly(folder / STEP, "prototype", groups)
     write_glb(folder / GLB, "prototype", groups)
-    text = json.dumps(document(built), indent=1, allow_nan=False) + "\n"
+    record = document(built, alternatives.result())
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8")
     return spec
 
@@ -68,8 +81,8 @@ def _file_names(part: PrintedPart) -> dict[str, str]:
     return {kind: f"{part.name}.{kind}" for kind in ("step", "stl", "3mf")}
 
 
-def document(built: PrototypeModel) -> dict[str, Any]:
-    """prototype.json: what is known of the prototype, in numbers."""
+def document(built: PrototypeModel, alternatives: list[dict[str, Any]]) -> dict[str, Any]:
+    """prototype.json: what is known of the prototype, in numbers; alternatives are of its balls."""
     layout, spec = built.layout, built.spec.prototype
     axis, zero, third = (layout.half.ellipsoid.frame() + 0.0).tolist()
     return {
@@ -81,9 +94,7 @@ def document(built: PrototypeModel) -> dict[str, Any]:
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
-        "alternatives": ball_alternatives(
-            built.spec, layout.half, layout.groups, layout.balls, layout.fit
-        ),
+        "alternatives": alternatives,
         "seats": _seats(built),
         "parts": [_part_record(part) for part in built.printed],
         "leds": [

@@ -3,13 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import SolidProperties, meshed, moved, one_solid, properties, solids
+from tbcad.cad.solids import (
+    SolidProperties,
+    from_bytes,
+    meshed,
+    moved,
+    one_solid,
+    properties,
+    solids,
+    to_bytes,
+)
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
 from tbcad.spec.errors import SpecError
@@ -37,6 +47,14 @@ class PlacedSolid:
     shape: TopoDS_Solid
     axes: Floats
     origin: Floats
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The kernel's shapes are no data to Python until they are written as bytes."""
+        return {**self.__dict__, "shape": to_bytes(self.shape)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Read the shape again, exactly as it was."""
+        self.__dict__.update(state, shape=from_bytes(state["shape"]))
 
     @property
     def on_bed(self) -> TopoDS_Solid:

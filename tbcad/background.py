@@ -5,32 +5,43 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
+
+Submit: TypeAlias = Callable[..., "Future[Any]"]
+"""Takes a function of a module and its arguments, which are copied; the result comes later."""
+
+
+def at_once(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    """Do work here and now, where there is no other process."""
+    future: Future[Any] = Future()
+    future.set_result(work(*arguments))
+    return future
 
 
 @contextmanager
-def in_background(work: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """Do work in another process while the block runs, and wait for it at the block's end.
+def background_process() -> Iterator[Submit]:
+    """Do work in another process, a piece after the other, while the block runs.
 
-    A block that fails, or is interrupted, ends the work at once.
-
-    Args:
-        work: a function of a module.
-        arguments: of it; they are copied.
+    At the block's end all of it is done. A block that fails, or is interrupted, ends it at once.
 
     Raises:
-        Exception: what the work raised.
-        RuntimeError: its process ended before it was done.
+        Exception: the first that the work raised.
+        RuntimeError: the process ended before its work was done.
     """
-    others = multiprocessing.active_children()
+    others, futures = multiprocessing.active_children(), list[Future[Any]]()
     with ProcessPoolExecutor(1, _context(), initializer=_ignore_interrupts) as pool:
-        result = pool.submit(work, *arguments)
+
+        def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+            futures.append(pool.submit(work, *arguments))
+            return futures[-1]
+
         try:
-            yield
-            result.result()
+            yield submit
+            for future in futures:
+                future.result()
         except BrokenProcessPool:
             raise RuntimeError(
                 "a process ended before its work was done: is memory short?"
