@@ -91,6 +91,21 @@ def test_swing_beyond_the_drive_is_refused() -> None:
         min_swing_placement(problem(separation, half, max_swing=2.49))
 
 
+@pytest.mark.parametrize("count", [3, 300])
+def test_too_many_balls_are_refused_without_a_search(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each 0.01 from each: the swing is a row of them, and what one ball serves."""
+    separation = 0.01 * (1 - np.eye(count))
+    row, half = 0.01 * (count - 1), np.full(count, 0.1)
+    if count < 10:
+        enough = problem(separation, half, max_swing=0.2 + row + 1e-4)
+        assert min_swing_placement(enough).swing == pytest.approx(0.2 + row, abs=1e-4)
+    monkeypatch.setattr("tbcad.prototype.balls.placement.milp", None)
+    with pytest.raises(SpecError, match=f"no place for {count} balls"):
+        min_swing_placement(problem(separation, half, max_swing=0.2 + row - 1e-2))
+
+
 def test_of_equal_swings_the_minimum_outermost_azimuth() -> None:
     """The third ball, narrow and wide-edged, has room to 0.5 but is drawn in."""
     edge = np.array([0.0, 0.0, 0.4])
