@@ -29,8 +29,9 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage
-from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, edge_model
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 
 COUNTS = (100, 300, 1000)
 MESHED = 10

@@ -21,13 +21,14 @@ from tbcad.version import __version__
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
 
-    from tbcad.api import Build, Design, analyse, build, capture, design, verify
+    from tbcad.api import Build, analyse, build, capture, design, verify
     from tbcad.errors import InputError
     from tbcad.mirrors.array import MirrorArray
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.spec.design import Spec
     from tbcad.spec.load import load_spec
     from tbcad.tolerance.analysis import Analysis
+    from tbcad.whole_design import Design
 
 __all__ = [
     "Analysis",
@@ -49,6 +50,7 @@ __all__ = [
 
 _MODULES = {
     "Analysis": "tbcad.tolerance.analysis",
+    "Design": "tbcad.whole_design",
     "InputError": "tbcad.errors",
     "LightField": "tbcad.simulate.capture.light_field",
     "MirrorArray": "tbcad.mirrors.array",

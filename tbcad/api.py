@@ -4,20 +4,19 @@ The commands of `tbcad` call the same functions. Heavy libraries are imported in
 bad input is refused before they are loaded.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign
 from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec, option_texts
-from tbcad.types import Progress
 
 if TYPE_CHECKING:
-    from build123d import Part
     from tbcad_verify.report.as_made import AsMade
     from tbcad_verify.report.report import Report
     from tbcad_verify.run.verify import VerifyOptions
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.object import Paint, SceneObject
     from tbcad.tolerance.analysis import Analysis, ToleranceOptions
+    from tbcad.types import Progress
+    from tbcad.whole_design import Design
 
 Settings = Mapping[str, str] | Sequence[str]
 AS_MADE_STAGE = "simulated builds by each process"
@@ -33,54 +34,6 @@ AS_MADE_STAGE = "simulated builds by each process"
 
 def silent(_: str) -> None:
     """Ignore a report of progress."""
-
-
-class Design(MirrorDesign):
-    """The mirrors of both cameras, computed from a spec, and the solids that follow from them.
-
-    Attributes:
-        spec: what was asked for.
-        halves: camera a's mirrors and camera b's, as arrays over mirrors.
-    """
-
-    def __repr__(self) -> str:
-        """Return name, number of mirrors and minimum coverage."""
-        first, second = self.halves
-        return (
-            f"<Design {self.spec.name!r}: n = {self.spec.optics.n}, "
-            f"{len(first)} + {len(second)} mirrors, "
-            f"minimum coverage {first.coverage.min():.2f} mm>"
-        )
-
-    def shell(self, camera: Literal["a", "b"] = "a") -> "Part":
-        """Return one camera's shell as a build123d part: mm, frame of the design, z up.
-
-        Raises:
-            SpecError: flanges or holes do not fit; it says what to change.
-            InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
-        """
-        from tbcad.cad.part import as_part
-        from tbcad.shell.files import camera_solid
-
-        if camera not in ("a", "b"):
-            raise InputError(f"there is no camera {camera!r}: allowed are 'a' and 'b'")
-        solid = camera_solid(self, self.halves["ab".index(camera)])
-        return as_part(solid.name, solid.shape)
-
-    def printed_parts(self) -> "dict[str, Part]":
-        """Return the printed parts of the prototype by name, as they are assembled, base angle 0.
-
-        Raises:
-            SpecError: the prototype cannot be laid out; it says what to change.
-            InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
-        """
-        from tbcad.cad.part import as_part
-        from tbcad.prototype.model import build_prototype_model
-
-        return {
-            printed.name: as_part(printed.name, printed.solid.shape)
-            for printed in build_prototype_model(self).printed
-        }
 
 
 @dataclass(frozen=True)
@@ -99,7 +52,7 @@ class Build:
     design: Design
     parts: tuple[str, ...]
     note: str
-    report: "Report | None"
+    report: Report | None
 
     def __repr__(self) -> str:
         """Return folder and verdict."""
@@ -135,6 +88,7 @@ def design(
     <Design 'turtleback': n = 4, 49 + 49 mirrors, minimum coverage 60.60 mm>
     """
     from tbcad.mirrors.array import design as mirror_design
+    from tbcad.whole_design import Design
 
     mirrors = mirror_design(_spec(spec, n, settings), detail)
     return Design(mirrors.spec, mirrors.halves)
@@ -178,6 +132,7 @@ def build(
     from tbcad.output.build import write_export
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.parts import default_parts
+    from tbcad.whole_design import Design
 
     chosen, out = _spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
@@ -203,7 +158,7 @@ def build(
 
 def _as_made(
     mirrors: Design, parts: Sequence[str], progress: Progress, detail: Progress
-) -> "AsMade | None":
+) -> AsMade | None:
     from tbcad.output.parts import SHELL
     from tbcad.simulate.scene.reflector import reflectors
     from tbcad.tolerance.as_made import as_made
@@ -218,7 +173,7 @@ def _as_made(
 
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
-) -> "AsMade | None":
+) -> AsMade | None:
     """Simulate a few builds of an export by every built-in process.
 
     Returns:
@@ -241,10 +196,10 @@ def as_made(
 
 def verify(
     exports: Path | str,
-    options: "VerifyOptions | None" = None,
+    options: VerifyOptions | None = None,
     *,
     progress: Progress = silent,
-) -> "Report":
+) -> Report:
     """Verify the files of a build with code that shares nothing with the code that wrote them.
 
     Args:
@@ -279,14 +234,14 @@ def capture(
     object_file: Path | str | None = None,
     *,
     out: Path | str | None = None,
-    geometry: "Geometry" = "spheres",
+    geometry: Geometry = "spheres",
     fit: bool = False,
-    paint: "Paint" = "own",
+    paint: Paint = "own",
     samples: int = 1,
     force: bool = False,
     progress: Progress = silent,
     detail: Progress = silent,
-) -> "LightField":
+) -> LightField:
     """Simulate the photographs of both cameras through the mirrors of a build.
 
     Args:
@@ -330,8 +285,8 @@ class Photographs:
         facts: how they are taken: design, n, geometry, samples.
     """
 
-    cameras: "CameraPhotographs"
-    subject: "SceneObject"
+    cameras: CameraPhotographs
+    subject: SceneObject
     capture_mm: float
     facts: dict[str, Any]
 
@@ -339,9 +294,9 @@ class Photographs:
 def photograph(
     exports: Path | str,
     object_file: Path | str | None,
-    geometry: "Geometry",
+    geometry: Geometry,
     fit: bool,
-    paint: "Paint",
+    paint: Paint,
     samples: int,
     progress: Progress,
     detail: Progress,
@@ -393,11 +348,11 @@ def analyse(
     object_file: Path | str | None = None,
     *,
     settings: Settings = (),
-    options: "ToleranceOptions | None" = None,
+    options: ToleranceOptions | None = None,
     progress: Progress = silent,
     detail: Progress = silent,
     answer: Progress = silent,
-) -> "Analysis":
+) -> Analysis:
     """Simulate many builds by a manufacturing process, and find what limits their yield.
 
     Args:

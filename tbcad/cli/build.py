@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from tbcad.cli.app import app
+from tbcad.cli.early_checks import check_is_folder
 from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
 from tbcad.cli.output_mode import Full, Json, Quiet, output_mode
 from tbcad.errors import InputError
@@ -144,8 +145,8 @@ def _process(name: str | None, wanted_yield: float | None) -> "Process | None":
     """The process whose margin is wanted, read and checked before anything takes long."""
     if name is None and wanted_yield is None:
         return None
-    from tbcad.tolerance.margin import check_yield
     from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerance.wanted_yield import check_yield
 
     if name is None:
         raise InputError(
@@ -190,6 +191,7 @@ def verify_command(
     output = output_mode(full, quiet, json)
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
+    check_is_folder(folder)
     from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.api import as_made, verify

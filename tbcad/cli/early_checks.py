@@ -11,6 +11,16 @@ DESIGN_FILE = "design.json"
 LIGHT_FIELD_FILE = "lightfield.h5"
 
 
+def check_is_folder(folder: Path) -> None:
+    """Refuse what is no folder.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; give the folder that `tbcad build` wrote")
+
+
 def check_is_export(folder: Path) -> None:
     """Refuse a folder without the record of a design.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.early_checks import check_is_capture, check_is_export
 from tbcad.cli.options import (
     Azimuth,
     Capture,
@@ -74,11 +75,12 @@ def capture(
     Writes both photographs at the full size of the sensors, and the light field: the ray, colour
     and mirror of every pixel.
     """
+    if mesh and prototype:
+        raise InputError("--mesh and --prototype exclude each other: leave one out")
+    check_is_export(folder)
     from tbcad.api import photograph, write_photographs
     from tbcad.output.folder import check_replaceable
 
-    if mesh and prototype:
-        raise InputError("--mesh and --prototype exclude each other: leave one out")
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, force)
     with stages(3) as screen:
@@ -118,6 +120,7 @@ def view(
     For a simulated capture also writes the ray-traced ground truth and a comparison, and prints
     PSNR and SSIM.
     """
+    check_is_capture(capture_folder)
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.scene.ground_truth import pinhole_picture
@@ -181,6 +184,7 @@ def refocus(
 
     For a simulated capture also writes the ray-traced picture of a real lens and a comparison.
     """
+    check_is_capture(capture_folder)
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation

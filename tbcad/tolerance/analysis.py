@@ -13,7 +13,7 @@ from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
-from tbcad.tolerance.margin import Margin, SolvedDesigns, check_yield, margin
+from tbcad.tolerance.margin import Margin, SolvedDesigns, margin
 from tbcad.tolerance.montecarlo.builds import (
     AnyResult,
     Case,
@@ -25,8 +25,9 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import Errors, draw, shell_error_shapes
+from tbcad.tolerance.montecarlo.draws import draw, shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.sensitivity import (
     SingleErrorEffect,
     WorstCoverage,
@@ -44,6 +45,7 @@ from tbcad.tolerance.stages import (
     SINGLE_ERRORS,
     builds_stage,
 )
+from tbcad.tolerance.wanted_yield import check_yield
 from tbcad.tolerance.yield_text import yield_sentence
 from tbcad.types import Floats, Progress
 

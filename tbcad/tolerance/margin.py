@@ -12,9 +12,10 @@ from tbcad.simulate.study.sweep import spec_with
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.montecarlo.builds import WorstCase, coverage_at_yield, simulate
-from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.process.process import Process, process_errors
+from tbcad.tolerance.wanted_yield import check_yield
 from tbcad.types import Floats, Progress
 
 WorstCoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
@@ -65,16 +66,6 @@ class SolvedDesigns:
         if isinstance(found, SpecError):
             raise found
         return found
-
-
-def check_yield(wanted_yield: float) -> None:
-    """Refuse a share of good builds that is not between 0 and 1.
-
-    Raises:
-        InputError: it is not.
-    """
-    if not 0 < wanted_yield < 1:
-        raise InputError(f"--yield {wanted_yield:g}: allowed is above 0, below 1, like 0.99")
 
 
 def margin(

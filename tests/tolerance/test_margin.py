@@ -21,8 +21,8 @@ from tbcad.tolerance.margin import (
     with_margin,
 )
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
-from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.process.process import load_process, process_errors
 
 TARGET = 60.0

@@ -24,8 +24,8 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
 from tbcad.tolerance.process.process import ErrorSpec, load_process

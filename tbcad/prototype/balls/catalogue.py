@@ -7,12 +7,13 @@ from functools import cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
 from tbcad.spec.errors import SpecError, short_text
-from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from tbcad.types import Floats
 
 STEEL_DENSITY_G_CM3 = 7.81  # 100Cr6 (AISI 52100), the usual steel of bearing balls
 BUILT_IN = ("metric", "inch")
@@ -55,13 +56,17 @@ class Catalogue:
         return len(self.balls)
 
     @cached_property
-    def diameter(self) -> Floats:
+    def diameter(self) -> "Floats":
         """Diameters, mm, (s,)."""
+        import numpy as np  # only here: grades are read before anything takes long
+
         return np.array([ball.diameter_mm for ball in self.balls])
 
     @cached_property
-    def mass_g(self) -> Floats:
+    def mass_g(self) -> "Floats":
         """Masses, grams, (s,)."""
+        import numpy as np
+
         return np.array([ball.mass_g for ball in self.balls])
 
     def available(self, grade: str, max_diameter: float) -> "Catalogue":

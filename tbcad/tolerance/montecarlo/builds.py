@@ -10,8 +10,9 @@ import numpy as np
 
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
-from tbcad.tolerance.montecarlo.draws import Errors, draw
+from tbcad.tolerance.montecarlo.draws import draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.pointing import pointing
 from tbcad.types import Floats, Ints
 

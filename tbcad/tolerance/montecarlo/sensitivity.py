@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
-from tbcad.tolerance.montecarlo.draws import NO_ERROR, Errors
+from tbcad.tolerance.montecarlo.error_kinds import NO_ERROR, Errors
 from tbcad.types import Floats
 
 WorstCoverage = Callable[[Errors], Floats]

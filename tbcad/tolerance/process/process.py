@@ -25,7 +25,7 @@ from tbcad.spec.errors import (
 from tbcad.spec.files import Table, read_toml, toml_value
 from tbcad.spec.prototype import GradeName
 from tbcad.spec.section import Section
-from tbcad.tolerance.montecarlo.draws import Distribution, Error, Errors
+from tbcad.tolerance.montecarlo.error_kinds import Distribution, Error, Errors
 
 BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
 DEFAULT_PROCESS = "sla"

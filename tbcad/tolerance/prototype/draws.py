@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.tolerance.montecarlo.draws import Errors, Shape, draw_kinds
+from tbcad.tolerance.montecarlo.draws import Shape, draw_kinds
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats
 
 # Random streams of a build begin here, beyond those of its shells.

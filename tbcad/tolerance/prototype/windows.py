@@ -23,8 +23,8 @@ from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.builds import CoverageResult
 from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
-from tbcad.tolerance.montecarlo.draws import Errors
 from tbcad.tolerance.montecarlo.edge_model import ASYMMETRIC
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.rays import (
     SIDE_SAMPLES,

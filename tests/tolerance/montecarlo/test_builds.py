@@ -14,8 +14,8 @@ from tbcad.tolerance.montecarlo.builds import (
     simulate,
     wilson_interval,
 )
-from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 
 SOME = Errors(sphere_centre=Error(0.02), camera_shift=Error(0.1), scale_axis=Error(0.001))
 BUILDS = 2 * BUILDS_PER_BATCH + 3

@@ -13,8 +13,9 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
-from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_model
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tests.tolerance.exact_builds import surrounded
 from tests.tolerance.montecarlo.every_edge import every_edge
 

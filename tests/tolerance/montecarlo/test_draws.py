@@ -3,7 +3,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tbcad.tolerance.montecarlo.draws import Error, Errors, ShellDraws, draw
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 
 M = 4
 ALL = Errors(**{field.name: Error(0.001) for field in fields(Errors)})

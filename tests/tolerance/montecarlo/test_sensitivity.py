@@ -12,8 +12,8 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import Error, Errors
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sensitivity import (
     FACTOR_TOLERANCE,
     LARGEST_FACTOR,

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from tbcad.spec.errors import SpecError, section_of
 from tbcad.spec.errors import dotted_fields as keys_of
-from tbcad.tolerance.montecarlo.draws import Error, Errors
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.process.process import (
     BUILT_IN,
     BY_USER,

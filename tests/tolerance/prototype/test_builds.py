@@ -16,7 +16,7 @@ from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.builds import CoverageResult, simulate
-from tbcad.tolerance.montecarlo.draws import Error, Errors
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.rays import (
     COARSE,

@@ -1,0 +1,77 @@
+"""The kinds of error of a process, with their spread and mean: read before numpy is loaded."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from tbcad.types import Floats
+
+Distribution = Literal["normal", "uniform"]
+
+
+@dataclass(frozen=True)
+class Error:
+    """One kind of error.
+
+    Attributes:
+        spread: standard deviation if normal, half width if uniform; in mm, radians or as a share.
+        mean: error common to all builds, in the same unit.
+        distribution: of the error about its mean.
+    """
+
+    spread: float = 0.0
+    mean: float = 0.0
+    distribution: Distribution = "normal"
+
+    def sample(self, generator: "np.random.Generator", *shape: int) -> "Floats":
+        """Random errors of a shape."""
+        normal = self.distribution == "normal"
+        deviation = generator.standard_normal(shape) if normal else generator.uniform(-1, 1, shape)
+        errors: Floats = self.mean + self.spread * deviation
+        return errors
+
+
+NO_ERROR = Error()
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of a manufacturing process, one kind a field, in mm, radians and shares (1 = 100 %).
+
+    Attributes:
+        sphere_centre: of each mirror's centre along each axis, mm.
+        sphere_radius: of each mirror's radius, mm.
+        scale_isotropic: share by which a shell is too large, one for each shell.
+        scale_axis: share by which both shells are too large along each axis of the frame.
+        shell_shift: of a whole shell along each axis, mm.
+        shell_tilt: of a whole shell about each axis through the object's centre, radians.
+        camera_shift: of each pinhole along each axis, mm.
+        camera_tilt: of each camera about each axis through its pinhole, radians.
+        camera_focal: share by which each camera's focal length is too long.
+        coating: by which a shell's coating is too thick, mm.
+        facets: coverage lost where a mirror is cut from flat facets, mm.
+        rotation_angle: of the prototype's base at each stop, radians.
+        axis_runout: of its axis, sideways, at each stop, mm.
+        axis_tilt: of its axis, radians.
+        ball_radius: of each ball's radius, mm.
+        seat: of each ball's centre along each axis, mm.
+    """
+
+    sphere_centre: Error = NO_ERROR
+    sphere_radius: Error = NO_ERROR
+    scale_isotropic: Error = NO_ERROR
+    scale_axis: Error = NO_ERROR
+    shell_shift: Error = NO_ERROR
+    shell_tilt: Error = NO_ERROR
+    camera_shift: Error = NO_ERROR
+    camera_tilt: Error = NO_ERROR
+    camera_focal: Error = NO_ERROR
+    coating: Error = NO_ERROR
+    facets: Error = NO_ERROR
+    rotation_angle: Error = NO_ERROR
+    axis_runout: Error = NO_ERROR
+    axis_tilt: Error = NO_ERROR
+    ball_radius: Error = NO_ERROR
+    seat: Error = NO_ERROR

@@ -1,0 +1,57 @@
+"""The class Design: mirrors of both cameras, and the solids that follow from them."""
+
+from typing import TYPE_CHECKING, Literal
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import MirrorDesign
+
+if TYPE_CHECKING:
+    from build123d import Part
+
+
+class Design(MirrorDesign):
+    """The mirrors of both cameras, computed from a spec, and the solids that follow from them.
+
+    Attributes:
+        spec: what was asked for.
+        halves: camera a's mirrors and camera b's, as arrays over mirrors.
+    """
+
+    def __repr__(self) -> str:
+        """Return name, number of mirrors and minimum coverage."""
+        first, second = self.halves
+        return (
+            f"<Design {self.spec.name!r}: n = {self.spec.optics.n}, "
+            f"{len(first)} + {len(second)} mirrors, "
+            f"minimum coverage {first.coverage.min():.2f} mm>"
+        )
+
+    def shell(self, camera: Literal["a", "b"] = "a") -> "Part":
+        """Return one camera's shell as a build123d part: mm, frame of the design, z up.
+
+        Raises:
+            SpecError: flanges or holes do not fit; it says what to change.
+            InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
+        """
+        from tbcad.cad.part import as_part
+        from tbcad.shell.files import camera_solid
+
+        if camera not in ("a", "b"):
+            raise InputError(f"there is no camera {camera!r}: allowed are 'a' and 'b'")
+        solid = camera_solid(self, self.halves["ab".index(camera)])
+        return as_part(solid.name, solid.shape)
+
+    def printed_parts(self) -> "dict[str, Part]":
+        """Return the printed parts of the prototype by name, as they are assembled, base angle 0.
+
+        Raises:
+            SpecError: the prototype cannot be laid out; it says what to change.
+            InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
+        """
+        from tbcad.cad.part import as_part
+        from tbcad.prototype.model import build_prototype_model
+
+        return {
+            printed.name: as_part(printed.name, printed.solid.shape)
+            for printed in build_prototype_model(self).printed
+        }
