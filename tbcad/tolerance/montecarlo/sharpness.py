@@ -7,14 +7,15 @@ rays, but for the residual of the calibration.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
-from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
 from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
@@ -163,11 +164,16 @@ def _with_residual(built: LightField, residual: float, seed: tuple[int, int]) ->
 def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> dict[str, object]:
     """Planes of a frame whose mirrors' rays are turned by small random angles."""
     rotation = np.vstack([np.zeros(3), residual * generator.standard_normal((len(frame.u), 3))])
-    direction = frame.planes["direction"]
-    rotated = direction + np.cross(rotation[frame.planes["mirror"]], direction)
-    length = np.linalg.norm(rotated, axis=2)[..., None]
-    unit = np.divide(rotated, length, out=np.zeros_like(rotated), where=length > 0)
-    return {**frame.planes, "direction": unit.astype(np.float32)}
+    mirror, direction = frame.planes["mirror"], frame.planes["direction"]
+
+    def rotated(rows: slice) -> NDArray[np.float32]:
+        turned = direction[rows] + np.cross(rotation[mirror[rows]], direction[rows])
+        length = np.linalg.norm(turned, axis=2)[..., None]
+        unit = np.divide(turned, length, out=np.zeros_like(turned), where=length > 0)
+        return np.asarray(unit, dtype=np.float32)
+
+    bands = in_threads(rotated, chunks(len(mirror), BAND_ROWS))
+    return {**frame.planes, "direction": np.concatenate(bands)}
 
 
 def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
