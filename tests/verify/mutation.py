@@ -35,7 +35,7 @@ TESTS: dict[str, list[str]] = {
     "mesh/holes.py": ["tests/verify/mesh/test_circles.py", *MEASURES, *CASING],
     "mesh/lines.py": ["tests/verify/mesh"],
     "mesh/mesh.py": ["tests/verify/mesh"],
-    "mesh/rays.py": [*CASING, *MEASURES],
+    "mesh/rays.py": ["tests/verify/mesh/test_rays.py", *CASING, *MEASURES],
     "mesh/segments.py": ["tests/verify/mesh", "tests/verify/shell/test_recovery.py"],
     "mesh/surfaces.py": ["tests/verify/mesh"],
     "mesh/threemf_structure.py": ["tests/verify/corpus/test_files.py", "-m", "corpus", "-k", "3MF"],

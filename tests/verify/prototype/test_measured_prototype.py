@@ -40,6 +40,7 @@ from tbcad_verify.run.child import Limits
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tests.exported_files import edit_json
+from tests.verify.prototype import synthetic_prototype
 from tests.verify.prototype.synthetic_prototype import (
     SyntheticPrototype,
     export,
@@ -95,6 +96,16 @@ def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
         seats.measure_seats(context, base)[1].centre, ball.b + shift, atol=1e-5
     )
     assert np.linalg.norm(shift) > 0.02
+
+
+def test_balls_touch_pads_in_the_middle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disc's radius, less the half of it that must be left to its edge."""
+    pad = 1.6
+    monkeypatch.setattr(synthetic_prototype, "PAD", pad)
+    context = context_of(export(tmp_path / "x", SyntheticPrototype()))
+    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    margins = [seat.margin for seat in seats.measure_seats(context, base)]
+    np.testing.assert_allclose(margins, pad / 4, rtol=0.02)
 
 
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:

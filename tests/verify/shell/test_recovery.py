@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import Delaunay
 from tbcad_verify.mesh.holes import round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
-from tbcad_verify.mesh.segments import creases, measure_edges, rounding
+from tbcad_verify.mesh.segments import Edges, count_folds, creases, measure_edges, rounding
 from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
@@ -276,3 +276,8 @@ def test_rounding_never_makes_a_crease() -> None:
     assert (np.abs(edges.angle) <= edges.noise)[sure].all()
     assert not creases(mesh, edges)[sure].any()
     assert rounding(mesh) < 2e-5
+
+
+def test_an_edge_that_rounding_may_have_folded_is_no_fold() -> None:
+    angle, noise = np.array([3.0, -3.0, 3.0, 2.9]), np.array([0.0, 0.0, 0.1, 0.0])
+    assert count_folds(Edges(np.arange(4), angle, noise), 0.2) == 2
