@@ -23,9 +23,9 @@ COLUMNS += ("pixels kept", "turning", "verdict")
 BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
 
 
-def figures(n: int) -> dict[str, Any]:
-    """Figures of a subdivision."""
-    found = overview(tbcad.design(n=n), optional_prototype=True)
+def figures(design: tbcad.Design) -> dict[str, Any]:
+    """Figures of a design; of one that was built, with the arrangement that was."""
+    found = overview(design, optional_prototype=True)
     row: dict[str, Any] = {
         "mirrors": found.mirrors,
         "view_angle_deg": found.view_angle_deg,
@@ -43,12 +43,13 @@ def figures(n: int) -> dict[str, Any]:
     return row
 
 
-def verdict(n: int) -> str:
-    """Verdict of a build with both parts."""
+def figures_as_built(n: int) -> dict[str, Any]:
+    """Figures and verdict of a build with both parts."""
     with tempfile.TemporaryDirectory() as folder:
         built = tbcad.build(tbcad.load_spec(None, [f"n={n}"]), Path(folder) / "exports")
     assert built.report is not None
-    return f"{built.report.verdict}, {' and '.join(built.parts)}"
+    verdict = f"{built.report.verdict}, {' and '.join(built.parts)}"
+    return {**figures(built.design), "verdict": verdict}
 
 
 def page_row(n: str, row: dict[str, Any]) -> str:
@@ -80,9 +81,7 @@ def main() -> None:
     wanted = parser.parse_args().build
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     for n in wanted or SUBDIVISIONS:
-        row = figures(n)
-        if n in wanted:
-            row["verdict"] = verdict(n)
+        row = figures_as_built(n) if n in wanted else figures(tbcad.design(n=n))
         results[str(n)] = row
         RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
         write_page(results)
