@@ -17,7 +17,7 @@ from tbcad_verify.printing.assessment import assess, print_check, to_row
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import overhang_area, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.printing.rotating_callipers import best_rotation
+from tbcad_verify.printing.rotating_callipers import best_rotation, silhouette
 
 from tests.verify.printing.printing_meshes import (
     box,
@@ -123,7 +123,7 @@ def test_no_turn_beats_the_one_found(
 ) -> None:
     """Against every twentieth of a degree."""
     flat = np.array([*corners, (-9, -8), (9, -7), (8, 9)]).T
-    angle, sides = best_rotation(flat, width, depth, 1e-9)
+    angle, sides = best_rotation(silhouette(flat), width, depth, 1e-9)
     tried = np.linspace(0, np.pi, 3601)
     x = np.cos(tried)[:, None] * flat[0] - np.sin(tried)[:, None] * flat[1]
     y = np.sin(tried)[:, None] * flat[0] + np.cos(tried)[:, None] * flat[1]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from tbcad_verify.mesh.vectors import norm, tangent_basis
+from tbcad_verify.printing.rotating_callipers import Silhouette, silhouette
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats
 
@@ -17,6 +19,21 @@ MIN_SHARE = 0.002  # of the hull's area, for a face to rest on
 GRID = 1 / 256  # side of the cells of directions whose facets are merged
 SAME_COS = np.cos(np.radians(0.1))  # directions closer than this are one
 AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file has it
+
+
+@dataclass(frozen=True)
+class HullView:
+    """A hull with one of its directions down, whatever the machine.
+
+    Attributes:
+        level: (3, 3) rotation from the file's axes to some with z up.
+        seen: from above.
+        height: mm.
+    """
+
+    level: Floats
+    seen: Silhouette
+    height: float
 
 
 @dataclass(frozen=True)
@@ -32,6 +49,22 @@ class PartHull:
     points: Floats
     down: Floats
     tilted: Floats
+
+    @cached_property
+    def standing(self) -> list[HullView]:
+        """The hull seen along each of `down`."""
+        return [_view(self.points, down) for down in self.down.T]
+
+    @cached_property
+    def leaning(self) -> list[HullView]:
+        """The hull seen along each of `tilted`."""
+        return [_view(self.points, down) for down in self.tilted.T]
+
+
+def _view(points: Floats, down: Floats) -> HullView:
+    level = np.stack([*(side[:, 0] for side in tangent_basis(-down[:, None])), -down])
+    turned = np.einsum("ij,jn->in", level, points)
+    return HullView(level, silhouette(turned[:2]), float(np.ptp(turned[2])))
 
 
 def part_hull(points: Floats) -> PartHull:

@@ -62,13 +62,16 @@ class PartMeasures:
         return len(self.mesh.faces)
 
 
-def measure(mesh: Mesh, status: str, mass: MassProperties) -> PartMeasures:
+def measure(
+    mesh: Mesh, status: str, mass: MassProperties, edges: Edges | None = None
+) -> PartMeasures:
     """Measure a mesh.
 
     Args:
         mesh: a part's; figures of one that is not closed mean little, as its `status` says.
         status: of manifold3d.
         mass: the mesh's mass properties.
+        edges: of the mesh, if they are measured.
 
     Raises:
         Unknown: all points lie in a plane: there is nothing to measure.
@@ -76,7 +79,7 @@ def measure(mesh: Mesh, status: str, mass: MassProperties) -> PartMeasures:
     hull = part_hull(mesh.points)
     # Facets without area have edges without an angle; those are uncertain, and left out.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        edges = measure_edges(mesh)
+        edges = edges or measure_edges(mesh)
     return PartMeasures(
         mesh,
         status,

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.mesh import Mesh
-from tbcad_verify.mesh.vectors import norm, tangent_basis
-from tbcad_verify.printing.orientations import PartHull
+from tbcad_verify.mesh.vectors import norm
+from tbcad_verify.printing.orientations import HullView
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.profile import Profile
 from tbcad_verify.printing.rotating_callipers import best_rotation
@@ -72,9 +72,9 @@ def place(measures: PartMeasures, profile: Profile) -> BedPlacement:
     those tried are not searched.
     """
     hull = measures.hull
-    poses = [_pose(hull, down, profile) for down in hull.down.T]
+    poses = [_pose(view, profile) for view in hull.standing]
     if not any(pose.fits for pose in poses):
-        poses += [_pose(hull, down, profile) for down in hull.tilted.T]
+        poses += [_pose(view, profile) for view in hull.leaning]
     fitting = [pose for pose in poses if pose.fits]
     if not fitting:
         pose = min(poses, key=lambda pose: pose.excess)
@@ -103,16 +103,14 @@ def pose_text(pose: Pose) -> str:
     return f"{down} down{turned}"
 
 
-def _pose(hull: PartHull, down: Floats, profile: Profile) -> Pose:
-    level = np.stack([*(side[:, 0] for side in tangent_basis(-down[:, None])), -down])
-    points = np.einsum("ij,jn->in", level, hull.points)
+def _pose(view: HullView, profile: Profile) -> Pose:
     width, depth, height = profile.bed_mm
     rim = 2 * profile.clearance_mm
-    angle, sides = best_rotation(points[:2], width - rim, depth - rim, SLACK_MM)
-    size = np.append(sides, np.ptp(points[2]))
+    angle, sides = best_rotation(view.seen, width - rim, depth - rim, SLACK_MM)
+    size = np.append(sides, view.height)
     excess = float((size - np.array([width - rim, depth - rim, height])).max())
     rotation = Rotation.from_rotvec([0, 0, angle]).as_matrix()
-    return Pose(np.einsum("ij,jk->ik", rotation, level), size, angle, excess)
+    return Pose(np.einsum("ij,jk->ik", rotation, view.level), size, angle, excess)
 
 
 def _overhangs(measures: PartMeasures, poses: list[Pose], profile: Profile) -> list[float | None]:

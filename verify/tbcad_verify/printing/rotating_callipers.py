@@ -2,20 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from tbcad_verify.types import Floats
 
 
-def best_rotation(points: Floats, width: float, depth: float, slack: float) -> tuple[float, Floats]:
+@dataclass(frozen=True)
+class Silhouette:
+    """A part seen from above.
+
+    Attributes:
+        rim: (2, N) corners of the convex hull, mm.
+        turns: (K,) rotations that bring an edge of the rim to lie along x or y, rad, ascending.
+        sides: (2, K) extents along x and y after each, mm.
+    """
+
+    rim: Floats
+    turns: Floats
+    sides: Floats
+
+
+def silhouette(points: Floats) -> Silhouette:
+    """The silhouette of points (2, N), mm."""
+    rim = points[:, ConvexHull(points.T).vertices]
+    turns = _edges(rim)
+    return Silhouette(rim, turns, _sides(rim, turns))
+
+
+def best_rotation(
+    seen: Silhouette, width: float, depth: float, slack: float
+) -> tuple[float, Floats]:
     """The best rotation, and the sides of the box after it.
 
     The smallest of the enclosing rectangles that fit; if none of those with a side along an edge
     fits, the rotation with the smallest excess over width or depth, whichever is larger.
 
     Args:
-        points: (2, N) seen from above, mm.
+        seen: from above.
         width: of the rectangle along x, mm.
         depth: along y, mm.
         slack: by how much the sides may be exceeded, mm.
@@ -25,16 +51,14 @@ def best_rotation(points: Floats, width: float, depth: float, slack: float) -> t
 
     Source: H. Freeman, R. Shapira, Determining the Minimum-Area Encasing Rectangle, 1975.
     """
-    rim = points[:, ConvexHull(points.T).vertices]
-    edges = _edges(rim)
-    sides = _sides(rim, edges)
-    fits = (sides <= np.array([[width], [depth]]) + slack).all(axis=0)
+    fits = (seen.sides <= np.array([[width], [depth]]) + slack).all(axis=0)
     if fits.any():
-        area = np.where(fits, sides[0] * sides[1], np.inf)
+        area = np.where(fits, seen.sides[0] * seen.sides[1], np.inf)
         k = int(np.argmax(area <= area.min() * (1 + 1e-9)))
-        return float(edges[k]), sides[:, k]
-    angles = _canonical(np.concatenate([edges, _balanced(rim, edges, width - depth)]))
-    sides = _sides(rim, angles)
+        return float(seen.turns[k]), seen.sides[:, k]
+    balanced = _balanced(seen.rim, seen.turns, width - depth)
+    angles = _canonical(np.concatenate([seen.turns, balanced]))
+    sides = _sides(seen.rim, angles)
     excess = np.maximum(sides[0] - width, sides[1] - depth)
     k = int(np.argmax(excess <= excess.min() + 1e-9 * np.abs(sides).max()))
     return float(angles[k]), sides[:, k]

@@ -46,6 +46,7 @@ class MeasuredPart:
         topology: of the mesh.
         mass: of the mesh on the bed.
         placed_mass: of the placed mesh.
+        edges: of the mesh.
     """
 
     part: Printed
@@ -56,6 +57,7 @@ class MeasuredPart:
     topology: Topology | None = None
     mass: MassProperties | None = None
     placed_mass: MassProperties | None = None
+    edges: Edges | None = None
 
     @property
     def placed_mesh(self) -> Mesh:
@@ -85,7 +87,7 @@ def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
     checks = guarded(solid, lambda: [*mesh_checks(part.stl, topology), folds])
     checks += guarded(pose, lambda: pose_checks(pose, part, mesh))
     mass = mass_properties(mesh)
-    return MeasuredPart(part, checks, "", mesh, placed, topology, mass, placed_mass)
+    return MeasuredPart(part, checks, "", mesh, placed, topology, mass, placed_mass, edges)
 
 
 def put_back(mesh: Mesh, part: Printed) -> Mesh:

@@ -13,6 +13,7 @@ from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.mass import MassProperties, mass_properties
 from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_facets
 from tbcad_verify.mesh.rays import in_threads
+from tbcad_verify.mesh.segments import Edges, measure_edges
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
 from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
@@ -60,6 +61,7 @@ class ShellPart:
     Attributes:
         part: its record.
         mesh: its triangles, joined.
+        edges: of the mesh.
         topology: what is wrong with the mesh.
         mass: volume, area, centroid and box.
         recovery: its patches and mirrors.
@@ -69,6 +71,7 @@ class ShellPart:
 
     part: Part
     mesh: Mesh | None
+    edges: Edges | None
     topology: Topology | None
     mass: MassProperties | None
     recovery: Recovery | None
@@ -153,7 +156,10 @@ def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
     mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
     topology, no_topology = attempt(lambda: examine_topology(require(mesh, no_mesh), facets))
     mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
-    recovery, no_mirrors = attempt(lambda: recover(require(mesh, no_mesh), pinhole, radius_mm))
+    edges, _ = attempt(lambda: measure_edges(require(mesh, no_mesh)))
+    recovery, no_mirrors = attempt(
+        lambda: recover(require(mesh, no_mesh), pinhole, radius_mm, edges)
+    )
     checks = guarded(
         check_names(TOPOLOGY, part.stl),
         lambda: mesh_checks(part.stl, require(topology, no_topology)),
@@ -162,7 +168,7 @@ def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
         lambda: [fold_check(part.stl, require(recovery, no_mirrors).folds)],
     )
     reason = no_mesh or no_mirrors or no_topology or no_mass
-    return ShellPart(part, mesh, topology, mass, recovery, checks, reason)
+    return ShellPart(part, mesh, edges, topology, mass, recovery, checks, reason)
 
 
 def _assess_printing(
@@ -173,7 +179,10 @@ def _assess_printing(
     mesh, mass, topology = measured.mesh, measured.mass, measured.topology
     measures, lost = attempt(
         lambda: measure(
-            require(mesh, reason), require(topology, reason).status, require(mass, reason)
+            require(mesh, reason),
+            require(topology, reason).status,
+            require(mass, reason),
+            measured.edges,
         )
     )
 

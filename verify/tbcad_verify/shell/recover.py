@@ -50,7 +50,9 @@ class Recovery:
     folds: int
 
 
-def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
+def recover(
+    mesh: Mesh, pinhole: Floats | None, radius_mm: float, edges: Edges | None = None
+) -> Recovery:
     """Find the mirrors of one part, from triangles alone.
 
     A mirror is a patch of a bulging sphere, or of a plane that sends the camera's light into the
@@ -60,8 +62,9 @@ def recover(mesh: Mesh, pinhole: Floats | None, radius_mm: float) -> Recovery:
         mesh: the part.
         pinhole: (3,) mm; None for parts that have no mirrors.
         radius_mm: of the capture sphere about the origin.
+        edges: of the mesh, if they are measured.
     """
-    edges = measure_edges(mesh)
+    edges = edges or measure_edges(mesh)
     segments, fits = merge_splinters(mesh, edges, segment_mesh(mesh, edges))
     mirror = _judge(fits, pinhole, radius_mm)
     if (mirror & _planes(fits)).any():
