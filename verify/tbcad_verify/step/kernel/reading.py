@@ -31,14 +31,15 @@ def read_solid(path: Path) -> Row:
     """
     shape = transferred(path)
     origin = corners_of(shape).mean(axis=0)
-    measured = [measure_face(face, origin) for face in faces_of(shape)]
+    gap = ShapeAnalysis_ShapeTolerance().Tolerance(shape, MAXIMUM)
+    measured = [measure_face(face, origin, gap) for face in faces_of(shape)]
     volume, *moment = np.sum([enclosed for _, enclosed in measured], axis=0).tolist()
     return {
         "solids": count(shape, TopAbs_SOLID),
         "shells": count(shape, TopAbs_SHELL),
         "open_edges": open_edges(shape),
         "valid": bool(BRepCheck_Analyzer(shape).IsValid()),
-        "gap": ShapeAnalysis_ShapeTolerance().Tolerance(shape, MAXIMUM),
+        "gap": gap,
         "volume": volume,
         "centroid": (origin + np.divide(moment, volume)).tolist(),
         "box": box(shape),
