@@ -49,7 +49,7 @@ def code_and_modules(words: Words, folder: Path) -> tuple[int, set[str]]:
     """Exit code of a command in a process of its own, and the modules that it has loaded."""
     done = subprocess.run(
         [sys.executable, "-c", LOADED, *words],
-        capture_output=True, text=True, check=True, cwd=folder,
+        capture_output=True, encoding="utf-8", check=True, cwd=folder,
     )  # fmt: skip
     code, *modules = done.stdout.splitlines()[-1].split()
     return int(code), {name.partition(".")[0] for name in modules}
