@@ -53,6 +53,7 @@ def optics(draw: st.DrawFn) -> list[str]:
 )  # holes whose strips send light to the object
 @example(options=of_optics([231.2, 0, -84.1], 53.8, 20))  # a mirror that bends into the foot
 @example(options=of_optics([49.3, 0, -63], 37.5, 20))  # the object stands in its own light
+@example(options=of_optics([70.0, 0, -38.8], 33.8, 20))  # light fans out by a right angle
 @example(options=of_optics([163.6, 0, -127], 67.9, 24.6))  # a cell whose foot side bends inward
 @settings(
     max_examples=60,

@@ -10,11 +10,13 @@ import pytest
 import trimesh
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.rays import build_scene
-from tbcad_verify.mesh.surfaces import prepare_for_rays
+from tbcad_verify.mesh.surfaces import ReflectedRays, prepare_for_rays
 from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell import coverage, seam
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
+    SAMPLES,
+    Outline,
     minimum_miss_distance,
     reflect_on_facets,
     reflect_on_fits,
@@ -46,6 +48,25 @@ def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float,
         2 * minimum_miss_distance(outline, fitted, ONE)[0],
         abs(winding_numbers(outline, fitted, ONE, u)[0]),
     )
+
+
+@pytest.mark.parametrize("widest", [0.3, 1.4, 1.9])
+def test_an_outline_may_send_light_sideways_and_back(widest: float) -> None:
+    """Lines through a focus above the origin fan out, by an angle that varies along the outline."""
+    edges = 24
+    turn = (np.arange(edges)[:, None] + SAMPLES).ravel() * 2 * np.pi / edges
+    fan = widest * (1 + 0.2 * np.cos(turn))
+    sideways = np.sin(fan) * np.stack([np.cos(turn), np.sin(turn), 0 * turn])
+    toward = sideways - np.cos(fan) * np.array([0.0, 0, 1])[:, None]
+    focus = np.array([0.0, 0, 8])[:, None] + 0 * toward
+    lines = ReflectedRays(focus, toward, np.ones(turn.size))
+    none, places = np.zeros(turn.size, dtype=np.int64), np.zeros_like(toward)
+    outline = Outline(none, none, places, places, places, none > 0)
+    u = np.array([0.0, 0, 1])[:, None]
+    assert abs(winding_numbers(outline, lines, ONE, u)[0]) == pytest.approx(1)
+    moved = replace(lines, point=focus + np.array([20.0, 0, 0])[:, None])
+    if widest < 1:
+        assert winding_numbers(outline, moved, ONE, u)[0] == pytest.approx(0, abs=1e-9)
 
 
 def plate(width: float, place: np.ndarray, pinhole: np.ndarray) -> tuple[Mesh, np.ndarray]:

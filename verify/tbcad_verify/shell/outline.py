@@ -22,7 +22,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect,
     reflect_directions,
 )
-from tbcad_verify.mesh.vectors import dot, norm
+from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell.recover import Recovery, follows_fit
 from tbcad_verify.types import Bools, Floats, Ints
@@ -140,13 +140,23 @@ def winding_numbers(
         virtual: pairs halves.
         u: (3, M) directions of the virtual cameras.
     """
-    miss = nearest_to_origin(lines).reshape(3, -1, SAMPLES.size)
+    axis = u[:, outline.mirror]
+    # Across each ray, turned with it to lie across the axis: a ray at a right angle to the axis
+    # may meet it far from the origin.
+    across = _turned(nearest_to_origin(lines), -unit(lines.toward), axis)
+    miss = across.reshape(3, -1, SAMPLES.size)
     start, end = miss[:, :, :-1].reshape(3, -1), miss[:, :, 1:].reshape(3, -1)
     edge_mirror = outline.mirror[:: SAMPLES.size]
     axis = np.repeat(u[:, edge_mirror], SAMPLES.size - 1, axis=1)
     angle = rotation_angles(axis, start, end).reshape(-1, SAMPLES.size - 1).sum(axis=1)
     angle = np.where(outline.seam[:: SAMPLES.size], 0.0, np.nan_to_num(angle))
     return np.bincount(virtual.index[edge_mirror], angle, virtual.count) / (2 * np.pi)
+
+
+def _turned(vector: Floats, start: Floats, end: Floats) -> Floats:
+    """Vectors across directions `start`, by the smallest turns that take those to `end`."""
+    share = dot(vector, end) / (1 + dot(start, end))
+    return np.asarray(vector - share * (start + end))
 
 
 def _outline_edges(
