@@ -1,6 +1,7 @@
 """Cells against slow oracles that know nothing of triangulations."""
 
 from itertools import pairwise
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -150,7 +151,8 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
     """Each mirror's cell lies on its own sphere and all of them add up to what rays see."""
     options = [f"n={n}", f"camera_mm=[{x}, 0, {z}]", f"radius_rule={rule}"]
     try:
-        cells = design(load_spec(None, options)).halves[0].cells
+        with patch("tbcad.mirrors.array.check_clearance"):  # the object may stand in the light
+            cells = design(load_spec(None, options)).halves[0].cells
     except SpecError:
         assume(False)
     assert (cell_areas(cells) > 0).all()

@@ -35,6 +35,7 @@ class TestChoice:
         base = chosen.base
         assert (chosen.k, base.hold, base.pad_angle_deg, base.hub_boss_mm) == (3, "glue", 35, 30)
 
+    @pytest.mark.designs
     def test_glue_only_where_no_magnet_fits(self, small_design: MirrorDesign) -> None:
         magnets = list(arrangements(small_design))
         assert {one.spec.prototype.base.hold for one in magnets} == {"magnet"}

@@ -35,7 +35,7 @@ def test_inserts_are_for_what_is_bolted_to_a_boss() -> None:
     assert {name: 4 * pattern.boss for name, pattern in PATTERNS.items()} == HUB_INSERTS
 
 
-@pytest.mark.slow
+@pytest.mark.designs
 @pytest.mark.parametrize(
     ("drive", "lock"), [("nema17-direct", "clamp"), ("stage-60", "set-screws")]
 )
