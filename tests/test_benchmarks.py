@@ -10,7 +10,7 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 def test_tables_are_made_from_the_results() -> None:
     code = "import sys; from table import filled; sys.stdout.write(filled(sys.stdin.read()))"
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    assert "<!-- table: simulation -->" in page
+    assert "<!-- table: all -->" in page
     run = subprocess.run(
         [sys.executable, "-c", code],
         cwd=FOLDER,
