@@ -172,7 +172,7 @@ def _boolean(
 
 def to_bytes(shape: TopoDS_Shape) -> bytes:
     """A shape as bytes from which it can be read again exactly."""
-    with NamedTemporaryFile(prefix="tbcad-") as file:  # streams of Python's lose large shapes
+    with NamedTemporaryFile(prefix="tbcad-") as file:  # a BytesIO loses large shapes
         BinTools.Write_s(shape, file.name)
         return Path(file.name).read_bytes()
 

@@ -36,6 +36,8 @@ from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.
 MAX_MODELS, MAX_PADS = 6, 2
+KERNEL_ERRORS = (Standard_Failure, StdFail_NotDone)
+KERNEL_FAILS = "the CAD kernel fails: {}"
 CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
 COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
 
@@ -107,8 +109,8 @@ def build_prototype_model(
             return _model(arrangement, progress, submit)
         except (SpecError, InvalidSolidError) as error:
             errors[balls, tilt] = error
-        except (Standard_Failure, StdFail_NotDone) as error:
-            errors[balls, tilt] = InvalidSolidError(f"the CAD kernel fails: {error}")
+        except KERNEL_ERRORS as error:
+            errors[balls, tilt] = InvalidSolidError(KERNEL_FAILS.format(error))
         if len(errors) == MAX_MODELS:
             break
     raise next(iter(errors.values()))
@@ -161,6 +163,8 @@ def carrier_fault(part: PlacedSolid) -> str:
         check_read_back(part.name, part.shape, part.properties)
     except InvalidSolidError as error:
         return str(error)
+    except KERNEL_ERRORS as error:
+        return KERNEL_FAILS.format(error)
     return ""
 
 

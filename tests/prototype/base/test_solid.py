@@ -448,6 +448,13 @@ class TestCoupon:
             coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)))
 
 
+def test_a_part_comes_back_from_bytes_as_it_was(part: PlacedSolid) -> None:
+    again = pickle.loads(pickle.dumps(part))
+    assert np.array_equal(again.axes, part.axes)
+    assert properties(again.shape).volume == pytest.approx(part.volume, rel=1e-12)
+    assert len(faces(again.shape)) == len(faces(part.shape))
+
+
 class TestCavities:
     def test_only_they_are_filled(self) -> None:
         axis = np.array([0.0, 0.0, 1.0])
