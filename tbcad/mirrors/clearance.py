@@ -110,7 +110,7 @@ def _wider_ellipsoid(optics: OpticsSpec, half: MirrorArray, spread: float) -> fl
     def spare(semi_minor: float) -> float:
         return _apex_passage(Ellipsoid(half.ellipsoid.pinhole, semi_minor), half.u) - needed
 
-    if spare(MAX_SEMI_MINOR) < 0:
+    if not spare(optics.semi_minor_mm) < 0 <= spare(MAX_SEMI_MINOR):
         return None
     semi_minor = brentq(spare, optics.semi_minor_mm, MAX_SEMI_MINOR)
     return math.ceil(semi_minor * STEPS_PER_MM) / STEPS_PER_MM

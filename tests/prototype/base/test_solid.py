@@ -1,5 +1,6 @@
 """The base as solids: every figure from the shape or its mesh, not from how it was built."""
 
+import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
