@@ -165,12 +165,13 @@ def _is_crowded(problem: PlacementProblem) -> bool:
     """Whether some balls, each apart from each, need more room than the widest swing leaves.
 
     Sound, not complete: it spares a search that takes minutes with hundreds of balls. From the
-    first ball of a group to the last is a path through all, no shorter than their least tree.
+    first ball of a group to the last is a path through all, no shorter than their minimum
+    spanning tree.
     """
     half_swing = min(problem.max_swing, 2 * np.pi) / 2
     low, high = problem.served_high - half_swing, problem.served_low + half_swing
     return any(
-        _least_tree(problem.min_separation[np.ix_(group, group)])
+        _spanning_length(problem.min_separation[np.ix_(group, group)])
         > high[group].max() - low[group].min() + SLACK * len(group)
         for group in _groups_apart(problem.min_separation)
     )
@@ -187,8 +188,8 @@ def _groups_apart(separation: Floats) -> Iterator[Ints]:
         yield np.array(group)
 
 
-def _least_tree(separation: Floats) -> float:
-    """Total length of the shortest tree that joins all balls, by their separations (k, k)."""
+def _spanning_length(separation: Floats) -> float:
+    """Length of the minimum spanning tree of all balls, by their separations (k, k)."""
     return float(minimum_spanning_tree(csr_array(np.triu(separation, 1))).sum())
 
 

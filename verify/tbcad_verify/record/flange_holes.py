@@ -88,9 +88,9 @@ def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flan
     pinhole, semi_minor = side * camera.pinhole, export.semi_minor_mm
     semi_axes = np.array([np.hypot(semi_minor, np.linalg.norm(pinhole) / 2), semi_minor]) + beyond
 
-    def line(flange: FlangeSpec, axis: int, at: float, least: float, end: float) -> Floats:
+    def line(flange: FlangeSpec, axis: int, at: float, lowest: float, end: float) -> Floats:
         section = _section(semi_axes + flange.width_mm / 2, pinhole, axis, at)
-        return _even(section, least, end, flange.bolts + flange.dowels)
+        return _even(section, lowest, end, flange.bolts + flange.dowels)
 
     on_seam = line(seam, X, across, low + foot.thickness_mm, seam.width_mm)
     on_foot = line(foot, Z, low, across + seam.width_mm / 2, foot.width_mm / 2)
@@ -134,19 +134,19 @@ def _section(semi_axes: Floats, pinhole: Floats, axis: int, at: float) -> Floats
     return np.asarray(centre[plane] + middle + length[:, None] * spoke)
 
 
-def _even(section: Floats, least: float, end: float, count: int) -> Floats:
-    """(H, 2) places at even distances along the part of a section above a least coordinate.
+def _even(section: Floats, lowest: float, end: float, count: int) -> Floats:
+    """(H, 2) places at even distances along the part of a section above a coordinate.
 
     Raises:
         Unknown: nothing is above it.
     """
-    above = np.flatnonzero(section[:, 1] > least)
+    above = np.flatnonzero(section[:, 1] > lowest)
     if not above.size or above[0] == 0 or above[-1] == len(section) - 1:
         raise Unknown("the back does not reach its flange")
     steps = np.linalg.norm(np.diff(section, axis=0), axis=1)
     along = np.concatenate([[0], np.cumsum(steps)])
     first, last = ([above[0] - 1, above[0]], [above[-1] + 1, above[-1]])
-    start, stop = (np.interp(least, section[k, 1], along[k]) for k in (first, last))
+    start, stop = (np.interp(lowest, section[k, 1], along[k]) for k in (first, last))
     places = np.linspace(start + end, stop - end, count)
     return np.column_stack([np.interp(places, along, column) for column in section.T])
 

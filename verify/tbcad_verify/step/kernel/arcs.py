@@ -21,7 +21,7 @@ from tbcad_verify.types import Floats
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 LONGEST = np.pi / 2 * 1.01  # of an arc that the rule integrates to rounding, rad
-LEAST_COSINE = 0.3  # of the outline's points to its middle: far from the pole of the integrals
+MIN_COSINE = 0.3  # of the outline's points to its middle: far from the pole of the integrals
 
 
 def between_arcs(
@@ -45,7 +45,7 @@ def between_arcs(
     middle = n.mean(axis=0)
     middle /= max(float(np.linalg.norm(middle)), np.finfo(np.float64).tiny)
     cosine = n @ middle
-    if cosine.min() < LEAST_COSINE:
+    if cosine.min() < MIN_COSINE:
         return None
     turning = np.cross(n, dn)
     area = float((turning @ middle / (1 + cosine)).sum())
