@@ -27,15 +27,15 @@ FUSED = (8, 16)
 def solids(rounds: int) -> list[Row]:
     """Both shells, checked by the kernel, against unions of one half's spheres."""
     made = design(load_spec(None, ["optics.n=18"]))
-    half = made.halves[0]
-    meshed = meshed_spheres(half)
-    exact = {count: exact_spheres(half, count) for count in FUSED}
+    array = made.arrays[0]
+    meshed = meshed_spheres(array)
+    exact = {count: exact_spheres(array, count) for count in FUSED}
     fuses = [partial(fused, exact[count]) for count in FUSED]
     works = [partial(shells, made), partial(united, meshed), *fuses]
     ours, union, *kernel = in_turns(works, rounds)
     return [
         measured("cells, both solids, kernel's check", ours, "s"),
-        measured(f"manifold3d's union, {len(half)} spheres of one half", union, "s"),
+        measured(f"manifold3d's union, {len(array)} spheres of one shell", union, "s"),
         measured("cells, both solids, check to manifold3d", ours.over(union), "times"),
         # Load by others slows manifold3d, on two cores, more than us on one: least is fairest.
         at_most("- least of each", Figure((ours.minimum / union.minimum,)), 0.75, "times"),
@@ -64,28 +64,28 @@ def shells(made: MirrorDesign) -> list[Solid]:
 
     The cells start from the polyhedron, not from those that the radii were solved with.
     """
-    half = made.halves[0]
+    array = made.arrays[0]
     every, faces = numbered_directions(made.spec.optics.n)
     upper = (every[:, 0] >= 0) & (every[:, 2] >= 0)
     triangles = bounded_triangulation(faces, every, upper)
-    first = replace(half, modelled_cells=cells_of(half.modelled_cells.surfaces, triangles))
-    design = replace(made, halves=(first, made.halves[1]))
+    first = replace(array, modelled_cells=cells_of(array.modelled_cells.surfaces, triangles))
+    design = replace(made, arrays=(first, made.arrays[1]))
     envelope = shell_envelope(design)
-    return [camera_solid(design, one, envelope) for one in design.halves]
+    return [camera_solid(design, one, envelope) for one in design.arrays]
 
 
-def spheres(half: MirrorArray) -> list[tuple[list[float], float]]:
+def spheres(array: MirrorArray) -> list[tuple[list[float], float]]:
     """Centres and radii of one half's mirrors."""
-    mirrors = half.mirrors
+    mirrors = array.mirrors
     centres = mirrors.apex - mirrors.radius[:, None] * mirrors.normal
     return list(zip(centres.tolist(), mirrors.radius.tolist(), strict=True))
 
 
-def meshed_spheres(half: MirrorArray) -> list[manifold3d.Manifold]:
+def meshed_spheres(array: MirrorArray) -> list[manifold3d.Manifold]:
     """All of one half's spheres as meshes, made beforehand: only the union is on the clock."""
     made = [
         manifold3d.Manifold.sphere(radius, SEGMENTS).translate(centre)
-        for centre, radius in spheres(half)
+        for centre, radius in spheres(array)
     ]
     for one in made:
         one.num_tri()  # made only when asked for something
@@ -100,11 +100,11 @@ def united(parts: list[manifold3d.Manifold]) -> manifold3d.Manifold:
     return whole
 
 
-def exact_spheres(half: MirrorArray, count: int) -> list[BRepPrimAPI_MakeSphere]:
+def exact_spheres(array: MirrorArray, count: int) -> list[BRepPrimAPI_MakeSphere]:
     """Neighbouring mirrors from the middle of one half, as solids of the kernel."""
-    middle = half.u[np.argmax(half.u.sum(axis=1))]
-    near = np.argsort(-half.u @ middle, kind="stable")[:count]
-    every = spheres(half)
+    middle = array.u[np.argmax(array.u.sum(axis=1))]
+    near = np.argsort(-array.u @ middle, kind="stable")[:count]
+    every = spheres(array)
     return [BRepPrimAPI_MakeSphere(gp_Pnt(*every[k][0]), every[k][1]).Shape() for k in near]
 
 

@@ -80,41 +80,41 @@ def _meshes(
     made: MirrorDesign,
     draws: tuple[ShellDraws, ShellDraws],
     folder: Path,
-    halves: tuple[EdgeModel, EdgeModel],
+    edge_models: tuple[EdgeModel, EdgeModel],
 ) -> tuple[float, float]:
     """Seconds a machine, and the largest difference from the fast model, mm."""
     folder.mkdir(parents=True, exist_ok=True)
     write_record(folder, made, shells=True)
     write_manifest(folder)
     record, count = read_record(folder), len(draws[0])
-    found = np.empty((count, 2 * len(made.halves[0]) - int(halves[0].halved.sum())))
+    found = np.empty((count, 2 * len(made.arrays[0]) - int(edge_models[0].halved.sum())))
 
     start = time.perf_counter()
     for k in range(count):
         _write(made, draws, k, folder)
         found[k] = _measured(record)
     seconds = time.perf_counter() - start
-    return seconds / count, float(np.abs(found - coverage(halves, draws)[0]).max())
+    return seconds / count, float(np.abs(found - coverage(edge_models, draws)[0]).max())
 
 
 def _write(made: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path) -> None:
     """Mesh both shells of a machine, as the exporter does."""
-    first, body = made.halves[0], shell_envelope(made)
-    for half, drawn in zip(made.halves, draws, strict=True):
-        cells = _cells(half, drawn, k)
-        cells = cells if half is first else cells.mirrored()
+    first, body = made.arrays[0], shell_envelope(made)
+    for array, drawn in zip(made.arrays, draws, strict=True):
+        cells = _cells(array, drawn, k)
+        cells = cells if array is first else cells.mirrored()
         facets = shell_mesh(made.spec, cells, body, first.apex_distance)
-        facets = facets if half is first else facets.mirrored()
-        write_stl(folder / f"shell_{half.camera_id}.stl", facets)
+        facets = facets if array is first else facets.mirrored()
+        write_stl(folder / f"shell_{array.camera_id}.stl", facets)
 
 
-def _cells(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
-    every, m, radius = half.cells.surfaces, len(half), draws.radius[k]
-    apex = half.mirrors.apex + draws.centre[k] + radius[:, None] * half.mirrors.normal
-    curvature = half.mirrors.curvature / (1 + radius * half.mirrors.curvature)
+def _cells(array: MirrorArray, draws: ShellDraws, k: int) -> Cells:
+    every, m, radius = array.cells.surfaces, len(array), draws.radius[k]
+    apex = array.mirrors.apex + draws.centre[k] + radius[:, None] * array.mirrors.normal
+    curvature = array.mirrors.curvature / (1 + radius * array.mirrors.curvature)
     walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
-    spheres = Surfaces(apex, half.mirrors.normal, curvature)
-    return cells_of(spheres.joined(walls), half.cells.triangles)
+    spheres = Surfaces(apex, array.mirrors.normal, curvature)
+    return cells_of(spheres.joined(walls), array.cells.triangles)
 
 
 def _measured(record: Export) -> np.ndarray:

@@ -91,7 +91,7 @@ def design(
     from tbcad.whole_design import Design
 
     mirrors = mirror_design(_spec(spec, n, settings), detail)
-    return Design(mirrors.spec, mirrors.halves)
+    return Design(mirrors.spec, mirrors.arrays)
 
 
 def _spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> Spec:
@@ -142,7 +142,7 @@ def build(
     mirrors = design(chosen, detail=detail)
     with replacing(out, force) as folder:
         export = write_export(mirrors, folder, asked, progress, optional_prototype=parts is None)
-        finished = Design(export.spec, mirrors.halves)
+        finished = Design(export.spec, mirrors.arrays)
         report = None
         if verify:
             # The files are read back before they replace the old ones.

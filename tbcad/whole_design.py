@@ -14,12 +14,12 @@ class Design(MirrorDesign):
 
     Attributes:
         spec: what was asked for.
-        halves: camera a's mirrors and camera b's, as arrays over mirrors.
+        arrays: camera a's mirrors and camera b's, as arrays over mirrors.
     """
 
     def __repr__(self) -> str:
         """Return name, number of mirrors and minimum coverage."""
-        first, second = self.halves
+        first, second = self.arrays
         return (
             f"<Design {self.spec.name!r}: n = {self.spec.optics.n}, "
             f"{len(first)} + {len(second)} mirrors, "
@@ -38,7 +38,7 @@ class Design(MirrorDesign):
 
         if camera not in ("a", "b"):
             raise InputError(f"there is no camera {camera!r}: allowed are 'a' and 'b'")
-        solid = camera_solid(self, self.halves["ab".index(camera)])
+        solid = camera_solid(self, self.arrays["ab".index(camera)])
         return as_part(solid.name, solid.shape)
 
     def printed_parts(self) -> "dict[str, Part]":

@@ -18,8 +18,8 @@ def paper_design() -> MirrorDesign:
 
 
 @pytest.fixture(scope="session")
-def paper_half(paper_design: MirrorDesign) -> MirrorArray:
-    return paper_design.halves[0]
+def paper_array(paper_design: MirrorDesign) -> MirrorArray:
+    return paper_design.arrays[0]
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +30,7 @@ def small_design() -> MirrorDesign:
 
 @pytest.fixture(scope="session")
 def small_half(small_design: MirrorDesign) -> MirrorArray:
-    return small_design.halves[0]
+    return small_design.arrays[0]
 
 
 @pytest.fixture(scope="session")

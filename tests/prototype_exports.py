@@ -18,7 +18,7 @@ def plan_of(made: PrototypeLayout) -> Plan:
     ball, stop = made.fit.ball, made.stops.stop
     back = np.argsort(made.twin)
     return Plan(
-        frame=made.half.ellipsoid.frame(),
+        frame=made.array.ellipsoid.frame(),
         apex=made.apices(),
         normal=made.normals(),
         radius=made.balls.radius,
@@ -37,7 +37,7 @@ def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> P
     plan = plan_csv.picture_rows(made)
     write_table(folder / "rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan)
     write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.ball_rows(made))
-    axis, zero, third = made.half.ellipsoid.frame().tolist()
+    axis, zero, third = made.array.ellipsoid.frame().tolist()
     document = {
         "schema": "tbcad-prototype/2",
         "camera": "a",

@@ -60,10 +60,11 @@ def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert (tmp_path / "exports" / "shell_a.step").is_file()
     assert isinstance(field, tbcad.LightField)
     spec = tbcad.load_spec(None)
-    for value in (spec, names["design"], names["half"], result, result.report, field):
+    for value in (spec, names["design"], names["array"], result, result.report, field):
         assert len(repr(value)) < 250
 
 
+@pytest.mark.slow
 def test_printed_parts_are_valid_and_assembled() -> None:
     """The post stands on the axis of the object, below it; the carrier is above the base plate."""
     settings = {"prototype.k": "4", "prototype.frame.clearance_mm": "1.5"}

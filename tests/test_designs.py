@@ -65,12 +65,12 @@ class TestEveryDesign:
 
     def test_mirrors_see_the_capture_sphere(self, path: Path) -> None:
         spec = load_spec(path)
-        assert design(spec).halves[0].coverage.min() >= spec.optics.capture_diameter_mm
+        assert design(spec).arrays[0].coverage.min() >= spec.optics.capture_diameter_mm
 
 
 def test_the_flat_baseline_sees_what_its_comment_says() -> None:
-    half = design(load_spec(DESIGNS / "mukaigawa-flat.toml")).halves[0]
-    assert half.coverage.min() == pytest.approx(21.1, abs=0.05)
+    array = design(load_spec(DESIGNS / "mukaigawa-flat.toml")).arrays[0]
+    assert array.coverage.min() == pytest.approx(21.1, abs=0.05)
 
 
 def test_the_sensor_design_keeps_the_papers_balance() -> None:
@@ -78,7 +78,7 @@ def test_the_sensor_design_keeps_the_papers_balance() -> None:
     paper, larger = load_spec(None), load_spec(DESIGNS / "sensor-10mp.toml")
     pixels = [spec.camera.width_px * spec.camera.height_px for spec in (paper, larger)]
     mirrors = [847, 1489]
-    assert [len(design(spec).halves[0]) for spec in (paper, larger)] == mirrors
+    assert [len(design(spec).arrays[0]) for spec in (paper, larger)] == mirrors
     growth = mirrors[1] / mirrors[0]
     assert pixels[1] / pixels[0] / growth == pytest.approx(growth, rel=0.02)
 

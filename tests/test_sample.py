@@ -40,7 +40,7 @@ def test_sample_is_verified(tmp_path: Path) -> None:
 
 
 def test_sample_has_the_mirrors_of_this_design_and_code(flat_design: MirrorDesign) -> None:
-    expected = [row for half in flat_design.halves for row in mirror_rows(half)]
+    expected = [row for array in flat_design.arrays for row in mirror_rows(array)]
     recorded = read_csv(SAMPLE / "mirrors.csv")
     assert [row["id"] for row in recorded] == [row["id"] for row in expected]
     for name in COLUMNS[2:]:

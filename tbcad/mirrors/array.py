@@ -110,11 +110,11 @@ class MirrorDesign:
 
     Attributes:
         spec: that they follow from, with the angle of view that was chosen.
-        halves: camera a's mirrors (x >= 0) and camera b's (x <= 0).
+        arrays: camera a's mirrors (x >= 0) and camera b's (x <= 0).
     """
 
     spec: Spec
-    halves: tuple[MirrorArray, MirrorArray]
+    arrays: tuple[MirrorArray, MirrorArray]
 
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
@@ -127,11 +127,11 @@ def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
     Raises:
         SpecError: when the spec's mirrors cannot be made; it names them.
     """
-    half = _half_a(spec, progress)
-    check_clearance(spec, half, _half_a)
-    hfov = round(float(np.degrees(half.camera.hfov)), HFOV_DIGITS)
+    array = _half_a(spec, progress)
+    check_clearance(spec, array, _half_a)
+    hfov = round(float(np.degrees(array.camera.hfov)), HFOV_DIGITS)
     camera = spec.camera.model_copy(update={"hfov_deg": hfov})
-    return MirrorDesign(spec.model_copy(update={"camera": camera}), (half, half.mirrored()))
+    return MirrorDesign(spec.model_copy(update={"camera": camera}), (array, array.mirrored()))
 
 
 def numbering_order(u: Floats) -> Ints:

@@ -25,29 +25,29 @@ TRIES = 5
 STEPS_PER_MM = 10  # of the sizes tried
 
 
-def check_clearance(spec: Spec, half: MirrorArray, solve: Solve) -> None:
+def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
     Args:
         spec: of the design.
-        half: camera a's mirrors.
+        array: camera a's mirrors.
         solve: the mirrors of another spec, to try remedies.
 
     Raises:
         SpecError: with the mirror, and sizes with which the light passes the object.
     """
     radius = spec.optics.capture_diameter_mm / 2
-    distance, mirror = _passage(spec.optics, half)
+    distance, mirror = _passage(spec.optics, array)
     if distance >= radius:
         return
     raise SpecError(
-        f"the object stands in its own light: on the way from mirror {half.ids[mirror]} to the "
+        f"the object stands in its own light: on the way from mirror {array.ids[mirror]} to the "
         f"camera light passes {distance:.4g} mm from the object's centre, closer than the capture "
-        f"sphere's radius of {radius:.4g} mm: {_remedies(spec, half, solve)}"
+        f"sphere's radius of {radius:.4g} mm: {_remedies(spec, array, solve)}"
     )
 
 
-def _remedies(spec: Spec, half: MirrorArray, solve: Solve) -> str:
+def _remedies(spec: Spec, array: MirrorArray, solve: Solve) -> str:
     sizes: dict[str, tuple[Size, str]] = {
         "capture_diameter_mm": (_smaller_sphere, "less"),
         "semi_minor_mm": (_wider_ellipsoid, "more"),
@@ -55,7 +55,7 @@ def _remedies(spec: Spec, half: MirrorArray, solve: Solve) -> str:
     tried = [
         f"optics.{key} {value:g} or {which}"
         for key, (size, which) in sizes.items()
-        if (value := _size_that_clears(spec, half, solve, key, size))
+        if (value := _size_that_clears(spec, array, solve, key, size))
     ]
     if not tried:
         return "make optics.capture_diameter_mm smaller or bring optics.camera_mm farther away"
@@ -63,26 +63,26 @@ def _remedies(spec: Spec, half: MirrorArray, solve: Solve) -> str:
 
 
 def _size_that_clears(
-    spec: Spec, half: MirrorArray, solve: Solve, key: str, size: Size
+    spec: Spec, array: MirrorArray, solve: Solve, key: str, size: Size
 ) -> float | None:
     """The size nearest to the spec's that was tried and clears, mm; None where none was found."""
     tried = spec
     for _ in range(TRIES):
-        value = size(spec.optics, half, _spread(tried.optics, half))
+        value = size(spec.optics, array, _spread(tried.optics, array))
         if value is None:
             return None
         tried = spec.model_copy(update={"optics": spec.optics.model_copy(update={key: value})})
         try:
-            half = solve(tried)
+            array = solve(tried)
         except SpecError:
             return None
-        if _passage(tried.optics, half)[0] >= tried.optics.capture_diameter_mm / 2:
+        if _passage(tried.optics, array)[0] >= tried.optics.capture_diameter_mm / 2:
             return value
     return None
 
 
-def _passage(optics: OpticsSpec, half: MirrorArray) -> tuple[float, int]:
-    return closest_passage(half.cells, half.ellipsoid.pinhole, optics.capture_diameter_mm / 2)
+def _passage(optics: OpticsSpec, array: MirrorArray) -> tuple[float, int]:
+    return closest_passage(array.cells, array.ellipsoid.pinhole, optics.capture_diameter_mm / 2)
 
 
 def _apex_passage(ellipsoid: Ellipsoid, u: Floats) -> float:
@@ -90,25 +90,25 @@ def _apex_passage(ellipsoid: Ellipsoid, u: Floats) -> float:
     return float(passing_distances(ellipsoid.pinhole, ellipsoid.apices(u)).min())
 
 
-def _spread(optics: OpticsSpec, half: MirrorArray) -> float:
+def _spread(optics: OpticsSpec, array: MirrorArray) -> float:
     """How much closer light in use passes than that of the apices, a mm of capture diameter.
 
     It hardly depends on the sizes, so a size that clears follows from the apices in closed form.
     """
-    apices = _apex_passage(half.ellipsoid, half.u)
-    return (apices - _passage(optics, half)[0]) / optics.capture_diameter_mm
+    apices = _apex_passage(array.ellipsoid, array.u)
+    return (apices - _passage(optics, array)[0]) / optics.capture_diameter_mm
 
 
-def _smaller_sphere(_: OpticsSpec, half: MirrorArray, spread: float) -> float | None:
-    diameter = _apex_passage(half.ellipsoid, half.u) / (0.5 + spread)
+def _smaller_sphere(_: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
+    diameter = _apex_passage(array.ellipsoid, array.u) / (0.5 + spread)
     return math.floor(diameter * STEPS_PER_MM) / STEPS_PER_MM or None
 
 
-def _wider_ellipsoid(optics: OpticsSpec, half: MirrorArray, spread: float) -> float | None:
+def _wider_ellipsoid(optics: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
     needed = optics.capture_diameter_mm * (0.5 + spread)
 
     def spare(semi_minor: float) -> float:
-        return _apex_passage(Ellipsoid(half.ellipsoid.pinhole, semi_minor), half.u) - needed
+        return _apex_passage(Ellipsoid(array.ellipsoid.pinhole, semi_minor), array.u) - needed
 
     if not spare(optics.semi_minor_mm) < 0 <= spare(MAX_SEMI_MINOR):
         return None

@@ -20,33 +20,35 @@ COLUMNS = (
 )
 
 
-def mirror_rows(half: MirrorArray) -> list[Row]:
+def mirror_rows(array: MirrorArray) -> list[Row]:
     """One row for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
-    mirrors = half.mirrors
+    mirrors = array.mirrors
     numbers = np.column_stack(
         [
-            half.u,
+            array.u,
             mirrors.apex,
             mirrors.normal,
             mirrors.centre,
             mirrors.radius,
-            half.half_width,
-            np.degrees([half.theta0, half.theta1, half.polar, half.azimuth]).T,
-            half.area,
-            half.coverage,
+            array.half_width,
+            np.degrees([array.theta0, array.theta1, array.polar, array.azimuth]).T,
+            array.area,
+            array.coverage,
         ]
     )
     values = [[None if np.isnan(x) else x + 0.0 for x in row] for row in numbers.tolist()]
     return [
-        dict(zip(COLUMNS, [name, half.camera_id, *row], strict=True))
-        for name, row in zip(half.ids, values, strict=True)
+        dict(zip(COLUMNS, [name, array.camera_id, *row], strict=True))
+        for name, row in zip(array.ids, values, strict=True)
     ]
 
 
 def write_record(folder: Path, design: MirrorDesign, shells: bool) -> None:
     """Write mirrors.csv and design.json; `shells`: whether the shells' files are there too."""
     write_table(
-        folder / MIRRORS_FILE, COLUMNS, (row for half in design.halves for row in mirror_rows(half))
+        folder / MIRRORS_FILE,
+        COLUMNS,
+        (row for array in design.arrays for row in mirror_rows(array)),
     )
     text = json.dumps(document(design, shells), indent=1, allow_nan=False) + "\n"
     (folder / DESIGN_FILE).write_text(text, encoding="utf-8")
@@ -60,18 +62,18 @@ def document(design: MirrorDesign, shells: bool) -> dict[str, Any]:
         "spec": spec_dict(spec),
         "target_mm": spec.optics.capture_diameter_mm,
         "coating_mm": spec.mirrors.coating_um / 1000,
-        "foot_z_mm": design.halves[0].foot,
-        "cameras": [camera_record(half) for half in design.halves],
-        "parts": [shell_record(half) for half in design.halves if shells],
+        "foot_z_mm": design.arrays[0].foot,
+        "cameras": [camera_record(array) for array in design.arrays],
+        "parts": [shell_record(array) for array in design.arrays if shells],
         "mirrors": MIRRORS_FILE,
     }
 
 
-def camera_record(half: MirrorArray) -> dict[str, Any]:
+def camera_record(array: MirrorArray) -> dict[str, Any]:
     """Record of one camera."""
-    view = half.camera
+    view = array.camera
     return {
-        "id": half.camera_id,
+        "id": array.camera_id,
         "pinhole_mm": (view.pinhole + 0.0).tolist(),
         "forward": (view.forward + 0.0).tolist(),
         "right": (view.right + 0.0).tolist(),
@@ -81,8 +83,8 @@ def camera_record(half: MirrorArray) -> dict[str, Any]:
     }
 
 
-def shell_record(half: MirrorArray) -> dict[str, str]:
+def shell_record(array: MirrorArray) -> dict[str, str]:
     """Record of one part and its files."""
-    name = f"shell_{half.camera_id}"
+    name = f"shell_{array.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
-    return {"name": name, "camera": half.camera_id, **files}
+    return {"name": name, "camera": array.camera_id, **files}

@@ -111,7 +111,7 @@ def overview(
     optional_prototype: bool = False,
 ) -> Overview:
     """Return what a build of a design would give; arguments and errors as of `write_export`."""
-    half, note, arrangement = design.halves[0], "", None
+    array, note, arrangement = design.arrays[0], "", None
     if PROTOTYPE in parts:
         progress("prototype: balls, their places, stops")
         try:
@@ -120,14 +120,14 @@ def overview(
             if not optional_prototype:
                 raise
             note = f"no prototype: {error}"
-    radius = half.mirrors.radius
+    radius = array.mirrors.radius
     planar = bool(np.isnan(radius).any())
     return Overview(
         spec=arrangement.spec if arrangement else design.spec,
-        mirrors=2 * len(half),
-        virtual_cameras=2 * len(half) - int((half.u[:, 0] == 0).sum()),
+        mirrors=2 * len(array),
+        virtual_cameras=2 * len(array) - int((array.u[:, 0] == 0).sum()),
         radius_mm=None if planar else (float(radius.min()), float(radius.max())),
-        minimum_coverage_mm=float(half.coverage.min()),
+        minimum_coverage_mm=float(array.coverage.min()),
         view_angle_deg=design.spec.camera.hfov_deg,
         shell_prints=_shells(design) if SHELL in parts else None,
         prototype=_prototype(arrangement) if arrangement else None,
@@ -137,7 +137,7 @@ def overview(
 
 def _shells(design: MirrorDesign) -> PrintEstimate:
     spec = design.spec.model_copy(update={"mesh": COARSE})
-    mesh = camera_a_mesh(MirrorDesign(spec, design.halves))
+    mesh = camera_a_mesh(MirrorDesign(spec, design.arrays))
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     return _print_estimate(2 * float(np.einsum("tx,tx->", a, np.cross(b, c))) / 6, design.spec)
 

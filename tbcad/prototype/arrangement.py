@@ -238,7 +238,7 @@ def _remedy(design: MirrorDesign, tried: list[int]) -> str:
         return f" (tried: {', '.join(map(str, dict.fromkeys(tried)))} balls)"
     free = _with_base(_with(design.spec, k=AUTO), **dict.fromkeys(OPEN_BASE_KEYS, AUTO))
     try:
-        chosen = _open_keys(arrange(MirrorDesign(free, design.halves)).spec)
+        chosen = _open_keys(arrange(MirrorDesign(free, design.arrays)).spec)
     except SpecError:
         return ""
     return "; tried: there is room with " + ", ".join(

@@ -60,7 +60,7 @@ def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
 
 def _views(prototype: PrototypeModel) -> SolidGroup:
     """The capture sphere, and what the camera sees up to the sphere's far end."""
-    camera, radius = prototype.layout.half.camera, prototype.capture_radius
+    camera, radius = prototype.layout.array.camera, prototype.capture_radius
     length = float(norm(camera.pinhole)) + radius
     width = length * np.tan(camera.hfov / 2)
     height = width * camera.height_px / camera.width_px

@@ -20,7 +20,7 @@ from tbcad.types import Bools, Floats, Ints
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0
 UP = (0.0, 0.0, 1.0)
-# Gap between the halves, in largest coordinates, and the direction of view, of both pictures.
+# Gap between the shells, in largest coordinates, and the direction of view, of both pictures.
 VIEWS = ((0.08, (1.5, 3.0, -1.95)), (0.0, (-0.4, 0.9, 2.8)))
 FRAME_MARGIN = 1.04  # the picture is larger than what it shows by this factor
 STRUCTURE_GREY = 205
@@ -42,30 +42,32 @@ class ModelledMirrors(NamedTuple):
 
 
 def draw(folder: Path, picture: Path) -> None:
-    """Draw both halves: from outside, apart, and up into the mirrors as the cameras look.
+    """Draw both shells: from outside, apart, and up into the mirrors as the cameras look.
 
     Args:
         folder: an export.
         picture: PNG file to write.
     """
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
-    halves = [_coloured(folder, camera) for camera in "ab"]
-    size = float(np.abs(np.asarray(halves[0].bounds)).max())
+    shells = [_coloured(folder, camera) for camera in "ab"]
+    size = float(np.abs(np.asarray(shells[0].bounds)).max())
     for column, (gap, direction) in enumerate(VIEWS):
         plotter.subplot(0, column)
         plotter.set_background("white")
         shift = np.array([gap * size, 0.0, 0.0])
-        placed = [half.translate(side * shift) for half, side in zip(halves, (1, -1), strict=True)]
-        for half in placed:
+        placed = [
+            shell.translate(side * shift) for shell, side in zip(shells, (1, -1), strict=True)
+        ]
+        for shell in placed:
             plotter.add_mesh(
-                half,
+                shell,
                 scalars="colour",
                 rgb=True,
                 smooth_shading=False,
                 specular=0.4,
                 specular_power=20,
             )
-        points = np.concatenate([np.asarray(half.points) for half in placed])
+        points = np.concatenate([np.asarray(array.points) for array in placed])
         _show_all(plotter, points, np.array(direction))
     plotter.screenshot(picture)
     plotter.close()
@@ -100,17 +102,17 @@ def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats
 
 
 def _coloured(folder: Path, camera: str) -> pyvista.PolyData:
-    """A half with mirrors in the colour of their polar angle, alternating in brightness."""
-    half = pyvista.read(folder / f"shell_{camera}.stl")
+    """A shell with mirrors in the colour of their polar angle, alternating in brightness."""
+    shell = pyvista.read(folder / f"shell_{camera}.stl")
     mirrors = read_mirrors(folder, camera)
-    corners = np.asarray(half.points, dtype=np.float64)[half.regular_faces]
+    corners = np.asarray(shell.points, dtype=np.float64)[shell.regular_faces]
     mirror, found = mirror_of_facets(corners, mirrors)
     share = (mirrors.polar - mirrors.polar.min()) / np.ptp(mirrors.polar)
     colour = np.column_stack([0.25 + 0.7 * share, 0.5 + 0.25 * share, 0.95 - 0.65 * share])
     colour *= np.where(np.arange(len(colour)) % 3 == 0, 0.85, 1.0)[:, None]
     rgb = np.where(found[:, None], 255 * colour[mirror], STRUCTURE_GREY)
-    half["colour"] = rgb.astype(np.uint8)
-    return half
+    shell["colour"] = rgb.astype(np.uint8)
+    return shell
 
 
 def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, Bools]:

@@ -27,12 +27,12 @@ def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda
     envelope = shell_envelope(design)
     progress("facets")
     mesh, known = camera_a_mesh(design, envelope), None
-    for half in design.halves:
-        files = shell_record(half)
+    for array in design.arrays:
+        files = shell_record(array)
         progress(f"{files['name']}: solid")
-        solid = camera_solid(design, half, envelope)
+        solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
-        own_mesh = mesh.mirrored() if half.camera_id == "b" else mesh
+        own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
         known = known.mirrored() if known else properties(solid.shape)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
         write_stl(folder / files["stl"], own_mesh)
@@ -45,12 +45,12 @@ def shell_envelope(design: MirrorDesign) -> Envelope:
     Raises:
         SpecError: when flanges or holes do not fit.
     """
-    half = design.halves[0]
-    return closing_envelope(design.spec.shell, half.modelled_cells, half.ellipsoid)
+    array = design.arrays[0]
+    return closing_envelope(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
 def camera_solid(
-    design: MirrorDesign, half: MirrorArray, envelope: Envelope | None = None
+    design: MirrorDesign, array: MirrorArray, envelope: Envelope | None = None
 ) -> Solid:
     """Solid of one camera's half, face by face; without an envelope it is worked out.
 
@@ -58,10 +58,10 @@ def camera_solid(
         SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds the solid invalid.
     """
-    name, maker = shell_record(half)["name"], Maker(mirrored=half.camera_id == "b")
-    mirrors = front_edges(maker, design.halves[0].modelled_cells)
+    name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
+    mirrors = front_edges(maker, design.arrays[0].modelled_cells)
     casing = casing_faces(mirrors, envelope or shell_envelope(design))
-    faces = [*zip(half.ids, mirrors.faces(), strict=True), *casing]
+    faces = [*zip(array.ids, mirrors.faces(), strict=True), *casing]
     solid = one_solid(name, maker.solid([face for _, face in faces]))
     return Solid(name, solid, tuple(faces))
 
@@ -72,6 +72,6 @@ def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mes
     Raises:
         SpecError: when flanges or holes do not fit.
     """
-    half = design.halves[0]
+    array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
-    return shell_mesh(design.spec, half.modelled_cells, envelope, half.apex_distance)
+    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)

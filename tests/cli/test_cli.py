@@ -201,6 +201,7 @@ def test_foreign_files_are_refused_and_kept_on_force(
     assert (out / "shell_a.stl").read_bytes() == (export / "shell_a.stl").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
     """SIGKILL while the new one is being written: not a byte of the old one changes."""
     out = tmp_path / "exports"

@@ -35,7 +35,7 @@ def test_it_has_all_key_figures(lines: list[str]) -> None:
 
 
 def test_it_has_the_design(lines: list[str], paper_design: MirrorDesign) -> None:
-    a, b = paper_design.halves
+    a, b = paper_design.arrays
     halved = int((a.u[:, 0] == 0).sum())
     assert f"{len(a) + len(b) - halved} virtual cameras" in lines[0]
     shown = re.search(r"coverage, spheres ([\d.]+) >= 60 mm", lines[1])

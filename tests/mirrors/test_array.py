@@ -5,53 +5,49 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, numbered_directions
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-
-
-def mirrors_of(*settings: str) -> MirrorArray:
-    return design(load_spec(None, settings)).halves[0]
+from tests.mirror_arrays import mirror_array
 
 
 def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
     """Camera a's mirrors, or the message of the error."""
     try:
-        return mirrors_of(*settings), ""
+        return mirror_array(*settings), ""
     except SpecError as error:
         return None, str(error)
 
 
 @pytest.mark.parametrize("n", [*range(2, 13), 17, 24, 36])
 def test_traced_mirrors_all_see_the_target(n: int) -> None:
-    half = mirrors_of(f"n={n}")
-    curved = half.mirrors.radius < 29.9999 * half.half_width
-    assert half.coverage.min() > 60.6 - 0.01
-    assert half.coverage[curved].max(initial=0) < 60.6 + 0.01
-    assert (half.mirrors.radius > 0).all()
-    assert np.isfinite(half.mirrors.radius).all()
+    array = mirror_array(f"n={n}")
+    curved = array.mirrors.radius < 29.9999 * array.half_width
+    assert array.coverage.min() > 60.6 - 0.01
+    assert array.coverage[curved].max(initial=0) < 60.6 + 0.01
+    assert (array.mirrors.radius > 0).all()
+    assert np.isfinite(array.mirrors.radius).all()
 
 
 def test_mirrors_that_see_enough_are_nearly_flat() -> None:
     """n = 4 and below: the radius stops at a stated multiple of the half width."""
-    half = mirrors_of("n=4")
-    nearly_flat = np.isclose(half.mirrors.radius, 30 * half.half_width)
+    array = mirror_array("n=4")
+    nearly_flat = np.isclose(array.mirrors.radius, 30 * array.half_width)
     assert nearly_flat.sum() > 5
-    assert (half.coverage[nearly_flat] >= 60.6 - 0.01).all()
+    assert (array.coverage[nearly_flat] >= 60.6 - 0.01).all()
 
 
 def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
-    half = mirrors_of("n=4", "radius_rule=paper")
-    assert (half.mirrors.radius > 0).all()
-    assert half.mirrors.radius.max() == pytest.approx((30 * half.half_width).max(), rel=0.5)
+    array = mirror_array("n=4", "radius_rule=paper")
+    assert (array.mirrors.radius > 0).all()
+    assert array.mirrors.radius.max() == pytest.approx((30 * array.half_width).max(), rel=0.5)
 
 
 def test_margin_is_added_to_the_target() -> None:
-    assert mirrors_of("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
+    assert mirror_array("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
 
 
 def test_coat_is_an_offset_of_the_radius() -> None:
-    bare, coated = mirrors_of("n=8"), mirrors_of("n=8", "coating_um=40")
+    bare, coated = mirror_array("n=8"), mirror_array("n=8", "coating_um=40")
     assert coated.mirrors.radius == pytest.approx(bare.mirrors.radius, rel=1e-12)
     m = len(coated)
     body = coated.modelled_cells.surfaces
@@ -61,7 +57,7 @@ def test_coat_is_an_offset_of_the_radius() -> None:
 
 def test_coat_thicker_than_a_mirror_is_refused() -> None:
     with pytest.raises(SpecError, match="coating_um"):
-        mirrors_of(
+        mirror_array(
             "n=18",
             "coating_um=500",
             "optics.camera_mm=[5,0,-5]",
@@ -71,7 +67,7 @@ def test_coat_thicker_than_a_mirror_is_refused() -> None:
 
 
 def test_other_half_is_the_mirror_image(small_design: MirrorDesign) -> None:
-    a, b = small_design.halves
+    a, b = small_design.arrays
     flip = [-1, 1, 1]
     assert np.array_equal(a.u * flip, b.u)
     assert np.array_equal(a.mirrors.centre * flip, b.mirrors.centre)
@@ -93,7 +89,9 @@ def test_numbers_run_from_the_zenith_down() -> None:
 def test_hopeless_targets_name_the_mirrors() -> None:
     """So long an ellipsoid leaves its outer spheres no radius at which they still meet."""
     with pytest.raises(SpecError, match=r"a\d{4} \(\d+\.\d+ mm\)") as caught:
-        mirrors_of("n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+        mirror_array(
+            "n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36"
+        )
     assert "\n" not in str(caught.value)
     assert "change optics.n" in str(caught.value)
 
@@ -104,7 +102,7 @@ def test_mirrors_that_no_lens_takes_in_are_refused_before_their_radii_are_search
     """Some hundred steps, each as long as a design of few mirrors."""
     monkeypatch.setattr("tbcad.mirrors.array.solve_radii", None)
     with pytest.raises(SpecError, match=r"no lens takes in all mirrors: .* have to be 180"):
-        mirrors_of("n=18", "camera_mm=[100, 0, -20]", "capture_diameter_mm=20")
+        mirror_array("n=18", "camera_mm=[100, 0, -20]", "capture_diameter_mm=20")
 
 
 @settings(max_examples=30, deadline=None)
@@ -125,10 +123,10 @@ def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
         f"semi_minor_mm={b}",
         f"capture_diameter_mm={capture}",
     ]
-    half, message = attempt(*options)
-    if half is None:
+    array, message = attempt(*options)
+    if array is None:
         assert "\n" not in message
         assert re.search("change|make|bring", message)
         return
-    assert half.coverage.min() > capture + 0.6 - 0.01
-    assert (half.area > 0).all()
+    assert array.coverage.min() > capture + 0.6 - 0.01
+    assert (array.area > 0).all()

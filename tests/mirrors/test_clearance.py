@@ -20,8 +20,8 @@ def refusal(*options: str) -> str:
 
 def clearance(*options: str) -> float:
     spec = load_spec(None, [*options])
-    half, radius = design(spec).halves[0], spec.optics.capture_diameter_mm / 2
-    return closest_passage(half.cells, half.ellipsoid.pinhole, radius)[0] - radius
+    array, radius = design(spec).arrays[0], spec.optics.capture_diameter_mm / 2
+    return closest_passage(array.cells, array.ellipsoid.pinhole, radius)[0] - radius
 
 
 def test_one_line_with_cause_place_and_limit() -> None:

@@ -12,44 +12,44 @@ CAPTURE = 30.0
 
 
 @pytest.fixture(scope="module")
-def sampled(paper_half: MirrorArray) -> np.ndarray:
-    return np.arange(0, len(paper_half), 60)
+def sampled(paper_array: MirrorArray) -> np.ndarray:
+    return np.arange(0, len(paper_array), 60)
 
 
 @pytest.fixture(scope="module")
-def outline(paper_half: MirrorArray, sampled: np.ndarray) -> np.ndarray:
-    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[sampled])
-    pinhole = norm(paper_half.camera.pinhole)
-    return ball_light.used_outlines(at, paper_half.mirrors.radius[sampled], pinhole, CAPTURE)
+def outline(paper_array: MirrorArray, sampled: np.ndarray) -> np.ndarray:
+    at = ball_light.ball_poses(paper_array.ellipsoid, paper_array.polar[sampled])
+    pinhole = norm(paper_array.camera.pinhole)
+    return ball_light.used_outlines(at, paper_array.mirrors.radius[sampled], pinhole, CAPTURE)
 
 
-def test_poses_turned_are_the_mirrors(paper_half: MirrorArray) -> None:
-    ellipsoid, mirrors = paper_half.ellipsoid, paper_half.mirrors
-    at = ball_light.ball_poses(ellipsoid, paper_half.polar)
+def test_poses_turned_are_the_mirrors(paper_array: MirrorArray) -> None:
+    ellipsoid, mirrors = paper_array.ellipsoid, paper_array.mirrors
+    at = ball_light.ball_poses(ellipsoid, paper_array.polar)
     frame = ellipsoid.frame()
-    assert rotated_about_x(at.apex, paper_half.azimuth) @ frame == pytest.approx(mirrors.apex)
-    assert rotated_about_x(at.normal, paper_half.azimuth) @ frame == pytest.approx(mirrors.normal)
+    assert rotated_about_x(at.apex, paper_array.azimuth) @ frame == pytest.approx(mirrors.apex)
+    assert rotated_about_x(at.normal, paper_array.azimuth) @ frame == pytest.approx(mirrors.normal)
 
 
 def test_rays_off_the_outline_touch_the_capture_sphere(
-    paper_half: MirrorArray, sampled: np.ndarray, outline: np.ndarray
+    paper_array: MirrorArray, sampled: np.ndarray, outline: np.ndarray
 ) -> None:
-    mirrors, azimuth = paper_half.mirrors, paper_half.azimuth[sampled]
-    point = rotated_about_x(outline, azimuth[:, None]) @ paper_half.ellipsoid.frame()
+    mirrors, azimuth = paper_array.mirrors, paper_array.azimuth[sampled]
+    point = rotated_about_x(outline, azimuth[:, None]) @ paper_array.ellipsoid.frame()
     centre, radius = mirrors.centre[sampled][:, None], mirrors.radius[sampled][:, None]
     assert norm(point - centre) == pytest.approx(np.broadcast_to(radius, point.shape[:2]))
-    miss = miss_distances(paper_half.camera.pinhole, point, unit(point - centre))
+    miss = miss_distances(paper_array.camera.pinhole, point, unit(point - centre))
     assert miss == pytest.approx(CAPTURE, abs=1e-6)
 
 
 def test_light_lies_in_its_hulls(
-    paper_half: MirrorArray, sampled: np.ndarray, outline: np.ndarray
+    paper_array: MirrorArray, sampled: np.ndarray, outline: np.ndarray
 ) -> None:
     """Rays over all of the part in use, by points along them."""
-    pinhole = norm(paper_half.camera.pinhole)
+    pinhole = norm(paper_array.camera.pinhole)
     camera = np.array([pinhole, 0.0, 0.0])
-    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[sampled])
-    radius = paper_half.mirrors.radius[sampled][:, None, None]
+    at = ball_light.ball_poses(paper_array.ellipsoid, paper_array.polar[sampled])
+    radius = paper_array.mirrors.radius[sampled][:, None, None]
     centre = (at.apex - radius[:, 0] * at.normal)[:, None]
     to_object, to_camera = ball_light.light_hulls(outline, pinhole, CAPTURE)
     for share in (0.0, 0.4, 0.8, 1.0):
@@ -83,13 +83,13 @@ def test_area_of_an_ellipse(a: float, b: float) -> None:
     assert ball_light.enclosed_areas(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
 
 
-def test_pixels_against_counting(paper_half: MirrorArray) -> None:
+def test_pixels_against_counting(paper_array: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
-    camera, mirrors, i = paper_half.camera, paper_half.mirrors, 400
-    at = ball_light.ball_poses(paper_half.ellipsoid, paper_half.polar[[i]])
+    camera, mirrors, i = paper_array.camera, paper_array.mirrors, 400
+    at = ball_light.ball_poses(paper_array.ellipsoid, paper_array.polar[[i]])
     outline = ball_light.used_outlines(at, mirrors.radius[[i]], norm(camera.pinhole), CAPTURE)
-    frame = paper_half.ellipsoid.frame()
-    pixels = ball_light.pixel_counts(camera, frame, outline, paper_half.azimuth[[i]])[0]
+    frame = paper_array.ellipsoid.frame()
+    pixels = ball_light.pixel_counts(camera, frame, outline, paper_array.azimuth[[i]])[0]
     size = 2 * camera.half_sizes[0] / camera.width_px / 4  # sixteen rays a pixel
     axes = np.stack([camera.right, np.cross(camera.forward, camera.right)])
     apex_ray = mirrors.apex[i] - camera.pinhole
@@ -101,10 +101,10 @@ def test_pixels_against_counting(paper_half: MirrorArray) -> None:
     assert pixels == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
 
 
-def test_field_angles_against_the_scalar_product_with_the_axis(paper_half: MirrorArray) -> None:
-    pinhole = paper_half.camera.pinhole
-    ray = unit(paper_half.mirrors.apex - pinhole)
+def test_field_angles_against_the_scalar_product_with_the_axis(paper_array: MirrorArray) -> None:
+    pinhole = paper_array.camera.pinhole
+    ray = unit(paper_array.mirrors.apex - pinhole)
     expected = np.arccos(ray @ unit(-pinhole))
-    assert ball_light.field_angles(paper_half.ellipsoid, paper_half.polar) == pytest.approx(
+    assert ball_light.field_angles(paper_array.ellipsoid, paper_array.polar) == pytest.approx(
         expected
     )

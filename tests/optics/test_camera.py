@@ -5,16 +5,16 @@ from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.camera import fitted_camera
 
 
-def test_all_mirrors_of_the_paper_are_in_the_frame(paper_half: MirrorArray) -> None:
+def test_all_mirrors_of_the_paper_are_in_the_frame(paper_array: MirrorArray) -> None:
     """89 degrees across 2080 x 1552 pixels hold camera a's 847 mirrors."""
-    camera = paper_half.camera
-    assert camera.fill(paper_half.cells.corners) <= 1
+    camera = paper_array.camera
+    assert camera.fill(paper_array.cells.corners) <= 1
     assert camera.forward @ camera.right == pytest.approx(0, abs=1e-12)
     assert abs(camera.forward[1]) < 1e-9  # the array is symmetric, and so is the camera
 
 
-def test_no_small_tilt_does_better(paper_half: MirrorArray) -> None:
-    camera, corners = paper_half.camera, paper_half.cells.corners
+def test_no_small_tilt_does_better(paper_array: MirrorArray) -> None:
+    camera, corners = paper_array.camera, paper_array.cells.corners
     best = camera.fill(corners)
     for tilt in (-1e-3, 1e-3):
         for axis in (camera.right, np.cross(camera.forward, camera.right)):
@@ -27,10 +27,10 @@ def test_no_small_tilt_does_better(paper_half: MirrorArray) -> None:
             assert other.fill(corners) >= best - 1e-9
 
 
-def test_mirrored_camera_sees_the_mirrored_array_alike(paper_half: MirrorArray) -> None:
-    flipped = paper_half.cells.corners * [-1, 1, 1]
-    camera = paper_half.camera
-    assert camera.mirrored().fill(flipped) == pytest.approx(camera.fill(paper_half.cells.corners))
+def test_mirrored_camera_sees_the_mirrored_array_alike(paper_array: MirrorArray) -> None:
+    flipped = paper_array.cells.corners * [-1, 1, 1]
+    camera = paper_array.camera
+    assert camera.mirrored().fill(flipped) == pytest.approx(camera.fill(paper_array.cells.corners))
     assert np.linalg.det(
         [camera.right, np.cross(camera.forward, camera.right), camera.forward]
     ) == pytest.approx(1)

@@ -9,12 +9,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray, design
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 
 def first_hit(surfaces: Surfaces, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +59,7 @@ RULES = ["traced", "paper", "flat"]
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 9])
 @pytest.mark.parametrize("rule", RULES)
 def test_every_ray_meets_the_cell_that_contains_it(n: int, rule: str) -> None:
-    cells = design(load_spec(None, [f"n={n}", f"radius_rule={rule}"])).halves[0].cells
+    cells = mirror_array(f"n={n}", f"radius_rule={rule}").cells
     rng = np.random.default_rng(n)
     mirror, point = within(cells, unit(rng.normal(size=(600, 3))))
     assert len(mirror) > 100
@@ -70,7 +70,7 @@ def test_every_ray_meets_the_cell_that_contains_it(n: int, rule: str) -> None:
 @pytest.mark.parametrize("n", [2, 3, 4, 7, 18])
 @pytest.mark.parametrize("rule", RULES)
 def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
-    cells = design(load_spec(None, [f"n={n}", f"radius_rule={rule}"])).halves[0].cells
+    cells = mirror_array(f"n={n}", f"radius_rule={rule}").cells
     arc, t = np.broadcast_arrays(np.arange(len(cells.arcs))[:, None], np.linspace(0, 1, 7))
     points = cells.arcs.at(arc, t)
     for face in cells.arcs.faces.T:
@@ -81,13 +81,13 @@ def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
 @pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 18, 25])
 def test_euler_characteristic(n: int) -> None:
     """V - E + F = 1 for a disc of cells (DESIGN.md section 4)."""
-    cells = design(load_spec(None, [f"n={n}"])).halves[0].cells
+    cells = mirror_array(f"n={n}").cells
     corners = np.unique(np.concatenate([cells.arcs.start, cells.arcs.end]))
     assert len(corners) - len(cells.arcs) + cells.mirrors == 1
 
 
-def test_each_arc_lies_in_two_rings_or_one(paper_half: MirrorArray) -> None:
-    cells = paper_half.cells
+def test_each_arc_lies_in_two_rings_or_one(paper_array: MirrorArray) -> None:
+    cells = paper_array.cells
     _, sides = cells.rings
     counts = np.bincount(sides // 2, minlength=len(cells.arcs))
     outer = (cells.arcs.faces >= cells.mirrors).any(axis=1)
@@ -95,8 +95,8 @@ def test_each_arc_lies_in_two_rings_or_one(paper_half: MirrorArray) -> None:
     assert len(np.unique(sides)) == len(sides)
 
 
-def test_rings_close(paper_half: MirrorArray) -> None:
-    cells = paper_half.cells
+def test_rings_close(paper_array: MirrorArray) -> None:
+    cells = paper_array.cells
     offsets, sides = cells.rings
     tail = np.where(sides % 2, cells.arcs.end[sides // 2], cells.arcs.start[sides // 2])
     head = np.where(sides % 2, cells.arcs.start[sides // 2], cells.arcs.end[sides // 2])
@@ -107,7 +107,7 @@ def test_rings_close(paper_half: MirrorArray) -> None:
 @pytest.mark.parametrize("rule", RULES)
 def test_areas_against_monte_carlo(rule: str) -> None:
     """Area of a cell = integral of distance^2 / cos over the rays that meet it."""
-    cells = design(load_spec(None, ["n=3", f"radius_rule={rule}"])).halves[0].cells
+    cells = mirror_array("n=3", f"radius_rule={rule}").cells
     rng = np.random.default_rng(5)
     count = 400_000
     ray = unit(rng.normal(size=(count, 3)))
@@ -152,7 +152,7 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
     options = [f"n={n}", f"camera_mm=[{x}, 0, {z}]", f"radius_rule={rule}"]
     try:
         with patch("tbcad.mirrors.array.check_clearance"):  # the object may stand in the light
-            cells = design(load_spec(None, options)).halves[0].cells
+            cells = mirror_array(*options).cells
     except SpecError:
         assume(False)
     assert (cell_areas(cells) > 0).all()

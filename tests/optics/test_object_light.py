@@ -4,21 +4,18 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray, design
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.object_light import closest_passage, passing_distances
 from tbcad.optics.reflection import reflected_rays
 from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 STEPS = 401
 
 
-def half_of(*options: str) -> MirrorArray:
-    return design(load_spec(None, [*options])).halves[0]
-
-
-def brute_force(half: MirrorArray, i: int, capture: float, reach: float) -> float:
+def brute_force(array: MirrorArray, i: int, capture: float, reach: float) -> float:
     """Smallest distance over a grid on mirror i, of rays that meet the capture sphere."""
-    surfaces, pinhole = half.cells.surfaces, half.ellipsoid.pinhole
+    surfaces, pinhole = array.cells.surfaces, array.ellipsoid.pinhole
     normal, k = surfaces.normal[i], surfaces.curvature[i]
     first = unit(np.cross(normal, [0.1, 0.9, 0.3]))
     a, b = np.meshgrid(*2 * [np.linspace(-reach, reach, STEPS)])
@@ -45,14 +42,14 @@ def brute_force(half: MirrorArray, i: int, capture: float, reach: float) -> floa
     ],
 )
 def test_against_brute_force(options: tuple[str, ...]) -> None:
-    half = half_of("n=3", *options)
+    array = mirror_array("n=3", *options)
     capture = half_capture(*options)
-    distance, mirror = closest_passage(half.cells, half.ellipsoid.pinhole, capture)
-    nearest = passing_distances(half.ellipsoid.pinhole, half.mirrors.apex).argsort()[:3]
-    reach = 2.5 * half.half_width
-    found = [brute_force(half, int(i), capture, reach[i]) for i in {mirror, *nearest}]
+    distance, mirror = closest_passage(array.cells, array.ellipsoid.pinhole, capture)
+    nearest = passing_distances(array.ellipsoid.pinhole, array.mirrors.apex).argsort()[:3]
+    reach = 2.5 * array.half_width
+    found = [brute_force(array, int(i), capture, reach[i]) for i in {mirror, *nearest}]
     # The grid's step is a hundredth of a mirror, and what it finds is never nearer than the truth.
-    assert distance == pytest.approx(min(found), abs=0.02 * half.half_width[mirror])
+    assert distance == pytest.approx(min(found), abs=0.02 * array.half_width[mirror])
     assert distance < min(found) + 1e-3
 
 
@@ -62,10 +59,10 @@ def half_capture(*options: str) -> float:
 
 def test_the_paper_s_limit() -> None:
     """ "The limit is 60 mm": the object would block the zenith mirror's light from 62.0 mm on."""
-    half = half_of("n=18", "capture_diameter_mm=62")
-    distance, mirror = closest_passage(half.cells, half.ellipsoid.pinhole, 31)
+    array = mirror_array("n=18", "capture_diameter_mm=62")
+    distance, mirror = closest_passage(array.cells, array.ellipsoid.pinhole, 31)
     assert distance == pytest.approx(31.0, abs=0.02)
-    assert half.u[mirror] == pytest.approx([0, 0, 1])
+    assert array.u[mirror] == pytest.approx([0, 0, 1])
 
 
 def test_ways_end_at_their_points() -> None:

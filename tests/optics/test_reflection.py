@@ -12,15 +12,15 @@ def test_reflection_at_a_plane() -> None:
     assert reflected[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
 
 
-def test_ray_over_the_apex_passes_the_origin(paper_half: MirrorArray) -> None:
-    mirrors = paper_half.mirrors
-    pinhole = paper_half.camera.pinhole
+def test_ray_over_the_apex_passes_the_origin(paper_array: MirrorArray) -> None:
+    mirrors = paper_array.mirrors
+    pinhole = paper_array.camera.pinhole
     assert miss_distances(pinhole, mirrors.apex, mirrors.normal).max() < 1e-9
 
 
-def test_rays_find_their_points_on_the_spheres(paper_half: MirrorArray) -> None:
+def test_rays_find_their_points_on_the_spheres(paper_array: MirrorArray) -> None:
     """Points beside the apices, given and found again by the intersection with the sphere."""
-    mirrors, pinhole = paper_half.mirrors, paper_half.camera.pinhole
+    mirrors, pinhole = paper_array.mirrors, paper_array.camera.pinhole
     normal = unit(mirrors.normal + 0.01 * unit(np.random.default_rng(1).normal(size=(847, 3))))
     point = mirrors.centre + mirrors.radius[:, None] * normal
     ray = unit(point - pinhole)

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import MirrorArray, design
+from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
 from tbcad.optics.trace import coverage_diameters, parabola_minima, samples_about_minima
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 
@@ -48,24 +48,24 @@ def brute_force_coverage(cells: Cells, pinhole: np.ndarray, i: int, reach: float
 
 @pytest.mark.parametrize("rule", ["paper", "traced"])
 def test_coverage_against_brute_force(rule: str) -> None:
-    half = design(load_spec(None, [f"radius_rule={rule}"])).halves[0]
-    whole = np.flatnonzero(half.u[:, 0] > 0)
-    extremes = whole[np.argsort(half.coverage[whole])[[0, 1, -1]]]
+    array = mirror_array(f"radius_rule={rule}")
+    whole = np.flatnonzero(array.u[:, 0] > 0)
+    extremes = whole[np.argsort(array.coverage[whole])[[0, 1, -1]]]
     for i in [*extremes, *whole[:: len(whole) // 6]]:
-        brute_force = brute_force_coverage(half.cells, PINHOLE, i, 2.2 * half.half_width[i])
+        brute_force = brute_force_coverage(array.cells, PINHOLE, i, 2.2 * array.half_width[i])
         # The grid's step is a third of a percent of its reach, and so is its error.
-        assert brute_force == pytest.approx(half.coverage[i], rel=4e-3)
+        assert brute_force == pytest.approx(array.coverage[i], rel=4e-3)
 
 
-def test_the_seam_does_not_limit_halved_mirrors(paper_half: MirrorArray) -> None:
+def test_the_seam_does_not_limit_halved_mirrors(paper_array: MirrorArray) -> None:
     """With the cut counted a halved mirror would see nothing: its apex lies on the cut."""
-    halved = paper_half.u[:, 0] == 0
+    halved = paper_array.u[:, 0] == 0
     assert halved.sum() == 37
-    assert coverage_diameters(paper_half.cells, PINHOLE)[halved].min() > 60
+    assert coverage_diameters(paper_array.cells, PINHOLE)[halved].min() > 60
 
 
-def test_smaller_radius_sees_more(paper_half: MirrorArray) -> None:
-    cells = paper_half.cells
+def test_smaller_radius_sees_more(paper_array: MirrorArray) -> None:
+    cells = paper_array.cells
     before = coverage_diameters(cells, PINHOLE)
     finer = Cells(
         cells.surfaces.with_curvature(1.01 * cells.surfaces.curvature),

@@ -10,48 +10,50 @@ from tbcad.optics.windows import Windows, cell_windows
 
 
 @pytest.fixture(scope="module")
-def seen(paper_half: MirrorArray) -> Windows:
-    return cell_windows(paper_half.cells, paper_half.camera.pinhole)
+def seen(paper_array: MirrorArray) -> Windows:
+    return cell_windows(paper_array.cells, paper_array.camera.pinhole)
 
 
-def own_spheres(half: MirrorArray, angle: float = 0.0) -> tuple[np.ndarray, ...]:
+def own_spheres(array: MirrorArray, angle: float = 0.0) -> tuple[np.ndarray, ...]:
     """Every mirror's own sphere, its window rotated about the vertical."""
-    axis = np.broadcast_to([0.0, 0.0, 1.0], half.u.shape)
-    mirrors = half.mirrors
-    return mirrors.centre, mirrors.radius, axis, np.full(len(half), angle)
+    axis = np.broadcast_to([0.0, 0.0, 1.0], array.u.shape)
+    mirrors = array.mirrors
+    return mirrors.centre, mirrors.radius, axis, np.full(len(array), angle)
 
 
-def test_own_spheres_cover_what_the_shell_covers(paper_half: MirrorArray, seen: Windows) -> None:
-    expected = coverage_diameters(paper_half.cells, paper_half.camera.pinhole)
-    assert seen.coverage(*own_spheres(paper_half)) == pytest.approx(expected, abs=2e-4)
+def test_own_spheres_cover_what_the_shell_covers(paper_array: MirrorArray, seen: Windows) -> None:
+    expected = coverage_diameters(paper_array.cells, paper_array.camera.pinhole)
+    assert seen.coverage(*own_spheres(paper_array)) == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.parametrize("i", [0, 7, 300, 846])
-def test_turned_windows_against_brute_force(paper_half: MirrorArray, seen: Windows, i: int) -> None:
+def test_turned_windows_against_brute_force(
+    paper_array: MirrorArray, seen: Windows, i: int
+) -> None:
     """2001 points on every side, turned by another library."""
     angle = 0.004
-    coverage = seen.coverage(*own_spheres(paper_half, angle))[i]
+    coverage = seen.coverage(*own_spheres(paper_array, angle))[i]
     arcs = seen.arc[seen.mirror == i]
     t = np.linspace(0, 1, 2001)
     points = [seen.cells.arcs.at(np.full(len(t), arc), t) for arc in arcs]
     ray = unit(np.concatenate(points) - seen.pinhole)
     ray = Rotation.from_rotvec([0, 0, angle]).apply(ray)
-    mirrors = paper_half.mirrors
+    mirrors = paper_array.mirrors
     miss = sphere_miss_distances(seen.pinhole, ray, mirrors.centre[i], np.array(mirrors.radius[i]))
     assert coverage == pytest.approx(2 * miss.min(), abs=1e-3)
 
 
 def test_windows_hold_their_own_apex_and_not_the_next(
-    paper_half: MirrorArray, seen: Windows
+    paper_array: MirrorArray, seen: Windows
 ) -> None:
-    direction = unit(paper_half.mirrors.apex - seen.pinhole)
+    direction = unit(paper_array.mirrors.apex - seen.pinhole)
     no_rotation = np.zeros(len(direction))
     assert seen.contains(direction, direction, no_rotation).all()
     assert not seen.contains(np.roll(direction, 60, axis=0), direction, no_rotation).any()
 
 
-def test_only_some(paper_half: MirrorArray, seen: Windows) -> None:
-    kept = np.arange(len(paper_half)) % 7 == 0
-    coverage = seen.only(kept).coverage(*own_spheres(paper_half))
+def test_only_some(paper_array: MirrorArray, seen: Windows) -> None:
+    kept = np.arange(len(paper_array)) % 7 == 0
+    coverage = seen.only(kept).coverage(*own_spheres(paper_array))
     assert np.isinf(coverage[~kept]).all()
-    assert (coverage[kept] == seen.coverage(*own_spheres(paper_half))[kept]).all()
+    assert (coverage[kept] == seen.coverage(*own_spheres(paper_array))[kept]).all()

@@ -17,9 +17,9 @@ def small(small_design: MirrorDesign) -> Overview:
 
 
 def test_counts_of_mirrors(small: Overview, small_design: MirrorDesign) -> None:
-    first, second = small_design.halves
+    first, second = small_design.arrays
     assert small.mirrors == len(first) + len(second)
-    directions = {tuple(row) for half in small_design.halves for row in half.u.round(9).tolist()}
+    directions = {tuple(row) for array in small_design.arrays for row in array.u.round(9).tolist()}
     assert small.virtual_cameras == len(directions)
 
 

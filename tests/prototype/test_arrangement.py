@@ -72,7 +72,7 @@ class TestRefused:
     def test_a_remedy_that_was_tried(self, small_design: MirrorDesign) -> None:
         """A ball for every mirror is too many; the message names a number that has room."""
         spec = load_spec(None, ["n=6", "prototype.k=103"])
-        fixed = MirrorDesign(spec, small_design.halves)
+        fixed = MirrorDesign(spec, small_design.arrays)
         with pytest.raises(SpecError, match=r"tried: there is room with prototype\.k auto \(which"):
             arrange(fixed)
 

@@ -40,8 +40,8 @@ def test_facets_belong_to_the_mirrors_that_they_were_made_for(
     """All facets of the casing are grey, also where three corners lie on the edge of a mirror."""
     array = design(load_spec(file, options))
     write_record(tmp_path, array, shells=False)
-    mesh, half = camera_a_mesh(array), array.halves[0]
-    made = mirror_facets(array.spec, half.modelled_cells, half.apex_distance).mirror
+    mesh, array = camera_a_mesh(array), array.arrays[0]
+    made = mirror_facets(array.spec, array.modelled_cells, array.apex_distance).mirror
     corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
     mirror, found = mirror_of_facets(corners, read_mirrors(tmp_path, "a"))
     area = np.linalg.norm(

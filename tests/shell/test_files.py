@@ -37,15 +37,15 @@ def test_all_files_are_there(exported: Path) -> None:
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_step_round_trip(exported: Path, small_design: MirrorDesign, which: int) -> None:
-    half = small_design.halves[which]
-    content = read_step(exported / f"shell_{half.camera_id}.step")
-    built = camera_solid(small_design, half)
+    array = small_design.arrays[which]
+    content = read_step(exported / f"shell_{array.camera_id}.step")
+    built = camera_solid(small_design, array)
     assert content.solids == 1
     assert content.valid
     assert volume(content.shape) == pytest.approx(volume(built.shape), rel=1e-9)
     assert area(content.shape) == pytest.approx(area(built.shape), rel=1e-9)
     assert set(content.faces) == {name for name, _ in built.faces}
-    assert content.kinds["StepGeom_SphericalSurface"] == len(half)
+    assert content.kinds["StepGeom_SphericalSurface"] == len(array)
     assert sum(content.kinds.values()) == len(built.faces)
 
 
@@ -54,9 +54,9 @@ def test_validation_properties_are_those_of_the_solid(
     exported: Path, small_design: MirrorDesign, which: int
 ) -> None:
     """Those of camera b's shell come by symmetry from camera a's."""
-    half = small_design.halves[which]
-    text = "".join((exported / f"shell_{half.camera_id}.step").read_text().split())
-    expected = properties(camera_solid(small_design, half).shape)
+    array = small_design.arrays[which]
+    text = "".join((exported / f"shell_{array.camera_id}.step").read_text().split())
+    expected = properties(camera_solid(small_design, array).shape)
     number = r"\(([-+.E0-9]+)\)"
     assert float(re.findall(f"VOLUME_MEASURE{number}", text)[0]) == pytest.approx(expected.volume)
     assert float(re.findall(f"AREA_MEASURE{number}", text)[0]) == pytest.approx(expected.area)
@@ -71,7 +71,7 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Mir
     from steputils import p21
 
     file = p21.readfile(str(exported / "shell_a.step"))
-    half = small_design.halves[0]
+    array = small_design.arrays[0]
     spheres = {}
     for instance in file.data[0].instances.values():
         if not hasattr(instance, "entity") or instance.entity.name != "ADVANCED_FACE":
@@ -82,8 +82,8 @@ def test_step_faces_keep_name_place_and_radius(exported: Path, small_design: Mir
             placement = file[sphere.params[1]].entity
             point = file[placement.params[1]].entity.params[1]
             spheres[name] = (*point, sphere.params[2])
-    assert list(spheres) == half.ids
-    expected = np.column_stack([half.mirrors.centre, half.mirrors.radius])
+    assert list(spheres) == array.ids
+    expected = np.column_stack([array.mirrors.centre, array.mirrors.radius])
     assert np.array(list(spheres.values())) == pytest.approx(expected, abs=1e-9)
 
 
@@ -105,12 +105,12 @@ def test_record(exported: Path, small_design: MirrorDesign) -> None:
     document = json.loads((exported / "design.json").read_text())
     assert document["spec"] == spec_dict(small_design.spec)
     assert document["mirrors"] == "mirrors.csv"
-    assert [row["id"] for row in rows] == [*small_design.halves[0].ids, *small_design.halves[1].ids]
-    for half in small_design.halves:
-        own_rows = [row for row in rows if row["camera"] == half.camera_id]
+    assert [row["id"] for row in rows] == [*small_design.arrays[0].ids, *small_design.arrays[1].ids]
+    for array in small_design.arrays:
+        own_rows = [row for row in rows if row["camera"] == array.camera_id]
         apex = np.array([[float(row[k]) for k in ("px", "py", "pz")] for row in own_rows])
-        assert np.array_equal(apex, half.mirrors.apex)  # full double precision
-        assert np.array_equal([float(row["coverage_mm"]) for row in own_rows], half.coverage)
+        assert np.array_equal(apex, array.mirrors.apex)  # full double precision
+        assert np.array_equal([float(row["coverage_mm"]) for row in own_rows], array.coverage)
 
 
 def test_planar_mirrors_have_no_sphere(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
 
 
 def facets_of(mirrors: MirrorDesign) -> Facets:
-    half = mirrors.halves[0]
-    return mirror_facets(mirrors.spec, half.modelled_cells, half.apex_distance)
+    array = mirrors.arrays[0]
+    return mirror_facets(mirrors.spec, array.modelled_cells, array.apex_distance)
 
 
 def normals_of(corner: np.ndarray) -> np.ndarray:
@@ -46,7 +46,7 @@ def normals_of(corner: np.ndarray) -> np.ndarray:
 
 def test_facets_lie_on_their_spheres_within_the_chord_error(small_design: MirrorDesign) -> None:
     facets = facets_of(small_design)
-    surfaces = small_design.halves[0].modelled_cells.surfaces
+    surfaces = small_design.arrays[0].modelled_cells.surfaces
     corner = facets.vertices[facets.triangles]
     for k in range(3):
         assert np.abs(surfaces.value(facets.mirror, corner[:, k])).max() < 1e-9
@@ -68,7 +68,7 @@ def test_all_facets_face_the_light(options: list[str]) -> None:
     in sight of its points' mean.
     """
     mirrors = design(load_spec(None, options))
-    facets, surfaces = facets_of(mirrors), mirrors.halves[0].modelled_cells.surfaces
+    facets, surfaces = facets_of(mirrors), mirrors.arrays[0].modelled_cells.surfaces
     corner = facets.vertices[facets.triangles]
     toward_light = surfaces.gradient(facets.mirror, corner.mean(axis=1))
     assert dot(normals_of(corner), toward_light).min() > 0
@@ -77,7 +77,7 @@ def test_all_facets_face_the_light(options: list[str]) -> None:
 def test_area_of_facets_is_that_of_the_cells(paper_design: MirrorDesign) -> None:
     facets = facets_of(paper_design)
     area = norm(normals_of(facets.vertices[facets.triangles])) / 2
-    assert area.sum() == pytest.approx(paper_design.halves[0].area.sum(), rel=1e-3)
+    assert area.sum() == pytest.approx(paper_design.arrays[0].area.sum(), rel=1e-3)
 
 
 @pytest.mark.parametrize("error_mm", [0.05, 0.2])
@@ -89,17 +89,17 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     """
     options = ["n=12", f"ray_error_mm={error_mm}", "chord_error_mm=0.002"]
     mirrors = design(load_spec(None, options))
-    facets, half = facets_of(mirrors), mirrors.halves[0]
+    facets, array = facets_of(mirrors), mirrors.arrays[0]
     on_rim = facets.triangles < len(facets.outlines.vertices)
     rim = on_rim.sum(axis=1) == 2
     mirror, corner = facets.mirror[rim], facets.vertices[facets.triangles[rim]]
     normal = unit(normals_of(corner))
     point = (corner * on_rim[rim][:, :, None]).sum(axis=1) / 2
-    exact = unit(half.modelled_cells.surfaces.gradient(mirror, point))
-    pinhole = half.camera.pinhole
+    exact = unit(array.modelled_cells.surfaces.gradient(mirror, point))
+    pinhole = array.camera.pinhole
     loss = miss_distances(pinhole, point, exact) - miss_distances(pinhole, point, normal)
     # Chords along curved arcs add their own sagitta, bounded by the chord error.
-    radius = half.modelled_cells.surfaces.radius[mirror]
+    radius = array.modelled_cells.surfaces.radius[mirror]
     chord = 2 * mirrors.spec.mesh.chord_error_mm * norm(point) / radius
     assert np.quantile(loss - chord, 0.99) < error_mm
 

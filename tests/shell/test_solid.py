@@ -27,8 +27,8 @@ def test_solid_is_valid_and_has_the_volume_of_its_mesh(options: list[str]) -> No
     fine = [*options, "structure_error_mm=0.002", "chord_error_mm=0.001"]
     mirrors = design(load_spec(None, fine))
     expected = pytest.approx(camera_a_mesh(mirrors).volume, rel=3e-4)
-    for half in mirrors.halves:
-        solid = camera_solid(mirrors, half)
+    for array in mirrors.arrays:
+        solid = camera_solid(mirrors, array)
         assert BRepCheck_Analyzer(solid.shape).IsValid()
         assert volume(solid.shape) == expected
 
@@ -37,21 +37,21 @@ def test_solid_is_valid_and_has_the_volume_of_its_mesh(options: list[str]) -> No
 def test_each_face_has_its_cells_area(rule: str) -> None:
     """A face that is the complement of its cell is valid too: only the area tells."""
     mirrors = design(load_spec(None, ["n=7", f"radius_rule={rule}"]))
-    for half in mirrors.halves:
-        faces = camera_solid(mirrors, half).faces[: len(half)]
-        assert [area(face) for _, face in faces] == pytest.approx(half.area, rel=1e-6)
+    for array in mirrors.arrays:
+        faces = camera_solid(mirrors, array).faces[: len(array)]
+        assert [area(face) for _, face in faces] == pytest.approx(array.area, rel=1e-6)
 
 
 def test_paper_design_areas(paper_design: MirrorDesign) -> None:
-    half = paper_design.halves[0]
-    faces = camera_solid(paper_design, half).faces[: len(half)]
-    assert sum(area(face) for _, face in faces) == pytest.approx(half.area.sum(), rel=1e-6)
+    array = paper_design.arrays[0]
+    faces = camera_solid(paper_design, array).faces[: len(array)]
+    assert sum(area(face) for _, face in faces) == pytest.approx(array.area.sum(), rel=1e-6)
 
 
 def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> None:
-    names = [name for name, _ in camera_solid(small_design, small_design.halves[1]).faces]
-    count = len(small_design.halves[1])
-    assert names[:count] == small_design.halves[1].ids
+    names = [name for name, _ in camera_solid(small_design, small_design.arrays[1]).faces]
+    count = len(small_design.arrays[1])
+    assert names[:count] == small_design.arrays[1].ids
     assert names[0] == "b0001"
     assert {"back", "seam", "foot", "seam_flange", "foot_flange"} <= set(names[count:])
     assert sum(name.startswith("seam_hole") for name in names) == 8
@@ -62,7 +62,7 @@ def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> 
 def test_holes_go_through(small_design: MirrorDesign) -> None:
     """Area of each hole's wall: circumference times thickness of its flange."""
     envelope = shell_envelope(small_design)
-    faces = dict(camera_solid(small_design, small_design.halves[0]).faces)
+    faces = dict(camera_solid(small_design, small_design.arrays[0]).faces)
     for kind in ("seam", "foot"):
         holes = getattr(envelope, f"{kind}_holes")
         thickness = np.linalg.norm(holes.direction)

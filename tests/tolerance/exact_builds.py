@@ -31,14 +31,14 @@ from tbcad.tolerance.montecarlo.draws import ShellDraws
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 
 
-def made(half: MirrorArray, draws: ShellDraws, k: int) -> Cells:
+def made(array: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     """Cells of build k before its shell is scaled and moved."""
-    every, m = half.cells.surfaces, len(half)
+    every, m = array.cells.surfaces, len(array)
     radius = 1 / every.curvature[:m] + draws.radius[k]
-    centre = half.mirrors.centre + draws.centre[k]
+    centre = array.mirrors.centre + draws.centre[k]
     spheres = Surfaces(centre + radius[:, None] * every.normal[:m], every.normal[:m], 1 / radius)
     walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
-    return cells_of(spheres.joined(walls), half.cells.triangles)
+    return cells_of(spheres.joined(walls), array.cells.triangles)
 
 
 def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
@@ -48,15 +48,15 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
     return replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
 
 
-def traced_coverage(half: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
+def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
     """Coverage of each mirror of build k by tbcad.optics.trace, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
     back = Rotation.from_rotvec(draws.shell_tilt[k]).inv()
-    pinhole = back.apply(half.camera.pinhole + draws.camera_shift[k] - draws.shell_shift[k])
+    pinhole = back.apply(array.camera.pinhole + draws.camera_shift[k] - draws.shell_shift[k])
     middle = back.apply(-draws.shell_shift[k])
-    cells = made(half, draws, k)
-    whole = half.cells.surfaces.apex[:, 0] != 0
+    cells = made(array, draws, k)
+    whole = array.cells.surfaces.apex[:, 0] != 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trace, "ROUNDS", FINE)
         patch.setattr(trace, "limiting_sides", lambda one: _counted(one, whole))
@@ -76,16 +76,16 @@ def write_meshes(
     design: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path
 ) -> None:
     """Write both shells of build k as STL files, as the exporter would."""
-    first, body = design.halves[0], shell_envelope(design)
-    for half, drawn in zip(design.halves, draws, strict=True):
-        own = made(half, drawn, k)
+    first, body = design.arrays[0], shell_envelope(design)
+    for array, drawn in zip(design.arrays, draws, strict=True):
+        own = made(array, drawn, k)
         facets = shell_mesh(
-            design.spec, own if half is first else own.mirrored(), body, first.apex_distance
+            design.spec, own if array is first else own.mirrored(), body, first.apex_distance
         )
-        facets = facets if half is first else facets.mirrored()
+        facets = facets if array is first else facets.mirrored()
         turn = Rotation.from_rotvec(drawn.shell_tilt[k])
         points = turn.apply(facets.vertices * drawn.scale[k]) + drawn.shell_shift[k]
-        write_stl(folder / f"shell_{half.camera_id}.stl", Mesh(points, facets.triangles))
+        write_stl(folder / f"shell_{array.camera_id}.stl", Mesh(points, facets.triangles))
 
 
 def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -120,17 +120,17 @@ def _minimum_coverage(setup: OpticalSetup) -> np.ndarray:
 
 
 def bisected_coverage(
-    half: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000
+    array: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000
 ) -> float:
     """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
 
     Every sphere and plane is looked at, scaled as it is, without any circle or corner.
     """
-    every, m = half.cells.surfaces, len(half)
+    every, m = array.cells.surfaces, len(array)
     scale = draws.scale[k]
-    centre = half.mirrors.centre + draws.centre[k]
-    radius = half.mirrors.radius + draws.radius[k]
-    apart = np.linalg.norm(half.mirrors.apex - half.mirrors.apex[mirror], axis=1)
+    centre = array.mirrors.centre + draws.centre[k]
+    radius = array.mirrors.radius + draws.radius[k]
+    apart = np.linalg.norm(array.mirrors.apex - array.mirrors.apex[mirror], axis=1)
     others = np.argsort(apart)[1:26]
     axis = np.eye(3) - np.outer(every.normal[mirror], every.normal[mirror])
     first = axis[np.argmax(np.linalg.norm(axis, axis=1))]
@@ -160,15 +160,15 @@ def bisected_coverage(
     point = at(low)
     normal = (point / scale - centre[mirror]) / scale
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return float(2 * miss_distances(half.camera.pinhole, point, normal).min())
+    return float(2 * miss_distances(array.camera.pinhole, point, normal).min())
 
 
-def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
+def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:
     """Whether each whole mirror's rays go round the object's middle, the camera moved, (m,).
 
     By the angle that the outline's image turns about the middle, along finely sampled arcs.
     """
-    cells, pinhole = half.cells, half.camera.pinhole + shift
+    cells, pinhole = array.cells, array.camera.pinhole + shift
     offsets, sides = cells.rings
     mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
     t = np.broadcast_to(np.linspace(0, 1, 65), (len(sides), 65))
@@ -176,10 +176,10 @@ def surrounded(half: MirrorArray, shift: np.ndarray) -> np.ndarray:
     point = cells.arcs.at(np.broadcast_to((sides // 2)[:, None], t.shape), t)
     face = np.broadcast_to(mirror[:, None], t.shape)
     out = reflected_rays(pinhole, point, cells.surfaces.gradient(face, point))
-    u = half.u[mirror][:, None]
+    u = array.u[mirror][:, None]
     image = point - out * ((point * u).sum(axis=2) / (out * u).sum(axis=2))[..., None]
-    first = np.cross(half.u, [0.3, 0.5, 0.8])
-    second = np.cross(half.u, first)
+    first = np.cross(array.u, [0.3, 0.5, 0.8])
+    second = np.cross(array.u, first)
     angle = np.arctan2(
         np.einsum("stx,sx->st", image, second[mirror]),
         np.einsum("stx,sx->st", image, first[mirror]),

@@ -325,7 +325,7 @@ class TestTables:
         assert all(float(row["five_percent_mm"]) < float(row["median_mm"]) for row in rows)
         u = np.array([[float(row[name]) for name in ("ux", "uy", "uz")] for row in rows])
         assert np.linalg.norm(u, axis=1) == pytest.approx(1, abs=1e-12)
-        assert np.array_equal(u[: len(little.halves[0])], analysis.cameras[0].u)
+        assert np.array_equal(u[: len(little.arrays[0])], analysis.cameras[0].u)
         # One for each direction of both halves.
         every = np.concatenate([at.u for at in analysis.cameras])
         apart = np.linalg.norm(every[:, None] - u, axis=2)

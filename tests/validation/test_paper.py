@@ -8,10 +8,10 @@ import pytest
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray, design, numbered_directions
+from tbcad.mirrors.array import MirrorArray, numbered_directions
 from tbcad.optics import flat
 from tbcad.simulate.study.paper import claimed
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)
 
@@ -20,10 +20,6 @@ def camera_a(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions of camera a's mirrors and all directions."""
     every, _ = numbered_directions(n)
     return every[(every[:, 0] >= 0) & (every[:, 2] >= 0)], every
-
-
-def mirrors_of(*settings: str) -> MirrorArray:
-    return design(load_spec(None, settings)).halves[0]
 
 
 def test_numbers_of_virtual_cameras() -> None:
@@ -52,7 +48,7 @@ def test_traced_coverage_of_flat_mirrors_agrees_with_their_cones() -> None:
 
     Measured on cells the shell's own borders count, seam and foot, not the neighbours beyond.
     """
-    half = mirrors_of("n=4", "radius_rule=flat")
+    half = mirror_array("n=4", "radius_rule=flat")
     inner = (half.u[:, 0] > 0.4) & (half.u[:, 2] > 0.4)
     cone = 2 * ELLIPSOID.camera_distance * np.sin(half.theta0)
     assert half.coverage[inner] == pytest.approx(cone[inner], rel=1e-6)
@@ -83,7 +79,7 @@ def test_angle_of_incidence() -> None:
 
 def test_radii_by_equation_2() -> None:
     """8.00 ... 65.4 mm, strongly tied to the polar angle of 45 ... 135 degrees."""
-    half = mirrors_of("radius_rule=paper")
+    half = mirror_array("radius_rule=paper")
     radius = half.mirrors.radius
     assert radius.min() == pytest.approx(8.00, abs=0.005)
     assert radius.max() == pytest.approx(65.4, abs=0.06)
@@ -99,7 +95,7 @@ def test_equation_2_falls_short() -> None:
     the one per cent looks like the first measurement's sampling of the cells' edges. The largest
     is the mirror (1, 0, 0), whose coverage the foot plane's place decides.
     """
-    coverage = mirrors_of("radius_rule=paper").coverage
+    coverage = mirror_array("radius_rule=paper").coverage
     assert (coverage < 60).sum() == 845
     assert coverage.min() == pytest.approx(50.34, abs=0.005)
     assert coverage.min() == pytest.approx(50.8, rel=0.01)
@@ -110,30 +106,30 @@ def test_equation_2_falls_short() -> None:
 
 def test_radii_that_reach_60_mm() -> None:
     """Before: 6.98 ... 68.4 mm, 0.88 of eq. 2. Exact here: 6.84 ... 67.11, 0.863."""
-    half = mirrors_of("margin_mm=0")
+    half = mirror_array("margin_mm=0")
     assert half.coverage == pytest.approx(np.full(847, 60.0), abs=0.01)
     radius = half.mirrors.radius
     assert radius.min() == pytest.approx(6.98, rel=0.021)
     assert radius.max() == pytest.approx(68.4, rel=0.021)
-    ratio = radius * mirrors_of("radius_rule=paper").mirrors.curvature
+    ratio = radius * mirror_array("radius_rule=paper").mirrors.curvature
     assert np.median(ratio) == pytest.approx(0.88, rel=0.021)
 
 
-def test_graph_of_the_cells(paper_half: MirrorArray) -> None:
+def test_graph_of_the_cells(paper_array: MirrorArray) -> None:
     """V - E + F = 1. Before: 1738 - 2584 + 847, with a corner split in two at 44 places."""
-    arcs = paper_half.cells.arcs
+    arcs = paper_array.cells.arcs
     corners = len(np.unique(np.concatenate([arcs.start, arcs.end])))
-    assert (corners, len(arcs), paper_half.cells.mirrors) == (1694, 2540, 847)
+    assert (corners, len(arcs), paper_array.cells.mirrors) == (1694, 2540, 847)
     assert corners - len(arcs) + 847 == 1
 
 
-def test_equatorial_mirrors_stay_whole(paper_half: MirrorArray) -> None:
+def test_equatorial_mirrors_stay_whole(paper_array: MirrorArray) -> None:
     """The foot plane lies half a mirror below z = 0: all of their apices and widths are above."""
-    equator = paper_half.u[:, 2] == 0
-    assert (paper_half.half_width[equator] <= -paper_half.foot + 1e-12).all()
+    equator = paper_array.u[:, 2] == 0
+    assert (paper_array.half_width[equator] <= -paper_array.foot + 1e-12).all()
 
 
-def test_number_of_equatorial_mirrors(paper_half: MirrorArray) -> None:
+def test_number_of_equatorial_mirrors(paper_array: MirrorArray) -> None:
     """37 a camera, by Table I: it gives 1657 virtual cameras for n = 18, z = 0 included.
 
     The polyhedron has 10 n^2 + 2 = 3242 vertices and mirror symmetry in z = 0, so 2 * 1657 - 3242
@@ -143,6 +139,6 @@ def test_number_of_equatorial_mirrors(paper_half: MirrorArray) -> None:
     """
     on_equator = numbered_directions(18)[0][:, 2] == 0
     assert on_equator.sum() == 2 * 1657 - 3242 == 72
-    equatorial = paper_half.u[paper_half.u[:, 2] == 0]
+    equatorial = paper_array.u[paper_array.u[:, 2] == 0]
     assert (equatorial[:, 0] == 0).sum() == 2
     assert len(equatorial) == 70 // 2 + 2 == 37

@@ -220,16 +220,16 @@ def test_convex_mirrors_need_more_depth_of_field(depths: dict[str, float]) -> No
 
 
 def test_range_of_distances_cannot_be_that_of_table_i(
-    paper_half: MirrorArray, depths: dict[str, float]
+    paper_array: MirrorArray, depths: dict[str, float]
 ) -> None:
     """150 ... 250 mm (section 6): no mirror is farther than 187 mm, its image 4 mm more.
 
     The images of the flat mirrors' centres are the only ones near the upper end, at 2 a = 245 mm.
     """
-    to_mirror = norm(paper_half.mirrors.apex - paper_half.camera.pinhole)
+    to_mirror = norm(paper_array.mirrors.apex - paper_array.camera.pinhole)
     assert to_mirror.max() < 190 < claimed("depth_far")
     assert depths["camera to farthest image, traced radii"] - to_mirror.max() < 5
-    assert 2 * paper_half.ellipsoid.semi_major == pytest.approx(claimed("depth_far"), rel=0.025)
+    assert 2 * paper_array.ellipsoid.semi_major == pytest.approx(claimed("depth_far"), rel=0.025)
     assert depths["camera to nearest image, traced radii"] < claimed("depth_near")
 
 

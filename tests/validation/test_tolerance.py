@@ -68,9 +68,9 @@ def row(*vector: float) -> np.ndarray:
 def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     """To the accuracy of the design's own samples, 1e-5 mm; the next test goes farther."""
     made = design(load_spec(None, settings))
-    for half, fast in zip(made.halves, halves_of(made), strict=True):
+    for array, fast in zip(made.arrays, halves_of(made), strict=True):
         one = mirror_coverage(fast, perfect(fast))
-        assert one.diameter[0] == pytest.approx(half.coverage, abs=2e-5)
+        assert one.diameter[0] == pytest.approx(array.coverage, abs=2e-5)
         assert (one.crossings[0, ~fast.halved] % 2 == 1).all()
 
 
@@ -81,7 +81,7 @@ def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> No
     """
     halves = halves_of(paper_design)
     draws = tuple(perfect(fast) for fast in halves)
-    for half, fast, drawn in zip(paper_design.halves, halves, draws, strict=True):
+    for half, fast, drawn in zip(paper_design.arrays, halves, draws, strict=True):
         found = mirror_coverage(fast, drawn).diameter[0]
         assert np.abs(found - traced_coverage(half, drawn, 0)).max() < 1e-6
         assert np.abs(found - half.coverage).max() < 1e-5
@@ -188,17 +188,17 @@ def test_pointing_error_is_the_lever_of_a_curved_mirror(
     halves: EdgeModels,
     error: Callable[[EdgeModel, float], tuple[ShellDraws, np.ndarray, np.ndarray]],
 ) -> None:
-    for half in halves:
-        draws, start, turn = error(half, 1e-4)
-        offset, angle = lever(half, start, turn)
-        found_angle, found_offset = pointing(half, draws)
+    for array in halves:
+        draws, start, turn = error(array, 1e-4)
+        offset, angle = lever(array, start, turn)
+        found_angle, found_offset = pointing(array, draws)
         assert found_offset[0] == pytest.approx(offset, rel=1e-3, abs=1e-8)
         assert found_angle[0] == pytest.approx(angle, rel=1e-3, abs=1e-10)
 
 
 def test_radius_of_one_mirror_alone(halves: EdgeModels, small_design: MirrorDesign) -> None:
     """Its own coverage by brute force; its neighbours see less or more, all others the same."""
-    half, alone = small_design.halves[0], 40
+    half, alone = small_design.arrays[0], 40
     radius = np.zeros((1, len(half)))
     radius[0, alone] = 0.1
     drawn = replace(perfect(halves[0]), radius=radius)
@@ -231,7 +231,7 @@ def test_random_builds_against_slow_tracing(
     """20 builds of 2 x 103 mirrors, within 1e-6 mm (asked for: 1e-4)."""
     errors = scaled(POSED, share)
     for half, fast, drawn in zip(
-        small_design.halves, halves, draw(errors, 7, range(20), len(halves[0])), strict=True
+        small_design.arrays, halves, draw(errors, 7, range(20), len(halves[0])), strict=True
     ):
         found = mirror_coverage(fast, drawn).diameter
         slow = np.stack([traced_coverage(half, drawn, k) for k in range(20)])
@@ -243,7 +243,7 @@ def test_random_paper_builds_against_slow_tracing(paper_design: MirrorDesign) ->
     halves = halves_of(paper_design)
     drawn, _ = draw(POSED, 7, range(3), len(halves[0]))
     found = mirror_coverage(halves[0], drawn).diameter
-    slow = np.stack([traced_coverage(paper_design.halves[0], drawn, k) for k in range(3)])
+    slow = np.stack([traced_coverage(paper_design.arrays[0], drawn, k) for k in range(3)])
     assert np.abs(found - slow).max() < 1e-6
 
 
@@ -257,7 +257,7 @@ def test_uneven_scale_against_brute_force(
     assert np.ptp(drawn.scale) > 0.005
     found = mirror_coverage(halves[1], drawn).diameter[0, mirror]
     assert found == pytest.approx(
-        bisected_coverage(small_design.halves[1], drawn, 0, mirror), abs=1e-4
+        bisected_coverage(small_design.arrays[1], drawn, 0, mirror), abs=1e-4
     )
 
 

@@ -60,32 +60,32 @@ class BallFit:
 
 def ball_fit(candidates: BallCandidates, balls: Balls, spec: PrototypeSpec) -> BallFit:
     """What the balls show in place of the mirrors."""
-    half, groups = candidates.half, candidates.groups
+    array, groups = candidates.array, candidates.groups
     shell = used_outlines(
-        ball_poses(half.ellipsoid, half.polar),
-        half.mirrors.radius,
-        2 * half.ellipsoid.linear_eccentricity,
+        ball_poses(array.ellipsoid, array.polar),
+        array.mirrors.radius,
+        2 * array.ellipsoid.linear_eccentricity,
         candidates.target / 2,
     )
     return BallFit(
         ball=groups.group_of,
-        polar_error=groups.polar[groups.group_of] - half.polar,
+        polar_error=groups.polar[groups.group_of] - array.polar,
         coverage=candidates.coverage(balls.radius, moved=True),
         coverage_fixed=candidates.coverage(balls.radius, moved=False),
         coverable=coverable(candidates, balls.catalogue, spec.picture == "moved"),
-        pixels_shell=_pixels(half, shell),
-        pixels=_pixels(half, balls.outline[groups.group_of]),
+        pixels_shell=_pixels(array, shell),
+        pixels=_pixels(array, balls.outline[groups.group_of]),
     )
 
 
-def _pixels(half: MirrorArray, outline: Floats) -> Floats:
+def _pixels(array: MirrorArray, outline: Floats) -> Floats:
     """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
-    share = np.where(half.u[:, 0] == 0, 0.5, 1.0)
-    return share * pixel_counts(half.camera, half.ellipsoid.frame(), outline, half.azimuth)
+    share = np.where(array.u[:, 0] == 0, 0.5, 1.0)
+    return share * pixel_counts(array.camera, array.ellipsoid.frame(), outline, array.azimuth)
 
 
 def ball_alternatives(
-    spec: Spec, half: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
+    spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
 ) -> list[dict[str, Any]]:
     """What each rule costs, for groups of camera a's mirrors: records for prototype.json.
 
@@ -94,13 +94,13 @@ def ball_alternatives(
 
     Args:
         spec: the design.
-        half: camera a's mirrors.
+        array: camera a's mirrors.
         groups: of them.
         balls: chosen by the spec's own rule, from the catalogue that all rules choose from.
         fit: of these balls.
     """
     target = spec.optics.capture_diameter_mm
-    candidates = ball_candidates(half, groups, target)
+    candidates = ball_candidates(array, groups, target)
 
     def alternative(rule: dict[str, Any]) -> tuple[Balls, BallFit]:
         ruled = spec.prototype.model_copy(update=rule)

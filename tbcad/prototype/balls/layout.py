@@ -50,7 +50,7 @@ class PrototypeLayout:
     the shell (z up), as are those of the mirrors.
 
     Attributes:
-        half: camera a and its mirrors.
+        array: camera a and its mirrors.
         grade: deviations that the balls' grade allows.
         groups: mirrors that share a ball.
         balls: in the half-plane of azimuth zero.
@@ -62,7 +62,7 @@ class PrototypeLayout:
             turned by 180 degrees about z, (m,).
     """
 
-    half: MirrorArray
+    array: MirrorArray
     grade: Grade
     groups: MirrorGroups
     balls: Balls
@@ -78,7 +78,9 @@ class PrototypeLayout:
 
     def on_base(self, points: Floats, angle: float = 0.0) -> Floats:
         """Points (k, 3) given at azimuth zero, one a ball, on the base at an angle, mm."""
-        return rotated_about_x(points, self.placement.azimuth + angle) @ self.half.ellipsoid.frame()
+        return (
+            rotated_about_x(points, self.placement.azimuth + angle) @ self.array.ellipsoid.frame()
+        )
 
     def apices(self, angle: float = 0.0) -> Floats:
         """Apices of the balls with the base at an angle (radians), mm, (k, 3)."""
@@ -118,30 +120,30 @@ def prototype_layout(spec: Spec, design: MirrorDesign, count: int | None = None)
     Raises:
         SpecError: when there is no such layout; it says what to change.
     """
-    half = design.halves[0]
+    array = design.arrays[0]
     k = next(ball_counts(spec, design)) if count is None else count
-    candidates, balls = _balls_for_groups(spec, half, k, _catalogue(spec.prototype))
+    candidates, balls = _balls_for_groups(spec, array, k, _catalogue(spec.prototype))
     groups, stop_error = candidates.groups, float(np.radians(spec.prototype.stop_error_deg))
-    requests = stop_requests(groups, half.azimuth, stop_error)
-    problem = _placement_problem(spec, half, balls, requests)
+    requests = stop_requests(groups, array.azimuth, stop_error)
+    problem = _placement_problem(spec, array, balls, requests)
     placement = min_swing_placement(problem)
     azimuth = azimuths_for_fewer_stops(problem, requests, placement.azimuth)
     return PrototypeLayout(
-        half=half,
+        array=array,
         grade=load_grades()[spec.prototype.grade],
         groups=groups,
         balls=balls,
         fit=ball_fit(candidates, balls, spec.prototype),
         problem=problem,
         placement=replace(placement, azimuth=azimuth, outermost=problem.outermost(azimuth)),
-        stops=plan_stops(groups, half.polar, requests, azimuth),
-        twin=_twins(half),
+        stops=plan_stops(groups, array.polar, requests, azimuth),
+        twin=_twins(array),
     )
 
 
-def _check_suitable(spec: Spec, half: MirrorArray) -> None:
+def _check_suitable(spec: Spec, array: MirrorArray) -> None:
     """One camera photographs both halves only if a half turn of the object swaps the cameras."""
-    if np.isnan(half.mirrors.radius).any():
+    if np.isnan(array.mirrors.radius).any():
         raise SpecError(
             "a prototype of balls needs curved mirrors, but mirrors.radius_rule is flat: set it "
             "to traced or paper"
@@ -161,25 +163,25 @@ def ball_counts(spec: Spec, design: MirrorDesign) -> Iterator[int]:
     Raises:
         SpecError: no prototype of balls suits the mirrors.
     """
-    half = design.halves[0]
-    _check_suitable(spec, half)
+    array = design.arrays[0]
+    _check_suitable(spec, array)
     if isinstance(spec.prototype.k, int):
         yield spec.prototype.k
         return
-    distinct = max_groups(half.polar, half.mirrors.radius, spec.prototype.radius_weight_deg)
+    distinct = max_groups(array.polar, array.mirrors.radius, spec.prototype.radius_weight_deg)
     most = min(distinct, MOST_BALLS)
-    smallest = _smallest_count(spec, half, most)
+    smallest = _smallest_count(spec, array, most)
     if smallest is not None:
         yield from range(smallest, min(smallest + MORE_BALLS, most) + 1)
     yield from range(min((smallest or MANY_BALLS + 1) - 1, most), 0, -1)
 
 
-def _smallest_count(spec: Spec, half: MirrorArray, most: int) -> int | None:
+def _smallest_count(spec: Spec, array: MirrorArray, most: int) -> int | None:
     """The smallest number of balls within the limits of the spec, None when there is none."""
     limits, catalogue = spec.prototype, _catalogue(spec.prototype)
     for k in range(1, min(most, MANY_BALLS) + 1):
-        if _directions_within_limits(limits, half, k):
-            fit = ball_fit(*_balls_for_groups(spec, half, k, catalogue), limits)
+        if _directions_within_limits(limits, array, k):
+            fit = ball_fit(*_balls_for_groups(spec, array, k, catalogue), limits)
             if 100 * (1 - fit.kept_share) <= limits.auto_lost_percent:
                 return k
     return None
@@ -190,14 +192,14 @@ def _catalogue(spec: PrototypeSpec) -> Catalogue:
     return load_catalogue(spec.catalogues).available(spec.grade, spec.largest_ball_mm)
 
 
-def _groups(spec: PrototypeSpec, half: MirrorArray, k: int) -> MirrorGroups:
-    return group_mirrors(half.polar, half.mirrors.radius, k, spec.radius_weight_deg)
+def _groups(spec: PrototypeSpec, array: MirrorArray, k: int) -> MirrorGroups:
+    return group_mirrors(array.polar, array.mirrors.radius, k, spec.radius_weight_deg)
 
 
-def _directions_within_limits(spec: PrototypeSpec, half: MirrorArray, k: int) -> bool:
+def _directions_within_limits(spec: PrototypeSpec, array: MirrorArray, k: int) -> bool:
     """Whether the polar errors of k groups are within the limits; this needs no balls."""
-    groups = _groups(spec, half, k)
-    error = np.degrees(np.abs(groups.polar[groups.group_of] - half.polar))
+    groups = _groups(spec, array, k)
+    error = np.degrees(np.abs(groups.polar[groups.group_of] - array.polar))
     return bool(
         error.max() <= spec.auto_direction_max_deg
         and np.median(error) <= spec.auto_direction_median_deg
@@ -205,20 +207,20 @@ def _directions_within_limits(spec: PrototypeSpec, half: MirrorArray, k: int) ->
 
 
 def _balls_for_groups(
-    spec: Spec, half: MirrorArray, k: int, catalogue: Catalogue
+    spec: Spec, array: MirrorArray, k: int, catalogue: Catalogue
 ) -> tuple[BallCandidates, Balls]:
-    groups = _groups(spec.prototype, half, k)
-    candidates = ball_candidates(half, groups, spec.optics.capture_diameter_mm)
+    groups = _groups(spec.prototype, array, k)
+    candidates = ball_candidates(array, groups, spec.optics.capture_diameter_mm)
     return candidates, choose_balls(candidates, spec.prototype, catalogue)
 
 
 def _placement_problem(
-    spec: Spec, half: MirrorArray, balls: Balls, requests: StopRequests
+    spec: Spec, array: MirrorArray, balls: Balls, requests: StopRequests
 ) -> PlacementProblem:
-    limits, ellipsoid = spec.prototype, half.ellipsoid
+    limits, ellipsoid = spec.prototype, array.ellipsoid
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, spec.optics.capture_diameter_mm / 2
     length = POST_LENGTHS * ellipsoid.semi_major
-    fixed = obstacles(limits, ellipsoid.frame(), half.camera, length)
+    fixed = obstacles(limits, ellipsoid.frame(), array.camera, length)
     lowest, highest = allowed_azimuths(balls, limits, fixed)
     return PlacementProblem(
         min_separation=np.maximum(*min_separations(balls, limits, pinhole, capture)),
@@ -231,11 +233,11 @@ def _placement_problem(
     )
 
 
-def _twins(half: MirrorArray) -> Ints:
+def _twins(array: MirrorArray) -> Ints:
     """Mirror (m,) that is each one's image in the plane y = 0.
 
     Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's
     mirror with the number of (x, -y, z).
     """
-    image = half.u * FLIP_X[[1, 0, 2]]
-    return np.asarray((half.u @ image.T).argmax(axis=0))
+    image = array.u * FLIP_X[[1, 0, 2]]
+    return np.asarray((array.u @ image.T).argmax(axis=0))

@@ -92,27 +92,27 @@ class BallCandidates:
     """Groups of camera a's mirrors, and what balls show in their places.
 
     Attributes:
-        half: camera a's mirrors.
+        array: camera a's mirrors.
         groups: of them.
         windows: their cells as the camera sees them.
         target: required coverage diameter, mm.
     """
 
-    half: MirrorArray
+    array: MirrorArray
     groups: MirrorGroups
     windows: Windows
     target: float
 
     def coverage(self, radius: Floats, moved: bool) -> Floats:
         """Coverage diameter (m,) with reflecting radii (k,), in moved cells or fixed ones, mm."""
-        half, group_of = self.half, self.groups.group_of
-        poses = ball_poses(half.ellipsoid, self.groups.polar)
+        array, group_of = self.array, self.groups.group_of
+        poses = ball_poses(array.ellipsoid, self.groups.polar)
         centre = rotated_about_x(
-            (poses.apex - radius[:, None] * poses.normal)[group_of], half.azimuth
+            (poses.apex - radius[:, None] * poses.normal)[group_of], array.azimuth
         )
-        across = rotated_about_x(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), half.azimuth)
-        frame = half.ellipsoid.frame()
-        rotation = self._window_rotation() if moved else np.zeros(len(half))
+        across = rotated_about_x(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), array.azimuth)
+        frame = array.ellipsoid.frame()
+        rotation = self._window_rotation() if moved else np.zeros(len(array))
         covered = self.windows.coverage(centre @ frame, radius[group_of], across @ frame, rotation)
         return covered if moved else np.where(self._shows_origin(), covered, 0.0)
 
@@ -123,25 +123,27 @@ class BallCandidates:
 
     def _window_rotation(self) -> Floats:
         """Rotation of each mirror's window about the pinhole that takes its apex to the ball's."""
-        angle = field_angles(self.half.ellipsoid, self.groups.polar)[self.groups.group_of]
-        return field_angles(self.half.ellipsoid, self.half.polar) - angle
+        angle = field_angles(self.array.ellipsoid, self.groups.polar)[self.groups.group_of]
+        return field_angles(self.array.ellipsoid, self.array.polar) - angle
 
     def _shows_origin(self) -> Bools:
         """Whether the ball's apex, which shows the origin, is in the mirror's own cell, (m,)."""
-        half = self.half
-        apex = ball_poses(half.ellipsoid, self.groups.polar).apex[self.groups.group_of]
-        sight = rotated_about_x(apex, half.azimuth) @ half.ellipsoid.frame() - half.camera.pinhole
+        array = self.array
+        apex = ball_poses(array.ellipsoid, self.groups.polar).apex[self.groups.group_of]
+        sight = (
+            rotated_about_x(apex, array.azimuth) @ array.ellipsoid.frame() - array.camera.pinhole
+        )
         direction = sight / norm(sight)[:, None]
-        return self.windows.contains(direction, direction, np.zeros(len(half)))
+        return self.windows.contains(direction, direction, np.zeros(len(array)))
 
     def only(self, mirrors: Bools) -> "BallCandidates":
         """The same, computing coverage for some mirrors only; infinite for the others."""
         return replace(self, windows=self.windows.only(mirrors))
 
 
-def ball_candidates(half: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
+def ball_candidates(array: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
     """Groups of mirrors whose places balls can be tried in; target is a coverage in mm."""
-    return BallCandidates(half, groups, cell_windows(half.cells, half.camera.pinhole), target)
+    return BallCandidates(array, groups, cell_windows(array.cells, array.camera.pinhole), target)
 
 
 def choose_balls(candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue) -> Balls:
@@ -157,7 +159,7 @@ def balls_with_radii(
     candidates: BallCandidates, radius: Floats, stock: Ints, catalogue: Catalogue, rim: float
 ) -> Balls:
     """Balls with reflecting radii (k,) in the places of the groups, caps with a rim (mm)."""
-    ellipsoid = candidates.half.ellipsoid
+    ellipsoid = candidates.array.ellipsoid
     poses = ball_poses(ellipsoid, candidates.groups.polar)
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, candidates.target / 2
     outline = used_outlines(poses, radius, pinhole, capture)
@@ -238,7 +240,7 @@ def _largest_place(covers: Callable[[Ints], Bools], count: int, last: int) -> In
 
 def _largest_radius(candidates: BallCandidates, low: Floats, ignored: Bools, moved: bool) -> Floats:
     """Largest reflecting radius (k,) from low upward that shows the target, mm."""
-    mirror = candidates.half.mirrors.radius
+    mirror = candidates.array.mirrors.radius
     high = np.maximum(low, MAX_CAP_RADIUS * candidates.groups.mean(mirror))
     for _ in range(BISECTION_STEPS):
         middle = (low + high) / 2

@@ -118,7 +118,7 @@ def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
     Raises:
         SpecError: when something does not fit; it says what to change.
     """
-    frame, seats = prototype.half.ellipsoid.frame(), seat_layout(spec, prototype)
+    frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)
     behind_light = float(light.pinhole / 2 - light.level / 2)
@@ -145,7 +145,7 @@ def _light(spec: BaseSpec, prototype: PrototypeLayout) -> LightSpheroid:
     On a sphere about a point the sum of distances is at most that at the point plus the diameter.
     The capture sphere is inside the mirrors' ellipsoid and so far below the level of any ball.
     """
-    pinhole = 2 * prototype.half.ellipsoid.linear_eccentricity
+    pinhole = 2 * prototype.array.ellipsoid.linear_eccentricity
     foci = LightSpheroid(pinhole, 0.0)
     cones = light_hulls(prototype.balls.outline, pinhole, 0.0)[0]
     level = (foci.excess(cones.end) + 2 * cones.end_radius).max()
@@ -205,7 +205,7 @@ def _end(seats: Seats, frame: Floats) -> float:
 
 def _sector(spec: BaseSpec, seats: Seats, prototype: PrototypeLayout) -> tuple[float, float]:
     """Azimuths between which the wall carries all bosses and has room for the edges' ribs."""
-    azimuth, frame = prototype.placement.azimuth, prototype.half.ellipsoid.frame()
+    azimuth, frame = prototype.placement.azimuth, prototype.array.ellipsoid.frame()
     radius = _half_plane(seats.at_depth(seats.front) @ frame.T)[:, 1]
     room = seats.boss + spec.rib_mm + EDGE_MM
     if (near := radius <= room).any():

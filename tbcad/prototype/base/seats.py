@@ -131,7 +131,7 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
 
 
 def _axes(prototype: PrototypeLayout) -> Floats:
-    frame, azimuth = prototype.half.ellipsoid.frame(), prototype.placement.azimuth
+    frame, azimuth = prototype.array.ellipsoid.frame(), prototype.placement.azimuth
     against = np.stack([0 * azimuth, np.sin(azimuth), -np.cos(azimuth)], axis=1) @ frame
     back = -prototype.normals()
     return np.stack([np.cross(against, back), against, back], axis=1)

@@ -33,7 +33,7 @@ def picture_rows(layout: PrototypeLayout) -> list[Row]:
     mirrors_b = [f"b{i + 1:04d}" for i in layout.twin.tolist()]
     rows = [
         (turn, int(stops.stop[i]) + 1, degrees[i][0], ball[i], mirrors[i], *degrees[i][1:])
-        for turn, mirrors in ((0, layout.half.ids), (180, mirrors_b))
+        for turn, mirrors in ((0, layout.array.ids), (180, mirrors_b))
         for i in order
     ]
     return [

@@ -53,7 +53,7 @@ def export_prototype(
     built = build_prototype_model(design, progress, submit)
     spec, layout = built.spec, built.layout
     progress("prototype: files")
-    chosen = (layout.half, layout.groups, layout.balls, layout.fit)
+    chosen = (layout.array, layout.groups, layout.balls, layout.fit)
     alternatives = submit(ball_alternatives, spec, *chosen)
     for part in built.printed:
         submit(_write_part, folder, part, spec)
@@ -84,10 +84,10 @@ def _file_names(part: PrintedPart) -> dict[str, str]:
 def document(built: PrototypeModel, alternatives: list[dict[str, Any]]) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers; alternatives are of its balls."""
     layout, spec = built.layout, built.spec.prototype
-    axis, zero, third = (layout.half.ellipsoid.frame() + 0.0).tolist()
+    axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return {
         "schema": SCHEMA,
-        "camera": layout.half.camera_id,
+        "camera": layout.array.camera_id,
         "target_mm": built.spec.optics.capture_diameter_mm,
         "picture": spec.picture,
         "target_pad_um": PAD_UM,

@@ -95,8 +95,8 @@ def bearing_head(
     edge = axes @ hub_point(base, plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
-    corner = np.array([plate.front, plate.high, plate.half])
-    body = box(np.array([plate.back, plate.low, -plate.half]), corner, base.frame)
+    corner = np.array([plate.front, plate.high, plate.half_width])
+    body = box(np.array([plate.back, plate.low, -plate.half_width]), corner, base.frame)
     added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
     removed = _motor_holes(spec, base, drive, plate)
     removed += _screws(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))

@@ -145,7 +145,7 @@ def _brackets(
     brackets = [upright_foot(spec.frame, axes, head.face, side) for side in (1, -1)]
     brackets.append(stage_foot(spec.frame, axes, stage, parts[FOOT_INSERT]))
     if spec.camera_diameter_mm > 0:
-        brackets.append(camera_bracket(spec, axes, prototype.half.camera))
+        brackets.append(camera_bracket(spec, axes, prototype.array.camera))
     return brackets
 
 
@@ -196,7 +196,7 @@ def _plate(
 def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
     if spec.camera_diameter_mm == 0:
         return []
-    camera, radius = prototype.half.camera, spec.camera_diameter_mm / 2
+    camera, radius = prototype.array.camera, spec.camera_diameter_mm / 2
     body = Cylinder(camera.pinhole, -camera.forward, radius, spec.camera_length_mm)
     return [Component("camera", "camera behind its pinhole", (body,))]
 

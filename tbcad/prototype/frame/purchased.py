@@ -27,13 +27,13 @@ class HeadPlate:
         front: of its face toward the hub, along the axis.
         low: of its lower edge, out from the axis.
         high: of its upper edge.
-        half: of its width.
+        half_width: of the plate.
     """
 
     front: float
     low: float
     high: float
-    half: float
+    half_width: float
 
     @property
     def back(self) -> float:
@@ -125,13 +125,13 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
     if motor.kind == "stages":
         body = axial_cylinder(base, base.hub.face, plate.front, motor["top_mm"] / 2)
         return _component("rotary_stage", motor, body)
-    half, out = motor["frame_mm"] / 2, drive.centre_mm
-    low = np.array([plate.back - motor["length_mm"], out - half, -half])
+    half_width, out = motor["frame_mm"] / 2, drive.centre_mm
+    low = np.array([plate.back - motor["length_mm"], out - half_width, -half_width])
     pilot = plate.back - OVERLAP_MM, plate.back + motor["pilot_height_mm"]
     # Through the pinion, or into the coupling.
     tip = base.hub.face - (0.0 if drive.belt else SHAFT_GAP_MM)
     added = (
-        box(low, np.array([plate.back, out + half, half]), base.frame),
+        box(low, np.array([plate.back, out + half_width, half_width]), base.frame),
         axial_cylinder(base, *pilot, motor["pilot_mm"] / 2, out),
         axial_cylinder(base, plate.back, tip, motor["shaft_mm"] / 2, out),
     )

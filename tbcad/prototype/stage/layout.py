@@ -129,7 +129,7 @@ def _grazing_radius(prototype: PrototypeLayout, capture: float) -> float:
     stops, ball = prototype.stops, prototype.fit.ball
     azimuth = (prototype.placement.azimuth[ball] + stops.angle[stops.stop])[:, None]
     outline = rotated_about_x(prototype.balls.outline[ball], azimuth)
-    points = outline @ prototype.half.ellipsoid.frame()
+    points = outline @ prototype.array.ellipsoid.frame()
     distance = norm(points)
     descent = np.arcsin(capture / distance) + np.arcsin(points[..., 2] / distance)
     return capture * float(np.sin(descent.min()))

@@ -78,7 +78,7 @@ def _check_visible(domes: Floats, prototype: PrototypeLayout, pillar: float, tip
 
     A pillar is taken to reach as high as its LED.
     """
-    cameras = prototype.half.ellipsoid.camera_distance * prototype.half.u
+    cameras = prototype.array.ellipsoid.camera_distance * prototype.array.u
     sight = cameras[:, None] - domes
     level = np.maximum(norm(sight[..., :2]), TINY)[..., None]
     direction = sight[..., :2] / level
@@ -93,7 +93,7 @@ def _check_visible(domes: Floats, prototype: PrototypeLayout, pillar: float, tip
         mirror, i, j = (int(axis[0]) for axis in np.nonzero(hidden))
         raise SpecError(
             f"prototype.stage.leds_mm: LED {i + 1} is hidden from mirror "
-            f"{prototype.half.ids[mirror]} by LED {j + 1}: move them, the higher ones to smaller x"
+            f"{prototype.array.ids[mirror]} by LED {j + 1}: move them, the higher ones to smaller x"
         )
 
 

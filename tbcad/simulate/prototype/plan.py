@@ -203,24 +203,24 @@ def _served(path: Path, pictures: list[_Picture], mirrors: int) -> tuple[Ints, I
     """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
     found = np.full((2, 2, mirrors), -1, dtype=np.int64)
     for row, one in enumerate(pictures, 1):
-        half, mirror = int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1
-        if one.mirror[0] != "ab"[half] or not 0 <= mirror < mirrors:
+        camera, mirror = int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1
+        if one.mirror[0] != "ab"[camera] or not 0 <= mirror < mirrors:
             raise InputError(
                 f"{path}: row {row} shows {one.mirror}, allowed with the object turned by "
-                f"{one.object_turn_deg:g} degrees is {_name(half, 0)} to "
-                f"{_name(half, mirrors - 1)}: {REBUILD}"
+                f"{one.object_turn_deg:g} degrees is {_name(camera, 0)} to "
+                f"{_name(camera, mirrors - 1)}: {REBUILD}"
             )
-        if found[0, half, mirror] >= 0:
+        if found[0, camera, mirror] >= 0:
             raise InputError(f"{path}: row {row} shows {one.mirror} a second time: {REBUILD}")
-        found[:, half, mirror] = one.ball - 1, one.stop - 1
+        found[:, camera, mirror] = one.ball - 1, one.stop - 1
     missing = np.argwhere(found[0] < 0)
     if missing.size:
         raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {REBUILD}")
     return found[0], found[1]
 
 
-def _name(half: int, mirror: int) -> str:
-    return f"{'ab'[half]}{mirror + 1:04d}"
+def _name(camera: int, mirror: int) -> str:
+    return f"{'ab'[camera]}{mirror + 1:04d}"
 
 
 def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Exported) -> None:
@@ -233,9 +233,9 @@ def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Ex
     apex = rotated(plan.apex[plan.ball], plan.frame[0], plan.angle[plan.stop])
     apart = norm(apex / norm(apex)[..., None] - u)
     off = np.abs(np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1))) - said)
-    half, mirror = np.unravel_index(off.argmax(), off.shape)
-    if off[half, mirror] > ERROR_DEG:
+    camera, mirror = np.unravel_index(off.argmax(), off.shape)
+    if off[camera, mirror] > ERROR_DEG:
         raise InputError(
-            f"{path}: {_name(int(half), int(mirror))} has error_deg {said[half, mirror]:g}, but "
-            f"its ball stands {off[half, mirror]:.3g} degrees off that: {REBUILD}"
+            f"{path}: {_name(int(camera), int(mirror))} has error_deg {said[camera, mirror]:g}, "
+            f"but its ball is {off[camera, mirror]:.3g} degrees off that: {REBUILD}"
         )

@@ -66,8 +66,8 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _run(reflector: Reflector, camera: Camera, plan: Plan, half: int, flip: Floats) -> PrototypeRun:
-    ball, stop, frame = plan.ball[half], plan.stop[half], plan.frame * flip
+def _run(reflector: Reflector, camera: Camera, plan: Plan, of: int, flip: Floats) -> PrototypeRun:
+    ball, stop, frame = plan.ball[of], plan.stop[of], plan.frame * flip
     angle = plan.angle[stop]
     apex, normal = (
         rotated(vectors[ball] * flip, frame[0], angle) for vectors in (plan.apex, plan.normal)

@@ -103,5 +103,7 @@ class SubstitutedReflector(Reflector):
 
 def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
     """Both cameras of a design with their mirrors."""
-    a, b = (Reflector(half.camera_id, half.camera, half.u, half.cells) for half in design.halves)
+    a, b = (
+        Reflector(array.camera_id, array.camera, array.u, array.cells) for array in design.arrays
+    )
     return a, b

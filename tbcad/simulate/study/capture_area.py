@@ -64,12 +64,12 @@ def _record(spec: Spec, n: int) -> Record:
     attempts = {
         rule: try_design(spec, optics={"n": n}, mirrors={"radius_rule": rule}) for rule in RULES
     }
-    half = next((attempt.half for attempt in attempts.values() if attempt.half), None)
+    array = next((attempt.array for attempt in attempts.values() if attempt.array), None)
     record: Record = {"n": n, "virtual_cameras": None, "flat_closed_form_mm": None}
-    if half:
-        smallest = float(np.sin(half.theta0.min()))
-        record["virtual_cameras"] = virtual_cameras(half)
-        record["flat_closed_form_mm"] = 2 * half.ellipsoid.camera_distance * smallest
+    if array:
+        smallest = float(np.sin(array.theta0.min()))
+        record["virtual_cameras"] = virtual_cameras(array)
+        record["flat_closed_form_mm"] = 2 * array.ellipsoid.camera_distance * smallest
     for rule, attempt in attempts.items():
         coverage = _coverage(attempt, spec.optics.capture_diameter_mm)
         record |= {f"{rule}_{name}": cell for name, cell in coverage.items()}
@@ -80,10 +80,10 @@ def _record(spec: Spec, n: int) -> Record:
 
 
 def _coverage(attempt: DesignAttempt, capture_mm: float) -> dict[str, Cell]:
-    if attempt.half is None:
+    if attempt.array is None:
         empty = dict.fromkeys(("minimum_mm", "median_mm", "mirrors_short"))
         return {**empty, "reason": attempt.reason}
-    coverage = attempt.half.coverage
+    coverage = attempt.array.coverage
     return {
         "minimum_mm": float(coverage.min()),
         "median_mm": float(np.median(coverage)),

@@ -107,17 +107,17 @@ def _mirror_records(spec: Spec, row: BalancedSensor, pitch: float) -> list[Recor
 
 def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) -> list[Record]:
     attempt = try_design(spec, optics={"n": row.n}, mirrors=RADII[radii])
-    if attempt.half is None:
+    if attempt.array is None:
         return [_record(row, "no design", radii, None, attempt.reason)]
     sensor = Sensor(row.width_px, row.height_px)
     radius = spec.optics.capture_diameter_mm / 2
-    counts = count_pixels(attempt.half, (sensor,), radius)[0]
-    values = _pixels(attempt.half, counts)
+    counts = count_pixels(attempt.array, (sensor,), radius)[0]
+    values = _pixels(attempt.array, counts)
     values["pixels of both frames / virtual cameras"] = (
-        2 * sensor.width_px * sensor.height_px / virtual_cameras(attempt.half)
+        2 * sensor.width_px * sensor.height_px / virtual_cameras(attempt.array)
     )
     if radii == PITCHED_RADII:
-        turned = count_pixels(attempt.half, (sensor,), radius, axes=axes_at_pitch(pitch))[0]
+        turned = count_pixels(attempt.array, (sensor,), radius, axes=axes_at_pitch(pitch))[0]
         values[f"{DISC}, {_at(pitch)}"] = float(turned.disc.mean())
     return [_record(row, name, radii, value) for name, value in values.items()]
 
@@ -126,12 +126,12 @@ def _at(pitch: float) -> str:
     return f"camera pitched by {np.degrees(pitch):.1f} deg"
 
 
-def _pixels(half: MirrorArray, counts: PixelCounts) -> dict[str, float]:
+def _pixels(array: MirrorArray, counts: PixelCounts) -> dict[str, float]:
     kinds = {"seeing": counts.seen, "disc": counts.disc, "on mirrors": counts.on}
     figures: dict[str, float] = {}
     for name, pixels in kinds.items():
         figures[f"{name} pixels / virtual cameras"] = (
-            2 * float(pixels.sum()) / virtual_cameras(half)
+            2 * float(pixels.sum()) / virtual_cameras(array)
         )
         figures[f"{name} pixels / mirrors"] = float(pixels.mean())
         figures[f"{name} pixels of a mirror, median"] = float(np.median(pixels))

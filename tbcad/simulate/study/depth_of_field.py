@@ -125,19 +125,19 @@ def _by_rule(spec: Spec, progress: Progress) -> tuple[dict[str, VirtualImages], 
     for rule in RULES:
         progress(f"radii by rule {rule}")
         attempt = try_design(spec, mirrors={"radius_rule": rule})
-        if attempt.half is None:
+        if attempt.array is None:
             refusals.append(f"No figures of {rule} radii: {attempt.reason}")
         else:
             radius = spec.optics.capture_diameter_mm / 2
-            by_rule[rule] = virtual_images(attempt.half, radius)
+            by_rule[rule] = virtual_images(attempt.array, radius)
     return by_rule, refusals
 
 
 def _mirror_table(by_rule: dict[str, VirtualImages], notes: tuple[str, ...]) -> Table:
     numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule.values())])
     columns = {
-        "id": [name for images in by_rule.values() for name in images.half.ids],
-        "radii": [rule for rule, images in by_rule.items() for _ in images.half.ids],
+        "id": [name for images in by_rule.values() for name in images.array.ids],
+        "radii": [rule for rule, images in by_rule.items() for _ in images.array.ids],
         **dict(zip(NUMBERS, numbers.T, strict=True)),
     }
     return Table.of_columns("depth-of-field", columns, notes)
@@ -145,15 +145,15 @@ def _mirror_table(by_rule: dict[str, VirtualImages], notes: tuple[str, ...]) -> 
 
 def _numbers(images: VirtualImages) -> Floats:
     """The columns NUMBERS of some mirrors, (m, 16)."""
-    half = images.half
+    array = images.array
     return np.column_stack(
         [
-            np.degrees(half.polar),
-            half.mirrors.radius,
+            np.degrees(array.polar),
+            array.mirrors.radius,
             np.degrees(images.incidence),
             images.to_mirror,
-            images.distance.reshape(len(half), -1),
-            images.depth.reshape(len(half), -1),
+            images.distance.reshape(len(array), -1),
+            images.depth.reshape(len(array), -1),
         ]
     )
 
@@ -234,11 +234,11 @@ def _stop_figures(stops: list[Record]) -> list[Figure]:
 
 def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
     series = [
-        Series(label, np.degrees(one.half.polar), one.distance[:, place, fan], mark)
+        Series(label, np.degrees(one.array.polar), one.distance[:, place, fan], mark)
         for rule, place, fan, label, mark in IMAGES
         if (one := by_rule.get(rule))
     ]
-    polar = np.concatenate([one.half.polar for one in by_rule.values()] or [np.zeros(1)])
+    polar = np.concatenate([one.array.polar for one in by_rule.values()] or [np.zeros(1)])
     ends = np.degrees([polar.min(), polar.max()])
     for key, style in (("depth_near", "r--"), ("depth_far", "r-.")):
         paper = claimed(key)

@@ -40,24 +40,26 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
     Raises:
         SpecError: the mirrors cannot be made.
     """
-    spec, halves = with_lens_of_table_i(spec), {}
+    spec, arrays = with_lens_of_table_i(spec), {}
     for rule in CURVES:
         progress(f"radii by rule {rule}")
-        halves[rule] = design(spec_with(spec, mirrors={"radius_rule": rule})).halves[0]
+        arrays[rule] = design(spec_with(spec, mirrors={"radius_rule": rule})).arrays[0]
     progress("pixels")
-    traced = halves["traced"]
+    traced = arrays["traced"]
     sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
     counts = count_pixels(traced, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
-    mirrors = _mirrors(traced, halves["paper"], counts, spec.mirrors.max_radius_widths)
-    correlations = [record for rule, half in halves.items() for record in _correlations(rule, half)]
+    mirrors = _mirrors(traced, arrays["paper"], counts, spec.mirrors.max_radius_widths)
+    correlations = [
+        record for rule, array in arrays.items() for record in _correlations(rule, array)
+    ]
     correlations += _pixel_correlations(mirrors)
     tables = (
         mirrors,
         Table.of_records("elevation-pixels", _bands(mirrors)),
         Table.of_records("elevation-correlation", correlations),
     )
-    panels = (_radius_panel(halves), _pixel_panel(mirrors))
-    figures = (*_figures(halves, correlations), *_pixel_figures(mirrors))
+    panels = (_radius_panel(arrays), _pixel_panel(mirrors))
+    figures = (*_figures(arrays, correlations), *_pixel_figures(mirrors))
     return Study("elevation", figures, tables, panels)
 
 
@@ -82,10 +84,10 @@ def _mirrors(
     return Table.of_columns("elevation", columns, NOTES)
 
 
-def _correlations(rule: str, half: MirrorArray) -> list[Record]:
-    radius = half.mirrors.radius
+def _correlations(rule: str, array: MirrorArray) -> list[Record]:
+    radius = array.mirrors.radius
     values = {"radius": radius, "log radius": np.log(radius)}
-    angles = {"polar angle": half.polar, "absolute azimuth": np.abs(half.azimuth)}
+    angles = {"polar angle": array.polar, "absolute azimuth": np.abs(array.azimuth)}
     return [
         _correlated(rule, (name, value), (other, angle), RADIUS_PLACE)
         for name, value in values.items()
@@ -145,9 +147,11 @@ def _bands(mirrors: Table) -> list[Record]:
     return records
 
 
-def _figures(halves: dict[str, MirrorArray], correlations: list[Record]) -> tuple[Figure, ...]:
-    ranges = {f"radii by rule {rule}": ("mm", half.mirrors.radius) for rule, half in halves.items()}
-    ranges["polar angle"] = ("deg", np.degrees(halves["traced"].polar))
+def _figures(arrays: dict[str, MirrorArray], correlations: list[Record]) -> tuple[Figure, ...]:
+    ranges = {
+        f"radii by rule {rule}": ("mm", array.mirrors.radius) for rule, array in arrays.items()
+    }
+    ranges["polar angle"] = ("deg", np.degrees(arrays["traced"].polar))
     extremes = (
         Figure(f"{name}, {which}", unit, value, where=RADIUS_PLACE)
         for name, (unit, values) in ranges.items()
@@ -169,10 +173,10 @@ def _pixel_figures(mirrors: Table) -> tuple[Figure, ...]:
     )
 
 
-def _radius_panel(halves: dict[str, MirrorArray]) -> Panel:
+def _radius_panel(arrays: dict[str, MirrorArray]) -> Panel:
     series = []
     for rule, (label, style) in CURVES.items():
-        radius, polar = halves[rule].mirrors.radius, halves[rule].polar
+        radius, polar = arrays[rule].mirrors.radius, arrays[rule].polar
         named = f"{label}: correlation of log radius {correlation(np.log(radius), polar):.3f}"
         series.append(Series(named, np.degrees(polar), radius, style))
     title = "Radius of the mirrors"

@@ -76,7 +76,7 @@ def allowed(width_px: int, height_px: int) -> bool:
 
 
 def count_pixels(
-    half: MirrorArray,
+    array: MirrorArray,
     sensors: tuple[Sensor, ...],
     radius: float,
     most_rays: int = MAX_RAYS,
@@ -85,7 +85,7 @@ def count_pixels(
     """Count the pixels of a camera with each sensor, the lens and mirrors as they are.
 
     Args:
-        half: the camera and its mirrors.
+        array: the camera and its mirrors.
         sensors: in place of the design's; the camera is turned so that the mirrors fit it best.
         radius: of the capture sphere, mm.
         most_rays: larger sensors are sampled by one ray for each square block of pixels, so that
@@ -98,7 +98,7 @@ def count_pixels(
         width, height = _sampled(sensor, most_rays)
         key = width, height, sensor.height_px / sensor.width_px
         if key not in traced:
-            traced[key] = _counted(half, _view(half, sensor, axes), (width, height), radius)
+            traced[key] = _counted(array, _view(array, sensor, axes), (width, height), radius)
         one, scale = traced[key], (sensor.width_px / width) ** 2
         counts.append(replace(one, on=one.on * scale, seen=one.seen * scale, disc=one.disc * scale))
     return counts
@@ -109,8 +109,8 @@ def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
     return -(-sensor.width_px // step), -(-sensor.height_px // step)
 
 
-def _view(half: MirrorArray, sensor: Sensor, axes: tuple[Floats, Floats] | None) -> Camera:
-    camera, corners = half.camera, half.cells.corners
+def _view(array: MirrorArray, sensor: Sensor, axes: tuple[Floats, Floats] | None) -> Camera:
+    camera, corners = array.camera, array.cells.corners
     width, height = sensor.width_px, sensor.height_px
     if axes is None:
         return fitted_camera(camera.pinhole, corners, width, height, camera.hfov)
@@ -118,13 +118,13 @@ def _view(half: MirrorArray, sensor: Sensor, axes: tuple[Floats, Floats] | None)
 
 
 def _counted(
-    half: MirrorArray, full: Camera, sampled: tuple[int, int], radius: float
+    array: MirrorArray, full: Camera, sampled: tuple[int, int], radius: float
 ) -> PixelCounts:
     """Counts of the rays themselves, through the centres of the sampled columns and rows."""
     view = replace(full, width_px=sampled[0], height_px=sampled[1])
-    reflector = Reflector(half.camera_id, view, half.u, half.cells)
-    on, seen, disc = traced_pixels(reflector, half.theta0, radius)
-    fill = full.fill(half.cells.corners)
+    reflector = Reflector(array.camera_id, view, array.u, array.cells)
+    on, seen, disc = traced_pixels(reflector, array.theta0, radius)
+    fill = full.fill(array.cells.corners)
     return PixelCounts(on, seen, disc, fill, sampled[0] * sampled[1])
 
 
@@ -157,6 +157,6 @@ def megapixels(table: Table) -> Floats:
     return table.numbers("width_px") * table.numbers("height_px") / 1e6
 
 
-def virtual_cameras(half: MirrorArray) -> int:
+def virtual_cameras(array: MirrorArray) -> int:
     """Virtual cameras of both halves together; those that the seam halves count once."""
-    return 2 * len(half) - int((half.u[:, 0] == 0).sum())
+    return 2 * len(array) - int((array.u[:, 0] == 0).sum())

@@ -155,10 +155,10 @@ def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
     """One n: a row for every sensor, or what a refusal says."""
     attempt, radius = try_design(spec, optics={"n": n}), spec.optics.capture_diameter_mm / 2
     heads: list[Record] = [{"n": n, **asdict(sensor)} for sensor in sensors]
-    if attempt.half is None:
+    if attempt.array is None:
         return [{**head, **dict.fromkeys(COUNTED), "reason": attempt.reason} for head in heads]
-    cameras = virtual_cameras(attempt.half)
-    counts = count_pixels(attempt.half, sensors, radius)
+    cameras = virtual_cameras(attempt.array)
+    counts = count_pixels(attempt.array, sensors, radius)
     return [
         {**head, **_counted(cameras, one), "reason": ""}
         for head, one in zip(heads, counts, strict=True)

@@ -29,9 +29,9 @@ class DesignAttempt:
     reason: str = ""
 
     @property
-    def half(self) -> MirrorArray | None:
+    def array(self) -> MirrorArray | None:
         """Camera a with its mirrors."""
-        return self.design.halves[0] if self.design else None
+        return self.design.arrays[0] if self.design else None
 
 
 def try_design(spec: Spec, **sections: dict[str, object]) -> DesignAttempt:

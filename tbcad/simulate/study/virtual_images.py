@@ -19,7 +19,7 @@ class VirtualImages:
     A principal ray runs from the camera over the apex to the centre of the capture sphere.
 
     Attributes:
-        half: the camera and its mirrors.
+        array: the camera and its mirrors.
         to_mirror: from camera to apex, mm, (m,).
         incidence: at the apex, radians, (m,).
         distance: from camera to the image of the sphere's nearest point, centre and farthest
@@ -27,7 +27,7 @@ class VirtualImages:
         depth: the same along the camera's optical axis, mm, (m, 3, 2).
     """
 
-    half: MirrorArray
+    array: MirrorArray
     to_mirror: Floats
     incidence: Floats
     distance: Floats
@@ -55,14 +55,14 @@ def image_distances(
     return tangential, sagittal
 
 
-def virtual_images(half: MirrorArray, radius: float) -> VirtualImages:
+def virtual_images(array: MirrorArray, radius: float) -> VirtualImages:
     """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
-    mirrors, pinhole = half.mirrors, half.camera.pinhole
+    mirrors, pinhole = array.mirrors, array.camera.pinhole
     toward = mirrors.apex - pinhole
     to_mirror, ray = norm(toward), unit(toward)
     incidence = np.arccos(np.clip(-dot(ray, mirrors.normal), -1, 1))
     objects = norm(mirrors.apex)[:, None] + radius * np.array([-1.0, 0.0, 1.0])
     image = image_distances(mirrors.curvature[:, None], incidence[:, None], objects)
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
-    along = ray @ half.camera.forward
-    return VirtualImages(half, to_mirror, incidence, distance, distance * along[:, None, None])
+    along = ray @ array.camera.forward
+    return VirtualImages(array, to_mirror, incidence, distance, distance * along[:, None, None])

@@ -104,7 +104,10 @@ class MonteCarloCase:
         """Result of the builds of these numbers."""
         draws = draw(self.errors, self.seed, builds, len(self.edge_models[0]))
         diameter, pixels = coverage(self.edge_models, draws)
-        rays = [pointing(half, drawn) for half, drawn in zip(self.edge_models, draws, strict=True)]
+        rays = [
+            pointing(edge_model, drawn)
+            for edge_model, drawn in zip(self.edge_models, draws, strict=True)
+        ]
         angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
         return ShellResult(diameter, offset, pixels, angle)
 

@@ -75,7 +75,7 @@ def edge_model(at: Reflector) -> EdgeModel:
     return EdgeModel(at.camera, table, neighbour_pairs(at.cells), halved, screen)
 
 
-def surface_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
+def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     """The surfaces of s builds before their shells are scaled and moved, (s, m + 2, 7).
 
     A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
@@ -84,19 +84,19 @@ def surface_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
     Raises:
         InputError: an error is larger than a mirror's radius.
     """
-    table, m = np.repeat(half.table[None], len(draws), axis=0), len(half)
-    curvature = half.table[:m, CURVATURE]
+    table, m = np.repeat(edge_model.table[None], len(draws), axis=0), len(edge_model)
+    curvature = edge_model.table[:m, CURVATURE]
     if np.any(draws.radius * curvature <= -1):
         raise InputError(
             f"sphere_radius_um and coating_um leave nothing of a mirror: allowed is less than its "
             f"radius, at minimum {1000 / curvature.max():.0f} um: make the errors smaller"
         )
-    table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * half.normal
+    table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * edge_model.normal
     table[:, :m, CURVATURE] = curvature / (1 + draws.radius * curvature)
     return table
 
 
-def view_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
+def view_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     """Camera and object of s builds, in the frame of the shell, (s, 6, 3).
 
     The rows are pinhole, object's centre, scale, and the camera's right, down and forward. Camera
@@ -104,7 +104,7 @@ def view_tables(half: EdgeModel, draws: ShellDraws) -> Floats:
     """
     shell = Rotation.from_rotvec(draws.shell_tilt)
     camera = Rotation.from_rotvec(draws.camera_tilt)
-    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in half.view.axes]
-    pinhole = half.view.pinhole + draws.camera_shift
+    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in edge_model.view.axes]
+    pinhole = edge_model.view.pinhole + draws.camera_shift
     points = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
     return np.stack([*points, draws.scale, *axes], axis=1)

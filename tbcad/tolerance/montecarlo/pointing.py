@@ -17,8 +17,8 @@ from tbcad.tolerance.montecarlo.edge_model import (
 from tbcad.types import Floats
 
 
-def pointing(half: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
-    """Errors of the ray of each mirror's centre pixel, for s builds of one half.
+def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
+    """Errors of the ray of each mirror's centre pixel, for s builds of one edge_model.
 
     The centre pixel shows the apex, and its designed ray goes through the object's centre. A pixel
     is a fixed place on the sensor: moved and tilted cameras and wrong focal lengths count.
@@ -27,21 +27,21 @@ def pointing(half: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
         Angle between the designed and the built ray after the mirror, radians, and distance of the
         built ray from the object's centre, mm, (s, m) each; NaN where it misses the sphere.
     """
-    pinhole, middle, scale, *axes = np.moveaxis(view_tables(half, draws)[:, :, None], 1, 0)
-    ray = _pixel_rays(half, draws, axes)
-    mirrors = surface_tables(half, draws)[:, : len(half)]
+    pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
+    ray = _pixel_rays(edge_model, draws, axes)
+    mirrors = surface_tables(edge_model, draws)[:, : len(edge_model)]
     point, normal = _entry(mirrors, pinhole / scale, ray / scale)
     out = reflect(unit(ray), unit(normal / scale))
     offset = norm(np.cross(point * scale - middle, out))
-    designed = reflected_rays(half.view.pinhole, half.apex, unit(half.normal))
+    designed = reflected_rays(edge_model.view.pinhole, edge_model.apex, unit(edge_model.normal))
     shells = map(Rotation.from_rotvec, draws.shell_tilt)
     built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
     return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
 
 
-def _pixel_rays(half: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
+def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
     """Rays (s, m, 3) of the same pixels in built cameras, whose axes are three of (s, 1, 3)."""
-    designed = (half.apex - half.view.pinhole) @ half.view.axes.T
+    designed = (edge_model.apex - edge_model.view.pinhole) @ edge_model.view.axes.T
     right, down, forward = designed[..., None].swapaxes(0, 1)
     focal = draws.focal[:, None, None] * forward
     return np.asarray(axes[2] + axes[0] * right / focal + axes[1] * down / focal)

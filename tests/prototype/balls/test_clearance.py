@@ -23,10 +23,10 @@ K = 12
 
 
 @pytest.fixture(scope="module")
-def balls(paper_half: MirrorArray) -> Balls:
+def balls(paper_array: MirrorArray) -> Balls:
     """As large as stock has them, so that they stand in each other's light too."""
-    groups = group_mirrors(paper_half.polar, paper_half.mirrors.radius, K, 0.25)
-    candidates = ball_candidates(paper_half, groups, 60.0)
+    groups = group_mirrors(paper_array.polar, paper_array.mirrors.radius, K, 0.25)
+    candidates = ball_candidates(paper_array, groups, 60.0)
     catalogue = load_catalogue(["metric"])
     stock = np.full(K, len(catalogue) - 1)
     return balls_with_radii(candidates, np.full(K, 30.0), stock, catalogue, 2.0)
@@ -45,10 +45,10 @@ def rays(balls: Balls, j: int, pinhole: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_light_passes_beyond_the_angle_and_hardly_within(
-    paper_half: MirrorArray, balls: Balls
+    paper_array: MirrorArray, balls: Balls
 ) -> None:
     """Against rays over the part in use: never blocked beyond, and at it closer than 2.6 mm."""
-    pinhole = norm(paper_half.camera.pinhole)
+    pinhole = norm(paper_array.camera.pinhole)
     _, dark = min_separations(balls, LIMITS, pinhole, 30.0)
     azimuth = np.radians(np.arange(0, 60, 0.5))
     nearest = np.full((K, K), np.inf)
@@ -67,18 +67,18 @@ def test_light_passes_beyond_the_angle_and_hardly_within(
     assert nearest.max() < 2.6
 
 
-def test_balls_touch_within_the_angle(paper_half: MirrorArray, balls: Balls) -> None:
-    touch, _ = min_separations(balls, LIMITS, norm(paper_half.camera.pinhole), 30.0)
+def test_balls_touch_within_the_angle(paper_array: MirrorArray, balls: Balls) -> None:
+    touch, _ = min_separations(balls, LIMITS, norm(paper_array.camera.pinhole), 30.0)
     assert (touch == touch.T).all()
     for i, j in ((0, 1), (3, 5), (6, 7)):
         other = rotated_about_x(balls.body_centre[i], np.array(touch[i, j] - SOLVER_MARGIN))
         assert norm(other - balls.body_centre[j]) == pytest.approx(60 + LIMITS.ball_wall_mm)
 
 
-def test_post_lies_straight_below(paper_half: MirrorArray, balls: Balls) -> None:
+def test_post_lies_straight_below(paper_array: MirrorArray, balls: Balls) -> None:
     """Its half-plane is opposite to the mirrors; only the lowest polar angles come near it."""
-    frame = paper_half.ellipsoid.frame()
-    post, camera = obstacles(LIMITS, frame, paper_half.camera, 400.0)
+    frame = paper_array.ellipsoid.frame()
+    post, camera = obstacles(LIMITS, frame, paper_array.camera, 400.0)
     assert post.azimuth == pytest.approx(np.pi)
     assert post.cone.end[0] == pytest.approx(400 * np.array([1, 1]) / np.sqrt(2))
     assert camera.cone.start[0] == pytest.approx([np.sqrt(2) * 100, 0])

@@ -43,7 +43,7 @@ def prototype(paper_prototype: PrototypeLayout) -> PrototypeLayout:
 
 @pytest.fixture(scope="module")
 def candidates(prototype: PrototypeLayout) -> BallCandidates:
-    return ball_candidates(prototype.half, prototype.groups, 60.0)
+    return ball_candidates(prototype.array, prototype.groups, 60.0)
 
 
 def small(design: MirrorDesign, *options: str) -> PrototypeLayout:
@@ -119,7 +119,7 @@ class TestBalls:
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)
         rows = ball_alternatives(
-            spec, prototype.half, prototype.groups, prototype.balls, prototype.fit
+            spec, prototype.array, prototype.groups, prototype.balls, prototype.fit
         )
         alternatives = {row["name"]: row for row in rows}
         assert alternatives["cover, with caps"]["pixels_kept_share"] == pytest.approx(
@@ -134,7 +134,7 @@ class TestBalls:
 
     def test_costs_do_not_depend_on_which_was_chosen(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)
-        groups = (prototype.half, prototype.groups)
+        groups = (prototype.array, prototype.groups)
         limits = spec.prototype.model_copy(update={"snap": "nearest", "caps": False})
         candidates = ball_candidates(*groups, spec.optics.capture_diameter_mm)
         balls = choose_balls(candidates, limits, prototype.balls.catalogue)
@@ -146,9 +146,9 @@ class TestBalls:
 class TestPlaces:
     def test_apices_stay_on_the_ellipsoid(self, prototype: PrototypeLayout) -> None:
         apex = prototype.apices(0.3)
-        pinhole = prototype.half.camera.pinhole
+        pinhole = prototype.array.camera.pinhole
         assert norm(apex) + norm(apex - pinhole) == pytest.approx(
-            np.full(len(prototype), 2 * prototype.half.ellipsoid.semi_major)
+            np.full(len(prototype), 2 * prototype.array.ellipsoid.semi_major)
         )
         assert prototype.centres(0.3) == pytest.approx(
             apex - prototype.balls.radius[:, None] * prototype.normals(0.3)
@@ -164,7 +164,7 @@ class TestPlaces:
     def test_no_ball_blocks_anothers_light(self, prototype: PrototypeLayout) -> None:
         """Rays off every ball by brute force against every other ball."""
         outline, balls = prototype.balls.outline, prototype.balls
-        camera, frame = prototype.half.camera.pinhole, prototype.half.ellipsoid.frame()
+        camera, frame = prototype.array.camera.pinhole, prototype.array.ellipsoid.frame()
         for share in (0.0, 0.5, 1.0):
             inner = balls.poses.apex[:, None] + share * (outline - balls.poses.apex[:, None])
             centre = balls.centre[:, None]
@@ -182,7 +182,7 @@ class TestPlaces:
                     assert (gap - balls.body_radius[others]).min() > LIMITS.light_margin_mm
 
     def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
-        view = prototype.half.camera
+        view = prototype.array.camera
         back = view.pinhole - LIMITS.camera_length_mm * view.forward
         for angle in np.linspace(-1, 1, 41) * prototype.placement.swing / 2:
             centre = prototype.body_centres(angle)
@@ -198,7 +198,7 @@ class TestPlaces:
 
     def test_outermost_is_that_of_the_edges(self, prototype: PrototypeLayout) -> None:
         """By the seats' edges themselves, at both ends of the swing."""
-        frame = prototype.half.ellipsoid.frame()
+        frame = prototype.array.ellipsoid.frame()
         far = 0.0
         for angle in (-prototype.placement.swing / 2, prototype.placement.swing / 2):
             _, out, across = (prototype.body_centres(angle) @ frame.T).T
@@ -217,15 +217,15 @@ class TestStops:
             * np.sin(prototype.groups.polar[prototype.fit.ball])
         )
         assert np.degrees(across).max() <= LIMITS.stop_error_deg + 1e-9
-        assert sum(len(stops.mirrors(i)) for i in range(len(stops))) == len(prototype.half)
+        assert sum(len(stops.mirrors(i)) for i in range(len(stops))) == len(prototype.array)
         assert min(len(stops.mirrors(i)) for i in range(len(stops))) > 0
 
     def test_errors_are_those_of_the_balls_themselves(self, prototype: PrototypeLayout) -> None:
-        for i in range(0, len(prototype.half), 50):
+        for i in range(0, len(prototype.array), 50):
             apex = prototype.apices(prototype.stops.angle[prototype.stops.stop[i]])[
                 prototype.fit.ball[i]
             ]
-            angle = np.arccos(np.clip(unit(apex) @ prototype.half.u[i], -1, 1))
+            angle = np.arccos(np.clip(unit(apex) @ prototype.array.u[i], -1, 1))
             assert prototype.stops.error[i] == pytest.approx(angle, abs=1e-7)
 
     def test_stops_rise_within_the_swing(self, prototype: PrototypeLayout) -> None:
@@ -234,14 +234,14 @@ class TestStops:
 
     def test_are_the_fewest_and_fewer_than_greedys(self, prototype: PrototypeLayout) -> None:
         requests = stop_requests(
-            prototype.groups, prototype.half.azimuth, np.radians(LIMITS.stop_error_deg)
+            prototype.groups, prototype.array.azimuth, np.radians(LIMITS.stop_error_deg)
         )
         angle = requests.azimuth - prototype.placement.azimuth[requests.ball]
         points, _ = min_stabbing_points(angle - requests.tolerance, angle + requests.tolerance)
         assert len(points) == len(prototype.stops)
         other = plan_stops(
             prototype.groups,
-            prototype.half.polar,
+            prototype.array.polar,
             requests,
             greedy_placement(prototype.problem).azimuth,
         )
@@ -251,11 +251,11 @@ class TestStops:
         self, prototype: PrototypeLayout, paper_design: MirrorDesign
     ) -> None:
         """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
-        b = paper_design.halves[1]
-        assert b.u[prototype.twin] == pytest.approx(prototype.half.u * [-1, -1, 1], abs=1e-9)
+        b = paper_design.arrays[1]
+        assert b.u[prototype.twin] == pytest.approx(prototype.array.u * [-1, -1, 1], abs=1e-9)
         rows = picture_rows(prototype)
         assert len(rows) == 2 * 847
-        assert {row["mirror"] for row in rows} == {*prototype.half.ids, *b.ids}
+        assert {row["mirror"] for row in rows} == {*prototype.array.ids, *b.ids}
         assert [row["object_turn_deg"] for row in rows] == [0] * 847 + [180] * 847
         first = [int(str(row["stop"])) for row in rows[:847]]
         assert first == sorted(first)

@@ -215,7 +215,7 @@ class TestRefused:
 
     def test_a_ball_next_to_the_axis(self, small_prototype: PrototypeLayout) -> None:
         seats = seat_layout(SPEC, small_prototype)
-        frame = small_prototype.half.ellipsoid.frame()
+        frame = small_prototype.array.ellipsoid.frame()
         near = replace(seats, centre=seats.centre @ frame.T * [1.0, 0.1, 0.1] @ frame)
         with pytest.raises(SpecError, match="is too near to the axis for its seat"):
             sector(SPEC, near, small_prototype)

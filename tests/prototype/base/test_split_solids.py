@@ -89,6 +89,8 @@ class TestSmall:
     def test_pads(self, small: Cut) -> None:
         check_pads(small)
 
+    @pytest.mark.slow
+    @pytest.mark.slow
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
         base, _, plan, parts, _ = small
         seats = base.local_seats
@@ -169,6 +171,8 @@ class TestSmall:
             beside = norm(distance - along[:, None] * path / length)
             assert not ((along > 0) & (along < length) & (beside < radius)).any()
 
+    @pytest.mark.slow
+    @pytest.mark.slow
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
         base, printer, _, parts, _ = small
         rebuilt = carrier_parts(base, split_base(base, printer), printer)

@@ -116,7 +116,7 @@ class TestCounterweight:
 
     def test_of_a_prototype(self, small_prototype: PrototypeLayout) -> None:
         masses = ball_masses(small_prototype, 1.27)
-        before = sum_masses(small_prototype.half.ellipsoid.frame(), masses)
+        before = sum_masses(small_prototype.array.ellipsoid.frame(), masses)
         after = sum_masses(before.frame, masses, counterweight(before, -70, 100))
         assert before.torque_amplitude > 100
         assert after.torque_amplitude < 1e-9 * before.torque_amplitude
@@ -131,7 +131,7 @@ class TestBalls:
         assert (masses.centre == small_prototype.body_centres()).all()
 
     def test_turning_the_base_turns_the_balls(self, small_prototype: PrototypeLayout) -> None:
-        frame = small_prototype.half.ellipsoid.frame()
+        frame = small_prototype.array.ellipsoid.frame()
         still = sum_masses(frame, ball_masses(small_prototype, 1.27))
         moved = sum_masses(
             frame,

@@ -66,7 +66,7 @@ def test_balls_have_grade_and_mass_caps_have_none(layout: PrototypeLayout, read:
 
 def test_what_they_show(layout: PrototypeLayout, read: Rows) -> None:
     fit = layout.fit
-    assert sum(int(row["mirrors"]) for row in read) == len(layout.half)
+    assert sum(int(row["mirrors"]) for row in read) == len(layout.array)
     assert column(read, "pixels").sum() == pytest.approx(fit.pixels.sum())
     assert column(read, "pixels_shell").sum() == pytest.approx(fit.pixels_shell.sum())
     for j, row in enumerate(read):

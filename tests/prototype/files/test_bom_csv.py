@@ -114,7 +114,7 @@ def test_unknown_part(layout: PrototypeLayout, drive: Drive) -> None:
 
 
 def test_record_of_the_drive(layout: PrototypeLayout) -> None:
-    summed = sum_masses(layout.half.ellipsoid.frame(), ball_masses(layout, 1.27))
+    summed = sum_masses(layout.array.ellipsoid.frame(), ball_masses(layout, 1.27))
     low, high = (float(layout.stops.angle[i]) for i in (0, -1))
     motion = MotionSpec()
     needed = summed.required_torque(

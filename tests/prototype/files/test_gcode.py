@@ -193,7 +193,7 @@ def test_a_person_as_trigger(layout: PrototypeLayout, drive: Drive) -> None:
 
 def test_comments_count_the_mirrors(layout: PrototypeLayout, program: list[str]) -> None:
     counts = re.findall(r"of \d+: (\d+) mirrors", "\n".join(program))
-    assert sum(map(int, counts)) == 2 * len(layout.half)
+    assert sum(map(int, counts)) == 2 * len(layout.array)
     assert f"(stop 1 of {len(layout.stops)}: {len(layout.stops.mirrors(0))} mirrors)" in program
 
 

@@ -23,14 +23,14 @@ def stops(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def test_every_mirror_of_both_cameras_once(layout: PrototypeLayout, plan: Rows) -> None:
     assert tuple(plan[0]) == PICTURE_COLUMNS
-    assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(layout.half) + 1))
+    assert [int(row["order"]) for row in plan] == list(range(1, 2 * len(layout.array) + 1))
     for turn, camera in (("0", "a"), ("180", "b")):
         own = [row["mirror"] for row in plan if row["object_turn_deg"] == turn]
-        assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(layout.half))]
+        assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(layout.array))]
 
 
 def test_round_trip(layout: PrototypeLayout, plan: Rows) -> None:
-    stops, ids = layout.stops, layout.half.ids
+    stops, ids = layout.stops, layout.array.ids
     of_b = {f"b{other + 1:04d}": i for i, other in enumerate(layout.twin.tolist())}
     number = {mirror: i for i, mirror in enumerate(ids)} | of_b
     for row in plan:
@@ -54,12 +54,12 @@ def test_each_run_goes_upward(plan: Rows) -> None:
 
 def test_the_table_alone_gives_the_directions(layout: PrototypeLayout, plan: Rows) -> None:
     """Ball's azimuth on the base and the base's angle, less the error: the mirror's azimuth."""
-    half, azimuth = layout.half, np.degrees(layout.placement.azimuth)
+    array, azimuth = layout.array, np.degrees(layout.placement.azimuth)
     for row in (row for row in plan if row["object_turn_deg"] == "0"):
-        i = half.ids.index(row["mirror"])
+        i = array.ids.index(row["mirror"])
         stands = azimuth[int(row["ball"]) - 1] + float(row["base_angle_deg"])
         found = stands - float(row["azimuth_error_deg"])
-        assert found == pytest.approx(np.degrees(half.azimuth[i]), abs=1e-9)
+        assert found == pytest.approx(np.degrees(array.azimuth[i]), abs=1e-9)
 
 
 def test_stops_sum_up_the_plan(plan: Rows, stops: Rows) -> None:

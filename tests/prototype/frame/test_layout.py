@@ -205,10 +205,10 @@ class TestRefusals:
         assert "would meet the bearings" in refusal(around, short, belt_travel_mm=40.0)
 
     def test_a_camera_that_looks_aside(self, around: Surroundings) -> None:
-        half = around.prototype.half
-        aside = replace(half.camera, forward=np.array([0.0, 0.6, 0.8]))
+        array = around.prototype.array
+        aside = replace(array.camera, forward=np.array([0.0, 0.6, 0.8]))
         turned = replace(
-            around, prototype=replace(around.prototype, half=replace(half, camera=aside))
+            around, prototype=replace(around.prototype, array=replace(array, camera=aside))
         )
         assert "second number of optics.camera_mm" in refusal(turned, drive("nema17-belt"))
 

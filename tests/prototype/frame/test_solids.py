@@ -102,7 +102,7 @@ class TestSolids:
         self, small_prototype: PrototypeLayout, solids: dict[str, PlacedSolid]
     ) -> None:
         """From the bracket alone: its face and slot, and the camera's radius and thread."""
-        view, own = small_prototype.half.camera, SMALL.prototype
+        view, own = small_prototype.array.camera, SMALL.prototype
         slot = [
             (point, way)
             for point, way, radius in cylinders(solids["camera_bracket"].shape)
@@ -205,9 +205,9 @@ class TestClearance:
         shapes += [stage_parts[name].shape for name in ("stage_crown", "stage_post")]
         shapes += [shape for name, shape in purchased.items() if name not in ("camera", "shaft")]
         mesh = trimesh.util.concatenate([as_trimesh(shape) for shape in shapes])
-        frame_, stops = small_prototype.half.ellipsoid.frame(), small_prototype.stops
-        pinhole = small_prototype.half.camera.pinhole
-        for mirror in range(len(small_prototype.half)):
+        frame_, stops = small_prototype.array.ellipsoid.frame(), small_prototype.stops
+        pinhole = small_prototype.array.camera.pinhole
+        for mirror in range(len(small_prototype.array)):
             ball = int(small_prototype.fit.ball[mirror])
             turn = small_prototype.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
             rim = small_prototype.balls.outline[ball]

@@ -170,7 +170,7 @@ class TestStage:
         crown = stage.components[1]
         pillars = [body for body in crown.added[3:] if isinstance(body, Cylinder)]
         assert len(pillars) == 4
-        cameras = small_prototype.half.ellipsoid.camera_distance * small_prototype.half.u
+        cameras = small_prototype.array.ellipsoid.camera_distance * small_prototype.array.u
         for i, place in enumerate(stage.leds):
             way = unit(cameras - place)
             points = place + np.arange(0.0, 60.0, 0.25)[:, None, None] * way
@@ -187,13 +187,13 @@ class TestKeepOut:
         """Rays from points of the capture sphere to points of the part in use, at its stops."""
         rng = np.random.default_rng(5)
         outline, stops = small_prototype.balls.outline, small_prototype.stops
-        frame = small_prototype.half.ellipsoid.frame()
-        for mirror in rng.choice(len(small_prototype.half), 12, replace=False).tolist():
+        frame = small_prototype.array.ellipsoid.frame()
+        for mirror in rng.choice(len(small_prototype.array), 12, replace=False).tolist():
             ball = int(small_prototype.fit.ball[mirror])
             azimuth = small_prototype.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
             rim = rotated_about_x(outline[ball], np.full(outline.shape[1], azimuth)) @ frame
             start = CAPTURE * unit(rng.normal(size=(len(rim), 3)))
-            ends = [start, np.broadcast_to(small_prototype.half.camera.pinhole, rim.shape)]
+            ends = [start, np.broadcast_to(small_prototype.array.camera.pinhole, rim.shape)]
             for other in ends:
                 share = rng.uniform(size=(len(rim), 1))
                 assert (keep_out.to_light(other + share * (rim - other)) < 1e-6).all()

@@ -137,8 +137,8 @@ def test_facets_of_a_mirror_have_its_area(
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.bincount(
         np.maximum(owner, 0), weights=np.linalg.norm(sides, axis=1) / 2, minlength=len(owner)
-    )[1 : len(low_resolution_design.halves[0]) + 1]
-    assert area == pytest.approx(low_resolution_design.halves[0].area, rel=2e-3)
+    )[1 : len(low_resolution_design.arrays[0]) + 1]
+    assert area == pytest.approx(low_resolution_design.arrays[0].area, rel=2e-3)
 
 
 def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:

@@ -56,13 +56,13 @@ def merged_light_field(runs: Runs, scene: Scene, resample: Resample = "photograp
 
 def ideal(layout: PrototypeLayout, angle: float) -> Plan:
     """A ball like each mirror, on a base that brings all of them there at one angle."""
-    half, m = layout.half, np.arange(len(layout.half))
-    back = Rotation.from_rotvec(-angle * half.ellipsoid.axis)
-    apex, normal = back.apply(half.mirrors.apex), back.apply(half.mirrors.normal)
-    radius = half.mirrors.radius
+    array, m = layout.array, np.arange(len(layout.array))
+    back = Rotation.from_rotvec(-angle * array.ellipsoid.axis)
+    apex, normal = back.apply(array.mirrors.apex), back.apply(array.mirrors.normal)
+    radius = array.mirrors.radius
     centre = apex - radius[:, None] * normal
     ball, stop = np.stack([m, np.argsort(layout.twin)]), np.zeros((2, len(m)), dtype=np.int64)
-    frame = half.ellipsoid.frame()
+    frame = array.ellipsoid.frame()
     return Plan(frame, apex, normal, radius, centre, radius, True, np.array([angle]), ball, stop)
 
 
@@ -111,7 +111,7 @@ class TestGeometry:
         self, runs: Runs, layout: PrototypeLayout
     ) -> None:
         """The record is computed at the mirror's own azimuth, these rays at the stop."""
-        for run, order in zip(runs, (np.arange(len(layout.half)), layout.twin), strict=True):
+        for run, order in zip(runs, (np.arange(len(layout.array)), layout.twin), strict=True):
             arcs, m = run.reflector.cells.arcs, len(run.reflector)
             wall, t = run.reflector.cells.seam, np.linspace(0, 1, 201)
             least = np.full(m, np.inf)
@@ -378,8 +378,8 @@ class TestReading:
             (lambda table: table[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
             (lambda table: raised(table, "stop", 1), "not numbered from 1"),
             (lambda table: exchanged(table, "1", "2"), "do not rise from stop to stop"),
-            (lambda table: table[3].update(ball=other(table[3]["ball"])), "but its ball stands"),
-            (lambda table: raised(table, "base_angle_deg", 0.5), "but its ball stands"),
+            (lambda table: table[3].update(ball=other(table[3]["ball"])), "but its ball is"),
+            (lambda table: raised(table, "base_angle_deg", 0.5), "but its ball is"),
             (lambda table: [row.pop("stop") for row in table], "1 stop: field required"),
             (lambda table: table.clear(), "not numbered from 1|does not show"),
         ],

@@ -12,7 +12,6 @@ from tbcad import schedule
 from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.mirrors import radii
-from tbcad.mirrors.array import design
 from tbcad.simulate import parallel
 from tbcad.simulate.study.capture_area import capture_area
 from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
@@ -31,6 +30,7 @@ from tbcad.simulate.study.study import (
 from tbcad.simulate.study.sweep import n_range
 from tbcad.simulate.study.tables import Table, csv_text
 from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 SMALL = ("n=4", "width_px=208", "height_px=155")
 # No radius gives some of these mirrors their coverage.
@@ -79,9 +79,9 @@ def test_capture_area_has_the_paper_beside_it() -> None:
     (at,) = table.where(n=4).records()
     assert at["paper_claim_flat_mm"] == 21.2
     assert at["flat_closed_form_mm"] == pytest.approx(21.0, abs=0.01)  # measured before: 21.0
-    half = design(load_spec(None, ["n=4", "radius_rule=paper"])).halves[0]
-    assert at["paper_minimum_mm"] == half.coverage.min()
-    assert at["paper_mirrors_short"] == (half.coverage < 59.9994).sum() > 0
+    array = mirror_array("n=4", "radius_rule=paper")
+    assert at["paper_minimum_mm"] == array.coverage.min()
+    assert at["paper_mirrors_short"] == (array.coverage < 59.9994).sum() > 0
     assert at["traced_minimum_mm"] > 60.59
     assert at["traced_mirrors_short"] == 0
     assert table.column("paper_claim_flat_mm") == [None, None, 21.2, None]

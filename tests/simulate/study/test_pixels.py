@@ -17,6 +17,7 @@ from tbcad.simulate.study.pixels import (
 )
 from tbcad.simulate.study.resolution import Ratio, balance, parse_ratio
 from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_array
 
 # The paper's lens does not hold the few large mirrors of a small n.
 WIDE = ("n=8", "hfov_deg=95", "width_px=832", "height_px=620")
@@ -42,24 +43,24 @@ def window(at: Reflector, mirror: int) -> float:
 def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: MirrorDesign) -> None:
     """Pixels counted one by one against the area within the cell's arcs."""
     at = reflectors(wide)[0]
-    on = count_pixels(wide.halves[0], (Sensor(832, 620),), 30.0)[0].on
+    on = count_pixels(wide.arrays[0], (Sensor(832, 620),), 30.0)[0].on
     area = np.array([window(at, i) for i in range(len(at))])
     assert np.abs(on - area).max() < 3 * np.sqrt(area.max())  # pixels along its edge
     assert on.sum() == pytest.approx(area.sum(), rel=5e-4)
 
 
 def test_both_cameras_have_the_same_pixels(wide: MirrorDesign) -> None:
-    theta0 = wide.halves[0].theta0
+    theta0 = wide.arrays[0].theta0
     a, b = (traced_pixels(at, theta0, 30.0) for at in reflectors(wide))
     assert np.array_equal(a, b)
 
 
 def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> None:
-    half = wide.halves[0]
+    array = wide.arrays[0]
     sensor = (Sensor(416, 310),)
-    assert count_pixels(half, sensor, 0.0)[0].seen.sum() == 0
-    most = count_pixels(half, sensor, 300.0)[0]  # all mirrors are inside
-    some = count_pixels(half, sensor, 30.0)[0]
+    assert count_pixels(array, sensor, 0.0)[0].seen.sum() == 0
+    most = count_pixels(array, sensor, 300.0)[0]  # all mirrors are inside
+    some = count_pixels(array, sensor, 30.0)[0]
     assert (some.seen <= some.on).all()
     assert 0.3 < some.seen.sum() / some.on.sum() < 0.9
     assert np.array_equal(some.on, most.on)
@@ -69,7 +70,7 @@ def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> Non
 def test_share_that_sees_the_sphere_follows_its_size(wide: MirrorDesign) -> None:
     """A mirror shows a small sphere in an area that grows with the square of its radius."""
     seen = [
-        count_pixels(wide.halves[0], (Sensor(1664, 1240),), r)[0].seen.sum()
+        count_pixels(wide.arrays[0], (Sensor(1664, 1240),), r)[0].seen.sum()
         for r in (5.0, 10.0, 20.0)
     ]
     assert seen[1] / seen[0] == pytest.approx(4, rel=0.02)
@@ -77,9 +78,9 @@ def test_share_that_sees_the_sphere_follows_its_size(wide: MirrorDesign) -> None
 
 
 def test_rays_for_blocks_of_pixels_give_the_same_count(wide: MirrorDesign) -> None:
-    half, sensor = wide.halves[0], Sensor(1664, 1240)
-    every = count_pixels(half, (sensor,), 30.0)[0]
-    some = count_pixels(half, (sensor,), 30.0, most_rays=600_000)[0]
+    array, sensor = wide.arrays[0], Sensor(1664, 1240)
+    every = count_pixels(array, (sensor,), 30.0)[0]
+    some = count_pixels(array, (sensor,), 30.0, most_rays=600_000)[0]
     assert every.rays == 1664 * 1240
     assert some.rays == 832 * 620
     assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
@@ -87,9 +88,9 @@ def test_rays_for_blocks_of_pixels_give_the_same_count(wide: MirrorDesign) -> No
 
 
 def test_sides_that_do_not_divide_are_sampled_too(wide: MirrorDesign) -> None:
-    half, sensor = wide.halves[0], Sensor(1663, 1239)
-    every = count_pixels(half, (sensor,), 30.0)[0]
-    some = count_pixels(half, (sensor,), 30.0, most_rays=600_000)[0]
+    array, sensor = wide.arrays[0], Sensor(1663, 1239)
+    every = count_pixels(array, (sensor,), 30.0)[0]
+    some = count_pixels(array, (sensor,), 30.0, most_rays=600_000)[0]
     assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
     assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)
 
@@ -97,12 +98,12 @@ def test_sides_that_do_not_divide_are_sampled_too(wide: MirrorDesign) -> None:
 @pytest.mark.parametrize("n", [2, 5, 6, 9])
 def test_number_of_virtual_cameras(n: int) -> None:
     """5 n^2 + 2 n + 1 vertices have z >= 0: 1657 at n = 18 (Table I)."""
-    half = design(load_spec(None, [f"n={n}"])).halves[0]
-    assert virtual_cameras(half) == 5 * n**2 + 2 * n + 1
+    array = mirror_array(f"n={n}")
+    assert virtual_cameras(array) == 5 * n**2 + 2 * n + 1
 
 
-def test_table_1(paper_half: MirrorArray) -> None:
-    assert virtual_cameras(paper_half) == 1657
+def test_table_1(paper_array: MirrorArray) -> None:
+    assert virtual_cameras(paper_array) == 1657
 
 
 @pytest.mark.parametrize("ratio", [Ratio(1, 1), Ratio(1, 4), Ratio(4, 1)])

@@ -55,6 +55,7 @@ def study() -> Study:
     )
 
 
+@pytest.mark.slow
 def test_more_pixels_make_better_views(study: Study) -> None:
     means = study.tables[1]
     every = means.where(elevation_deg="all").numbers("ssim")
@@ -135,6 +136,8 @@ def test_interval_of_the_mean_difference() -> None:
     assert mean_difference_interval(one[:1], other[:1]) == (-np.inf, np.inf)
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_prototype_against_the_shell(export_folder: Path) -> None:
     """Fewer pixels and other virtual cameras: views that are slightly worse."""
     export = read_export(export_folder)
@@ -155,6 +158,8 @@ def test_prototype_against_the_shell(export_folder: Path) -> None:
     assert rows["at 95 % the difference is"] == verdict
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
     """Section 5.3: the wider the filter, the lower the contrast, and the blurrier every view."""
     viewpoints = viewpoints_around((30.0,), 1, 640.0)

@@ -3,16 +3,12 @@
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import MirrorArray, design
+from tbcad.mirrors.array import MirrorArray
 from tbcad.simulate.study.virtual_images import image_distances, virtual_images
-from tbcad.spec.load import load_spec
 from tbcad.types import Floats
+from tests.mirror_arrays import mirror_array
 
 FAN = 1e-5  # distance of a fan's neighbouring ray from the apex, mm
-
-
-def half_of(*settings: str) -> MirrorArray:
-    return design(load_spec(None, settings)).halves[0]
 
 
 def traced(curvature: float, incidence: float, distance: float, fan: Floats) -> float:
@@ -59,25 +55,25 @@ def test_one_image_on_the_axis() -> None:
 
 def test_flat_mirrors_show_the_object_at_twice_the_semi_major_axis() -> None:
     """The ellipsoid's two distances sum to 2a: images lie at 2a - R, 2a, 2a + R in both fans."""
-    half = half_of("n=6", "radius_rule=flat")
-    at = virtual_images(half, 30.0)
+    array = mirror_array("n=6", "radius_rule=flat")
+    at = virtual_images(array, 30.0)
     twice = 2 * np.sqrt(100**2 + 100**2 / 2)
-    expected = np.broadcast_to(twice + np.array([-30.0, 0, 30])[:, None], (len(half), 3, 2))
+    expected = np.broadcast_to(twice + np.array([-30.0, 0, 30])[:, None], (len(array), 3, 2))
     assert at.distance == pytest.approx(expected, rel=1e-12)
 
 
 def test_depth_is_what_the_camera_measures_along_its_axis() -> None:
     """The image point itself, from apex and ray, seen from the pinhole."""
-    half = half_of("n=4")
-    at = virtual_images(half, 30.0)
-    pinhole = half.camera.pinhole
-    way = (half.mirrors.apex - pinhole) / at.to_mirror[:, None]
+    array = mirror_array("n=4")
+    at = virtual_images(array, 30.0)
+    pinhole = array.camera.pinhole
+    way = (array.mirrors.apex - pinhole) / at.to_mirror[:, None]
     point = pinhole + at.distance[:, 1, 0][:, None] * way
-    assert at.depth[:, 1, 0] == pytest.approx((point - pinhole) @ half.camera.forward, rel=1e-12)
+    assert at.depth[:, 1, 0] == pytest.approx((point - pinhole) @ array.camera.forward, rel=1e-12)
     assert (at.depth < at.distance).all()
 
 
-def test_incidence_is_that_of_the_paper_design(paper_half: MirrorArray) -> None:
+def test_incidence_is_that_of_the_paper_design(paper_array: MirrorArray) -> None:
     """16 ... 35 degrees at the apices, measured before (DESIGN.md section 3)."""
-    incidence = np.degrees(virtual_images(paper_half, 30.0).incidence)
+    incidence = np.degrees(virtual_images(paper_array, 30.0).incidence)
     assert (round(incidence.min()), round(incidence.max())) == (16, 35)

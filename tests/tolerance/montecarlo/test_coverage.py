@@ -109,7 +109,7 @@ def test_mirror_that_looks_past_the_object_sees_nothing(
     a, _ = none(halves)
     moved = replace(a, camera_shift=np.array([[0.0, shift, 0.0]]))
     one, whole = mirror_coverage(halves[0], moved), ~halves[0].halved
-    wanted = surrounded(small_design.halves[0], moved.camera_shift[0])
+    wanted = surrounded(small_design.arrays[0], moved.camera_shift[0])
     assert np.array_equal(one.crossings[0, whole] % 2 == 1, wanted[whole])
     assert wanted[whole].all() == all_look
 
@@ -136,11 +136,11 @@ class TestSlowWay:
         return draw(errors, 5, range(4), len(halves[0]))
 
     def test_same_coverage_as_with_every_edge(self, halves: EdgeModels, size: float) -> None:
-        for half, drawn in zip(halves, self.draws(halves, size), strict=True):
-            slow, fast = every_edge(half, drawn), mirror_coverage(half, drawn)
+        for array, drawn in zip(halves, self.draws(halves, size), strict=True):
+            slow, fast = every_edge(array, drawn), mirror_coverage(array, drawn)
             assert np.array_equal(fast.diameter, 2 * np.sqrt(slow[..., MISS_SQUARED]))
             assert np.array_equal(fast.crossings, slow[..., CROSSINGS])
-            scale = (drawn.focal[:, None] / half.view.pixel_pitch) ** 2
+            scale = (drawn.focal[:, None] / array.view.pixel_pitch) ** 2
             assert np.array_equal(fast.pixels, np.abs(slow[..., AREA]) * scale)
 
     def test_same_minimum_where_only_that_is_asked(self, halves: EdgeModels, size: float) -> None:
@@ -183,5 +183,5 @@ def test_planar_mirrors_with_a_thick_coat_move_and_stay_planar() -> None:
     a, b = (edge_model(at) for at in reflectors(flat))
     bare, _ = coverage((a, b), draw(Errors(), 1, range(1), len(a)))
     coated, _ = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
-    assert bare[0, : len(a)] == pytest.approx(flat.halves[0].coverage, abs=1e-5)
+    assert bare[0, : len(a)] == pytest.approx(flat.arrays[0].coverage, abs=1e-5)
     assert 0 < np.abs(coated - bare).max() < 1

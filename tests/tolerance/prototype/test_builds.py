@@ -143,7 +143,7 @@ class TestCoverage:
         self, model: PrototypeModel, layout: PrototypeLayout
     ) -> None:
         diameter, offset = coverage_and_offsets(model, draws_of(model, 1))[0]
-        m = len(layout.half)
+        m = len(layout.array)
         assert diameter[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
 

@@ -23,8 +23,8 @@ def mesh(how: Change, named: int = 0, halves: Sequence[str] = "a") -> Job:
     """Change the mesh of halves in both files; the first so many balls must be named."""
 
     def job(folder: Path) -> Sequence[str]:
-        for half in halves:
-            write(folder, half, how(read(folder, half), balls(folder, half)))
+        for array in halves:
+            write(folder, array, how(read(folder, array), balls(folder, array)))
         return [ball.id for ball in balls(folder, "a")[:named]]
 
     return job

@@ -81,6 +81,8 @@ def test_a_good_export_passes(export_folder: Path) -> None:
         assert mirror["pixels"] > 0
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_same_export_same_bytes(export_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     verify(export_folder, options=IN_PROCESS)
     before = (export_folder / "verify.json").read_bytes()
@@ -126,6 +128,8 @@ def test_quiet_is_one_line(export_folder: Path, capsys: pytest.CaptureFixture[st
     assert len(out.out.splitlines()) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_too_little_coverage_names_the_worst(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

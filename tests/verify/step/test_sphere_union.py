@@ -341,8 +341,8 @@ def made(name: str) -> MirrorDesign:
 def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
     sample = read_export(SAMPLE)
-    table = [row for half in it.halves for row in mirror_rows(half)]
-    views = {half.camera_id: half.camera.pinhole for half in it.halves}
+    table = [row for array in it.arrays for row in mirror_rows(array)]
+    views = {array.camera_id: array.camera.pinhole for array in it.arrays}
     cameras: dict[str, Camera] = {
         key: sample.cameras[key].model_copy(update={"pinhole": pinhole})
         for key, pinhole in views.items()
@@ -351,7 +351,7 @@ def as_export(it: MirrorDesign) -> Export:
         sample,
         mirrors=Mirrors.model_validate({key: [row[key] for row in table] for key in COLUMNS}),
         cameras=cameras,
-        foot_z_mm=it.halves[0].foot,
+        foot_z_mm=it.arrays[0].foot,
         coating_mm=it.spec.mirrors.coating_um / 1000,
     )
 
@@ -387,8 +387,8 @@ def test_area_under_the_coat() -> None:
     """The record's area is the reflecting surface's, not the solid's."""
     it = made("coat")
     bare = cells_of_export(as_export(it), "a")
-    np.testing.assert_allclose(bare.area, cell_areas(it.halves[0].modelled_cells), rtol=1e-11)
-    assert np.abs(bare.area / it.halves[0].area - 1).max() > 1e-3
+    np.testing.assert_allclose(bare.area, cell_areas(it.arrays[0].modelled_cells), rtol=1e-11)
+    assert np.abs(bare.area / it.arrays[0].area - 1).max() > 1e-3
 
 
 def test_the_halves_mirror_each_other() -> None:
