@@ -155,10 +155,10 @@ def _on_worker(
     work: Callable[[Unit], Result], unit: Unit, expected: Versions, scheduler: str
 ) -> Result:
     """Result of a unit on a worker, which must have the same versions as the client."""
-    for name, here in versions().items():
-        if here != expected[name]:
+    for name, installed in versions().items():
+        if installed != expected[name]:
             raise InputError(
-                f"--scheduler {scheduler}: a worker on {platform.node()} has {name} {here}, "
+                f"--scheduler {scheduler}: a worker on {platform.node()} has {name} {installed}, "
                 f"allowed is {expected[name]} as here: install the same there"
             )
     return work(unit)

@@ -76,9 +76,9 @@ def _sums_before(expected: Mapping[str, float]) -> list[float]:
 class _TimeLeftColumn(ProgressColumn):
     """The estimate, in words."""
 
-    def __init__(self, left: TimeLeft) -> None:
+    def __init__(self, time_left: TimeLeft) -> None:
         super().__init__()
-        self._left = left
+        self._left = time_left
 
     def render(self, task: Task) -> Text:
         task.completed = self._left.done
@@ -89,9 +89,11 @@ class _TimeLeftColumn(ProgressColumn):
 class Stages:
     """Stages of one command, shown on stderr."""
 
-    def __init__(self, bar: Progress | None, total: float, left: TimeLeft | None = None) -> None:
+    def __init__(
+        self, bar: Progress | None, total: float, time_left: TimeLeft | None = None
+    ) -> None:
         """Show stages on a bar, or in plain lines when there is none."""
-        self._bar, self._left = bar, left
+        self._bar, self._left = bar, time_left
         self._task = bar.add_task("", total=total) if bar else None
         self._started = monotonic()
         self._stage = ""
@@ -148,16 +150,16 @@ def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterato
         yield SilentStages() if silent else Stages(None, 0)
         return
     if isinstance(expected, int):
-        left, total = None, float(expected)
+        time_left, total = None, float(expected)
     else:
-        left = TimeLeft(expected)
-        total = left.total
+        time_left = TimeLeft(expected)
+        total = time_left.total
     columns = (
         SpinnerColumn(),
         BarColumn(bar_width=BAR_WIDTH),
         TimeElapsedColumn(),
-        *([_TimeLeftColumn(left)] if left else []),
+        *([_TimeLeftColumn(time_left)] if time_left else []),
         TextColumn("{task.description}", markup=False),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        yield Stages(bar, total, left)
+        yield Stages(bar, total, time_left)

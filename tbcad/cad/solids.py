@@ -209,12 +209,12 @@ def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
     Raises:
         InvalidSolidError: when it is several, or the kernel's check finds it invalid.
     """
-    found = solids(shape)
-    if len(found) != 1:
-        raise InvalidSolidError(f"{name}: {len(found)} solids where one should be")
-    if not BRepCheck_Analyzer(found[0]).IsValid():
+    bodies = solids(shape)
+    if len(bodies) != 1:
+        raise InvalidSolidError(f"{name}: {len(bodies)} solids where one should be")
+    if not BRepCheck_Analyzer(bodies[0]).IsValid():
         raise InvalidSolidError(f"{name}: the kernel's check finds the solid invalid")
-    return found[0]
+    return bodies[0]
 
 
 def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:

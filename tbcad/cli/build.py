@@ -201,9 +201,9 @@ def verify_command(
     started = monotonic()
     with stages(export_times(folder), silent=quiet) as screen:
         # Before the verification, which writes: a command that is stopped has changed nothing.
-        made = as_made(folder, screen.stage, screen.detail)
+        simulated = as_made(folder, screen.stage, screen.detail)
         report = verify(folder, options, progress=screen.stage)
-    report = replace(report, as_made=made, seconds=monotonic() - started)
+    report = replace(report, as_made=simulated, seconds=monotonic() - started)
     report.show(report_console(), output)
     return 0 if report.passed else 1
 

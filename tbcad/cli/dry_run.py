@@ -25,34 +25,34 @@ def show_overview(spec: Spec, asked: Sequence[str] | None, output: "Output", scr
     """Print what a build would give, as a record when that is the output."""
     parts = default_parts(spec) if asked is None else asked
     screen.stage("mirrors: radii and cells")
-    found = overview(design(spec), parts, screen.stage, optional_prototype=asked is None)
-    there = [part for part in parts if part != PROTOTYPE or found.prototype]
+    figures = overview(design(spec), parts, screen.stage, optional_prototype=asked is None)
+    there = [part for part in parts if part != PROTOTYPE or figures.prototype]
     seconds = sum(build_times(spec.optics.n, there, True, None).values())
     if output == "json":
-        typer.echo(json.dumps(overview_record(found, seconds), indent=1))
+        typer.echo(json.dumps(overview_record(figures, seconds), indent=1))
     else:
-        typer.echo("\n".join(overview_lines(found, seconds)))
+        typer.echo("\n".join(overview_lines(figures, seconds)))
     return 0
 
 
-def overview_lines(found: Overview, seconds: float) -> list[str]:
+def overview_lines(figures: Overview, seconds: float) -> list[str]:
     """Lines of at most 80 columns; seconds: that the build is expected to take."""
     radii = "planar"
-    if found.radius_mm is not None:
-        radii = "radius {:.1f} to {:.1f} mm".format(*found.radius_mm)
+    if figures.radius_mm is not None:
+        radii = "radius {:.1f} to {:.1f} mm".format(*figures.radius_mm)
     lines = [
-        f"mirrors           {found.mirrors} ({found.virtual_cameras} virtual cameras), {radii}",
-        f"minimum coverage  {found.minimum_coverage_mm:.2f} mm, of "
-        f"{found.spec.optics.capture_diameter_mm:g} mm",
-        f"lens              {found.view_angle_deg:g} degrees across "
-        f"{found.spec.camera.width_px} pixels",
+        f"mirrors           {figures.mirrors} ({figures.virtual_cameras} virtual cameras), {radii}",
+        f"minimum coverage  {figures.minimum_coverage_mm:.2f} mm, of "
+        f"{figures.spec.optics.capture_diameter_mm:g} mm",
+        f"lens              {figures.view_angle_deg:g} degrees across "
+        f"{figures.spec.camera.width_px} pixels",
     ]
-    if found.shell_prints:
-        lines.append(f"both shells       {_print_text(found.shell_prints)}")
-    if found.prototype:
-        lines += _prototype_lines(found.prototype)
-    if found.note:
-        lines.append(found.note)
+    if figures.shell_prints:
+        lines.append(f"both shells       {_print_text(figures.shell_prints)}")
+    if figures.prototype:
+        lines += _prototype_lines(figures.prototype)
+    if figures.note:
+        lines.append(figures.note)
     minutes = max(seconds / MINUTE, 0.1)
     return [
         *lines,
@@ -60,27 +60,27 @@ def overview_lines(found: Overview, seconds: float) -> list[str]:
     ]
 
 
-def overview_record(found: Overview, seconds: float) -> dict[str, Any]:
+def overview_record(figures: Overview, seconds: float) -> dict[str, Any]:
     """The same for programs: fields of `Overview`, masses in grams, prices in euros."""
-    record = asdict(found) | {"spec": spec_dict(found.spec)}
+    record = asdict(figures) | {"spec": spec_dict(figures.spec)}
     return record | {"build_seconds": round(seconds)}
 
 
-def _prototype_lines(found: PrototypeOverview) -> Iterator[str]:
-    caps = f" and {found.caps} caps" if found.caps else ""
-    yield f"prototype         {found.balls} balls{caps}, {found.stops} stops, " + (
-        f"swing {found.swing_deg:.0f} degrees"
+def _prototype_lines(figures: PrototypeOverview) -> Iterator[str]:
+    caps = f" and {figures.caps} caps" if figures.caps else ""
+    yield f"prototype         {figures.balls} balls{caps}, {figures.stops} stops, " + (
+        f"swing {figures.swing_deg:.0f} degrees"
     )
-    yield f"  coverage        {found.minimum_coverage_mm:.2f} mm, " + (
-        f"{found.kept_share:.0%} of the shell's pixels"
+    yield f"  coverage        {figures.minimum_coverage_mm:.2f} mm, " + (
+        f"{figures.kept_share:.0%} of the shell's pixels"
     )
-    yield f"  balls           {found.ball_mass_g:.0f} g, about {found.ball_price:.0f} EUR"
-    yield f"  turning         {found.turning_mass_g:.0f} g, driven by {found.motor}"
-    yield f"  printed parts   {_print_text(found.prints)}"
+    yield f"  balls           {figures.ball_mass_g:.0f} g, about {figures.ball_price:.0f} EUR"
+    yield f"  turning         {figures.turning_mass_g:.0f} g, driven by {figures.motor}"
+    yield f"  printed parts   {_print_text(figures.prints)}"
 
 
-def _print_text(found: PrintEstimate) -> str:
+def _print_text(figures: PrintEstimate) -> str:
     return (
-        f"{found.volume_cm3:.0f} cm3, about {found.mass_g:.0f} g, {found.hours:.0f} h, "
-        f"{found.price:.0f} EUR by FDM"
+        f"{figures.volume_cm3:.0f} cm3, about {figures.mass_g:.0f} g, {figures.hours:.0f} h, "
+        f"{figures.price:.0f} EUR by FDM"
     )

@@ -293,6 +293,8 @@ def _show(out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, 
         {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
     )
     write_images({out: picture, files[0]: truth, files[1]: sheet})
-    found = image_quality(truth, picture)
-    typer.echo(f"PSNR {found.psnr_db:.2f} dB, SSIM {found.ssim:.4f} against the {names[1]} picture")
+    quality = image_quality(truth, picture)
+    typer.echo(
+        f"PSNR {quality.psnr_db:.2f} dB, SSIM {quality.ssim:.4f} against the {names[1]} picture"
+    )
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

@@ -42,10 +42,10 @@ def read_json(path: Path, model: type[Model], schema: str, missing: str) -> Mode
         value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
-    found = value.get("schema") if isinstance(value, dict) else None
-    if found != schema:
+    version = value.get("schema") if isinstance(value, dict) else None
+    if version != schema:
         raise InputError(
-            f"{path}: schema is {found!r:.40}, this version of tbcad reads {schema!r}: {REBUILD}"
+            f"{path}: schema is {version!r:.40}, this version of tbcad reads {schema!r}: {REBUILD}"
         )
     try:
         return model.model_validate(value)

@@ -84,10 +84,10 @@ def _colours(writer: STEPControl_Writer, bodies: Sequence[ColouredSolid]) -> str
         entity = STEPConstruct.FindEntity_s(styles.FinderProcess(), body.shape)
         if id(entity) not in place:
             raise StepError(f"the kernel lost {body.name}")
-        own = list(_style(number, place[id(entity)], body.colour))
+        style = list(_style(number, place[id(entity)], body.colour))
         items.append(f"#{number}")
-        number += len(own)
-        lines += own
+        number += len(style)
+        lines += style
     context = place[id(styles.FindContext(bodies[0].shape))]
     drawn, listed = "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION", ",\n".join(items)
     lines.append(f"#{number}={drawn}('',\n({listed}),#{context});")

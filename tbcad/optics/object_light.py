@@ -58,9 +58,9 @@ def closest_passage(cells: Cells, pinhole: Floats, capture: float) -> tuple[floa
 
 def passing_distances(pinhole: Floats, point: Floats) -> Floats:
     """Distances (...) from the origin of straight ways from a pinhole to points (..., 3), mm."""
-    way = point - pinhole
-    share = np.clip(-(way @ pinhole) / dot(way, way), 0, 1)
-    return norm(pinhole + share[..., None] * way)
+    ray = point - pinhole
+    share = np.clip(-(ray @ pinhole) / dot(ray, ray), 0, 1)
+    return norm(pinhole + share[..., None] * ray)
 
 
 def _minima(cells: Cells, arc: Ints, function: Callable[[Floats], Floats]) -> Floats:

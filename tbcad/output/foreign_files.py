@@ -22,12 +22,12 @@ def foreign_files(folder: Path) -> list[Path]:
         OSError: the folder cannot be read.
     """
     manifest = read_manifest(folder)
-    own = {MANIFEST, VERDICT} if manifest else set()
+    of_tbcad = {MANIFEST, VERDICT} if manifest else set()
     listed = manifest.files if manifest else {}
     return [
         path
         for path in sorted(folder.iterdir())
-        if not (is_file(path) and (path.name in own or is_listed(path, listed.get(path.name))))
+        if not (is_file(path) and (path.name in of_tbcad or is_listed(path, listed.get(path.name))))
     ]
 
 

@@ -67,15 +67,15 @@ def arrangements(design: MirrorDesign) -> Iterator[Arrangement]:
     """
     tried: list[int] = []
     first_error: SpecError | None = None
-    found = False
+    any_arranged = False
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, Arrangement):
-            found = True
+            any_arranged = True
             yield outcome
         elif first_error is None:
             first_error = outcome
-    if not found and first_error is not None:
+    if not any_arranged and first_error is not None:
         raise SpecError(f"{first_error}{_remedy(design, tried)}") from None
 
 

@@ -174,7 +174,7 @@ def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
 def _assembly(folder: Path, record: Record) -> list[_Drawn]:
     """All bodies of prototype.glb, in millimetres and z up."""
     scene = trimesh.load_scene(folder / record["assembly"]["glb"])
-    found = []
+    drawn = []
     for name in sorted(scene.graph.nodes_geometry):
         place, geometry = scene.graph[name]
         mesh = scene.geometry[geometry]
@@ -183,8 +183,8 @@ def _assembly(folder: Path, record: Record) -> list[_Drawn]:
         surface = pyvista.PolyData(points, faces.ravel()).clean()
         surface = surface.compute_normals(split_vertices=True, feature_angle=30.0)
         colour = mesh.visual.material.baseColorFactor / 255
-        found.append(_Drawn(name, scene.graph.transforms.parents[name], surface, colour))
-    return found
+        drawn.append(_Drawn(name, scene.graph.transforms.parents[name], surface, colour))
+    return drawn
 
 
 def _add(plotter: pyvista.Plotter, body: _Drawn, moved: Floats) -> None:

@@ -106,11 +106,11 @@ def _coloured(folder: Path, camera: str) -> pyvista.PolyData:
     shell = pyvista.read(folder / f"shell_{camera}.stl")
     mirrors = read_mirrors(folder, camera)
     corners = np.asarray(shell.points, dtype=np.float64)[shell.regular_faces]
-    mirror, found = mirror_of_facets(corners, mirrors)
+    mirror, on_mirror = mirror_of_facets(corners, mirrors)
     share = (mirrors.polar - mirrors.polar.min()) / np.ptp(mirrors.polar)
     colour = np.column_stack([0.25 + 0.7 * share, 0.5 + 0.25 * share, 0.95 - 0.65 * share])
     colour *= np.where(np.arange(len(colour)) % 3 == 0, 0.85, 1.0)[:, None]
-    rgb = np.where(found[:, None], 255 * colour[mirror], STRUCTURE_GREY)
+    rgb = np.where(on_mirror[:, None], 255 * colour[mirror], STRUCTURE_GREY)
     shell["colour"] = rgb.astype(np.uint8)
     return shell
 
@@ -125,10 +125,10 @@ def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, B
     smallest = np.full(len(corners), np.inf)
     for tried in nearest.T:
         one = ModelledMirrors(*(values[tried] for values in mirrors))
-        away = np.max([np.abs(_height(corners[:, k], one)) for k in range(3)], axis=0)
-        away[dot(facing, _outward(middle, one)) < FACING_COS] = np.inf
-        better = away < smallest
-        best[better], smallest[better] = tried[better], away[better]
+        distance = np.max([np.abs(_height(corners[:, k], one)) for k in range(3)], axis=0)
+        distance[dot(facing, _outward(middle, one)) < FACING_COS] = np.inf
+        better = distance < smallest
+        best[better], smallest[better] = tried[better], distance[better]
     return best, smallest < CORNER_TOLERANCE_MM
 
 

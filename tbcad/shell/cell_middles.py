@@ -59,6 +59,6 @@ def _deepest_step(start: Floats, axes: Floats, point: Floats, inward: Floats) ->
     """
     # Unknowns: both steps and the smallest distance, which is to be largest.
     table = np.column_stack([-inward @ axes.T, np.ones(len(point))])
-    found = linprog([0, 0, -1], A_ub=table, b_ub=dot(inward, start - point), bounds=(None, None))
-    step: Floats = np.asarray(found.x)[:2] @ axes
+    solution = linprog([0, 0, -1], A_ub=table, b_ub=dot(inward, start - point), bounds=(None, None))
+    step: Floats = np.asarray(solution.x)[:2] @ axes
     return step

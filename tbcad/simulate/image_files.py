@@ -74,9 +74,9 @@ def side_by_side(pictures: Mapping[str, Bytes]) -> Bytes:
     sheet = Image.new("RGB", (count * width + (count - 1) * GAP_PX, height + LABEL_PX), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
     for k, (name, picture) in enumerate(pictures.items()):
-        left = k * (width + GAP_PX)
-        sheet.paste(Image.fromarray(picture), (left, LABEL_PX))
-        draw.text((left + 4, 3), name, fill="black", font=font)
+        x = k * (width + GAP_PX)
+        sheet.paste(Image.fromarray(picture), (x, LABEL_PX))
+        draw.text((x + 4, 3), name, fill="black", font=font)
     return np.asarray(sheet)
 
 

@@ -66,7 +66,7 @@ def equivalent_blur_px(truth: Bytes, picture: Bytes) -> float:
         blurred = gaussian_filter(sharp, (sigma, sigma, 0))
         return float(np.mean((blurred - target) ** 2))
 
-    found = minimize_scalar(
+    fit = minimize_scalar(
         error, bounds=BLUR_RANGE_PX, method="bounded", options={"xatol": BLUR_STEP_PX}
     )
-    return float(found.x)
+    return float(fit.x)

@@ -200,10 +200,10 @@ def analyse(
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
     single_errors = _single_errors(simulator, errors, worst, detail)
-    own = ProcessOption(
+    chosen = ProcessOption(
         process.name, estimate_yield(result.worst, export.capture_mm), None, options.builds
     )
-    process_options = _process_options(simulator, own, worst, progress)
+    process_options = _process_options(simulator, chosen, worst, progress)
     own_margin = None
     if options.margins:
         progress(MARGINS)
@@ -272,11 +272,11 @@ def _single_errors(
 
 
 def _process_options(
-    simulator: _Simulator, own: ProcessOption, worst: WorstCoverage, progress: Progress
+    simulator: _Simulator, chosen: ProcessOption, worst: WorstCoverage, progress: Progress
 ) -> tuple[ProcessOption, ...]:
     """Every process with its yield, or the one that was asked for."""
     if not simulator.options.every_process:
-        return (own,)
+        return (chosen,)
     progress(EVERY_PROCESS)
     return tuple(_process_option(simulator, name, worst) for name in BUILT_IN)
 
@@ -294,8 +294,8 @@ def _margins(
     """The same processes with the margins that they need, and the margin of the one asked for."""
     designs = SolvedDesigns()
     if not simulator.options.every_process:
-        own = _margin(simulator, process, designs)
-        return tuple(replace(option, margin=own) for option in compared), own
+        chosen = _margin(simulator, process, designs)
+        return tuple(replace(option, margin=chosen) for option in compared), chosen
     options = tuple(
         replace(option, margin=_margin(simulator, load_process(option.name), designs))
         for option in compared

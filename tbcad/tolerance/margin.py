@@ -62,10 +62,10 @@ class SolvedDesigns:
                 self._models[spec] = edge_models(reflectors(design(spec)))
             except SpecError as error:
                 self._models[spec] = error
-        found = self._models[spec]
-        if isinstance(found, SpecError):
-            raise found
-        return found
+        model = self._models[spec]
+        if isinstance(model, SpecError):
+            raise model
+        return model
 
 
 def margin(

@@ -64,10 +64,10 @@ def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: floa
     features = _features(polar, radius, radius_weight_deg)
     start = _start(features, k)
     try:
-        _, found = kmeans2(features, start, iter=MAX_ITERATIONS, minit="matrix", missing="raise")
+        _, labels = kmeans2(features, start, iter=MAX_ITERATIONS, minit="matrix", missing="raise")
     except ClusterError:
         raise SpecError(f"k-means leaves a group empty: make prototype.k less than {k}") from None
-    group_of = _by_polar_angle(np.asarray(found, dtype=np.int64), polar, k)
+    group_of = _by_polar_angle(np.asarray(labels, dtype=np.int64), polar, k)
     return MirrorGroups(group_of, _means(group_of, polar, k), _means(group_of, radius, k))
 
 

@@ -159,11 +159,11 @@ def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
 
 def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) -> TopoDS_Solid:
     bodies, contacts, pads = _bars(spec, shelves), [], []
-    for row, left in (place for shelf in shelves for place in shelf):
+    for row, corner in (place for shelf in shelves for place in shelf):
         k = row.seat
-        bodies += _texts(row, spec, left)
+        bodies += _texts(row, spec, corner)
         for n, offset in enumerate(row.offsets):
-            at = np.array([*_seat_middle(row, left, n, seats), float(seats.back[k])])
+            at = np.array([*_seat_middle(row, corner, n, seats), float(seats.back[k])])
             wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
             bodies.append(moved(cut(wall, [seat_hollow(seats, k, offset)]), DOWN, at))
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ DOWN)
@@ -177,8 +177,8 @@ def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) 
 def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
     """A bar under each shelf, and one at the left that joins them."""
     half = _bar_width(spec) / 2
-    middles = [float(left[1]) for ((_, left), *_) in shelves]
-    ends = [float(left[0] + row.size[0]) - GAP_MM for (*_, (row, left)) in shelves]
+    middles = [float(corner[1]) for ((_, corner), *_) in shelves]
+    ends = [float(corner[0] + row.size[0]) - GAP_MM for (*_, (row, corner)) in shelves]
     low, high = middles[0] - half, middles[-1] + half
     bars = [
         _bar((0.0, y - half), (end, y + half), spec) for y, end in zip(middles, ends, strict=True)
@@ -192,10 +192,10 @@ def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) ->
     return prism(polygon(corners), np.array([0, 0, BAR_HEIGHT * spec.floor_mm]))
 
 
-def _seat_middle(row: CouponRow, left: Floats, n: int, seats: Seats) -> Floats:
+def _seat_middle(row: CouponRow, corner: Floats, n: int, seats: Seats) -> Floats:
     """Where the axis of a row's n-th seat meets the bed, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
-    return np.asarray(left + np.array([right - float(seats.boss[row.seat]), 0.0]))
+    return np.asarray(corner + np.array([right - float(seats.boss[row.seat]), 0.0]))
 
 
 def _wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
@@ -213,16 +213,16 @@ def _wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
     return np.array([[front, 0.0], [front, boss], *slope, [back, 0.0]])
 
 
-def _texts(row: CouponRow, spec: BaseSpec, left: Floats) -> list[TopoDS_Shape]:
+def _texts(row: CouponRow, spec: BaseSpec, corner: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
-    solids = _text(row.name, spec, left, row.first / 2)
+    solids = _text(row.name, spec, corner, row.first / 2)
     half = _offsets_width(spec) / 2
     for n, offset in enumerate(row.offsets):
-        solids += _text(_offset_text(offset), spec, left, row.first + n * row.cell + half)
+        solids += _text(_offset_text(offset), spec, corner, row.first + n * row.cell + half)
     return solids
 
 
-def _text(text: str, spec: BaseSpec, left: Floats, x: float) -> list[TopoDS_Shape]:
+def _text(text: str, spec: BaseSpec, corner: Floats, x: float) -> list[TopoDS_Shape]:
     """A text about a point at a distance x from a row's left end."""
-    place = np.array([*(left + np.array([x, 0.0])), BAR_HEIGHT * spec.floor_mm])
+    place = np.array([*(corner + np.array([x, 0.0])), BAR_HEIGHT * spec.floor_mm])
     return relief(text, spec.digit_mm, spec.relief_mm, SUNK_MM, np.eye(3), place)

@@ -135,8 +135,8 @@ def _piece(base: BaseLayout, split: BaseSplit, n: int, whole: TopoDS_Solid) -> T
     piece, holes, seats = split.pieces[n], piece_holes(base, split, n), base.local_seats
     expected = volume_by_cut_mesh(whole, piece, holes, CHORD_MM)
     shape = cut(whole, [*(_beyond(row) for row in piece), *holes])
-    own = np.array([split.piece_of(end) == n for end in seats.at_depth(seats.back)])
-    contacts, pads = seats.contacts[own].reshape(-1, 3), np.repeat(seats.pad[own], 3)
+    in_piece = np.array([split.piece_of(end) == n for end in seats.at_depth(seats.back)])
+    contacts, pads = seats.contacts[in_piece].reshape(-1, 3), np.repeat(seats.pad[in_piece], 3)
     return checked(f"carrier_{n + 1}", shape, expected, contacts, pads)
 
 

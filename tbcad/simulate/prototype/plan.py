@@ -201,7 +201,7 @@ def _angles(path: Path, pictures: list[_Picture]) -> Floats:
 
 def _served(path: Path, pictures: list[_Picture], mirrors: int) -> tuple[Ints, Ints]:
     """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
-    found = np.full((2, 2, mirrors), -1, dtype=np.int64)
+    ball_and_stop = np.full((2, 2, mirrors), -1, dtype=np.int64)
     for row, one in enumerate(pictures, 1):
         camera, mirror = int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1
         if one.mirror[0] != "ab"[camera] or not 0 <= mirror < mirrors:
@@ -210,13 +210,13 @@ def _served(path: Path, pictures: list[_Picture], mirrors: int) -> tuple[Ints, I
                 f"{one.object_turn_deg:g} degrees is {_name(camera, 0)} to "
                 f"{_name(camera, mirrors - 1)}: {REBUILD}"
             )
-        if found[0, camera, mirror] >= 0:
+        if ball_and_stop[0, camera, mirror] >= 0:
             raise InputError(f"{path}: row {row} shows {one.mirror} a second time: {REBUILD}")
-        found[:, camera, mirror] = one.ball - 1, one.stop - 1
-    missing = np.argwhere(found[0] < 0)
+        ball_and_stop[:, camera, mirror] = one.ball - 1, one.stop - 1
+    missing = np.argwhere(ball_and_stop[0] < 0)
     if missing.size:
         raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {REBUILD}")
-    return found[0], found[1]
+    return ball_and_stop[0], ball_and_stop[1]
 
 
 def _name(camera: int, mirror: int) -> str:

@@ -68,7 +68,7 @@ def definitions(
         progress=lambda unit: progress(f"Table II: n = {unit[0].n}, radii {unit[1]}"),
     )
     records = [record for row in rows for record in _mirror_records(spec, row, pitch)]
-    records += [record for found in reversed(counted) for record in found]
+    records += [record for by_sensor in reversed(counted) for record in by_sensor]
     table = Table.of_records("resolution-definitions", records, NOTES, COLUMNS)
     fits = _fits(table, known=is_table_i(spec))
     return table, Table.of_records("resolution-table-ii", fits, columns=FIT_COLUMNS)

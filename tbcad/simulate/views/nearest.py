@@ -52,11 +52,11 @@ def _nearest(points: Floats, tiles: Ints, pinholes: Floats, targets: Floats, lim
                 step += (ray[j] - targets[i - 1, j]) ** 2
             moved += np.sqrt(step)
         best, owner = limit, -1
-        for turn in range(-1, len(near)):  # first the mirror of the previous target
-            k = previous if turn < 0 else near[turn]
-            if k < 0 or last[k] < 0 or came[k] - moved >= best or (turn >= 0 and k == previous):
+        for rank in range(-1, len(near)):  # first the mirror of the previous target
+            k = previous if rank < 0 else near[rank]
+            if k < 0 or last[k] < 0 or came[k] - moved >= best or (rank >= 0 and k == previous):
                 continue
-            bound = _lower_bound(pinholes[k], ray) if turn >= 0 else 0.0
+            bound = _lower_bound(pinholes[k], ray) if rank >= 0 else 0.0
             if bound >= best:
                 came[k] = bound + moved
                 continue

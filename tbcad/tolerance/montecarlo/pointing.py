@@ -50,9 +50,9 @@ def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) ->
 def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
     """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.simulate.scene.rays."""
     apex, normal, curvature = table[..., APEX], table[..., NORMAL], table[..., CURVATURE, None]
-    away = origin - apex
-    c = dot(normal + curvature / 2 * away, away)
-    b = dot(normal + curvature * away, ray)
+    offset = origin - apex
+    c = dot(normal + curvature / 2 * offset, offset)
+    b = dot(normal + curvature * offset, ray)
     with np.errstate(invalid="ignore"):
         root = np.sqrt(b * b - 2 * curvature[..., 0] * c * dot(ray, ray))
     point = origin + (2 * c / (root - b))[..., None] * ray

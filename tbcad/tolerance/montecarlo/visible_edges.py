@@ -134,9 +134,9 @@ def _end_parameter(reach: float, bend: float) -> float:
 def _value_along(surface: Floats, edge: Floats) -> Vector:
     """Coefficients of a surface's value along an edge, times w."""
     k, bend = surface[CURVATURE], edge[BEND]
-    normal, away = vector(surface, NORMAL), minus(vector(edge, START), vector(surface, APEX))
-    value = dot(plus_scaled(normal, k / 2, away), away)
-    gradient = plus_scaled(normal, k, away)
+    normal, offset = vector(surface, NORMAL), minus(vector(edge, START), vector(surface, APEX))
+    value = dot(plus_scaled(normal, k / 2, offset), offset)
+    gradient = plus_scaled(normal, k, offset)
     along, out = dot(gradient, vector(edge, TANGENT)), dot(gradient, vector(edge, OUTWARD))
     return value, along, value * bend * bend / 4 - out * bend / 2 + k / 2
 

@@ -61,7 +61,7 @@ def minimum_miss_distances(
         the point of the ball that shows the object's centre.
     """
     side, coarse, first = sides
-    result, found = np.zeros(len(radius)), np.empty((np.diff(first).max(), SIDE_COLUMNS))
+    result, side_minima = np.zeros(len(radius)), np.empty((np.diff(first).max(), SIDE_COLUMNS))
     samples = np.empty((3, STRIDE))
     for i in range(len(radius)):
         axis = vector(highlight[i])
@@ -73,14 +73,14 @@ def minimum_miss_distances(
             e = first[i] + k
             _sample_side(coarse[e], lens[i], pinhole, centre[i], radius[i], right, down, samples)
             crossings += _crossings(samples)
-            _put_minimum(found[k], samples[MISS])
-            limit = min(limit, found[k, MINIMUM])
+            _put_minimum(side_minima[k], samples[MISS])
+            limit = min(limit, side_minima[k, MINIMUM])
         if crossings % 2 == 0:
             continue
         minimum = inf
         for k in range(count):
-            if found[k, MINIMUM] == inf or not found[k, BOUND] > limit:
-                best, low = int(found[k, BEST]), found[k, MINIMUM]
+            if side_minima[k, MINIMUM] == inf or not side_minima[k, BOUND] > limit:
+                best, low = int(side_minima[k, BEST]), side_minima[k, MINIMUM]
                 refined = _minimum_of_side(
                     side[first[i] + k], best, low, lens[i], pinhole, centre[i], radius[i]
                 )
@@ -185,9 +185,9 @@ def _normal(to_object: Vector, to_camera: Vector, share: float) -> Vector:
 def _cosine_difference(normal: Vector, camera: Vector, centre: Vector, radius: float) -> float:
     """Cosine between a ball's normal and the direction to the object, less that for the camera."""
     point = plus_scaled(centre, radius, normal)
-    away = minus(camera, point)
+    to_point = minus(camera, point)
     to_object = -dot(normal, point) / sqrt(dot(point, point))
-    return to_object - dot(normal, away) / sqrt(dot(away, away))
+    return to_object - dot(normal, to_point) / sqrt(dot(to_point, to_point))
 
 
 @compiled_loop

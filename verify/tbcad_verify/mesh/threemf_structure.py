@@ -79,10 +79,10 @@ def _model_text(blob: FileBytes) -> bytes:
                 raise BadExport(f"{blob.name}: {claim}; {AGAIN}")
             names = sorted(member.filename for member in members)
             if names != sorted(MEMBERS):
-                found = shown(", ".join(names))
+                given = shown(", ".join(names))
                 allowed = ", ".join(MEMBERS)
                 raise BadExport(
-                    f"{blob.name}: broken 3MF (members are {found}, allowed are {allowed}, each "
+                    f"{blob.name}: broken 3MF (members are {given}, allowed are {allowed}, each "
                     f"once); {AGAIN}"
                 )
             return {name: _member(blob.name, archive, name) for name in MEMBERS}[MODEL]
@@ -142,8 +142,8 @@ def _check_element(element: ElementTree.Element, name: str) -> None:
         raise ValueError(f"text in {name} is not allowed")
     children = CHILDREN[name]
     if len(element) != len(children):
-        found = ", ".join(_plain(child.tag) for child in element) or "nothing"
-        raise ValueError(f"{name} must hold {', '.join(children) or 'nothing'}, not {shown(found)}")
+        given = ", ".join(_plain(child.tag) for child in element) or "nothing"
+        raise ValueError(f"{name} must hold {', '.join(children) or 'nothing'}, not {shown(given)}")
     for child, expected in zip(element, children, strict=True):
         _check_element(child, expected)
 

@@ -57,8 +57,8 @@ def _balance(context: PrototypeContext, parts: list[MeasuredPart]) -> Iterator[s
     zero, third = (drive.mass_g * drive.centre @ axis for axis in axes[1:])
     moment = float(np.hypot(zero, third))
     yield from _unlike("moment_g_mm", drive.moment_g_mm, moment)
-    turn = np.radians(drive.azimuth_deg) - np.arctan2(third, zero)
-    if moment * abs(np.sin(turn / 2)) > SHARE * moment:
+    azimuth_error = np.radians(drive.azimuth_deg) - np.arctan2(third, zero)
+    if moment * abs(np.sin(azimuth_error / 2)) > SHARE * moment:
         yield "azimuth_deg"
 
 
@@ -120,10 +120,10 @@ def _gears(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterat
     yield from _unlike("belt_pull_n", drive.belt_pull_n, pull)
     steps = FULL_STEPS * spec.motion.microsteps * ratio / 360
     yield from _unlike("steps_per_deg", drive.steps_per_deg, steps)
-    own = MOTORS_NMM[motor] * ratio
-    holds = own * EFFICIENCY[spec.base.drive]
+    motor_torque = MOTORS_NMM[motor] * ratio
+    holds = motor_torque * EFFICIENCY[spec.base.drive]
     yield from _unlike("holding_torque_nmm", drive.holding_torque_nmm, holds)
-    share = min(drive.worst_torque_nmm / own, 1.0)
+    share = min(drive.worst_torque_nmm / motor_torque, 1.0)
     angle = np.degrees(np.arcsin(share)) * STEPS_PER_PERIOD / FULL_STEPS / ratio
     yield from _unlike("wind_up_deg", drive.wind_up_deg, float(angle))
 
@@ -140,11 +140,11 @@ def _ratio(
         return (STAGE_RATIO if drive == "stage-60" else 1.0), 0.0, 0.0
     teeth, rims = {}, {}
     for name in ("wheel", "pinion"):
-        found = re.fullmatch(r"GT2-(\d+)", bought.get(name) or "")
+        pulley = re.fullmatch(r"GT2-(\d+)", bought.get(name) or "")
         solid = solids.get(name)
-        if not found or solid is None:
+        if not pulley or solid is None:
             raise Unknown(f"there is no {name} of known teeth")
-        teeth[name] = int(found[1])
+        teeth[name] = int(pulley[1])
         rims[name] = next(face for face in solid.faces if not face.hollow)
         expected = teeth[name] * PITCH_MM / (2 * np.pi) + RIM_MM
         if abs(rims[name].radius - expected) > AXIS_MM:

@@ -29,12 +29,12 @@ def checks(
 
     The distance of the farthest from the stage informs: an LED in its pocket has a wall close by.
     """
-    inside, free, held = names
+    inside, free, on_stage = names
     leds = context.prototype.leds
     beyond = [led.name for led in leds if np.linalg.norm(led.position) > context.radius]
     sphere = at_most(inside, len(beyond), 0, f"the camera may not see {short_list(beyond)}")
     if not leds or not stage:
-        return [sphere, informative(free, 0), informative(held, 0, "no LED, or no stage")]
+        return [sphere, informative(free, 0), informative(on_stage, 0, "no LED, or no stage")]
     mesh, facet = joined_meshes(stage)
     distance = [distance_to_facets(led.position, mesh, np.arange(facet.size)) for led in leds]
     sunk = [led.name for led in leds if _is_in_material(stage, led.position)]
@@ -42,7 +42,7 @@ def checks(
     return [
         sphere,
         at_most(free, len(sunk), 0, f"in the material of the stage: {short_list(sunk)}"),
-        informative(held, distance[k], f"{leds[k].name} is farthest from the stage"),
+        informative(on_stage, distance[k], f"{leds[k].name} is farthest from the stage"),
     ]
 
 

@@ -132,12 +132,12 @@ def _labels(name: CheckName, context: PrototypeContext) -> Check:
 def labelled_mm(label: str, cap: bool) -> float | None:
     """The diameter of a ball, or a cap's radius, that a label names; None if it names none."""
     if cap:
-        found = re.fullmatch(r"cap R ([\d.]+) mm", label)
-        return float(found[1]) if found else None
-    if found := re.fullmatch(r"([\d.]+) mm", label):
-        return float(found[1])
-    if found := re.fullmatch(r"(?:(\d+) )?(?:(\d+)/(\d+))? ?in", label):
-        whole, share, parts = (float(one or 0) for one in found.groups())
+        label_parts = re.fullmatch(r"cap R ([\d.]+) mm", label)
+        return float(label_parts[1]) if label_parts else None
+    if label_parts := re.fullmatch(r"([\d.]+) mm", label):
+        return float(label_parts[1])
+    if label_parts := re.fullmatch(r"(?:(\d+) )?(?:(\d+)/(\d+))? ?in", label):
+        whole, share, parts = (float(one or 0) for one in label_parts.groups())
         return INCH_MM * (whole + (share / parts if parts else 0))
     return None
 

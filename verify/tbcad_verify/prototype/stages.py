@@ -96,11 +96,11 @@ def verify_prototype(
     drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
     _purchases(context, parts, sink, lambda: require(drawn, no_drawing))
     sink(Results(stages=[SEATS]))
-    held = _seats(context, parts, sink)
+    seats_measured = _seats(context, parts, sink)
     fitted = _caps(context, parts, sink) if prototype.balls.cap.any() else []
     sink(Results(stages=[LIGHT]))
     measured, reason = attempt(
-        lambda: measure_prototype(context, require(held, NO_SEATS), fitted, parts)
+        lambda: measure_prototype(context, require(seats_measured, NO_SEATS), fitted, parts)
     )
     views, no_views = attempt(lambda: ball_views.ball_views(require(measured, reason)))
     placed_files = stl_names(parts, *PLACED)
@@ -113,7 +113,7 @@ def verify_prototype(
         lambda: require(measured, reason),
         lambda: require(drawn, no_drawing),
     )
-    sink(Results(prototype=json_rows(context, held, views)))
+    sink(Results(prototype=json_rows(context, seats_measured, views)))
     return parts
 
 
@@ -132,23 +132,28 @@ def _purchases(
     drawn: Callable[[], dict[str, Shape]],
 ) -> None:
     """What there is, in all files that list it, and what follows from it."""
-    found, reason = attempt(lambda: inventory.assembly_solids(context))
-    own, no_own = attempt(lambda: inventory.part_solids(context))
+    drawn_solids, reason = attempt(lambda: inventory.assembly_solids(context))
+    part_files, no_part_files = attempt(lambda: inventory.part_solids(context))
     counted, no_solids = attempt(
         lambda: purchases.Solids(
-            _of_role(context, "base", require(own, no_own)),
-            _of_role(context, "cap", require(own, no_own)),
-            require(found, reason),
+            _of_role(context, "base", require(part_files, no_part_files)),
+            _of_role(context, "cap", require(part_files, no_part_files)),
+            require(drawn_solids, reason),
         )
     )
     _add(
         sink,
         inventory,
         RECORD_FILE,
-        lambda: (context, drawn(), require(found, reason), require(own, no_own)),
+        lambda: (
+            context,
+            drawn(),
+            require(drawn_solids, reason),
+            require(part_files, no_part_files),
+        ),
     )
     _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
-    _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(found, reason)))
+    _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(drawn_solids, reason)))
 
 
 def _of_role(context: PrototypeContext, role: str, solids: dict[str, TextSolid]) -> list[TextSolid]:
@@ -159,9 +164,9 @@ def _seats(
     context: PrototypeContext, parts: list[MeasuredPart], sink: ResultSink
 ) -> list[MeasuredSeat] | None:
     base, no_base = attempt(lambda: joined_meshes(of_roles(parts, "base"))[0])
-    held, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
-    _add(sink, seats, stl_names(parts, "base"), lambda: (context, require(held, reason)))
-    return held
+    seats_measured, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
+    _add(sink, seats, stl_names(parts, "base"), lambda: (context, require(seats_measured, reason)))
+    return seats_measured
 
 
 def _caps(
@@ -188,14 +193,14 @@ def _swing(
 
 
 def json_rows(
-    context: PrototypeContext, held: list[MeasuredSeat] | None, views: BallViews | None
+    context: PrototypeContext, seats_measured: list[MeasuredSeat] | None, views: BallViews | None
 ) -> Row:
     """Ball by ball and stop by stop, as verify.json has it; what is not known is null."""
     balls = context.prototype.balls
     count = len(balls)
     error = minimum = pixels = shell = np.full(count, np.nan)
-    if held is not None:
-        error = seats.centre_errors(context, held)
+    if seats_measured is not None:
+        error = seats.centre_errors(context, seats_measured)
     if views is not None:
         minimum = ball_coverage(context, views.coverage)
         pixels = np.round(np.bincount(context.ball, views.pixels, count))

@@ -143,22 +143,22 @@ def stamps(folder: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
 
     Files that are not there are left out.
     """
-    found: dict[str, tuple[int, ...]] = {}
+    entries: dict[str, tuple[int, ...]] = {}
     for name in names:
         with contextlib.suppress(OSError):
             info = (folder / name).stat()
-            found[name] = (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns)
-    return found
+            entries[name] = (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns)
+    return entries
 
 
 def listing(folder: Path) -> frozenset[str]:
     """Every file below the folder, by relative name; linked folders are not entered."""
-    found = (
+    entries = (
         Path(root, name).relative_to(folder).as_posix()
         for root, _, names in os.walk(folder)
         for name in names
     )
-    return frozenset(found)
+    return frozenset(entries)
 
 
 def refuse_unsafe(name: str) -> None:

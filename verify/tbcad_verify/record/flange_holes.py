@@ -100,15 +100,15 @@ def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flan
     )
 
 
-def hole_faults(found: Sequence[Hole], wanted: Sequence[Flange], limits: HoleLimits) -> list[str]:
+def hole_faults(holes: Sequence[Hole], wanted: Sequence[Flange], limits: HoleLimits) -> list[str]:
     """What is wrong with the holes of a half: number, diameter, direction, depth and place."""
     faults: list[str] = []
     for flange in wanted:
-        mine = [hole for hole in found if _is_along(hole, flange)]
+        mine = [hole for hole in holes if _is_along(hole, flange)]
         faults += [f"{flange.name} flange: {fault}" for fault in _faults(mine, flange, limits)]
     return faults + [
         f"a hole of {2 * hole.radius:g} mm in no flange"
-        for hole in found
+        for hole in holes
         if not any(_is_along(hole, flange) for flange in wanted)
     ]
 
@@ -120,16 +120,17 @@ def _section(semi_axes: Floats, pinhole: Floats, axis: int, at: float) -> Floats
         Unknown: the plane misses it.
     """
     major, minor = semi_axes
-    way, centre = pinhole / np.linalg.norm(pinhole), pinhole / 2
-    form = (np.eye(3) - np.outer(way, way)) / minor**2 + np.outer(way, way) / major**2
+    major_axis, centre = pinhole / np.linalg.norm(pinhole), pinhole / 2
+    along = np.outer(major_axis, major_axis)
+    form = (np.eye(3) - along) / minor**2 + along / major**2
     plane, height = [Y, Z - axis], at - centre[axis]
     inner, mixed = form[np.ix_(plane, plane)], form[plane, axis] * height
     middle = -np.linalg.solve(inner, mixed)
     rest = 1 - form[axis, axis] * height**2 - mixed @ middle
     if rest <= 0:
         raise Unknown("the back does not reach its flange")
-    turn = np.linspace(-np.pi, np.pi, SAMPLES)
-    spoke = np.column_stack([np.sin(turn), np.cos(turn)])
+    angle = np.linspace(-np.pi, np.pi, SAMPLES)
+    spoke = np.column_stack([np.sin(angle), np.cos(angle)])
     length = np.sqrt(rest / np.einsum("ni,ij,nj->n", spoke, inner, spoke))
     return np.asarray(centre[plane] + middle + length[:, None] * spoke)
 
@@ -167,14 +168,14 @@ def _is_along(hole: Hole, flange: Flange) -> bool:
     return abs(float(hole.axis[flange.axis])) > 1 - PARALLEL
 
 
-def _faults(found: Sequence[Hole], flange: Flange, limits: HoleLimits) -> Iterator[str]:
-    have = np.array([2 * hole.radius for hole in found])
+def _faults(holes: Sequence[Hole], flange: Flange, limits: HoleLimits) -> Iterator[str]:
+    have = np.array([2 * hole.radius for hole in holes])
     for diameter in sorted({*flange.diameter.tolist(), *_others(have, flange, limits.size)}):
         number = int((np.abs(have - diameter) <= limits.size).sum())
         wanted = int((flange.diameter == diameter).sum())
         if number != wanted:
             yield f"{number} holes of {diameter:g} mm, not {wanted}"
-    for hole in found:
+    for hole in holes:
         if abs(hole.depth - flange.thickness) > limits.size:
             yield f"a hole {hole.depth:g} mm deep, not {flange.thickness:g}"
         same = np.abs(flange.diameter - 2 * hole.radius) <= limits.size

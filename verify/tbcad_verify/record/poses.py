@@ -238,15 +238,15 @@ def _half_angles(camera: Camera, b: float, u: Floats, vertices: Floats) -> Float
     virtual camera and the line where two tangent planes meet is in the pencil of the two.
     """
     count = min(NEIGHBOURS, vertices.shape[1])
-    own, *others = np.asarray(cKDTree(vertices.T).query(u.T, k=count)[1]).T
+    vertex, *others = np.asarray(cKDTree(vertices.T).query(u.T, k=count)[1]).T
     rho = _radial_distance(camera, b, vertices)
     normal = unit(unit(camera.pinhole[:, None] - rho * vertices) - vertices)
     virtual = _camera_distance(camera, b) * u
     sines = []
-    own_height = dot(normal[:, own], virtual - rho[own] * vertices[:, own])
+    own_height = dot(normal[:, vertex], virtual - rho[vertex] * vertices[:, vertex])
     for other in others:
         height = dot(normal[:, other], virtual - rho[other] * vertices[:, other])
-        plane = unit(height * normal[:, own] - own_height * normal[:, other])
+        plane = unit(height * normal[:, vertex] - own_height * normal[:, other])
         sines.append(np.abs(dot(plane, u)))
     return np.asarray(np.arcsin(np.min(sines, axis=0)))
 

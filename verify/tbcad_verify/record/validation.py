@@ -183,13 +183,13 @@ def shown(value: object) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
-def _described(model: type[BaseModel], found: ErrorDetails, place: str) -> str:
-    if found["type"] == "extra_forbidden":
-        return _unknown(model, str(found["loc"][0]))
-    if found["type"] == "value_error":
-        return f"{place} {found['ctx']['error']}".strip()
-    value = "missing" if found["type"] == "missing" else shown(found["input"])
-    return f"{place} is {value}, allowed is {_allowed_at(model, found['loc'])}"
+def _described(model: type[BaseModel], error: ErrorDetails, place: str) -> str:
+    if error["type"] == "extra_forbidden":
+        return _unknown(model, str(error["loc"][0]))
+    if error["type"] == "value_error":
+        return f"{place} {error['ctx']['error']}".strip()
+    value = "missing" if error["type"] == "missing" else shown(error["input"])
+    return f"{place} is {value}, allowed is {_allowed_at(model, error['loc'])}"
 
 
 def _unknown(model: type[BaseModel], key: str) -> str:

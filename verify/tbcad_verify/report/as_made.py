@@ -38,15 +38,15 @@ class AsMade:
     reason: str = ""
 
 
-def as_made_lines(made: AsMade | None) -> list[str]:
+def as_made_lines(as_made: AsMade | None) -> list[str]:
     """The same in words; without simulated builds, the command that makes them."""
-    if made is None:
+    if as_made is None:
         return [NOT_SIMULATED]
-    if not made.processes:
-        return [f"As made: not simulated, {made.reason}"]
-    figures = [f"{one.process} {one.share:.0%} {one.coverage_mm:.3g}" for one in made.processes]
+    if not as_made.processes:
+        return [f"As made: not simulated, {as_made.reason}"]
+    figures = [f"{one.process} {one.share:.0%} {one.coverage_mm:.3g}" for one in as_made.processes]
     return [
-        f"As made ({made.builds} simulated builds): yield, and median minimum coverage in mm",
+        f"As made ({as_made.builds} simulated builds): yield, and median minimum coverage in mm",
         f"  {', '.join(figures)}",
         f"  larger yield: tbcad build --for-process NAME; causes: {COMMAND}",
     ]

@@ -56,11 +56,11 @@ def _figures(check: Check) -> dict[str, Any]:
 
 
 def _as_made(report: Report) -> dict[str, Any] | None:
-    made = report.as_made
-    if made is None:
+    as_made = report.as_made
+    if as_made is None:
         return None
     processes = [
         {"process": one.process, "yield": one.share, "coverage_mm": one.coverage_mm}
-        for one in made.processes
+        for one in as_made.processes
     ]
-    return {"builds": made.builds, "processes": processes, "reason": made.reason or None}
+    return {"builds": as_made.builds, "processes": processes, "reason": as_made.reason or None}

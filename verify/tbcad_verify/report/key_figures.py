@@ -48,8 +48,8 @@ KEY_FIGURES = (
 def key_figures(report: Report) -> list[tuple[KeyFigure, Check]]:
     """The key figures of what was built; of several files, the one nearest to its limit."""
     wanted = (*KEY_FIGURES, *_requested_printers(report))
-    found = ((one, checks_named(report.checks, one.check)) for one in wanted)
-    return [(one, min(checks, key=_margin)) for one, checks in found if checks]
+    checked = ((one, checks_named(report.checks, one.check)) for one in wanted)
+    return [(one, min(checks, key=_margin)) for one, checks in checked if checks]
 
 
 def checks_named(checks: Sequence[Check], name: str) -> list[Check]:

@@ -33,12 +33,12 @@ DIGITS = 4  # of a figure; below 1, where zeros lead, one less
 def summary(report: Report) -> list[Text]:
     """Verdict, what failed and what to do, key figures, what making leaves, time and folder."""
     failed = _failure_lines(report)
-    made = as_made_lines(report.as_made)[: AS_MADE_LINES if failed else None]
+    as_made = as_made_lines(report.as_made)[: AS_MADE_LINES if failed else None]
     note = textwrap.wrap(report.note, WIDTH, max_lines=NOTE_LINES, placeholder=MORE)
     end = [*_skipped_line(report), *note, _end_line(report)]
-    room = MAX_LINES - 1 - len(failed) - len(made) - len(end)
+    room = MAX_LINES - 1 - len(failed) - len(as_made) - len(end)
     figures = _figure_lines(report, room)
-    return [_coloured(report), *map(Text, (*failed, *figures, *made, *end))]
+    return [_coloured(report), *map(Text, (*failed, *figures, *as_made, *end))]
 
 
 def _coloured(report: Report) -> Text:

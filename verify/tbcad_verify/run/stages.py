@@ -229,11 +229,13 @@ def _trace_shells(
     )
 
     sink(Results(stages=[PIXELS]))
-    found, not_found = attempt(lambda: pixels.checks(require(setup, no_setup), covered, files))
+    pixel_counts, no_pixels = attempt(
+        lambda: pixels.checks(require(setup, no_setup), covered, files)
+    )
     report(
         pixels.CHECKS,
-        lambda: require(found, not_found)[1],
-        {"pixels": found[0]} if found else {},
+        lambda: require(pixel_counts, no_pixels)[1],
+        {"pixels": pixel_counts[0]} if pixel_counts else {},
     )
 
 

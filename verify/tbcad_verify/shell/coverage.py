@@ -89,18 +89,18 @@ def measure(setup: OpticalSetup) -> Coverage:
     )
 
 
-def checks(setup: OpticalSetup, found: Coverage, files: str) -> list[Check]:
+def checks(setup: OpticalSetup, coverage: Coverage, files: str) -> list[Check]:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
     facets, spheres, seen, gap, off = check_names(CHECKS, files)
-    ids, hidden = setup.export.mirrors.ids, found.hidden
+    ids, hidden = setup.export.mirrors.ids, coverage.hidden
     who = worst_offenders(ids, hidden, "points", hidden > 0, ".0f")
-    widest = setup.virtual_ids[int(np.argmax(found.gap))]
+    widest = setup.virtual_ids[int(np.argmax(coverage.gap))]
     return [
-        _covers(setup, facets, found.facet),
-        _covers(setup, spheres, found.fitted),
-        at_most(seen, int(hidden.sum()), 0, f"{who}; behind {short_list(found.blockers)}"),
-        informative(gap, float(found.gap.max()), f"widest at {widest}"),
-        informative(off, _off_the_record(setup, found)),
+        _covers(setup, facets, coverage.facet),
+        _covers(setup, spheres, coverage.fitted),
+        at_most(seen, int(hidden.sum()), 0, f"{who}; behind {short_list(coverage.blockers)}"),
+        informative(gap, float(coverage.gap.max()), f"widest at {widest}"),
+        informative(off, _off_the_record(setup, coverage)),
     ]
 
 
@@ -137,10 +137,10 @@ def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
     return at_least(name, 0.0 if unseen else measured, target, "; ".join(parts))
 
 
-def _off_the_record(setup: OpticalSetup, found: Coverage) -> float:
+def _off_the_record(setup: OpticalSetup, coverage: Coverage) -> float:
     """Largest difference between coverage on fitted surfaces and as the designer computed it."""
     recorded = setup.export.mirrors.coverage_mm
-    off = np.abs(found.fitted[setup.virtual.index] - recorded)
+    off = np.abs(coverage.fitted[setup.virtual.index] - recorded)
     return float(np.nan_to_num(off, nan=-1).max())
 
 

@@ -80,9 +80,11 @@ def _aim(
     step = 1e-6
     for _ in range(NEWTON):
         axes = [norm(d) * axis for axis in tangent_basis(unit(d))]
-        here = _miss(reflect(seen, index, d), u)
-        slopes = [(_miss(reflect(seen, index, d + step * axis), u) - here) / step for axis in axes]
-        a, b = _solve(slopes, target - here)
+        missed_by = _miss(reflect(seen, index, d), u)
+        slopes = [
+            (_miss(reflect(seen, index, d + step * axis), u) - missed_by) / step for axis in axes
+        ]
+        a, b = _solve(slopes, target - missed_by)
         d = d + a * axes[0] + b * axes[1]
     return d
 

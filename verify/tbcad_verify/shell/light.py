@@ -116,9 +116,9 @@ def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     second, stopped = _second(sensor, lines, miss, distance, useful)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
-    way = distance_before_mirror(sensor.seen, np.take(d, clear, axis=1), lines.reach[clear])
+    distance = distance_before_mirror(sensor.seen, np.take(d, clear, axis=1), lines.reach[clear])
     nearest = np.full(sensor.mirrors, np.inf)
-    np.minimum.at(nearest, on_object, way)
+    np.minimum.at(nearest, on_object, distance)
     some = clear[(first * sensor.camera.width + on[clear]) % SAMPLED == 0]
     return PixelTally(
         np.bincount(on_object, minlength=sensor.mirrors),

@@ -81,28 +81,28 @@ def centre_and_radius_errors(
     A planar mirror has neither. Its centre error is the largest of: the apex's distance from the
     patch, the angle between the normals times the patch's half width, and the patch's bulge.
     """
-    found = np.flatnonzero(segment >= 0)
-    surfaces = fits.surfaces.take(segment[found]).coated(coating_mm)
-    flat = mirrors.flat[found]
-    centre, radius = mirrors.columns("cx", 3)[:, found], mirrors.columns("radius_mm")[0, found]
+    matched = np.flatnonzero(segment >= 0)
+    surfaces = fits.surfaces.take(segment[matched]).coated(coating_mm)
+    flat = mirrors.flat[matched]
+    centre, radius = mirrors.columns("cx", 3)[:, matched], mirrors.columns("radius_mm")[0, matched]
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = norm(surfaces.centre() - centre)
         grown = np.abs(1 / surfaces.curvature - radius)
-    extent, sag = fits.extent[segment[found]], fits.sag[segment[found]]
-    apex, normal = mirrors.columns("px", 3)[:, found], mirrors.columns("nx", 3)[:, found]
+    extent, sag = fits.extent[segment[matched]], fits.sag[segment[matched]]
+    apex, normal = mirrors.columns("px", 3)[:, matched], mirrors.columns("nx", 3)[:, matched]
     tilt = norm(unit(surfaces.gradient(apex)) - normal) * extent
     plane = np.max([np.abs(surfaces.height(apex)), tilt, np.where(sag > FLAT_MM, sag, 0)], axis=0)
     errors = np.full((2, len(mirrors)), np.nan)
-    errors[0, found] = np.where(flat, plane, moved)
-    errors[1, found] = np.where(flat, 0.0, grown)
+    errors[0, matched] = np.where(flat, plane, moved)
+    errors[1, matched] = np.where(flat, 0.0, grown)
     return errors[0], errors[1]
 
 
 def owners(segment: Ints, count: int) -> Ints:
     """(K,) the mirror of each of `count` patches, by the patch (M,) of each mirror; -1 for none."""
     owner = np.full(count, -1, dtype=np.intp)
-    found = np.flatnonzero(segment >= 0)
-    owner[segment[found]] = found
+    matched = np.flatnonzero(segment >= 0)
+    owner[segment[matched]] = matched
     return owner
 
 

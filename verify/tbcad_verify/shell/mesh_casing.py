@@ -81,10 +81,14 @@ class MeshCasing:
         angle = np.linspace(0, np.pi / 2, MERIDIAN)
         circle = np.stack([np.cos(angle), np.sin(angle)])
         inner, outer = ((self.semi_axes + more)[:, None] for more in (self.deepest, beyond))
-        start, way = inner * circle / outer, circle / inner
-        way /= np.hypot(*way) * outer
+        start, direction = inner * circle / outer, circle / inner
+        direction /= np.hypot(*direction) * outer
         # The ray and the outer spheroid, both scaled so that this is a circle.
-        a, b, c = (way**2).sum(axis=0), (way * start).sum(axis=0), (start**2).sum(axis=0) - 1
+        a, b, c = (
+            (direction**2).sum(axis=0),
+            (direction * start).sum(axis=0),
+            (start**2).sum(axis=0) - 1,
+        )
         return float(((np.sqrt(b * b - a * c) - b) / a).min())
 
 
@@ -137,7 +141,7 @@ def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
     return MeshCasing(semi_axes, deepest, float(np.median(beyond)), float(beyond.min()))
 
 
-def _of_part(setup: OpticalSetup, number: int, found: RoundHoles | None) -> list[Check]:
+def _of_part(setup: OpticalSetup, number: int, round_holes: RoundHoles | None) -> list[Check]:
     export, part = setup.export, setup.export.parts[number]
     wall, holes = check_names(CHECKS, part.stl)
     asked, blur = export.spec.shell.wall_mm, ROUNDINGS * rounding(setup.mesh)
@@ -148,7 +152,7 @@ def _of_part(setup: OpticalSetup, number: int, found: RoundHoles | None) -> list
         detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
         wanted = flanges(export, export.cameras[part.camera], casing.beyond)
         limits = HoleLimits(SIZE_MM + blur, PLACE_MM + blur)
-        faults = hole_faults(_each(require(found, NOT_MEASURED)), wanted, limits)
+        faults = hole_faults(_each(require(round_holes, NOT_MEASURED)), wanted, limits)
         return [
             at_most(wall, abs(measured - asked), WALL_MM + blur, detail),
             at_most(holes, len(faults), 0, short_list(faults)),
@@ -157,11 +161,11 @@ def _of_part(setup: OpticalSetup, number: int, found: RoundHoles | None) -> list
     return guarded([wall, holes], work)
 
 
-def _each(found: RoundHoles) -> list[Hole]:
+def _each(holes: RoundHoles) -> list[Hole]:
     return [
         Hole(point, axis, float(diameter) / 2, float(depth))
         for point, axis, diameter, depth in zip(
-            found.middle.T, found.axis.T, found.diameter, found.depth, strict=True
+            holes.middle.T, holes.axis.T, holes.diameter, holes.depth, strict=True
         )
     ]
 
@@ -183,9 +187,9 @@ def find_valleys(setup: OpticalSetup, number: int) -> Valleys:
 def _back(setup: OpticalSetup, valleys: Valleys, camera: Camera) -> Floats:
     """(3, B) corners of the facets through which rays from inner valleys leave, mm."""
     start = valleys.point[:, valleys.inner]
-    way = unit(unit(start) + unit(start - camera.pinhole[:, None]))
-    facet = first_hits(setup.scene, start + LIFT_MM * way, way)
-    square = dot(np.take(setup.scene.planes[:, :3], facet, axis=0).T, way) > SQUARE_COS
+    direction = unit(unit(start) + unit(start - camera.pinhole[:, None]))
+    facet = first_hits(setup.scene, start + LIFT_MM * direction, direction)
+    square = dot(np.take(setup.scene.planes[:, :3], facet, axis=0).T, direction) > SQUARE_COS
     corners = np.unique(setup.mesh.faces[facet[(facet >= 0) & square]])
     return np.ascontiguousarray(setup.mesh.points[corners].T)
 

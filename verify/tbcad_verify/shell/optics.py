@@ -99,11 +99,11 @@ class OpticalSetup:
         """The mirrors and parts that facets belong to, each once; facet -1 is none."""
         patches = np.unique(self.recovery.segments.label[facets[facets >= 0]])
         owner, ids, parts = self.owner(), self.export.mirrors.ids, self.export.parts
-        found = {
+        matches = {
             ids[owner[k]] if owner[k] >= 0 else f"{parts[self.part[k]].name} (no mirror)"
             for k in patches.tolist()
         }
-        return sorted(found | ({"nothing"} if (facets < 0).any() else set()))
+        return sorted(matches | ({"nothing"} if (facets < 0).any() else set()))
 
 
 def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> OpticalSetup:
@@ -114,14 +114,14 @@ def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Op
     camera = np.array([item.camera for item in export.parts])[part]
     scene = build_scene(mesh)
     seen = _patches_at_apices(export, scene, recovery, camera)
-    found = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)
-    mirrors = recovery.fits.surfaces.take(found.segment).coated(export.coating_mm)
+    matches = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)
+    mirrors = recovery.fits.surfaces.take(matches.segment).coated(export.coating_mm)
     return OpticalSetup(
         export,
         mesh,
         recovery,
         part,
-        found,
+        matches,
         virtual_cameras(export.mirrors),
         scene,
         mirrors,

@@ -196,13 +196,13 @@ def _onto_coats(
 ) -> Floats:
     """Move edge points to where the coated surfaces of both sides meet; walls have no coat."""
     inside, beyond = sides
-    own = fits.surfaces.take(inside).coated(coat)
+    surface = fits.surfaces.take(inside).coated(coat)
     both = (beyond >= 0) & follows_fit(fits)[beyond]
     facing = np.where(both, beyond, inside)
     other = fits.surfaces.take(facing)
     other = _mixed(coated[facing], other.coated(coat), other)
     for _ in range(NEWTON):
-        x = x - _least_step(own, other, both, x)
+        x = x - _least_step(surface, other, both, x)
     return x
 
 
@@ -214,10 +214,10 @@ def _mixed(choose: NDArray[np.bool_], one: Surfaces, two: Surfaces) -> Surfaces:
     )
 
 
-def _least_step(own: Surfaces, other: Surfaces, both: NDArray[np.bool_], x: Floats) -> Floats:
+def _least_step(surface: Surfaces, other: Surfaces, both: NDArray[np.bool_], x: Floats) -> Floats:
     """The shortest move that puts x on its own surface and, where there are both, the other."""
-    f, g = own.height(x), other.height(x)
-    m, n = own.gradient(x), other.gradient(x)
+    f, g = surface.height(x), other.height(x)
+    m, n = surface.gradient(x), other.gradient(x)
     c = np.where(both, dot(m, n), 0.0)
     rest = np.maximum(1 - c * c, 1e-12)
     a, b = (f - c * g) / rest, (g - c * f) / rest

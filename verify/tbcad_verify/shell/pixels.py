@@ -69,13 +69,13 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
 def _ring(setup: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_rim.RimRays:
     mine = np.flatnonzero(setup.mine(camera))
     start = setup.recovery.fits.middle[:, setup.match.segment[mine]]
-    found = image_rim.rim_rays(
+    rim = image_rim.rim_rays(
         setup.seen(camera), mine, start, setup.u[:, mine], _reach(setup, seen)[mine]
     )
     # A halved mirror shows the camera only what its own half reflects.
     side = np.repeat(np.sign(start[0]), image_rim.AZIMUTHS)
-    own = ~setup.virtual.halved[found.mirror] | (side * found.lines.point[0] >= 0)
-    return take(found, own)
+    in_own_half = ~setup.virtual.halved[rim.mirror] | (side * rim.lines.point[0] >= 0)
+    return take(rim, in_own_half)
 
 
 def _reach(setup: OpticalSetup, seen: Coverage | None) -> Floats:

@@ -104,8 +104,8 @@ def _judge(fits: SurfaceFits, pinhole: Floats | None, radius_mm: float) -> Bools
     image = fits.extent * (1 + norm(middle) / norm(incoming))
     lands = norm(middle - along * outgoing) <= radius_mm + image
     bulges = (fits.sag > FLAT_MM) & (fits.count >= MIN_VERTICES)
-    found = bulges | (_planes(fits) & lands)
-    return np.asarray(follows_fit(fits) & facing[0] & facing[1] & found)
+    is_mirror = bulges | (_planes(fits) & lands)
+    return np.asarray(follows_fit(fits) & facing[0] & facing[1] & is_mirror)
 
 
 def _planes(fits: SurfaceFits) -> Bools:

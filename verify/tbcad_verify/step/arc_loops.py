@@ -60,16 +60,16 @@ def front_pieces(arcs: MapArcs, spread: float) -> MapArcs:
 def _swept(arcs: MapArcs) -> Floats:
     """(N,) twice the area on the map between each arc and the apex, mm^2; < 0 clockwise."""
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
-    turn = arcs.bend * arcs.length  # to the right
+    bend_angle = arcs.bend * arcs.length  # to the right
     chord = start[0] * end[1] - start[1] * end[0]
-    return np.asarray(chord - arcs.length**2 * turn * _bulge(turn))
+    return np.asarray(chord - arcs.length**2 * bend_angle * _bulge(bend_angle))
 
 
-def _bulge(turn: Floats) -> Floats:
+def _bulge(bend_angle: Floats) -> Floats:
     """(turn - sin turn) / turn^3."""
-    small = np.abs(turn) < 1e-2
-    safe = np.where(small, 1.0, turn)
-    return np.where(small, 1 / 6 - turn**2 / 120, (safe - np.sin(safe)) / safe**3)
+    small = np.abs(bend_angle) < 1e-2
+    safe = np.where(small, 1.0, bend_angle)
+    return np.where(small, 1 / 6 - bend_angle**2 / 120, (safe - np.sin(safe)) / safe**3)
 
 
 def inside(arcs: MapArcs, mirror: Ints, y: Floats) -> Bools:

@@ -73,10 +73,10 @@ def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
             if table.kinds.get(point) == "VERTEX_POINT"
         }
         valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
-        found = [round_face(table, one) for one in faces if names[one] not in mirrors]
+        round_faces = [round_face(table, one) for one in faces if names[one] not in mirrors]
     except (LookupError, ValueError) as error:
         raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
-    hollow = tuple(face for face in found if face and face.kind == "cylinder" and face.hollow)
+    hollow = tuple(face for face in round_faces if face and face.kind == "cylinder" and face.hollow)
     radii = sorted({round(face.radius, 6) for face in hollow})
     bores = tuple(hole for radius in radii for hole in holes(hollow, radius, HOLE_MM))
     return Casing((major, minor), centre, axis, np.array(valleys).reshape(-1, 3), bores)
@@ -89,28 +89,28 @@ def wall(casing: Casing, camera: Camera, semi_minor: float) -> float:
         Unknown: the back is not the spheroid that belongs to the camera.
     """
     focal = camera.pinhole / 2
-    own = np.array([float(np.hypot(semi_minor, np.linalg.norm(focal))), semi_minor])
+    semi_axes = np.array([float(np.hypot(semi_minor, np.linalg.norm(focal))), semi_minor])
     outer = np.array(casing.semi_axes)
     along = abs(float(casing.axis @ focal)) / float(np.linalg.norm(focal))
-    beyond = outer - own
+    beyond = outer - semi_axes
     if max(np.abs(casing.centre - focal).max(), abs(1 - along), abs(np.ptp(beyond))) > AXIAL_MM:
         raise Unknown("the back is another spheroid than the camera's")
-    inner = own + _deepest(casing, own, float(beyond.max()))
+    inner = semi_axes + _deepest(casing, semi_axes, float(beyond.max()))
     angle = np.linspace(0, np.pi / 2, MERIDIAN)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     distance = np.asarray(cKDTree(circle * outer).query(circle * inner)[0])
     return float(distance.min())
 
 
-def _deepest(casing: Casing, own: Floats, most: float) -> float:
+def _deepest(casing: Casing, semi_axes: Floats, most: float) -> float:
     """By how much a spheroid must be longer than the ellipsoid to hold all valleys, mm."""
     offset = casing.valleys - casing.centre
     along = offset @ casing.axis
     across = np.linalg.norm(offset - along[:, None] * casing.axis, axis=1)
     places = np.column_stack([along, across])
-    low, high = -float(own.min()) / 2, most
+    low, high = -float(semi_axes.min()) / 2, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        inside = ((places / (own + middle)) ** 2).sum(axis=1).max() <= 1
+        inside = ((places / (semi_axes + middle)) ** 2).sum(axis=1).max() <= 1
         low, high = (low, middle) if inside else (middle, high)
     return high

@@ -80,7 +80,7 @@ def _integrands(y: Floats, along: Floats, k: Floats) -> Floats:
     """(4, N) per mm of the map's arcs, at points y (2, N) that move along `along` (2, N)."""
     square = y[0] ** 2 + y[1] ** 2
     w = 1 / (1 + k**2 * square / 4)
-    turn = y[0] * along[1] - y[1] * along[0]
+    crossed = y[0] * along[1] - y[1] * along[0]
     growth = -(k**2) / 2 * w**2 * (y[0] * along[0] + y[1] * along[1])
     step, m = w * along + growth * y, w * square
-    return np.stack([w * turn / 2, m * step[1] / 2, -m * step[0] / 2, m * w * turn / 4])
+    return np.stack([w * crossed / 2, m * step[1] / 2, -m * step[0] / 2, m * w * crossed / 4])

@@ -65,9 +65,9 @@ class StepTable:
 
     def __init__(self, text: str) -> None:
         """Find all entities in a text; ValueError: it is no STEP file."""
-        found = read_entities(text).texts
-        self.kinds = {number: kind for number, (kind, _) in found.items()}
-        self.bodies = {number: body for number, (_, body) in found.items()}
+        entities = read_entities(text).texts
+        self.kinds = {number: kind for number, (kind, _) in entities.items()}
+        self.bodies = {number: body for number, (_, body) in entities.items()}
 
     def of(self, kind: str) -> list[int]:
         """Numbers of all entities of a kind."""
@@ -75,11 +75,11 @@ class StepTable:
 
     def references(self, number: int) -> list[int]:
         """What an entity refers to."""
-        return [int(found) for found in REFERENCE.findall(self.bodies.get(number, ""))]
+        return [int(digits) for digits in REFERENCE.findall(self.bodies.get(number, ""))]
 
     def numbers(self, number: int) -> list[float]:
         """Decimal numbers in an entity."""
-        return [float(found) for found in NUMBER.findall(self.bodies[number])]
+        return [float(digits) for digits in NUMBER.findall(self.bodies[number])]
 
     def reached(self, start: int) -> Iterator[int]:
         """All entities that one refers to, and what these refer to."""
@@ -110,7 +110,7 @@ def read_solids(text: str) -> dict[str, TextSolid]:
     try:
         table = StepTable(text)
         _refuse_moved(table)
-        found = [
+        solids = [
             (_product(table, shape), solid)
             for shape, representation in map(
                 table.references, table.of("SHAPE_DEFINITION_REPRESENTATION")
@@ -119,12 +119,12 @@ def read_solids(text: str) -> dict[str, TextSolid]:
             for solid in table.references(representation)
             if table.kinds.get(solid) == "MANIFOLD_SOLID_BREP"
         ]
-        if len(found) != len(table.of("MANIFOLD_SOLID_BREP")):
+        if len(solids) != len(table.of("MANIFOLD_SOLID_BREP")):
             raise Unknown("a solid is no product's, or of several")
-        names = [name for name, _ in found]
+        names = [name for name, _ in solids]
         if len(set(names)) != len(names):
             raise Unknown("two solids have the same name")
-        return {name: _solid(table, solid) for name, solid in found}
+        return {name: _solid(table, solid) for name, solid in solids}
     except (LookupError, ValueError) as error:
         raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
 
@@ -142,7 +142,7 @@ def holes(faces: tuple[RoundFace, ...], radius: float, tolerance: float) -> list
         for face in faces
         if face.kind == "cylinder" and face.hollow and abs(face.radius - radius) <= tolerance
     ]
-    found: list[Hole] = []
+    round_holes: list[Hole] = []
     for line in _lines(some):
         first = line[0]
         spans = sorted(_span_on(first, face) for face in line)
@@ -150,10 +150,10 @@ def holes(faces: tuple[RoundFace, ...], radius: float, tolerance: float) -> list
         for low, high in [*spans[1:], (np.inf, np.inf)]:
             if low > end + SAME_LINE_MM:
                 middle = first.point + (start + end) / 2 * first.axis
-                found.append(Hole(middle, first.axis, first.radius, end - start))
+                round_holes.append(Hole(middle, first.axis, first.radius, end - start))
                 start, end = low, high
             end = max(end, high)
-    return found
+    return round_holes
 
 
 def _lines(faces: list[RoundFace]) -> list[list[RoundFace]]:

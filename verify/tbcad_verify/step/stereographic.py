@@ -106,12 +106,12 @@ def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float
     """
     alpha, beta, gamma = _forms(maps, others)
     same = (np.abs(alpha) * spread + np.abs(beta).sum(axis=0) + np.abs(gamma) / spread) < COINCIDENT
-    own = number[:, None] == np.arange(len(others.curvature))
+    same_cell = number[:, None] == np.arange(len(others.curvature))
     earlier = np.arange(len(others.curvature)) < number[:, None]
     size = beta[0] ** 2 + beta[1] ** 2
     square = size - 4 * alpha * gamma
-    real = (square > COINCIDENT * (size + np.abs(alpha * gamma))) & ~same & ~own
-    covers = ~own & np.where(same, earlier, ~real & (alpha * spread + gamma / spread < 0))
+    real = (square > COINCIDENT * (size + np.abs(alpha * gamma))) & ~same & ~same_cell
+    covers = ~same_cell & np.where(same, earlier, ~real & (alpha * spread + gamma / spread < 0))
     scale = 1 / np.sqrt(np.where(real, square, 1))
     return _with_horizon(
         MapCircles(alpha * scale, beta * scale, gamma * scale, real, covers), maps.reach

@@ -77,12 +77,12 @@ def _of_edges(shape: TopoDS_Shape) -> Floats:
 def _ellipse(curve: BRepAdaptor_Curve) -> list[float]:
     """Centre, half axes as vectors, first and last parameter of an ellipse or circle."""
     if curve.GetType() == GeomAbs_Circle:
-        found = curve.Circle()
-        radii = found.Radius(), found.Radius()
+        bounds = curve.Circle()
+        radii = bounds.Radius(), bounds.Radius()
     else:
-        found = curve.Ellipse()
-        radii = found.MajorRadius(), found.MinorRadius()
-    place = found.Position()
+        bounds = curve.Ellipse()
+        radii = bounds.MajorRadius(), bounds.MinorRadius()
+    place = bounds.Position()
     one, two = triple(place.XDirection()), triple(place.YDirection())
     return [
         *triple(place.Location()),
@@ -105,10 +105,10 @@ def _of_ellipses(rows: Floats) -> Floats:
 
 def _of_curve(curve: BRepAdaptor_Curve) -> Floats:
     """(6,) how far any other curve reaches, by the kernel's search for its extremes."""
-    found = Bnd_Box()
-    BndLib_Add3dCurve.AddOptimal_s(curve, 0.0, found)
-    found.SetGap(0.0)
-    return np.array([-value for value in triple(found.CornerMin())] + triple(found.CornerMax()))
+    bounds = Bnd_Box()
+    BndLib_Add3dCurve.AddOptimal_s(curve, 0.0, bounds)
+    bounds.SetGap(0.0)
+    return np.array([-value for value in triple(bounds.CornerMin())] + triple(bounds.CornerMax()))
 
 
 def reach_of_face(face: TopoDS_Shape, axis: Floats) -> float:

@@ -68,10 +68,10 @@ def _of_sphere(face: TopoDS_Face, surface: BRepAdaptor_Surface) -> AreaMoments |
     if surface.GetType() != GeomAbs_Sphere or not surface.Sphere().Position().Direct():
         return None
     centre = np.array(triple(surface.Sphere().Location()))
-    found = between_arcs(face, centre, surface.Sphere().Radius())
-    if found is None:
+    figures = between_arcs(face, centre, surface.Sphere().Radius())
+    if figures is None:
         return None
-    area, first, second = found
+    area, first, second = figures
     offset = first / area
     return AreaMoments(area, centre + offset, second - area * np.outer(offset, offset))
 

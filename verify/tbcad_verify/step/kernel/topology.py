@@ -31,9 +31,9 @@ def faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
 
 def each_once(shape: TopoDS_Shape, kind: Any) -> list[TopoDS_Shape]:
     """All parts of a kind, each once."""
-    found = TopTools_IndexedMapOfShape()
-    TopExp.MapShapes_s(shape, kind, found)
-    return [found.FindKey(k) for k in range(1, found.Extent() + 1)]
+    shapes = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, shapes)
+    return [shapes.FindKey(k) for k in range(1, shapes.Extent() + 1)]
 
 
 def edges_of(shape: TopoDS_Shape) -> list[TopoDS_Edge]:
