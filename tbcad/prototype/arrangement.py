@@ -16,6 +16,7 @@ from tbcad.prototype.base.mass import carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import Parts, load_parts
@@ -42,6 +43,7 @@ class Arrangement:
         drive: that turns it.
         keep_out: what static parts must keep out of.
         stage: layout of the object stage.
+        wiring: of lamp and LEDs.
         frame: layout of what holds stage, base and camera.
         parts: lists of purchased parts.
     """
@@ -54,6 +56,7 @@ class Arrangement:
     drive: Drive
     keep_out: KeepOut
     stage: StageLayout
+    wiring: Wiring
     frame: FrameLayout
     parts: Parts
 
@@ -154,12 +157,14 @@ def _frame_attempts(
             return False
         keep_out = _keep_out(chosen, layout, base)
         try:
-            chosen, stage = _staged(chosen, layout, keep_out, parts)
+            chosen, stage, wiring = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
             yield chosen, error
             return True
         try:
-            arrangement = _arranged(chosen, layout, base, estimate, keep_out, stage, parts)
+            arrangement = _arranged(
+                chosen, layout, base, estimate, keep_out, (stage, wiring), parts
+            )
         except SpecError as error:
             yield chosen, error
         else:
@@ -170,16 +175,23 @@ def _frame_attempts(
 
 def _staged(
     spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
-) -> tuple[Spec, StageLayout]:
-    """The stage, without LEDs where those in the automatic places cannot be used."""
+) -> tuple[Spec, StageLayout, Wiring]:
+    """The stage, without LEDs where those in the automatic places cannot be used or wired."""
     section = spec.prototype.stage
     try:
-        return spec, stage_layout(spec.prototype, layout, keep_out, parts)
+        return spec, *_wired(spec, layout, keep_out, parts)
     except SpecError:
         if section.leds_mm != led_places(spec.optics.capture_diameter_mm):
             raise
     without = _with(spec, stage=section.model_copy(update={"leds_mm": ()}))
-    return without, stage_layout(without.prototype, layout, keep_out, parts)
+    return without, *_wired(without, layout, keep_out, parts)
+
+
+def _wired(
+    spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
+) -> tuple[StageLayout, Wiring]:
+    stage = stage_layout(spec.prototype, layout, keep_out, parts)
+    return stage, wiring_layout(spec.prototype, stage, parts)
 
 
 def _with(spec: Spec, **values: object) -> Spec:
@@ -209,10 +221,10 @@ def _arranged(
     base: BaseLayout,
     estimate: tuple[BaseBalance, Drive],
     keep_out: KeepOut,
-    stage: StageLayout,
+    staged: tuple[StageLayout, Wiring],
     parts: Parts,
 ) -> Arrangement:
-    balance, drive = estimate
+    (balance, drive), (stage, wiring) = estimate, staged
     frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     return Arrangement(
         spec=spec,
@@ -223,6 +235,7 @@ def _arranged(
         drive=drive,
         keep_out=keep_out,
         stage=stage,
+        wiring=wiring,
         frame=frame,
         parts=parts,
     )

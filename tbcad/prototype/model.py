@@ -23,6 +23,7 @@ from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.electronics.wiring import Wiring
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
 from tbcad.prototype.printing.component_solids import placed_component
 from tbcad.prototype.printing.parts import PrintedPart, Role
@@ -52,6 +53,7 @@ class PrototypeModel:
         base: layout of the carrier.
         split: how the carrier is cut to fit the bed.
         stage: layout of the object stage.
+        wiring: of lamp and LEDs.
         frame: layout of what holds stage, base and camera.
         printed: all printed parts.
         balance: of what turns with the base.
@@ -65,6 +67,7 @@ class PrototypeModel:
     base: BaseLayout
     split: BaseSplit
     stage: StageLayout
+    wiring: Wiring
     frame: FrameLayout
     printed: tuple[PrintedPart, ...]
     balance: BaseBalance
@@ -78,7 +81,7 @@ class PrototypeModel:
         counts = Counter(base_purchased_parts(self.base, self.split))
         counts.update(cap_magnets(self.base, self.layout, self.parts))
         counts.update(frame_purchased_parts(self.frame))
-        counts[self.stage.led.name] += len(self.stage.leds)
+        counts.update(self.wiring.purchased)
         return counts
 
 
@@ -148,11 +151,12 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         base=base,
         split=arrangement.split,
         stage=stage,
+        wiring=arrangement.wiring,
         frame=frame,
         printed=printed,
         balance=balance,
         drive=drive,
-        parts=parts,
+        parts=parts | arrangement.wiring.parts,
         capture_radius=spec.optics.capture_diameter_mm / 2,
     )
 

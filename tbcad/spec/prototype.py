@@ -164,6 +164,9 @@ class MotionSpec(Section):
     axis: Literal["X", "A"] = "X"
     """Axis of the controller: X with a degree for a millimetre (GRBL 1.1 has X, Y and Z only),
     or A in degrees (grblHAL and others)."""
+    controller: Literal["grblhal", "grbl"] = "grblhal"
+    """Firmware of the controller: grblHAL switches lamp and LEDs on digital outputs (M64, M65);
+    GRBL 1.1 has none, so with it only the lit object is photographed."""
     trigger: Literal["coolant", "pause"] = "coolant"
     """What triggers a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
     home_deg: float = Field(0.0, ge=-180, le=180)
@@ -177,6 +180,8 @@ class MotionSpec(Section):
     """Acceleration of the base; the motor is chosen for it."""
     settle_s: float = Field(0.5, ge=0, le=60)
     """Pause at a stop before a photograph."""
+    light_s: float = Field(0.1, ge=0, le=60)
+    """Pause after lamp or LED is switched, before a photograph."""
     trigger_s: float = Field(0.2, gt=0, le=60)
     """Time for which the relay is on."""
     exposure_s: float = Field(1.0, ge=0, le=600)
@@ -199,6 +204,10 @@ class StageSpec(Section):
     """LEDs in the pockets."""
     leds_mm: Annotated[Places, OR_AUTO] = AUTO
     """Centres of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
+    led_ma: float = Field(10.0, ge=0.5, le=100)
+    """Current of an LED, at most; the resistor is the next larger of the series E24."""
+    led_supply_v: float = Field(24.0, ge=3, le=48)
+    """Voltage that LED and resistor are in series at."""
     led_wall_mm: float = Field(2.0, ge=0.8, le=20)
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)

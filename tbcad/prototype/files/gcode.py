@@ -1,11 +1,15 @@
 """rotation_plan.nc: the plan as G-code for a GRBL-style controller with one rotary axis.
 
+At each stop it takes a photograph in the dark, one of each LED alone and one of the lit object.
+
 GRBL 1.1 knows the axes X, Y and Z only and refuses the word A, so its X takes degrees for
 millimetres; controllers with more axes take A. It drops comments in round brackets, shows none of
-them itself, and reads lines of at most 79 characters. M8, M9 and G4 wait for the motion to end.
-The program does not home: $H needs switches on axes that do not exist, unless GRBL is built for it.
-It starts at a known base angle: at a mark, or where homing ended.
-Sources: grbl/gcode.c, grbl/protocol.h and doc/markdown/settings.md of GRBL 1.1h.
+them itself, and reads lines of at most 79 characters. M8, M9 and G4 wait for the motion to end; M64
+and M65 are done when they are read, so a dwell comes before them after every motion.
+The program does not home: $H needs switches on axes that do not exist, unless GRBL is built for
+it. It starts at a known base angle: at a mark, or where homing ended.
+Sources: grblHAL core gcode.c; grbl/gcode.c, grbl/protocol.h and doc/markdown/settings.md of GRBL
+1.1h.
 """
 
 import math
@@ -18,6 +22,7 @@ from numpy.typing import NDArray
 
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.electronics.outputs import LIT, Phase, phases
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
@@ -25,6 +30,7 @@ from tbcad.types import Floats
 MAX_LINE_LENGTH = 79
 RUNS = 2  # one for each turn of the object
 DECIMALS = 4  # of a degree: far below a microstep, and 7 digits are what GRBL's floats hold
+SYNC_S = 0.01  # shortest dwell, which makes the controller wait for the end of a motion
 SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
 
 
@@ -68,22 +74,31 @@ def free_base_angles(prototype: PrototypeLayout) -> tuple[float, float]:
     return low, min(float((problem.max_azimuth - azimuth).min()), problem.max_swing / 2)
 
 
-def gcode_program(prototype: PrototypeLayout, drive: Drive, motion: MotionSpec) -> list[str]:
+def gcode_program(
+    prototype: PrototypeLayout, drive: Drive, motion: MotionSpec, leds: int
+) -> list[str]:
     """Lines of the program, each shorter than 80 characters.
+
+    Args:
+        prototype: whose stops are driven to.
+        drive: of the base.
+        motion: of the base.
+        leds: number of LEDs.
 
     Raises:
         SpecError: when the base cannot be where the program starts, for post or camera.
     """
-    sequence = stop_sequence(prototype, motion)
+    sequence, lit = stop_sequence(prototype, motion), phases(leds, motion)
     lines = [
-        *_header(sequence, drive, motion),
+        *_header(sequence, drive, motion, lit),
         f"M0 (MSG, base at {motion.home_deg:g} degrees, object straight? Then resume)",
         "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
         f"G92 {_axis_word(motion.home_deg, motion)}",
-        *_photographs(sequence, motion),
+        *(f"M65 P{phase.output}" for phase in lit if phase.output is not None),
+        *_photographs(sequence, motion, lit),
         f"G1 {_axis_word(sequence.start, motion)}",
         "M0 (MSG, turn the object by 180 degrees about z, then resume)",
-        *_photographs(sequence, motion),
+        *_photographs(sequence, motion, lit),
         f"G1 {_axis_word(motion.home_deg, motion)}",
         "G92.1",
         "M2",
@@ -97,18 +112,26 @@ def write_program(path: Path, lines: list[str]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
-def duration_minutes(sequence: StopSequence, motion: MotionSpec) -> float:
+def duration_minutes(sequence: StopSequence, motion: MotionSpec, lit: tuple[Phase, ...]) -> float:
     """Duration of the program, min, without pauses and manual work."""
     travel = RUNS * 2 * (float(sequence.angle[-1]) - sequence.start)
-    rest = motion.settle_s
+    each = motion.light_s if len(lit) > 1 else 0.0
     if motion.trigger == "coolant":
-        rest += motion.trigger_s + motion.exposure_s
+        each += motion.trigger_s + motion.exposure_s
+    rest = _settle_s(motion, lit) + len(lit) * each
     return travel / motion.feed_deg_min + RUNS * len(sequence.angle) * rest / 60
 
 
-def _header(sequence: StopSequence, drive: Drive, motion: MotionSpec) -> Iterator[str]:
+def _settle_s(motion: MotionSpec, lit: tuple[Phase, ...]) -> float:
+    """Dwell after a motion, s; with lights to switch, never none."""
+    return max(motion.settle_s, SYNC_S if len(lit) > 1 else 0.0)
+
+
+def _header(
+    sequence: StopSequence, drive: Drive, motion: MotionSpec, lit: tuple[Phase, ...]
+) -> Iterator[str]:
     number = SETTING[motion.axis]
-    minutes = duration_minutes(sequence, motion)
+    minutes = duration_minutes(sequence, motion, lit)
     yield f"(rotation plan: {len(sequence.angle)} stops, twice, about {minutes:.0f} min)"
     yield f"({drive.name}, {drive.motor.name}, {drive.ratio:g} turns of the motor a turn)"
     yield "(settings for the controller, to be sent before:)"
@@ -118,23 +141,42 @@ def _header(sequence: StopSequence, drive: Drive, motion: MotionSpec) -> Iterato
     yield f"($12{number}={motion.acceleration_deg_s2:g}: degrees/s^2)"
     if motion.trigger == "coolant":
         yield "(the camera's release is a relay on the coolant output)"
+    for phase in lit:
+        if phase.output is not None:
+            name = "lamp" if phase.name == LIT else phase.name
+            yield f"(digital output {phase.output}: {name})"
 
 
-def _photographs(sequence: StopSequence, motion: MotionSpec) -> Iterator[str]:
+def _photographs(
+    sequence: StopSequence, motion: MotionSpec, lit: tuple[Phase, ...]
+) -> Iterator[str]:
     """One run through all stops, in ascending order."""
     yield f"G1 {_axis_word(sequence.start, motion)} F{motion.feed_deg_min:g}"
     stops = zip(sequence.angle.tolist(), sequence.mirrors.tolist(), strict=True)
     for stop, (angle, count) in enumerate(stops, 1):
         yield f"(stop {stop} of {len(sequence.angle)}: {count} mirrors)"
         yield f"G1 {_axis_word(angle, motion)}"
-        yield from _photograph(stop, motion)
+        if settle := _settle_s(motion, lit):
+            yield _dwell(settle)
+        for phase in lit:
+            yield from _phase(stop, phase, motion, switched=len(lit) > 1)
 
 
-def _photograph(stop: int, motion: MotionSpec) -> Iterator[str]:
-    if motion.settle_s:
-        yield _dwell(motion.settle_s)
+def _phase(stop: int, phase: Phase, motion: MotionSpec, *, switched: bool) -> Iterator[str]:
+    """One photograph: its light on, released, and off again when it is exposed."""
+    if phase.output is not None:
+        yield f"M64 P{phase.output}"
+    if switched and motion.light_s:
+        yield _dwell(motion.light_s)
+    name = f"{phase.name}, " if switched else ""
+    yield from _photograph(f"stop {stop}: {name}photograph", motion)
+    if phase.output is not None:
+        yield f"M65 P{phase.output}"
+
+
+def _photograph(title: str, motion: MotionSpec) -> Iterator[str]:
     if motion.trigger == "pause":
-        yield f"M0 (MSG, stop {stop}: photograph, then resume)"
+        yield f"M0 (MSG, {title}, then resume)"
         return
     yield "M8"
     yield _dwell(motion.trigger_s)

@@ -15,6 +15,8 @@ from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.balls.fit import ball_alternatives
+from tbcad.prototype.electronics import wiring
+from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.parts import PrintedPart, part_mesh
@@ -105,6 +107,7 @@ def document(built: PrototypeModel, alternatives: list[dict[str, Any]]) -> dict[
             }
             for name, position, direction in led_poses(built.stage)
         ],
+        "controller": _controller(built),
         "bought": [
             {"name": item.name, "what": item.what, "part": item.part, "turns": item.rotates}
             for item in built.frame.purchased
@@ -132,6 +135,19 @@ def _part_record(part: PrintedPart) -> dict[str, Any]:
         "quantity": 1,
         "axes": (part.solid.axes + 0.0).tolist(),
         "origin_mm": (part.solid.origin + 0.0).tolist(),
+    }
+
+
+def _controller(built: PrototypeModel) -> dict[str, Any]:
+    """Firmware, and which digital output is on in each photograph of a stop."""
+    motion = built.spec.prototype.motion
+    return {
+        "firmware": motion.controller,
+        "axis": motion.axis,
+        "phases": [
+            {"name": phase.name, "output": phase.output}
+            for phase in phases(len(built.stage.leds), motion)
+        ],
     }
 
 
@@ -171,8 +187,9 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
         ("rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan_csv.picture_rows(layout)),
         ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(layout)),
         ("plate_holes.csv", plan_csv.HOLE_COLUMNS, plan_csv.hole_rows(built.frame)),
+        ("wiring.csv", wiring.COLUMNS, wiring.wiring_rows(built.wiring)),
         ("bom.csv", bom_csv.COLUMNS, bill),
     ):
         write_table(folder / name, columns, rows)
-    program = gcode.gcode_program(layout, built.drive, motion)
+    program = gcode.gcode_program(layout, built.drive, motion, len(built.stage.leds))
     gcode.write_program(folder / "rotation_plan.nc", program)

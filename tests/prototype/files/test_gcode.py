@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files.gcode import (
     DECIMALS,
     duration_minutes,
@@ -24,10 +26,13 @@ from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import MotionSpec
 
 MOTION = MotionSpec()
+LEDS = 4
+PHASES = phases(LEDS, MOTION)
 # What GRBL 1.1h takes, by modal group (grbl/gcode.c); only these are used here.
 GROUPS = {
     **{"G0": 1, "G1": 1, "G4": 0, "G92": 0, "G92.1": 0, "G90": 3, "G91": 3, "G94": 5},
     **{"G21": 6, "G54": 12, "M0": 104, "M2": 104, "M8": 108, "M9": 108},
+    **{"M64": 110, "M65": 110},  # grblHAL
 }
 
 
@@ -43,7 +48,9 @@ class Grbl:
         ended: after M2.
         rest: seconds of dwell.
         moves: every place it was sent to.
+        lights: outputs that are on.
         shots: place each time the relay closed.
+        lit: outputs that were on then.
         pauses: place and comment of each M0.
     """
 
@@ -53,6 +60,8 @@ class Grbl:
     relay: bool = False
     ended: bool = False
     rest: float = 0.0
+    lights: set[float] = field(default_factory=set)
+    lit: list[set[float]] = field(default_factory=list)
     moves: list[float] = field(default_factory=list)
     shots: list[float] = field(default_factory=list)
     pauses: list[tuple[float | None, str]] = field(default_factory=list)
@@ -85,14 +94,19 @@ class Grbl:
             assert self.feed > 0
             assert self.at is not None, "moves before it knows where it is"
             assert not self.relay, "moves while the camera is released"
+            assert not self.lights, "moves while a light is on"
             self.at = value[self.axis]
             self.moves.append(self.at)
+        elif {"M64", "M65"} & set(commands):
+            assert rest == {"P"}
+            (self.lights.add if "M64" in commands else self.lights.discard)(value["P"])
         else:
             assert not rest
         if "M8" in commands:
             assert not self.relay
             assert self.at is not None
             self.shots.append(self.at)
+            self.lit.append(set(self.lights))
             self.relay = True
         if "M9" in commands:
             self.relay = False
@@ -121,7 +135,7 @@ def drive() -> Drive:
 
 @pytest.fixture(scope="module")
 def program(layout: PrototypeLayout, drive: Drive) -> list[str]:
-    return gcode_program(layout, drive, MOTION)
+    return gcode_program(layout, drive, MOTION, LEDS)
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +149,34 @@ def test_every_stop_twice_in_order_within_a_step(
 ) -> None:
     angle = np.degrees(layout.stops.angle)
     step = 1 / drive.steps_per_deg(MOTION.microsteps)
-    off = np.abs(np.array(controller.shots) - np.tile(angle, 2))
+    off = np.abs(np.array(controller.shots) - np.repeat(np.tile(angle, 2), len(PHASES)))
     assert off.max() < 10**-DECIMALS < step / 10
+
+
+def test_every_stop_is_photographed_dark_by_each_led_alone_and_lit(
+    layout: PrototypeLayout, controller: Grbl
+) -> None:
+    stop = [set(), {1.0}, {2.0}, {3.0}, {4.0}, {0.0}]
+    assert controller.lit == 2 * len(layout.stops) * stop
+
+
+def test_lights_wait_for_the_end_of_the_motion(layout: PrototypeLayout, drive: Drive) -> None:
+    """grblHAL switches an output when it reads the line: a dwell must be between."""
+    lines = gcode_program(layout, drive, MotionSpec(settle_s=0.0, light_s=0.0), LEDS)
+    for line, following in pairwise(lines):
+        if line.startswith("G1 "):
+            assert following.startswith(("G4 P", "(stop", "M0", "G92.1"))
+            assert not following.startswith("G4 P0.000")
+
+
+def test_grbl_photographs_the_lit_object_only(layout: PrototypeLayout, drive: Drive) -> None:
+    plain = sent(gcode_program(layout, drive, MotionSpec(controller="grbl"), LEDS))
+    assert plain.lit == [set()] * 2 * len(layout.stops)
+
+
+def test_more_leds_than_outputs(layout: PrototypeLayout, drive: Drive) -> None:
+    with pytest.raises(SpecError, match="use at most 7 LEDs"):
+        gcode_program(layout, drive, MOTION, 8)
 
 
 def test_it_stays_in_the_swing_but_for_the_approach(
@@ -158,7 +198,7 @@ def test_it_stays_in_the_swing_but_for_the_approach(
 def test_every_stop_is_reached_from_below(controller: Grbl) -> None:
     steps = list(zip(controller.moves, controller.moves[1:], strict=False))
     for shot in set(controller.shots):
-        came = [old for old, new in steps if new == shot]
+        came = [old for old, new in steps if new == shot != old]
         assert len(came) == 2
         assert max(came) < shot
 
@@ -173,21 +213,24 @@ def test_pauses_for_people(layout: PrototypeLayout, controller: Grbl) -> None:
 
 def test_it_ends_where_it_began(layout: PrototypeLayout, drive: Drive) -> None:
     motion = MotionSpec(home_deg=-12.5)
-    assert sent(gcode_program(layout, drive, motion)).at == -12.5
+    assert sent(gcode_program(layout, drive, motion, LEDS)).at == -12.5
 
 
 def test_other_axis(layout: PrototypeLayout, drive: Drive) -> None:
-    plain, other = (gcode_program(layout, drive, MotionSpec(axis=axis)) for axis in ("X", "A"))
+    plain, other = (
+        gcode_program(layout, drive, MotionSpec(axis=axis), LEDS) for axis in ("X", "A")
+    )
     assert sent(other, "A").shots == sent(plain).shots
     assert f"($103={drive.steps_per_deg(16):.6g}: steps a degree)" in other
     assert f"($100={drive.steps_per_deg(16):.6g}: steps a degree)" in plain
 
 
 def test_a_person_as_trigger(layout: PrototypeLayout, drive: Drive) -> None:
-    lines = gcode_program(layout, drive, MotionSpec(trigger="pause"))
+    lines = gcode_program(layout, drive, MotionSpec(trigger="pause"), LEDS)
     controller = sent(lines)
     assert not controller.shots
-    assert len(controller.pauses) == 2 + 2 * len(layout.stops)
+    assert len(controller.pauses) == 2 + 2 * len(layout.stops) * len(PHASES)
+    assert controller.pauses[2][1] == "MSG, stop 1: led_1, photograph, then resume"
     assert not {"M8", "M9"} & set(lines)
 
 
@@ -201,7 +244,7 @@ def test_time(layout: PrototypeLayout, controller: Grbl) -> None:
     sequence = stop_sequence(layout, MOTION)
     travel = 2 * 2 * (sequence.angle[-1] - sequence.start)
     minutes = controller.rest / 60 + travel / MOTION.feed_deg_min
-    assert duration_minutes(sequence, MOTION) == pytest.approx(minutes)
+    assert duration_minutes(sequence, MOTION, PHASES) == pytest.approx(minutes)
 
 
 @pytest.mark.parametrize(
@@ -213,11 +256,11 @@ def test_time(layout: PrototypeLayout, controller: Grbl) -> None:
     ],
 )
 def test_other_motions(layout: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
-    controller = sent(gcode_program(layout, drive, motion))
+    controller = sent(gcode_program(layout, drive, motion, LEDS))
     low, high = np.degrees(free_base_angles(layout))
     assert low <= min(controller.moves)
     assert max(controller.moves) <= high
-    assert len(controller.shots) == 2 * len(layout.stops)
+    assert len(controller.shots) == 2 * len(layout.stops) * len(PHASES)
 
 
 def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:

@@ -11,6 +11,7 @@ from tests.verify.corpus.prototype_changes import (
     PROGRAM,
     RECORD,
     STEP,
+    WIRING,
     compact,
     drive,
     empty_step,
@@ -52,7 +53,23 @@ PROGRAMS: tuple[Mutation, ...] = (
     fails("program: M2 halfway", PROGRAM, program(DWELL, "M2\n", 1), PLAN, "after the end"),
     fails("program: never turned", PROGRAM, program(r"M0 \(MSG, turn.*\n", ""), PLAN, "pauses for"),
     fails("program: no dwell", PROGRAM, program("G4 .*\n", ""), PLAN, "0 s after the motion"),
-    fails("program: too short a dwell", PROGRAM, program("P0.500", "P0.100"), PLAN, "0.1 s after"),
+    fails("program: too short a dwell", PROGRAM, program("P0.500", "P0.100"), PLAN, "0.2 s after"),
+    fails("program: a light stays on", PROGRAM, program("M65 P0\n", ""), PLAN, "a light is on"),
+    fails("program: no LED", PROGRAM, program("M64 P2\n", ""), PLAN, "outputs none on, not [2]"),
+    fails(
+        "program: a light before the end of the motion",
+        PROGRAM,
+        program(DWELL, "M64 P1\nM65 P1\nG4 P0.500\n", 1),
+        PLAN,
+        "before the motion has ended",
+    ),
+    fails(
+        "program: lamp and LED exchanged",
+        PROGRAM,
+        together(program("P1\n", "P9\n"), program("P0\n", "P1\n"), program("P9\n", "P0\n")),
+        PLAN,
+        "outputs [0] on, not [1]",
+    ),
     fails("program: no M9", PROGRAM, program("M9\n", ""), PLAN, "release is on"),
     fails("program: no F", PROGRAM, program(" F900", ""), PLAN, "without a speed"),
     fails("program: F0", PROGRAM, program(" F900", " F0"), PLAN, "without a speed"),
@@ -141,7 +158,10 @@ PURCHASES: tuple[Mutation, ...] = (
     ),
     *(
         fails(f"nothing bought: {name}", BILL, unlisted(name), LIST, name.partition("x")[0])
-        for name in ("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1")
+        for name in (
+            *("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1"),
+            *("MOSFET", "XH-8", "R-0.6W-2200", "WIRE-30"),
+        )
     ),
     fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
     fails("another volume", BILL, row(BILL, 0, print_volume_mm3=1.0), LIST, "its volume"),
@@ -203,6 +223,55 @@ PURCHASES: tuple[Mutation, ...] = (
     fails("an error of direction", BALLS, row(BALLS, 0, error_deg=0.0), "ball labels", "deg off"),
 )
 
+WIRES: tuple[Mutation, ...] = (
+    *(
+        fails(f"wiring: {column}", WIRING, row(WIRING, 1, **{column: value}), "wiring", words)
+        for column, value, words in (
+            ("on", "M64 P3", "led_1 is switched by"),
+            ("signal", "led_2", "lines are"),
+            ("resistor_ohm", 220.0, "is not of 220 ohm"),
+            ("current_ma", 50.0, "its current is not 50 mA"),
+            ("dissipation_w", 0.01, "dissipates"),
+            ("forward_v", 1.8, "LED-3 of 1.8 V"),
+            ("pins", "3 4", "its pins are 3 4"),
+            ("connector", "XH-2", "too few contacts"),
+            ("length_mm", 300.0, "300 mm of wire do not reach"),
+            ("wire", "WIRE-28", "do not go through the crown's bore"),
+        )
+    ),
+    fails(
+        "wiring: a resistor of a quarter of the power",
+        WIRING,
+        row(WIRING, 1, resistor="R-0.25W-2200"),
+        "wiring",
+        "rated for 0.25 W",
+    ),
+    fails(
+        "wiring: a resistor that is not sold",
+        WIRING,
+        row(WIRING, 1, resistor="R-0.6W-2150", resistor_ohm=2150.0),
+        "wiring",
+        "2150 ohm is not in the series",
+    ),
+    fails(
+        "phases without the dark",
+        RECORD,
+        record(lambda r: r["controller"]["phases"].pop(0)),
+        "wiring",
+        "other phases",
+    ),
+    fails(
+        "another firmware",
+        RECORD,
+        record(lambda r: r["controller"].update(firmware="grbl")),
+        "wiring",
+        "controller is grbl",
+    ),
+    refused(
+        "no controller", RECORD, record(lambda r: r.pop("controller")), RECORD, "controller is"
+    ),
+)
+
 DRIVES: tuple[Mutation, ...] = (
     *(
         fails(f"drive: {key}", RECORD, scaled(key, 1.1), "drive", key)
@@ -231,4 +300,4 @@ GOOD: tuple[Mutation, ...] = (
     Mutation("prototype.json in one line", RECORD, compact, 0),
     Mutation("a note in the record", RECORD, together(record(lambda r: r.update(note="mine"))), 0),
 )
-PROTOTYPES: tuple[Mutation, ...] = (*PROGRAMS, *PARTS, *ASSEMBLIES, *PURCHASES, *DRIVES)
+PROTOTYPES: tuple[Mutation, ...] = (*PROGRAMS, *PARTS, *ASSEMBLIES, *PURCHASES, *WIRES, *DRIVES)

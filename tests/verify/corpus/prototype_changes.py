@@ -20,6 +20,7 @@ Record = dict[str, Any]
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
+WIRING = "wiring.csv"
 
 
 def record(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 # What is not made: no STEP assembly, no parts list, names and balls of its own, no weight.
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
+    "wiring",
     *("drive", "ball labels", "radius rule"),
 }
 STEPS = 200 * 16 * 3 / 360
@@ -271,21 +272,27 @@ def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
 def program(stops: list[list[Any]]) -> str:
     """As tbcad writes it, by hand: times and speeds are those of the paper's design."""
     at = [f"X{np.trunc(row[1] * 1e4) / 1e4:.4f}" for row in stops]
-    rest = len(stops) * 1.7 / 30 + (stops[-1][1] - stops[0][1]) / 225
+    rest = len(stops) * (0.5 + 3 * 1.3) / 30 + (stops[-1][1] - stops[0][1]) / 225
+    expose = ["G4 P0.100", "M8", "G4 P0.200", "M9", "G4 P1.000"]
+    lights = [expose, ["M64 P1", *expose, "M65 P1"], ["M64 P0", *expose, "M65 P0"]]
     lines = [
         f"(rotation plan: {len(stops)} stops, twice, about {rest:.0f} min)",
         f"($100={STEPS:.6g}: steps a degree)",
         "($110=900: degrees a minute, at most)",
         "($120=50: degrees/s^2)",
+        "(digital output 1: led_1)",
+        "(digital output 0: lamp)",
         "M0 (MSG, base at 0 degrees, object straight? Then resume)",
         "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
         "G92 X0.0000",
+        "M65 P1",
+        "M65 P0",
     ]
     for run in range(2):
         lines.append(f"G1 {at[0]} F900")
         for k, row in enumerate(stops):
             lines.append(f"(stop {k + 1} of {len(stops)}: {row[2]} mirrors)")
-            lines += [f"G1 {at[k]}", "G4 P0.500", "M8", "G4 P0.200", "M9", "G4 P1.000"]
+            lines += [f"G1 {at[k]}", "G4 P0.500", *chain.from_iterable(lights)]
         if run == 0:
             lines.append(f"G1 {at[0]}")
             lines.append("M0 (MSG, turn the object by 180 degrees about z, then resume)")
@@ -396,6 +403,14 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         ],
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
+        "controller": {
+            "firmware": "grblhal",
+            "axis": "X",
+            "phases": [
+                {"name": name, "output": output}
+                for name, output in (("dark", None), ("led_1", 1), ("lit", 0))
+            ],
+        },
         "drive": DRIVE,
         "bought": [{"name": "motor", "what": "a box", "part": "NEMA17-40", "turns": False}],
         "frame_stock": {"plate": "none", "upright": "none", "uprights_cut_to_mm": 0.0},

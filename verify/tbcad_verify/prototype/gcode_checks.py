@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.gcode_lines import LAMP
 from tbcad_verify.prototype.gcode_machine import Machine, Photograph, run_program
 from tbcad_verify.record.spec import MotionSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
@@ -37,27 +38,57 @@ def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     yield from _travel(context, machine)
     yield from _settings(context, machine)
     motion, stops = context.export.spec.prototype.motion, context.prototype.stops
-    expected = np.tile(stops.angle, RUNS)
+    lights = expected_lights(context)
+    expected = np.repeat(np.tile(stops.angle, RUNS), len(lights))
     if machine.angles.shape != expected.shape:
         yield f"{machine.angles.size} photographs, not {expected.size}"
     else:
         for k, one in enumerate(machine.photographs):
-            turned, stop = divmod(k, len(stops))
+            taken, phase = divmod(k, len(lights))
+            turned, stop = divmod(taken, len(stops))
             if not abs(one.angle - expected[k]) <= PROGRAM_DEG:
                 yield f"photograph {k + 1} at {one.angle:.4f} deg"
             if one.turned != turned:
                 yield f"photograph {k + 1} with the object turned {one.turned} times"
             if (one.stop, one.mirrors) != (stop + 1, stops.mirrors[stop]):
                 yield f"photograph {k + 1} has another comment than its stop"
+            yield from (f"photograph {k + 1} {what}" for what in _unlike_light(one, lights, phase))
     low = context.prototype.swing[0]
     for k, one in enumerate(machine.photographs):
         if not one.rising and one.angle > low + PROGRAM_DEG:
             yield f"photograph {k + 1} is approached from above"
-        yield from (f"photograph {k + 1} {what}" for what in _unlike_motion(one, motion))
+        switched = len(lights) > 1
+        yield from (f"photograph {k + 1} {what}" for what in _unlike_motion(one, motion, switched))
 
 
-def _unlike_motion(one: Photograph, motion: MotionSpec) -> Iterator[str]:
-    """What is wrong with the motion about one photograph."""
+def expected_lights(context: PrototypeContext) -> list[tuple[float, frozenset[int]]]:
+    """Number of each photograph of a stop, and the digital outputs that are on in it.
+
+    The number is 0 in the dark, -1 for the lamp, else that of an LED. The lamp is on output 0, LED
+    k on output k. GRBL 1.1 has no such outputs: there is one photograph, of the lit object.
+    """
+    if context.export.spec.prototype.motion.controller == "grbl":
+        return [(LAMP, frozenset())]
+    leds = range(1, len(context.prototype.leds) + 1)
+    alone = [(float(led), frozenset({led})) for led in leds]
+    return [(0.0, frozenset()), *alone, (LAMP, frozenset({0}))]
+
+
+def _unlike_light(
+    one: Photograph, lights: list[tuple[float, frozenset[int]]], phase: int
+) -> Iterator[str]:
+    number, outputs = lights[phase]
+    if one.lights != outputs:
+        yield f"with outputs {sorted(one.lights) or 'none'} on, not {sorted(outputs) or 'none'}"
+    told = one.phase if len(lights) > 1 else number
+    if np.isinf(one.released) and told != number:
+        yield "with a pause that tells another light"
+
+
+def _unlike_motion(one: Photograph, motion: MotionSpec, switched: bool) -> Iterator[str]:
+    """What is wrong with the motion about one photograph; switched: lights are."""
+    if switched and one.lit < motion.light_s - PROGRAM_S:
+        yield f"{one.lit:g} s after a light was switched"
     if one.settled < motion.settle_s - PROGRAM_S:
         yield f"{one.settled:g} s after the motion"
     if np.isinf(one.released) != (motion.trigger == "pause"):
@@ -106,6 +137,7 @@ def _settings(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     for name, value in expected.items():
         if len(told.get(name, ())) != 1 or not _is_close(told[name][0], value):
             yield f"the comments' {name.replace('_', ' ')} is not {value:g}"
+    yield from _told_lights(context, machine)
     if machine.axis != motion.axis:
         yield f"drives axis {machine.axis or 'none'}"
     if any(count != len(context.prototype.stops) for count in told.get("count", ())):
@@ -113,6 +145,14 @@ def _settings(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     minutes, known = machine.seconds / 60, told.get("minutes", [np.inf])
     if not abs(known[0] - minutes) <= MINUTES + MINUTES_SHARE * minutes:
         yield f"takes {minutes:.0f} min"
+
+
+def _told_lights(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+    """The comments name every output and its light."""
+    named = {(min(outputs), number) for number, outputs in expected_lights(context) if outputs}
+    told = list(zip(machine.told.get("output", ()), machine.told.get("light", ()), strict=True))
+    if sorted(told) != sorted(named):
+        yield "the comments name other lights than the outputs have"
 
 
 def _is_close(one: float, two: float) -> bool:

@@ -18,8 +18,10 @@ COMMANDS = (
     rf"G92 {AXIS}",
     r"G92\.1",
     r"M[0289]",
+    r"M6[45] P\d",
 )
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d\d)?"
+LED = r"led_\d+"
 COMMENTS = (
     r"rotation plan: (?P<stops>\d+) stops, twice, about (?P<minutes>\d+) min",
     rf"[\w-]+, [\w-]+, {NUMBER} turns of the motor a turn",
@@ -32,12 +34,17 @@ COMMENTS = (
     r"a degree for a millimetre, absolute, units a minute",
     rf"MSG, base at (?P<base>{NUMBER}) degrees, object straight\? Then resume",
     r"MSG, turn the object by (?P<turn>180) degrees about z, then resume",
-    r"MSG, stop (?P<photograph>\d+): photograph, then resume",
+    rf"digital output (?P<output>\d): (?P<light>lamp|{LED})",
+    rf"MSG, stop (?P<photograph>\d+): (?:(?P<phase>dark|{LED}|lit), )?photograph, then resume",
     r"stop (?P<stop>\d+) of (?P<count>\d+): (?P<mirrors>\d+) mirrors",
 )
 LINE = re.compile(rf"(?P<command>{'|'.join(COMMANDS)})?(?: ?\((?P<comment>[^()]+)\))?")
 WORD = re.compile(r"([A-Z])(\S+)")
 FORMS = tuple(re.compile(form) for form in COMMENTS)
+
+
+LAMP = -1.0  # number that stands for the lamp where LEDs are numbered from 1
+LIGHTS = {"dark": 0.0, "lit": LAMP, "lamp": LAMP}
 
 
 @dataclass(frozen=True)
@@ -84,5 +91,13 @@ def _said(comment: str) -> dict[str, float] | None:
     """The numbers in a comment by name; None if it is none of the known ones."""
     for form in FORMS:
         if found := form.fullmatch(comment):
-            return {name: float(value) for name, value in found.groupdict().items()}
+            told = found.groupdict().items()
+            return {name: _number(value) for name, value in told if value is not None}
     return None
+
+
+def _number(value: str) -> float:
+    """A number, or that of a light: 0 for none."""
+    if value.startswith("led_"):
+        return float(value.removeprefix("led_"))
+    return LIGHTS[value] if value in LIGHTS else float(value)

@@ -3,7 +3,8 @@
 Every mode is part of the machine's state and unset at first; no motion is done before all are set.
 The machine knows the true angle of the base, whatever offset the program gives to its coordinates.
 
-Source: grbl/gcode.c of GRBL 1.1h: modal groups, G92 as an offset, M8 and G4 after motion has ended.
+Sources: grbl/gcode.c of GRBL 1.1h: modal groups, G92 as an offset, M8 and G4 after the motion.
+grblHAL core gcode.c: M64 and M65 are done when they are read, before the motion has ended.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ class Photograph:
         turned: how often the object was turned before it.
         stop: number of its stop in the comments, from 1; 0 without.
         mirrors: that the comment of the stop tells.
+        lights: digital outputs that are on.
+        lit: time since one of them was switched, s.
+        phase: light that the pause tells: 0 none, -1 the lamp, else the LED's number; NaN without.
     """
 
     angle: float
@@ -42,6 +46,9 @@ class Photograph:
     turned: int
     stop: int
     mirrors: int
+    lights: frozenset[int]
+    lit: float
+    phase: float = math.nan
 
 
 @dataclass
@@ -54,7 +61,11 @@ class Machine:
         angle: of the base, degrees; NaN before a person has put it to a known one.
         offset: of the base's angle from the program's coordinate, degrees; NaN before it is set.
         feed: degrees a minute; 0 before it is set.
-        rest: time since the last motion, s.
+        rest: time since the last motion, or since the release was turned off, s.
+        still: time since the last motion, s.
+        ended_motion: whether the controller has waited for the end of the last motion.
+        lights: digital outputs that are on.
+        switched: time since one of them was switched, s.
         rising: whether the last motion, if any, was upward.
         release: value of `rest` when the camera's release was turned on; NaN while it is off.
         ended: the program has ended.
@@ -74,6 +85,10 @@ class Machine:
     offset: float = math.nan
     feed: float = 0.0
     rest: float = 0.0
+    still: float = 0.0
+    ended_motion: bool = True
+    lights: set[int] = field(default_factory=set)
+    switched: float = math.inf
     rising: bool = False
     release: float = math.nan
     ended: bool = False
@@ -120,6 +135,8 @@ class Machine:
             "M8": self._release_on,
             "M9": self._release_off,
             "M0": lambda: self._pause(line.says),
+            "M64": lambda: self._switch_on(int(values["P"])),
+            "M65": lambda: self._switch_off(int(values["P"])),
             "M2": self._end,
         }[line.code]()
 
@@ -132,12 +149,34 @@ class Machine:
         return ""
 
     def _wait(self, seconds: float) -> str:
+        self.ended_motion = True
         self.rest += seconds
+        self.still += seconds
+        self.switched += seconds
         self.seconds += seconds
         return ""
 
+    def _switch_on(self, output: int) -> str:
+        if output in self.lights:
+            return f"turns output {output} on twice"
+        self.lights.add(output)
+        return self._switch()
+
+    def _switch_off(self, output: int) -> str:
+        self.lights.discard(output)
+        return self._switch()
+
+    def _switch(self) -> str:
+        self._end_photograph()
+        self.switched = 0.0
+        if self._is_on():
+            return "switches a light while the camera's release is on"
+        return "" if self.ended_motion else "switches a light before the motion has ended"
+
     def _end(self) -> str:
         self.ended = True
+        if self.lights:
+            return "ends while a light is on"
         return "ends while the camera's release is on" if self._is_on() else ""
 
     def _is_on(self) -> bool:
@@ -163,11 +202,16 @@ class Machine:
             return "moves without a speed"
         if self._is_on():
             return "moves while the camera's release is on"
+        if self.lights:
+            return "moves while a light is on"
         target = values[self.axis] + self.offset
         if target != self.angle:
             self.rising = target > self.angle
             self._end_rest()
-        self.seconds += abs(target - self.angle) / self.feed * SECONDS
+            self.ended_motion = False
+        duration = abs(target - self.angle) / self.feed * SECONDS
+        self.seconds += duration
+        self.switched += duration
         self.angle = target
         self.moves.append(target)
         return ""
@@ -175,7 +219,7 @@ class Machine:
     def _end_rest(self) -> None:
         """The base begins to move: nothing rests any longer."""
         self._end_photograph()
-        self.rest = 0.0
+        self.rest = self.still = 0.0
 
     def _end_photograph(self) -> None:
         if self.photographs and math.isnan(self.photographs[-1].waited):
@@ -184,6 +228,7 @@ class Machine:
     def _release_on(self) -> str:
         if self._is_on():
             return "turns the camera's release on twice"
+        self.ended_motion = True
         self._photograph(math.nan, math.nan)
         self.release = self.rest
         return ""
@@ -195,26 +240,30 @@ class Machine:
         self.release, self.rest = math.nan, 0.0
         return ""
 
-    def _photograph(self, released: float, waited: float) -> None:
+    def _photograph(self, released: float, waited: float, phase: float = math.nan) -> None:
         self._end_photograph()
         self.photographs.append(
             Photograph(
                 self.angle,
-                self.rest,
+                self.still,
                 released,
                 waited,
                 self.rising,
                 self.pauses.count("turn"),
                 self.last_told("stop"),
                 self.last_told("mirrors"),
+                frozenset(self.lights),
+                self.switched,
+                phase,
             )
         )
 
     def _pause(self, says: dict[str, float]) -> str:
         if self._is_on():
             return "pauses while the camera's release is on"
+        self.ended_motion = True
         if "photograph" in says:
-            self._photograph(math.inf, math.inf)
+            self._photograph(math.inf, math.inf, says.get("phase", math.nan))
             return ""
         if "base" in says:
             self.pauses.append("base")

@@ -15,6 +15,7 @@ import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart
+from tbcad_verify.prototype.wiring_checks import bought as wired
 from tbcad_verify.record.prototype import PARTS_LIST, PLATE_HOLES
 from tbcad_verify.record.prototype_tables import PartsList
 from tbcad_verify.report.checks import Check, CheckName, at_most, require, short_list
@@ -107,7 +108,7 @@ def _bought(context: PrototypeContext, solids: Solids) -> dict[str, int]:
     counts.update(f"cap {k}" for k in balls.number[balls.cap].tolist())
     counts.update(one.part for one in prototype.bought if one.part)
     counts.update(ELECTRONICS)
-    counts[spec.stage.led] += len(prototype.leds)
+    counts.update(wired(context))
     if spec.base.hold == "magnet":
         for diameter in spec.base.magnets_mm:
             radius = (diameter + spec.base.magnet_play_mm) / 2

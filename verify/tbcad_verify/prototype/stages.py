@@ -21,6 +21,7 @@ from tbcad_verify.prototype import (
     purchases,
     seats,
     swing,
+    wiring_checks,
 )
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.assembly import Shape
@@ -37,7 +38,7 @@ from tbcad_verify.prototype.measured_parts import (
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import PARTS_LIST, Prototype
+from tbcad_verify.record.prototype import PARTS_LIST, WIRING, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
@@ -153,6 +154,7 @@ def _purchases(
         ),
     )
     _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
+    _add(sink, wiring_checks, WIRING, lambda: (context, require(drawn_solids, reason)))
     _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(drawn_solids, reason)))
 
 

@@ -23,6 +23,7 @@ from tbcad_verify.record.prototype_tables import (
     Plan,
     PlateHoles,
     Stops,
+    Wiring,
 )
 from tbcad_verify.record.validation import (
     FileOrNone,
@@ -39,7 +40,7 @@ from tbcad_verify.types import Floats
 
 SCHEMA = "tbcad-prototype/2"
 RECORD = "prototype.json"
-PARTS_LIST, PLATE_HOLES = "bom.csv", "plate_holes.csv"
+PARTS_LIST, PLATE_HOLES, WIRING = "bom.csv", "plate_holes.csv", "wiring.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
@@ -135,6 +136,21 @@ class FrameStock(Strict):
     uprights_cut_to_mm: float = Field(ge=0, le=LARGEST)
 
 
+class LightPhase(Strict):
+    """One photograph of a stop: its name, and the digital output that is on, if any."""
+
+    name: Name
+    output: int | None = Field(ge=0, le=99)
+
+
+class Controller(Strict):
+    """What the controller is, and the photographs of a stop in order."""
+
+    firmware: Literal["grblhal", "grbl"]
+    axis: Literal["X", "A"]
+    phases: list[LightPhase] = Field(min_length=1, max_length=99)
+
+
 Amount = Annotated[float, Field(ge=0, le=LARGEST)]
 
 
@@ -181,6 +197,7 @@ class Prototype(Strict):
         seats: one for each ball.
         parts: printed.
         leds: of the stage.
+        controller: of motion and lights.
         bought: purchased parts other than balls.
         frame_stock: parts of the frame that are cut or drilled.
         assembly: files of the whole.
@@ -188,6 +205,7 @@ class Prototype(Strict):
         balls: K of them.
         plan: every picture.
         stops: of the base.
+        wiring: lines of the controller; None without the file.
         parts_list: what to buy and to print; None without the file.
         plate_holes: of the base plate; None without the file.
         program: text of the controller's program.
@@ -203,6 +221,7 @@ class Prototype(Strict):
     seats: list[Seat] = Field(max_length=MOST)
     parts: list[Printed] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
+    controller: Controller
     bought: list[Bought] = Field(max_length=MOST)
     frame_stock: FrameStock
     assembly: Assembly = Assembly()
@@ -210,6 +229,7 @@ class Prototype(Strict):
     balls: Balls
     plan: Plan
     stops: Stops
+    wiring: Wiring | None
     parts_list: PartsList | None
     plate_holes: PlateHoles | None
     program: str
@@ -248,7 +268,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     names = (RECORD, BALLS, PLAN, STOPS, PROGRAM)
-    optional = [name for name in (PARTS_LIST, PLATE_HOLES) if (folder / name).exists()]
+    optional = [name for name in (PARTS_LIST, PLATE_HOLES, WIRING) if (folder / name).exists()]
     texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (*names, *optional)}
     value = parse_json(texts[RECORD], SCHEMA)
     if value.get("balls") != BALLS:
@@ -261,6 +281,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "stops": Stops.read(texts[STOPS]),
         "parts_list": PartsList.read(texts[PARTS_LIST]) if PARTS_LIST in texts else None,
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
+        "wiring": Wiring.read(texts[WIRING]) if WIRING in texts else None,
         "program": texts[PROGRAM].text(),
         "digests": {name: blob.digest for name, blob in texts.items()},
     }

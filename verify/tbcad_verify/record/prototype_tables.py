@@ -105,6 +105,30 @@ class PlateHoles(Columns):
     holds: Texts
 
 
+class Wiring(Columns):
+    """wiring.csv: one line of the controller a row."""
+
+    most_rows: ClassVar[int] = MOST
+
+    line: Counts
+    signal: Texts
+    part: Texts
+    output: Texts
+    on: Texts
+    off: Texts
+    connector: Texts
+    pins: Texts
+    supply_v: Masses
+    forward_v: Masses
+    resistor: Texts
+    resistor_ohm: Masses
+    current_ma: Masses
+    dissipation_w: Masses
+    wire: Texts
+    length_mm: Masses
+    path: Texts
+
+
 class Plan(Columns):
     """One mirror's picture a row, N of them; angles in degrees, numbers from 1."""
 

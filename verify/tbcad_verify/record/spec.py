@@ -147,12 +147,14 @@ class MotionSpec(Strict):
     """How the base is driven from stop to stop: motion, trigger and controller."""
 
     axis: Literal["X", "A"]
+    controller: Literal["grblhal", "grbl"]
     trigger: Literal["coolant", "pause"]
     home_deg: float = Field(ge=-180, le=180)
     approach_deg: float = Field(ge=0, le=30)
     feed_deg_min: float = Field(ge=1, le=100000)
     acceleration_deg_s2: float = Field(gt=0, le=10000)
     settle_s: float = Field(ge=0, le=60)
+    light_s: float = Field(ge=0, le=60)
     trigger_s: float = Field(gt=0, le=60)
     exposure_s: float = Field(ge=0, le=600)
     microsteps: int = Field(ge=1, le=256)
@@ -166,6 +168,8 @@ class StageSpec(Strict):
     disc_mm: Annotated[float, Field(ge=4, le=500), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
     leds_mm: Annotated[list[Place], Field(max_length=12), OR_AUTO]
+    led_ma: float = Field(ge=0.5, le=100)
+    led_supply_v: float = Field(ge=3, le=48)
     led_wall_mm: float = Field(ge=0.8, le=20)
     wire_mm: float = Field(ge=1, le=10)
     wall_mm: float = Field(ge=1, le=20)

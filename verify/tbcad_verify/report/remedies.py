@@ -32,6 +32,7 @@ REMEDIES = {
     "inventory": _RECORD,
     "parts list": _RECORD,
     "plate holes": _RECORD,
+    "wiring": _RECORD,
     "leds as designed": _RECORD,
     "cell areas": _RECORD,
     "watertight": _MESH,
