@@ -38,10 +38,10 @@ def test_facets_belong_to_the_mirrors_that_they_were_made_for(
     file: Path | None, options: list[str], tmp_path: Path
 ) -> None:
     """All facets of the casing are grey, also where three corners lie on the edge of a mirror."""
-    array = design(load_spec(file, options))
-    write_record(tmp_path, array, shells=False)
-    mesh, array = camera_a_mesh(array), array.arrays[0]
-    made = mirror_facets(array.spec, array.modelled_cells, array.apex_distance).mirror
+    mirrors = design(load_spec(file, options))
+    write_record(tmp_path, mirrors, shells=False)
+    mesh, array = camera_a_mesh(mirrors), mirrors.arrays[0]
+    made = mirror_facets(mirrors.spec, array.modelled_cells, array.apex_distance).mirror
     corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
     mirror, found = mirror_of_facets(corners, read_mirrors(tmp_path, "a"))
     area = np.linalg.norm(
