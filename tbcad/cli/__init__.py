@@ -8,6 +8,7 @@ from functools import partial
 import typer
 
 from tbcad.cli import build as _build  # noqa: F401 - adds its commands
+from tbcad.cli import camera as _camera  # noqa: F401 - adds its command
 from tbcad.cli import simulate as _simulate  # noqa: F401 - adds its commands
 from tbcad.cli import study as _study  # noqa: F401 - adds its commands
 from tbcad.cli import tolerance as _tolerance  # noqa: F401 - adds its command

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tbcad.background import Submit, background_process
 from tbcad.cad.brep import InvalidSolidError
+from tbcad.camera.sheet import write_camera_sheet
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
@@ -65,6 +66,8 @@ def write_export(
             submit(write_shells, design, folder)
             export = _prototype_with_shells(design, folder, progress, submit, optional_prototype)
             progress("shells")
+    radius = design.spec.optics.capture_diameter_mm / 2
+    write_camera_sheet(folder, design.arrays[0], radius)
     write_record(folder, replace(design, spec=export.spec), SHELL in parts)
     progress("manifest")
     write_manifest(folder)

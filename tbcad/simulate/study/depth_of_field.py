@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.errors import InputError
-from tbcad.simulate.study.lens import (
+from tbcad.camera.lens import (
     DepthRange,
     Lens,
     aperture_stop,
@@ -13,12 +12,13 @@ from tbcad.simulate.study.lens import (
     focal_length,
     lens_for,
 )
+from tbcad.camera.virtual_images import FANS, PLACES, VirtualImages, virtual_images
+from tbcad.errors import InputError
 from tbcad.simulate.study.paper import claimed, claims, with_lens_of_table_i
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import try_design
 from tbcad.simulate.study.tables import Record, Table
-from tbcad.simulate.study.virtual_images import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Progress
 

@@ -20,6 +20,7 @@ from tests.verify.synthetic_export import (
     PIN,
     B,
     Cells,
+    camera_sheet,
     csv_bytes,
     document,
     mirrored,
@@ -443,7 +444,10 @@ def export(folder: Path, spec: SyntheticPrototype) -> Path:
     mirrors = rows(design, record)
     found = document(design)
     found["spec"]["prototype"]["picture"] = "moved" if spec.moved else "fixed"
-    files: dict[str, bytes] = {"mirrors.csv": table(mirrors)}
+    files = {
+        "mirrors.csv": table(mirrors),
+        "camera.json": json.dumps(camera_sheet(design, record)).encode(),
+    }
     if spec.shell:
         a = solid(Cells(design, record))
         files |= {"shell_a.stl": stl(a), "shell_b.stl": stl(mirrored(a))}

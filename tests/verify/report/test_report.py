@@ -181,7 +181,7 @@ def test_broken_export_fails_for_its_reason(
 def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
     """Consistent, watertight, and every mirror left sees enough: but one is not there."""
     design = Design()
-    from tests.verify.synthetic_export import document, poses, write
+    from tests.verify.synthetic_export import camera_sheet, document, poses, write
 
     record = [m for m in poses(design) if m["number"] != 10]
     facets = solid(Cells(Design(without=(10,)), poses(design)))
@@ -190,6 +190,7 @@ def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
         {
             "design.json": json.dumps(document(design)).encode(),
             "mirrors.csv": table(rows(design, record)),
+            "camera.json": json.dumps(camera_sheet(design, record)).encode(),
             "shell_a.stl": stl(facets),
             "shell_b.stl": stl(mirrored(facets)),
         },

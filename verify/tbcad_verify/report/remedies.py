@@ -28,6 +28,7 @@ REMEDIES = {
     "figures": _RECORD,
     "directions": _RECORD,
     "radius rule": _RECORD,
+    "camera sheet": _RECORD,
     "drive": _RECORD,
     "inventory": _RECORD,
     "parts list": _RECORD,

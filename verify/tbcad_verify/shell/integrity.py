@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mesh import Topology
+from tbcad_verify.record.camera_sheet import sheet_check
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import digest, listing
 from tbcad_verify.record.poses import (
@@ -82,12 +83,15 @@ RECORD = (
     ("poses", "mirrors.csv", "mm off"),
     ("figures", "mirrors.csv", "mm off"),
     ("directions", "mirrors.csv", "misplaced or missing"),
+    ("camera sheet", "camera.json", "wrong figures"),
 )
 
 
 def record_checks(export: Export) -> list[Check]:
-    """Record and spec agree, and mirrors are where DESIGN.md section 2 puts them."""
-    return guarded_each(RECORD, (_requirements, _ids, _poses, _figures, _directions), export)
+    """Record and spec agree, mirrors are on their ellipsoids, and the camera sheet suits them."""
+    return guarded_each(
+        RECORD, (_requirements, _ids, _poses, _figures, _directions, sheet_check), export
+    )
 
 
 def mesh_checks(file: str, topology: Topology) -> list[Check]:

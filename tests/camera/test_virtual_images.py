@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from tbcad.camera.virtual_images import image_distances, virtual_images
 from tbcad.mirrors.array import MirrorArray
-from tbcad.simulate.study.virtual_images import image_distances, virtual_images
 from tbcad.types import Floats
 from tests.mirror_arrays import mirror_array
 

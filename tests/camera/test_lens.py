@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tbcad.errors import InputError
-from tbcad.simulate.study.depth_of_field import LensOptions
-from tbcad.simulate.study.lens import (
+from tbcad.camera.lens import (
     DepthRange,
     Lens,
     aperture_stop,
@@ -17,6 +15,8 @@ from tbcad.simulate.study.lens import (
     lens_for,
     sharpest,
 )
+from tbcad.errors import InputError
+from tbcad.simulate.study.depth_of_field import LensOptions
 
 LENS = Lens(pixel=0.00345, image=3.65, wide_open=2.8, wavelength=550e-6)
 RANGE = DepthRange(150.0, 250.0)

@@ -1,0 +1,1 @@
+"""The real camera and lens that a design needs."""

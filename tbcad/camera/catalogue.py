@@ -1,0 +1,141 @@
+"""Cameras and lenses that exist: CSV lists with their sources, which users extend by their own."""
+
+from dataclasses import dataclass
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+from tbcad.spec.errors import SpecError
+
+CAMERA_SIZES = ("sensor_width_mm", "sensor_height_mm", "width_px", "height_px")
+CAMERA_COLUMNS = ("name", "mount", *CAMERA_SIZES, "control", "source")
+LENS_SIZES = (
+    *("focal_min_mm", "focal_max_mm", "f_number_min", "f_number_max"),
+    *("min_focus_m", "image_circle_mm"),
+)
+LENS_COLUMNS = ("name", "mounts", *LENS_SIZES, "source")
+MAX_VALUE = 1e5  # of any figure
+# Mounts on which lenses of another mount sit by a plain ring, which keeps the lens's distance.
+_SHORT = ("Canon RF", "Nikon Z", "Sony E", "Fujifilm G")  # distances from flange to sensor
+ADAPTERS = {
+    "Canon EF": _SHORT,
+    "Canon EF-S": ("Canon RF", "Sony E"),
+    "Nikon F": (*_SHORT, "Canon EF"),
+    "C": ("CS",),
+}
+
+
+@dataclass(frozen=True)
+class CameraBody:
+    """A camera with square pixels.
+
+    Attributes:
+        name: maker and model.
+        mount: of lenses.
+        width_mm: of the sensor's picture.
+        height_mm: of it.
+        width_px: its columns.
+        height_px: its rows.
+        control: by which a computer triggers it.
+        source: of the figures.
+    """
+
+    name: str
+    mount: str
+    width_mm: float
+    height_mm: float
+    width_px: float
+    height_px: float
+    control: str
+    source: str
+
+    @property
+    def pixel_mm(self) -> float:
+        """Width of a pixel."""
+        return self.width_mm / self.width_px
+
+
+@dataclass(frozen=True)
+class RectilinearLens:
+    """A lens that keeps straight lines straight.
+
+    Attributes:
+        name: maker and model.
+        mounts: in which it is sold.
+        focal_min_mm: shortest focal length, for a distant object.
+        focal_max_mm: longest; the same where it does not zoom.
+        f_number_min: fully open at the shortest focal length.
+        f_number_max: fully stopped down.
+        min_focus_mm: smallest distance from the sensor to what is in focus.
+        image_circle_mm: diagonal of the sensor that it covers.
+        source: of the figures.
+    """
+
+    name: str
+    mounts: tuple[str, ...]
+    focal_min_mm: float
+    focal_max_mm: float
+    f_number_min: float
+    f_number_max: float
+    min_focus_mm: float
+    image_circle_mm: float
+    source: str
+
+    def fits(self, mount: str) -> bool:
+        """Whether it sits on a mount, by itself or by an adapter without optics."""
+        return any(mount == own or mount in ADAPTERS.get(own, ()) for own in self.mounts)
+
+
+def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
+    """Cameras of the list that comes with tbcad, then those of a user's.
+
+    Raises:
+        InputError: a list cannot be read; it names the line and column.
+    """
+    return [_camera(where, row) for where, row in _rows("cameras.csv", user_list, CAMERA_COLUMNS)]
+
+
+def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
+    """Lenses of the list that comes with tbcad, then those of a user's.
+
+    Raises:
+        InputError: a list cannot be read; it names the line and column.
+    """
+    return [_lens(where, row) for where, row in _rows("lenses.csv", user_list, LENS_COLUMNS)]
+
+
+def _camera(where: str, row: Row) -> CameraBody:
+    mount, source = (required_text(where, row, column) for column in ("mount", "source"))
+    width, height, columns, rows = (
+        positive_number(where, row, size, MAX_VALUE) for size in CAMERA_SIZES
+    )
+    return CameraBody(row["name"], mount, width, height, columns, rows, row["control"], source)
+
+
+def _lens(where: str, row: Row) -> RectilinearLens:
+    short, long, wide_open, stopped, metres, circle = (
+        positive_number(where, row, size, MAX_VALUE) for size in LENS_SIZES
+    )
+    for low, high, name in ((short, long, "focal_max_mm"), (wide_open, stopped, "f_number_max")):
+        if high < low:
+            raise SpecError(
+                f"{where}, column {name}: {high:g}, allowed is {low:g} or more: correct it"
+            )
+    mounts = tuple(required_text(where, row, "mounts").split("|"))
+    source = required_text(where, row, "source")
+    return RectilinearLens(
+        row["name"], mounts, short, long, wide_open, stopped, 1000 * metres, circle, source
+    )
+
+
+def _rows(name: str, user_list: Path | None, columns: tuple[str, ...]) -> list[tuple[str, Row]]:
+    lists: list[tuple[Path | Traversable, str]] = [(files("tbcad.camera") / name, name)]
+    if user_list is not None:
+        lists.append((user_list, str(user_list)))
+    names: set[str] = set()
+    rows = [row for file, shown in lists for row in read_rows(file, shown, columns)]
+    for where, row in rows:
+        required_text(where, row, "name")
+        check_unique(where, row, "name", names)
+    return rows

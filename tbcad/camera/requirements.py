@@ -1,0 +1,113 @@
+"""What a design asks of its cameras and lenses, in figures to buy by."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.camera.lens import DepthRange, aperture_stop, lens_for, sharpest
+from tbcad.camera.virtual_images import virtual_images
+from tbcad.mirrors.array import MirrorArray
+
+WAVELENGTH_MM = 550e-6
+WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
+# Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
+# and the light that a polished steel ball reflects (0.55 to 0.60 over the visible).
+METER_CONSTANT, OBJECT_REFLECTANCE, MIRROR_REFLECTANCE = 12.5, 0.18, 0.55
+
+
+@dataclass(frozen=True)
+class CameraRequirements:
+    """What the camera and lens of either pinhole must do; a rectilinear lens is assumed.
+
+    Attributes:
+        hfov_deg: angle of view across that just holds all mirrors.
+        vfov_deg: angle of view down.
+        width_px: pixels across it, at least.
+        height_px: pixels down it, at least.
+        near_mm: depth, from the entrance pupil along the optical axis, of the nearest virtual
+            image of the capture sphere.
+        far_mm: depth of the farthest.
+        focus_mm: depth to focus on, where the blur at both ends is the same.
+        pupil_mm: diameter of the entrance pupil with the least blur at both ends.
+        blur_px: circle of confusion there at both ends, in pixels of this design.
+        airy_px: diameter of the Airy disc there, 550 nm.
+        total_px: root of the sum of both squares.
+    """
+
+    hfov_deg: float
+    vfov_deg: float
+    width_px: int
+    height_px: int
+    near_mm: float
+    far_mm: float
+    focus_mm: float
+    pupil_mm: float
+    blur_px: float
+    airy_px: float
+    total_px: float
+
+    @property
+    def depths(self) -> DepthRange:
+        """Depths that are to be sharp together."""
+        return DepthRange(self.near_mm, self.far_mm)
+
+    @property
+    def half_sizes(self) -> tuple[float, float]:
+        """Half width and half height of the picture at unit distance."""
+        return (
+            math.tan(math.radians(self.hfov_deg) / 2),
+            math.tan(math.radians(self.vfov_deg) / 2),
+        )
+
+
+def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements:
+    """Requirements of camera a's array; camera b's are the same.
+
+    Args:
+        array: the camera and its mirrors.
+        radius: of the capture sphere, mm.
+    """
+    view, depth = array.camera, virtual_images(array, radius).depth
+    across, down = _half_sizes(array)
+    over = DepthRange(float(depth.min()), float(depth.max()))
+    lens = lens_for(view.hfov, view.width_px, 1.0, WIDE_OPEN, WAVELENGTH_MM)
+    pupil = sharpest(lens, over)
+    blur = aperture_stop(lens, over, pupil)
+    return CameraRequirements(
+        2 * math.degrees(math.atan(across)),
+        2 * math.degrees(math.atan(down)),
+        math.ceil(2 * across / view.pixel_pitch),
+        math.ceil(2 * down / view.pixel_pitch),
+        over.near,
+        over.far,
+        over.focus,
+        pupil,
+        blur["blur_px"],
+        blur["airy_px"],
+        blur["total_px"],
+    )
+
+
+def _half_sizes(array: MirrorArray) -> tuple[float, float]:
+    """Half width and half height that the mirrors fill of a picture at unit distance."""
+    view = array.camera
+    image = (array.cells.corners - view.pinhole) @ view.axes.T
+    across, down = np.abs(image[:, :2] / image[:, 2:]).max(axis=0)
+    return float(across), float(down)
+
+
+def exposure_seconds(f_number: float, magnification: float, lux: float, iso: float) -> float:
+    """Time of exposure for a mid-grey object seen by reflection in the mirrors, s.
+
+    t = pi K N'^2 / (E S rho R), with the working F-number N' = N (1 + magnification).
+
+    Args:
+        f_number: as engraved on the lens.
+        magnification: image distance over focal length, less 1.
+        lux: illuminance on the object.
+        iso: speed of the sensor.
+    """
+    working = f_number * (1 + magnification)
+    light = lux * iso * OBJECT_REFLECTANCE * MIRROR_REFLECTANCE
+    return math.pi * METER_CONSTANT * working**2 / light
