@@ -10,6 +10,7 @@ from tbcad.camera.virtual_images import virtual_images
 from tbcad.mirrors.array import MirrorArray
 
 WAVELENGTH_MM = 550e-6
+ROUNDING_PX = 1e-6
 WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
 # Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
 # and the light that a polished steel ball reflects (0.55 to 0.60 over the visible).
@@ -77,8 +78,8 @@ def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements
     return CameraRequirements(
         2 * math.degrees(math.atan(across)),
         2 * math.degrees(math.atan(down)),
-        math.ceil(2 * across / view.pixel_pitch),
-        math.ceil(2 * down / view.pixel_pitch),
+        math.ceil(2 * across / view.pixel_pitch - ROUNDING_PX),
+        math.ceil(2 * down / view.pixel_pitch - ROUNDING_PX),
         over.near,
         over.far,
         over.focus,
@@ -90,10 +91,14 @@ def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements
 
 
 def _half_sizes(array: MirrorArray) -> tuple[float, float]:
-    """Half width and half height that the mirrors fill of a picture at unit distance."""
+    """Half width and half height that the mirrors fill of a picture at unit distance.
+
+    A frame that the spec sets smaller cuts off corners of mirrors that show none of the object.
+    """
     view = array.camera
     image = (array.cells.corners - view.pinhole) @ view.axes.T
-    across, down = np.abs(image[:, :2] / image[:, 2:]).max(axis=0)
+    filled = np.abs(image[:, :2] / image[:, 2:]).max(axis=0)
+    across, down = np.minimum(filled, view.half_sizes)
     return float(across), float(down)
 
 
