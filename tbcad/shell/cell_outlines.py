@@ -5,10 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.optics.cells import Cells
-from tbcad.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
-
-MIN_SEGMENTS = 3
 
 
 @dataclass(frozen=True)
@@ -64,11 +61,11 @@ def cell_outlines(cells: Cells, segments: Ints) -> CellOutlines:
     used, index = np.unique(np.concatenate([arcs.start, arcs.end]), return_inverse=True)
     start, end = index[: len(arcs)], index[len(arcs) :]
     first_inner = len(used) + np.concatenate([[0], np.cumsum(segments - 1)[:-1]])
-    arc, k = _rows_and_columns(segments - 1)
+    arc, k = rows_and_columns(segments - 1)
     vertices = np.concatenate([cells.corners[used], arcs.at(arc, (k + 1) / segments[arc])])
 
     offsets, sides = cells.rings
-    side, k = _rows_and_columns(segments[sides // 2])
+    side, k = rows_and_columns(segments[sides // 2])
     arc, backward = sides[side] // 2, sides[side] % 2 == 1
     inner = first_inner[arc] + np.where(backward, segments[arc] - k, k) - 1
     vertex = np.where(k == 0, np.where(backward, end[arc], start[arc]), inner)
@@ -87,27 +84,7 @@ def cell_outlines(cells: Cells, segments: Ints) -> CellOutlines:
     )
 
 
-def segment_counts(spec: Spec, cells: Cells, distance: Floats) -> Ints:
-    """Segments of each arc (e,), for the mirror that needs more of the two.
-
-    A facet keeps one normal along its segment of length s, so the rays at its ends shift by
-    s (distance / r) along the outline's image. Near where that image comes closest to the object's
-    centre it turns about the circle of radius R: a shift d costs d^2 / 2 R of coverage's radius.
-    """
-    curvature = cells.surfaces.curvature[: cells.mirrors]
-    shift = np.sqrt(spec.optics.capture_diameter_mm * spec.mesh.ray_error_mm)
-    with np.errstate(divide="ignore"):
-        by_rays = shift / (curvature * distance)
-        by_chord = np.sqrt(4 * spec.mesh.chord_error_mm / curvature)
-    longest = np.full(len(cells.surfaces), np.inf)
-    longest[: cells.mirrors] = np.minimum(by_rays, by_chord)
-    arcs = cells.arcs
-    segments = np.ceil(arcs.length / longest[arcs.faces].min(axis=1))
-    straight = arcs.weight == 1
-    return np.where(straight, 1, np.maximum(segments, MIN_SEGMENTS)).astype(np.int64)
-
-
-def _rows_and_columns(counts: Ints) -> tuple[Ints, Ints]:
+def rows_and_columns(counts: Ints) -> tuple[Ints, Ints]:
     """Row and column of every element of rows with these many elements each."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -10,18 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.geometry.vectors import norm
 from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.cell_middles import means, middles
-from tbcad.shell.cell_outlines import CellOutlines, cell_outlines, segment_counts
+from tbcad.shell.cell_outlines import CellOutlines, cell_outlines
+from tbcad.shell.segments import segment_counts
+from tbcad.shell.strips import strip_points, strip_widths
 from tbcad.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
-
-# A corner's inner point is at most this many strip widths away, where arcs meet at a sharp angle.
-MAX_MITRE = 4.0
-# Share of the distance from outline to middle that the strip takes at most.
-MAX_STRIP_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
 
     Args:
         spec: design with the mesh tolerances.
-        cells: of the modelled surfaces.
+        cells: camera a's, of the modelled surfaces.
         distance: from each mirror to the object, mm, (m,).
     """
     outlines = cell_outlines(cells, segment_counts(spec, cells, distance))
@@ -67,34 +64,13 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     """A strip along each outline, then rings of quads, then a fan about the middle."""
     mirrors, cell, edge = cells.mirror_surfaces, outlines.cell, outlines.points
     middle = middles(outlines, mirrors)
-    reach = norm(edge - middle[cell])
-    first = np.unique(cell, return_index=True)[1]
-    farthest, nearest = (limit.reduceat(reach, first) for limit in (np.maximum, np.minimum))
-    width = np.minimum(
-        _strip_width(spec.mesh.ray_error_mm, mirrors.radius, distance, middle),
-        MAX_STRIP_SHARE * nearest,
-    )
+    farthest = np.zeros(len(mirrors))
+    np.maximum.at(farthest, cell, norm(edge - middle[cell]))
     outside = -cells.surfaces.gradient(cell, edge)
-    strip = _strip_points(outlines, outside, width[cell])
-    # Where the strip would fold it goes straight toward the middle instead, which never folds.
-    folded = _folded_cells(outlines, strip, middle, outside)[cell]
-    straight = edge + (width / farthest)[cell, None] * (middle[cell] - edge)
-    strip = mirrors.projected(cell, np.where(folded[:, None], straight, strip))
+    width = strip_widths(spec.mesh.ray_error_mm, mirrors.radius, distance, middle)
+    strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
     return _RingMesh(outlines, mirrors, middle, strip, rings.astype(np.int64)).facets()
-
-
-def _strip_width(ray_error: float, radius: Floats, distance: Floats, points: Floats) -> Floats:
-    """Width of the strip in each cell by the ray error, mm, (m,).
-
-    The normal errs by (w / 2) / r, the reflected ray by twice that, over the distance. A strip
-    narrower than sqrt(2 r q) gains nothing: the tilt q / w that a rounding error q gives its facets
-    when points (m, 3) are written as 32-bit floats is then more than w / (2 r), the tilt of an
-    exact strip.
-    """
-    largest = np.abs(points).max(axis=1).astype(np.float32)
-    rounding = np.spacing(largest).astype(np.float64) / 2
-    return np.asarray(np.maximum(ray_error * radius / distance, np.sqrt(2 * radius * rounding)))
 
 
 @dataclass(frozen=True)
@@ -181,31 +157,3 @@ class _RingMesh:
         first = np.column_stack([a, b, np.where(crossed, d, c)])
         second = np.column_stack([np.where(crossed, b, a), c, d])
         return [first, second]
-
-
-def _strip_points(outlines: CellOutlines, outside: Floats, width: Floats) -> Floats:
-    """Points (b, 3) one strip width (b,) inside the outlines.
-
-    Square to the segment before, so that its facet on the outline has a right angle there; where
-    arcs meet, mitred. An arc has one such point less than segments: its last one, where rays
-    are farthest from the object's centre, makes do with a skew.
-    """
-    edge = outlines.points
-    across = unit(np.cross(outside, edge[outlines.following] - edge))
-    before = np.empty_like(across)
-    before[outlines.following] = across
-    mitre = (across + before) / (1 + dot(across, before))[:, None]
-    length = norm(mitre)
-    mitre *= (np.minimum(length, MAX_MITRE) / length)[:, None]
-    return edge + width[:, None] * np.where(outlines.corner[:, None], mitre, before)
-
-
-def _folded_cells(outlines: CellOutlines, strip: Floats, middle: Floats, outside: Floats) -> Bools:
-    """Cells (m,) whose strip would fold, as in a corner much sharper than 60 degrees."""
-    edge, following = outlines.points, outlines.following
-    a, b, c, d = edge, edge[following], strip[following], strip
-    triangles = ((a, b, c), (a, c, d), (a, b, d), (b, c, d), (d, c, middle[outlines.cell]))
-    wrong = [dot(np.cross(q - p, r - p), outside) <= 0 for p, q, r in triangles]
-    folded: Bools = np.zeros(len(middle), dtype=bool)
-    folded[outlines.cell[np.any(wrong, axis=0)]] = True
-    return folded

@@ -89,12 +89,8 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     """
     options = ["n=12", f"ray_error_mm={error_mm}", "chord_error_mm=0.002"]
     mirrors = design(load_spec(None, options))
-    facets, array = facets_of(mirrors), mirrors.arrays[0]
-    on_rim = facets.triangles < len(facets.outlines.vertices)
-    rim = on_rim.sum(axis=1) == 2
-    mirror, corner = facets.mirror[rim], facets.vertices[facets.triangles[rim]]
-    normal = unit(normals_of(corner))
-    point = (corner * on_rim[rim][:, :, None]).sum(axis=1) / 2
+    mirror, edge, normal = rim_facets(mirrors, np.float64)
+    array, point = mirrors.arrays[0], edge.mean(axis=1)
     exact = unit(array.modelled_cells.surfaces.gradient(mirror, point))
     pinhole = array.camera.pinhole
     loss = miss_distances(pinhole, point, exact) - miss_distances(pinhole, point, normal)
@@ -102,6 +98,46 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     radius = array.modelled_cells.surfaces.radius[mirror]
     chord = 2 * mirrors.spec.mesh.chord_error_mm * norm(point) / radius
     assert np.quantile(loss - chord, 0.99) < error_mm
+
+
+def rim_facets(
+    mirrors: MirrorDesign, written_as: type[np.floating]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mirror (t,), ends on the rim (t, 2, 3) and normal (t, 3) of facets with a side on the rim."""
+    facets = facets_of(mirrors)
+    on_rim = facets.triangles < len(facets.outlines.vertices)
+    rim = on_rim.sum(axis=1) == 2
+    corner = facets.vertices.astype(written_as).astype(np.float64)[facets.triangles[rim]]
+    edge = corner[on_rim[rim]].reshape(-1, 2, 3)
+    return facets.mirror[rim], edge, unit(normals_of(corner))
+
+
+SHORT_ARCS = (
+    ["n=3", "camera_mm=[97.2, 0, -52]", "semi_minor_mm=35.4", "capture_diameter_mm=20"],
+    ["n=3", "camera_mm=[62.3, 0, -50.2]", "semi_minor_mm=36.1", "capture_diameter_mm=22.2"],
+    ["n=3", "camera_mm=[63.9, 0, -46.1]", "semi_minor_mm=37.4", "capture_diameter_mm=20.5"],
+)
+LONG_MIRRORS = (
+    ["n=5", "camera_mm=[363.5, 0, -145.4]", "semi_minor_mm=115.5", "capture_diameter_mm=47.1"],
+    ["n=7", "camera_mm=[219, 0, -119.6]", "semi_minor_mm=113.8", "capture_diameter_mm=78.1"],
+)
+
+
+@pytest.mark.parametrize("options", [["n=3"], ["n=7"], *SHORT_ARCS, *LONG_MIRRORS], ids=str)
+def test_facets_cost_less_than_the_margin(options: list[str]) -> None:
+    """Arcs shorter than the strip (one has 1.2 micrometres) do not skew facets on long ones.
+
+    Off long mirrors far from the camera a facet's rays shift toward the object's centre.
+    """
+    mirrors = design(load_spec(None, options))
+    array, (mirror, edge, normal) = mirrors.arrays[0], rim_facets(mirrors, np.float32)
+    cut = array.cells.halved[mirror] & (edge[:, :, 0] == 0).all(axis=1)
+    pinhole = array.camera.pinhole
+    at_ends = miss_distances(pinhole, edge, normal[:, None]).min(axis=1)
+    seen = np.full(len(array), np.inf)
+    np.minimum.at(seen, mirror[~cut], 2 * at_ends[~cut])
+    left = seen.min() - mirrors.spec.optics.capture_diameter_mm
+    assert left > mirrors.spec.mirrors.margin_mm / 3
 
 
 def test_joining_faces_are_flat_to_the_last_bit(small_design: MirrorDesign) -> None:
