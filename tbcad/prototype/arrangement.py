@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, ball_counts, prototype_layout
+from tbcad.prototype.balls.layout import (
+    BallChoices,
+    PrototypeLayout,
+    ball_counts,
+    prototype_layout,
+)
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.mass import carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
@@ -109,11 +114,11 @@ Outcome = tuple[Spec, Arrangement | SpecError]
 
 def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
     """Outcomes for every number of balls."""
-    parts = load_parts()
-    for k in ball_counts(design.spec, design):
+    parts, choices = load_parts(), BallChoices(design.spec, design.arrays[0])
+    for k in ball_counts(design.spec, design, choices):
         spec = _with(design.spec, k=k)
         try:
-            layout = prototype_layout(spec, design, k)
+            layout = prototype_layout(spec, design, k, choices)
         except SpecError as error:
             yield spec, error
         else:

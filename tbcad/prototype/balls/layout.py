@@ -1,7 +1,8 @@
 """The prototype in numbers: balls, their places on the base, its swing and its stops."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from tbcad.prototype.balls.placement import (
     PlacementProblem,
     min_swing_placement,
 )
-from tbcad.prototype.balls.selection import BallCandidates, Balls, ball_candidates, choose_balls
+from tbcad.prototype.balls.selection import Balls, ball_candidates, choose_balls
 from tbcad.prototype.balls.stops import (
     StopPlan,
     StopRequests,
@@ -30,9 +31,9 @@ from tbcad.prototype.balls.stops import (
     plan_stops,
     stop_requests,
 )
+from tbcad.prototype.suitable import check_suitable
 from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MOST_BALLS, PrototypeSpec
+from tbcad.spec.prototype import MOST_BALLS
 from tbcad.types import Floats, Ints
 
 # Length of the post in semi-major axes: it reaches down beyond all balls.
@@ -109,21 +110,62 @@ class PrototypeLayout:
         return float(np.ptp(self.placement.azimuth))
 
 
-def prototype_layout(spec: Spec, design: MirrorDesign, count: int | None = None) -> PrototypeLayout:
+@dataclass(frozen=True)
+class BallChoices:
+    """The balls of any number of groups, chosen once for each number.
+
+    Attributes:
+        spec: the design; its number of balls does not matter.
+        array: camera a's mirrors.
+    """
+
+    spec: Spec
+    array: MirrorArray
+    _chosen: dict[int, tuple[MirrorGroups, Balls, BallFit]] = field(default_factory=dict)
+
+    def groups(self, k: int) -> MirrorGroups:
+        """The mirrors in k groups."""
+        weight = self.spec.prototype.radius_weight_deg
+        return group_mirrors(self.array.polar, self.array.mirrors.radius, k, weight)
+
+    def chosen(self, k: int) -> tuple[MirrorGroups, Balls, BallFit]:
+        """The mirrors in k groups, the ball of each, and how well it replaces them."""
+        if k not in self._chosen:
+            limits, target = self.spec.prototype, self.spec.optics.capture_diameter_mm
+            candidates = ball_candidates(self.array, self.groups(k), target)
+            balls = choose_balls(candidates, limits, self._catalogue)
+            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls, limits)
+        return self._chosen[k]
+
+    @cached_property
+    def _catalogue(self) -> Catalogue:
+        """Balls that can be bought."""
+        limits = self.spec.prototype
+        return load_catalogue(limits.catalogues).available(limits.grade, limits.largest_ball_mm)
+
+
+def prototype_layout(
+    spec: Spec,
+    design: MirrorDesign,
+    count: int | None = None,
+    choices: BallChoices | None = None,
+) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
     Args:
         spec: the design.
         design: its mirrors.
         count: number of balls; None: the first that the spec permits.
+        choices: of balls that were looked at before.
 
     Raises:
         SpecError: when there is no such layout; it says what to change.
     """
     array = design.arrays[0]
-    k = next(ball_counts(spec, design)) if count is None else count
-    candidates, balls = _balls_for_groups(spec, array, k, _catalogue(spec.prototype))
-    groups, stop_error = candidates.groups, float(np.radians(spec.prototype.stop_error_deg))
+    choices = choices or BallChoices(spec, array)
+    k = next(ball_counts(spec, design, choices)) if count is None else count
+    groups, balls, fit = choices.chosen(k)
+    stop_error = float(np.radians(spec.prototype.stop_error_deg))
     requests = stop_requests(groups, array.azimuth, stop_error)
     problem = _placement_problem(spec, array, balls, requests)
     placement = min_swing_placement(problem)
@@ -133,7 +175,7 @@ def prototype_layout(spec: Spec, design: MirrorDesign, count: int | None = None)
         grade=load_grades()[spec.prototype.grade],
         groups=groups,
         balls=balls,
-        fit=ball_fit(candidates, balls, spec.prototype),
+        fit=fit,
         problem=problem,
         placement=replace(placement, azimuth=azimuth, outermost=problem.outermost(azimuth)),
         stops=plan_stops(groups, array.polar, requests, azimuth),
@@ -141,77 +183,53 @@ def prototype_layout(spec: Spec, design: MirrorDesign, count: int | None = None)
     )
 
 
-def _check_suitable(spec: Spec, array: MirrorArray) -> None:
-    """One camera photographs both halves only if a half turn of the object swaps the cameras."""
-    if np.isnan(array.mirrors.radius).any():
-        raise SpecError(
-            "a prototype of balls needs curved mirrors, but mirrors.radius_rule is flat: set it "
-            "to traced or paper"
-        )
-    if spec.optics.camera_mm[1] != 0:
-        raise SpecError(
-            f"a prototype needs cameras that a half turn about z swaps, but optics.camera_mm has "
-            f"y = {spec.optics.camera_mm[1]:g}: set it to 0, or build --parts shell"
-        )
-
-
-def ball_counts(spec: Spec, design: MirrorDesign) -> Iterator[int]:
+def ball_counts(
+    spec: Spec, design: MirrorDesign, choices: BallChoices | None = None
+) -> Iterator[int]:
     """Numbers of balls that the spec permits, in the order in which layouts are tried.
 
     With prototype.k auto: the smallest number within the limits auto_..., a few more, then fewer.
+
+    Args:
+        spec: the design.
+        design: its mirrors.
+        choices: takes the balls that are looked at.
 
     Raises:
         SpecError: no prototype of balls suits the mirrors.
     """
     array = design.arrays[0]
-    _check_suitable(spec, array)
+    check_suitable(spec)
     if isinstance(spec.prototype.k, int):
         yield spec.prototype.k
         return
     distinct = max_groups(array.polar, array.mirrors.radius, spec.prototype.radius_weight_deg)
     most = min(distinct, MOST_BALLS)
-    smallest = _smallest_count(spec, array, most)
+    smallest = _smallest_count(choices or BallChoices(spec, array), most)
     if smallest is not None:
         yield from range(smallest, min(smallest + MORE_BALLS, most) + 1)
     yield from range(min((smallest or MANY_BALLS + 1) - 1, most), 0, -1)
 
 
-def _smallest_count(spec: Spec, array: MirrorArray, most: int) -> int | None:
+def _smallest_count(choices: BallChoices, most: int) -> int | None:
     """The smallest number of balls within the limits of the spec, None when there is none."""
-    limits, catalogue = spec.prototype, _catalogue(spec.prototype)
+    limits = choices.spec.prototype
     for k in range(1, min(most, MANY_BALLS) + 1):
-        if _directions_within_limits(limits, array, k):
-            fit = ball_fit(*_balls_for_groups(spec, array, k, catalogue), limits)
+        if _directions_within_limits(choices, k):
+            _, _, fit = choices.chosen(k)
             if 100 * (1 - fit.kept_share) <= limits.auto_lost_percent:
                 return k
     return None
 
 
-def _catalogue(spec: PrototypeSpec) -> Catalogue:
-    """Balls that can be bought for a prototype."""
-    return load_catalogue(spec.catalogues).available(spec.grade, spec.largest_ball_mm)
-
-
-def _groups(spec: PrototypeSpec, array: MirrorArray, k: int) -> MirrorGroups:
-    return group_mirrors(array.polar, array.mirrors.radius, k, spec.radius_weight_deg)
-
-
-def _directions_within_limits(spec: PrototypeSpec, array: MirrorArray, k: int) -> bool:
+def _directions_within_limits(choices: BallChoices, k: int) -> bool:
     """Whether the polar errors of k groups are within the limits; this needs no balls."""
-    groups = _groups(spec, array, k)
-    error = np.degrees(np.abs(groups.polar[groups.group_of] - array.polar))
+    limits, groups = choices.spec.prototype, choices.groups(k)
+    error = np.degrees(np.abs(groups.polar[groups.group_of] - choices.array.polar))
     return bool(
-        error.max() <= spec.auto_direction_max_deg
-        and np.median(error) <= spec.auto_direction_median_deg
+        error.max() <= limits.auto_direction_max_deg
+        and np.median(error) <= limits.auto_direction_median_deg
     )
-
-
-def _balls_for_groups(
-    spec: Spec, array: MirrorArray, k: int, catalogue: Catalogue
-) -> tuple[BallCandidates, Balls]:
-    groups = _groups(spec.prototype, array, k)
-    candidates = ball_candidates(array, groups, spec.optics.capture_diameter_mm)
-    return candidates, choose_balls(candidates, spec.prototype, catalogue)
 
 
 def _placement_problem(

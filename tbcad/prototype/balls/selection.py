@@ -222,8 +222,8 @@ def _covering(
     beyond = ~all_ignored & spec.caps & (stock == last)
     if not beyond.any():
         return radius, stock
-    cap = _largest_radius(candidates.only(beyond[groups.group_of]), radius, ignored, moved)
-    cap = np.floor(cap / CAP_STEP_MM + COVERAGE_ROUNDING_MM) * CAP_STEP_MM
+    steps = _largest_cap(candidates.only(beyond[groups.group_of]), radius, ignored, moved)
+    cap = steps * CAP_STEP_MM
     beyond &= cap > radius
     return np.where(beyond, cap, radius), np.where(beyond, CAP, stock)
 
@@ -238,12 +238,19 @@ def _largest_place(covers: Callable[[Ints], Bools], count: int, last: int) -> In
     return low
 
 
-def _largest_radius(candidates: BallCandidates, low: Floats, ignored: Bools, moved: bool) -> Floats:
-    """Largest reflecting radius (k,) from low upward that shows the target, mm."""
+def _largest_cap(candidates: BallCandidates, low: Floats, ignored: Bools, moved: bool) -> Floats:
+    """Largest reflecting radius (k,) from low upward that shows the target, in whole steps."""
     mirror = candidates.array.mirrors.radius
     high = np.maximum(low, MAX_CAP_RADIUS * candidates.groups.mean(mirror))
     for _ in range(BISECTION_STEPS):
+        if np.array_equal(_steps(low), _steps(high)):
+            break
         middle = (low + high) / 2
         covered = candidates.covers_groups(middle, ignored, moved)
         low, high = np.where(covered, middle, low), np.where(covered, high, middle)
-    return low
+    return _steps(low)
+
+
+def _steps(radius: Floats) -> Floats:
+    """Whole steps of a cap's radius in radii (k,), but for rounding."""
+    return np.asarray(np.floor(radius / CAP_STEP_MM + COVERAGE_ROUNDING_MM))

@@ -1,6 +1,7 @@
 """The prototype of the paper's design, and what is refused."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
+from tbcad.prototype.balls import layout
 from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
+    BallChoices,
     PrototypeLayout,
     ball_counts,
     prototype_layout,
@@ -21,6 +24,7 @@ from tbcad.prototype.balls.placement import greedy_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
+    Balls,
     ball_candidates,
     choose_balls,
 )
@@ -51,6 +55,24 @@ def small(design: MirrorDesign, *options: str) -> PrototypeLayout:
 
 
 class TestBalls:
+    def test_a_search_and_its_layout_choose_them_once(
+        self, small_design: MirrorDesign, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        spec, asked = small_design.spec, []
+
+        def counted(candidates: BallCandidates, *rest: Any) -> Balls:
+            asked.append(len(candidates.groups))
+            return choose_balls(candidates, *rest)
+
+        monkeypatch.setattr(layout, "choose_balls", counted)
+        choices = BallChoices(spec, small_design.arrays[0])
+        count = next(ball_counts(spec, small_design, choices))
+        shared = prototype_layout(spec, small_design, count, choices)
+        assert len(set(asked)) == len(asked) > 0
+        alone = prototype_layout(spec, small_design, count)
+        assert (shared.balls.radius == alone.balls.radius).all()
+        assert (shared.fit.coverage == alone.fit.coverage).all()
+
     def test_all_mirrors_show_the_whole_target(self, prototype: PrototypeLayout) -> None:
         assert prototype.fit.coverage.min() > 60
         assert prototype.fit.coverable.all()
