@@ -258,24 +258,29 @@ def test_twins_are_turned_about_z(context: PrototypeContext) -> None:
     )
 
 
-def test_no_step_of_the_swing_is_too_large(measured: MeasuredPrototype) -> None:
-    """A rod that the base passes at one angle only is found, however thin."""
+@pytest.mark.parametrize(("turn", "meets"), [(0.0, True), (170.0, False)])
+def test_no_step_of_the_swing_is_too_large(
+    measured: MeasuredPrototype, turn: float, meets: bool
+) -> None:
+    """A rod that the base passes at one angle only is found, whichever has more facets."""
     import manifold3d
 
-    arm = manifold3d.Manifold.cube([100.0, 2.0, 2.0]).translate([0, 80, 0])
-    rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate([5.0, 0, 0])
     rows = measured.context.frame
+    arm = manifold3d.Manifold.cube([100.0, 2.0, 2.0]).translate([0, 80, 0])
     arm = arm.transform(np.hstack([rows[[1, 2, 0]].T, np.zeros((3, 1))]))
-    for turn, meets in ((0.0, True), (170.0, False)):
-        at = turned(rows.T @ np.array([0.3, 85.0, 80.7]), turn)
-        standing = rod.translate(at - np.array([5.2, 0.2, 0.2]))
-        found = swing.sweep(
+    at = turned(rows.T @ np.array([0.3, 85.0, 80.7]), turn)
+    rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate(at - np.array([0.2, 0.2, 0.2]))
+    one, two = (
+        swing.sweep(
             measured,
-            swing.axial_solid(measured, "arm", arm),
-            swing.axial_solid(measured, "rod", standing),
+            swing.axial_solid(measured, "arm", moving),
+            swing.axial_solid(measured, "rod", still),
         )
-        assert (found.volume > swing.TOUCH_MM3) == meets
-        assert found.samples > 5
+        for moving, still in ((arm.refine(3), rod), (arm, rod.refine(3)))
+    )
+    assert (one.volume > swing.TOUCH_MM3) == meets
+    assert one.samples == two.samples > 5
+    assert (one.volume, one.gap, one.at) == pytest.approx((two.volume, two.gap, two.at), abs=1e-6)
 
 
 def test_one_look_does_where_nothing_can_ever_meet(measured: MeasuredPrototype) -> None:

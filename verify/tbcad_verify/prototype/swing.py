@@ -146,13 +146,14 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
     bound = _distance_at_any_angle(moving, still)
     names = (moving.name, still.name)
     if bound >= CLEAR_MM:
-        shared = (_rotated(measured, moving, low) ^ still.solid).volume()
-        return PairSweep(names, shared, min(SEARCH_MM, bound), low, 1, 0.0)
+        one, two = _placed(measured, moving, still, low)
+        return PairSweep(names, (one ^ two).volume(), min(SEARCH_MM, bound), low, 1, 0.0)
     at, samples, blind = low, 0, 0.0
     volume, worst, gap = 0.0, low, SEARCH_MM
     while True:
-        solid = _rotated(measured, moving, at)
-        shared, distance = (solid ^ still.solid).volume(), solid.min_gap(still.solid, SEARCH_MM)
+        one, two = _placed(measured, moving, still, at)
+        distance = one.min_gap(two, SEARCH_MM)  # 0 where they share room, also one inside the other
+        shared = 0.0 if distance > 0 else (one ^ two).volume()
         samples += 1
         if shared > volume or (volume == 0 and distance < gap):
             worst = at
@@ -164,10 +165,22 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
         at = min(at + step, high)
 
 
-def _rotated(measured: MeasuredPrototype, moving: AxialSolid, angle: float) -> Any:
-    """The solid at a base angle, rad."""
+def _placed(
+    measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid, angle: float
+) -> tuple[Any, Any]:
+    """Both solids as they lie to each other at a base angle, rad.
+
+    The one with fewer facets is rotated: the other's are sorted in space only once.
+    """
+    if moving.solid.num_tri() > still.solid.num_tri():
+        return moving.solid, _rotated(measured, still, -angle)
+    return _rotated(measured, moving, angle), still.solid
+
+
+def _rotated(measured: MeasuredPrototype, one: AxialSolid, angle: float) -> Any:
+    """A solid rotated about the base's axis by an angle, rad."""
     rotation = measured.context.base_rotation(np.array([angle])).as_matrix()[0]
-    return moving.solid.transform(np.hstack([rotation, np.zeros((3, 1))]))
+    return one.solid.transform(np.hstack([rotation, np.zeros((3, 1))]))
 
 
 def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSolid:

@@ -23,12 +23,18 @@ from tbcad_verify.run.child import Limits
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
-from tbcad_verify.step.shell_checks import shell_step_checks
+from tbcad_verify.step.shell_checks import (
+    ShellComparison,
+    shell_comparisons,
+    shell_step_checks,
+)
 from tbcad_verify.step.step_file import StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
 Stamps = dict[str, tuple[int, ...]]
+Files = dict[str, StepFile | Unknown]
+Comparisons = dict[str, ShellComparison | Unknown]
 
 
 @dataclass(frozen=True)
@@ -103,36 +109,35 @@ def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> N
     with ThreadPoolExecutor(1) as pool:
         try:
             # Reading STEP files needs none of the stages, and takes as long as they do.
-            files = pool.submit(read_step_files, export, limits)
+            steps = pool.submit(_read_steps, export, limits)
             if options.apart:
                 command = worker_command(export.folder, options.printers)
                 watch(command, stage_titles(export), results, options.seconds)
             else:
                 run_stages(export.folder, results.add, options.printers)
-            _compare_steps(export, results, files)
+            _compare_steps(export, results, steps)
         except BaseException:
             limits.stop.set()
             raise
 
 
+def _read_steps(export: Export, limits: Limits) -> tuple[Files, Comparisons]:
+    files = read_step_files(export, limits)
+    return files, shell_comparisons(export, files)
+
+
 def _compare_steps(
-    export: Export,
-    results: CollectedResults,
-    read: Future[dict[str, StepFile | Unknown]],
+    export: Export, results: CollectedResults, steps: Future[tuple[Files, Comparisons]]
 ) -> None:
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        files = read.result()
-        results.add(
-            Results(
-                checks=shell_step_checks(
-                    export, results.masses, files, results.mirrors.get("coverage_fitted_mm")
-                )
-            )
-        )
+        _, comparisons = steps.result()
+        coverage = results.mirrors.get("coverage_fitted_mm")
+        checks = shell_step_checks(export, results.masses, comparisons, coverage)
+        results.add(Results(checks=checks))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files = read.result()
+        files, _ = steps.result()
         results.add(Results(checks=part_step_checks(export, results.masses, files)))
 
 

@@ -65,13 +65,8 @@ def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
         major, minor = table.numbers(curve)[-2:]
         faces = table.of("ADVANCED_FACE")
         names = {one: TEXT.findall(table.bodies[one])[0] for one in faces}
-        corners = {
-            point
-            for one, name in names.items()
-            if name in mirrors
-            for point in table.reached(one)
-            if table.kinds.get(point) == "VERTEX_POINT"
-        }
+        reached = table.reached(*(one for one, name in names.items() if name in mirrors))
+        corners = [one for one in reached if table.kinds.get(one) == "VERTEX_POINT"]
         valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
         round_faces = [round_face(table, one) for one in faces if names[one] not in mirrors]
     except (LookupError, ValueError) as error:

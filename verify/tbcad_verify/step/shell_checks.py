@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -21,6 +21,7 @@ from tbcad_verify.report.checks import (
     CheckName,
     Unknown,
     at_most,
+    attempt,
     each_at_most,
     guarded,
     require,
@@ -74,10 +75,28 @@ class ShellComparison(PartComparison):
     camera: Camera
 
 
+def shell_comparisons(
+    export: Export, files: dict[str, StepFile | Unknown]
+) -> dict[str, ShellComparison | Unknown]:
+    """Each shell's STEP file with all that it is compared with but its mesh, or why not, by part.
+
+    Args:
+        export: the record.
+        files: as read, by part.
+    """
+    found = {}
+    for part in export.parts:
+        if part.step:
+            work = partial(_comparison, export, part, files[part.name])
+            comparison, reason = attempt(work)
+            found[part.name] = comparison or Unknown(reason)
+    return found
+
+
 def shell_step_checks(
     export: Export,
     masses: dict[str, MassProperties],
-    files: dict[str, StepFile | Unknown],
+    comparisons: dict[str, ShellComparison | Unknown],
     coverage: Floats | None = None,
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
@@ -85,13 +104,13 @@ def shell_step_checks(
     Args:
         export: the record.
         masses: of the meshes, by part.
-        files: as read, by part.
+        comparisons: by part.
         coverage: (M,) mm, as measured on spheres.
     """
 
     def of_part(part: Part) -> list[Check]:
-        file, mass = files[part.name], masses.get(part.name)
-        return run_checks(CHECKS, part.step, _comparison(export, part, known(file), mass))
+        comparison = known(comparisons[part.name])
+        return run_checks(CHECKS, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
 
     checks = [
         check
@@ -121,9 +140,8 @@ def _recorded_coverage(export: Export, coverage: Floats | None) -> Check:
     return _worst_of(COVERAGE, export.mirrors.ids, error, COVERAGE_MM, "mm")
 
 
-def _comparison(
-    export: Export, part: Part, file: StepFile, mass: MassProperties | None
-) -> ShellComparison:
+def _comparison(export: Export, part: Part, read: StepFile | Unknown) -> ShellComparison:
+    file = known(read)
     mine = export.mirrors.camera == part.camera
     mirrors = export.mirrors.take(np.flatnonzero(mine))
     count = Counter(file.faces.names)
@@ -131,7 +149,7 @@ def _comparison(
     return ShellComparison(
         part.name,
         file,
-        mass,
+        None,
         export.mesh_error_mm,
         mirrors=mirrors,
         foreign=frozenset(export.mirrors.ids) - frozenset(mirrors.ids),

@@ -81,9 +81,9 @@ class StepTable:
         """Decimal numbers in an entity."""
         return [float(digits) for digits in NUMBER.findall(self.bodies[number])]
 
-    def reached(self, start: int) -> Iterator[int]:
-        """All entities that one refers to, and what these refer to."""
-        seen, todo = {start}, [start]
+    def reached(self, *start: int) -> Iterator[int]:
+        """Some entities, all that they refer to, and what these refer to, each once."""
+        seen, todo = set(start), list(start)
         while todo:
             number = todo.pop()
             yield number

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ PROCESSES = min(os.cpu_count() or 1, 4)  # read files at the same time, 0.2 GB e
 READER = ("-P", "-m", "tbcad_verify.step")
 
 Row = dict[str, Any]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -153,15 +154,15 @@ def _answer(path: Path, reason: str) -> StepFile | Unknown:
     return parse(value["text"], value["solid"])
 
 
-def known(file: StepFile | Unknown) -> StepFile:
-    """A file that was read.
+def known(found: Found | Unknown) -> Found:
+    """What was found.
 
     Raises:
-        Unknown: it was not.
+        Unknown: nothing was.
     """
-    if isinstance(file, Unknown):
-        raise file
-    return file
+    if isinstance(found, Unknown):
+        raise found
+    return found
 
 
 def parse(text: Row, solid: Row) -> StepFile:
