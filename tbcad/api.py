@@ -13,6 +13,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from tbcad.errors import InputError
+from tbcad.loading import large_libraries
 from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec, option_texts
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.object import Paint, SceneObject
-    from tbcad.tolerance.analysis import Analysis, ToleranceOptions
+    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerance.options import ToleranceOptions
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
@@ -129,10 +131,12 @@ def build(
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    from tbcad.output.build import write_export
-    from tbcad.output.folder import check_replaceable, replacing
-    from tbcad.output.parts import default_parts
-    from tbcad.whole_design import Design
+    with large_libraries():
+        from tbcad.background import background_process
+        from tbcad.output.build import write_export
+        from tbcad.output.folder import check_replaceable, replacing
+        from tbcad.output.parts import SHELL, default_parts
+        from tbcad.whole_design import Design
 
     chosen, out = _spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
@@ -140,8 +144,11 @@ def build(
     started = monotonic()
     progress("mirrors: radii and cells")
     mirrors = design(chosen, detail=detail)
-    with replacing(out, force) as folder:
-        export = write_export(mirrors, folder, asked, progress, optional_prototype=parts is None)
+    with replacing(out, force) as folder, background_process() as submit:
+        made = submit(_as_made, mirrors) if verify and SHELL in asked else None
+        export = write_export(
+            mirrors, folder, asked, progress, submit, optional_prototype=parts is None
+        )
         finished = Design(export.spec, mirrors.arrays)
         report = None
         if verify:
@@ -150,25 +157,20 @@ def build(
                 _verify(folder, progress=progress),
                 folder=out,
                 note=export.note,
-                as_made=_as_made(finished, export.parts, progress, detail),
+                as_made=made.result() if made else None,
                 seconds=monotonic() - started,
             )
     return Build(out, finished, export.parts, export.note, report)
 
 
-def _as_made(
-    mirrors: Design, parts: Sequence[str], progress: Progress, detail: Progress
-) -> AsMade | None:
-    from tbcad.output.parts import SHELL
+def _as_made(mirrors: Design) -> AsMade:
+    """Simulate a few builds of a design by every built-in process."""
     from tbcad.simulate.scene.reflector import reflectors
     from tbcad.tolerance.as_made import as_made
 
-    if SHELL not in parts:
-        return None
-    progress(AS_MADE_STAGE)
     spec = mirrors.spec
     target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
-    return as_made(reflectors(mirrors), target, coat, detail)
+    return as_made(reflectors(mirrors), target, coat)
 
 
 def as_made(
@@ -371,8 +373,8 @@ def analyse(
     """
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
-    from tbcad.tolerance.analysis import ToleranceOptions
     from tbcad.tolerance.analysis import analyse as analyse_export
+    from tbcad.tolerance.options import ToleranceOptions
     from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
     from tbcad.tolerance.stages import RECORD
 

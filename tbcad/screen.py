@@ -1,26 +1,22 @@
-"""Progress of a long command: a bar on a terminal, plain lines elsewhere."""
+"""Progress of a long command: a bar on a terminal, plain lines elsewhere.
+
+What draws is loaded when it is needed: help and errors of the input come without it.
+"""
+
+from __future__ import annotations
 
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from time import monotonic
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    Task,
-    TextColumn,
-    TimeElapsedColumn,
-)
-from rich.text import Text
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
 
 WIDTH = 80  # columns of what is printed where no terminal says how many it has
-BAR_WIDTH = 12
-MINUTE = 60
 # The pace of this computer is taken from the stages done, and from this share of all of them as if
 # it had been done at the expected pace: the first short stages say little of the others.
 PRIOR_SHARE = 0.1
@@ -28,6 +24,8 @@ PRIOR_SHARE = 0.1
 
 def report_console() -> Console:
     """Where results are printed."""
+    from rich.console import Console
+
     return Console() if sys.stdout.isatty() else Console(width=WIDTH)
 
 
@@ -71,19 +69,6 @@ def _sums_before(expected: Mapping[str, float]) -> list[float]:
     for seconds in expected.values():
         sums.append(sums[-1] + seconds)
     return sums[:-1]
-
-
-class _TimeLeftColumn(ProgressColumn):
-    """The estimate, in words."""
-
-    def __init__(self, time_left: TimeLeft) -> None:
-        super().__init__()
-        self._left = time_left
-
-    def render(self, task: Task) -> Text:
-        task.completed = self._left.done
-        minutes, seconds = divmod(round(self._left.seconds), MINUTE)
-        return Text(f"about {minutes}:{seconds:02d} left")
 
 
 class Stages:
@@ -145,21 +130,18 @@ def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterato
             time left is shown.
         silent: show nothing.
     """
+    from rich.console import Console
+
     console = Console(stderr=True)
     if silent or not console.is_terminal:
         yield SilentStages() if silent else Stages(None, 0)
         return
+    from tbcad.progress_bar import progress_bar
+
     if isinstance(expected, int):
         time_left, total = None, float(expected)
     else:
         time_left = TimeLeft(expected)
         total = time_left.total
-    columns = (
-        SpinnerColumn(),
-        BarColumn(bar_width=BAR_WIDTH),
-        TimeElapsedColumn(),
-        *([_TimeLeftColumn(time_left)] if time_left else []),
-        TextColumn("{task.description}", markup=False),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with progress_bar(console, time_left) as bar:
         yield Stages(bar, total, time_left)

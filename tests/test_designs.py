@@ -1,10 +1,14 @@
 """The designs that come with tbcad, and what their comments promise."""
 
+import ast
+import inspect
 import re
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from tbcad.mirrors.array import design
 from tbcad.spec.design import Spec
@@ -14,6 +18,7 @@ from tbcad.spec.load import load_spec
 DESIGNS = Path(__file__).parents[1] / "designs"
 PAPER = DESIGNS / "turtleback.toml"
 KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
+SECTIONS = [Spec, *filter(None, (section_of(field) for _, field in dotted_fields(Spec)))]
 
 
 def dotted(table: dict[str, object], prefix: str = "") -> set[str]:
@@ -90,5 +95,19 @@ def test_the_print_is_the_paper_at_half_scale() -> None:
     assert 2 * small.capture_diameter_mm == paper.capture_diameter_mm
 
 
-def test_every_key_says_what_it_is() -> None:
-    assert [key for key, field in KEYS.items() if not field.description] == []
+def keys_with_docstrings(model: type[BaseModel]) -> set[str]:
+    """The keys of a section under which its source has a text."""
+    (section,) = ast.parse(inspect.getsource(model)).body
+    assert isinstance(section, ast.ClassDef)
+    return {
+        key.target.id
+        for key, text in pairwise(section.body)
+        if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name)
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    }
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_key_says_what_it_is(section: type[BaseModel]) -> None:
+    own = {name for name in section.__annotations__ if not section_of(section.model_fields[name])}
+    assert own - keys_with_docstrings(section) == set()

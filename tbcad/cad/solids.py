@@ -3,16 +3,16 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 import numpy as np
-from cadquery import Shape
 from manifold3d import Manifold, Mesh64, OpType
 from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_BooleanOperation,
     BRepAlgoAPI_Common,
@@ -38,12 +38,14 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeRevol,
     BRepPrimAPI_MakeSphere,
 )
+from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
-from OCP.TopTools import TopTools_ListOfShape
+from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.mesh import Mesh
@@ -164,6 +166,7 @@ def _boolean(
     # Both only spare time: faces come in the same order, tests compare the bytes.
     operation.SetRunParallel(len(first) + len(second) > FEW)
     operation.SetUseOBB(True)
+    operation.SetToFillHistory(False)
     operation.Build()
     if not operation.IsDone():
         raise InvalidSolidError("the kernel cannot join or cut these solids")
@@ -194,13 +197,19 @@ def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
 
 
 def solids(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
-    """All solids of a shape."""
-    return [solid.wrapped for solid in Shape.cast(shape).Solids()]
+    """All solids of a shape, each once."""
+    return [TopoDS.Solid_s(solid) for solid in _parts(shape, TopAbs_SOLID)]
 
 
 def faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
-    """All faces of a shape."""
-    return [face.wrapped for face in Shape.cast(shape).Faces()]
+    """All faces of a shape, each once."""
+    return [TopoDS.Face_s(face) for face in _parts(shape, TopAbs_FACE)]
+
+
+def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return (found.FindKey(k) for k in range(1, found.Extent() + 1))
 
 
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
@@ -227,7 +236,9 @@ def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
 
 def volume(shape: TopoDS_Shape) -> float:
     """Volume, mm^3."""
-    return float(Shape.cast(shape).Volume())
+    inside = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, inside)
+    return float(inside.Mass())
 
 
 def properties(shape: TopoDS_Shape) -> SolidProperties:
@@ -241,9 +252,14 @@ def properties(shape: TopoDS_Shape) -> SolidProperties:
 
 def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
     """Centres (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
-    planes = [face for face in Shape.cast(shape).Faces() if face.geomType() == "PLANE"]
-    centre = [Shape.centerOfMass(face).toTuple() for face in planes]
-    return np.array(centre).reshape(-1, 3), np.array([face.Area() for face in planes])
+    centre, area = [], []
+    for face in faces(shape):
+        if BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane:
+            surface = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(face, surface)
+            centre.append(surface.CentreOfMass().Coord())
+            area.append(surface.Mass())
+    return np.array(centre).reshape(-1, 3), np.array(area)
 
 
 def volume_by_meshes(

@@ -1,5 +1,6 @@
 """The command `tbcad`: thin; heavy libraries are imported inside the commands."""
 
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -55,4 +56,6 @@ def _run(arguments: list[str]) -> int:
 
 def main() -> None:
     """Entry point of the command."""
+    # None of them concerns a design, and looking for them in all installed packages takes time.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     sys.exit(run(sys.argv[1:]))

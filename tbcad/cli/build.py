@@ -6,10 +6,9 @@ from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.markup import escape
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_folder
+from tbcad.cli.early_checks import check_are_printers, check_is_folder
 from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
 from tbcad.cli.output_mode import Full, Json, Quiet, output_mode
 from tbcad.errors import InputError
@@ -95,7 +94,7 @@ def build(
     from tbcad.api import build as build_files
     from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.parts import default_parts, parse_parts
+    from tbcad.output.parts import check_parts, default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
     started = monotonic()
@@ -107,6 +106,8 @@ def build(
     process = _process(for_process, share)
     wanted_yield = DEFAULT_YIELD if share is None else share
     chosen = asked or default_parts(spec)
+    if asked is not None:
+        check_parts(spec, asked)
     if not dry_run:
         check_replaceable(out, force)
     times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
@@ -192,6 +193,7 @@ def verify_command(
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
     check_is_folder(folder)
+    check_are_printers(printers or ())
     from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.api import as_made, verify
@@ -246,6 +248,7 @@ def doctor() -> int:
 
 def _show_finding(finding: "Finding") -> None:
     """Show what was found, and below it, after an arrow, what to do."""
+    from rich.markup import escape
     from rich.table import Table
 
     row = Table.grid(padding=(0, 1))

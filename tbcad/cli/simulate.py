@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_capture, check_is_export
+from tbcad.cli.early_checks import check_is_capture, check_is_export, check_is_object
 from tbcad.cli.options import (
     Azimuth,
     Capture,
@@ -78,6 +78,7 @@ def capture(
     if mesh and prototype:
         raise InputError("--mesh and --prototype exclude each other: leave one out")
     check_is_export(folder)
+    check_is_object(object_file)
     from tbcad.api import photograph, write_photographs
     from tbcad.output.folder import check_replaceable
 

@@ -20,7 +20,6 @@ Seconds = dict[str, float]
 
 MIRRORS: Seconds = {"mirrors: radii and cells": 3.0}
 SHELLS: Seconds = {
-    "facets": 2.5,
     "shell_a: solid": 3.0,
     "shell_a: files": 6.0,
     "shell_b: solid": 3.0,
@@ -78,7 +77,7 @@ def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None)
     solids = prototype | scaled(WAIT_FOR_SHELLS, n) if both else shells | prototype
     margin = {} if process is None else scaled({margin_stage(process): MARGIN_SECONDS}, n)
     times = margin | scaled(MIRRORS, n) | solids | MANIFEST
-    return times | (verify_times(n, parts) | as_made_times(n, parts) if verify else {})
+    return times | (verify_times(n, parts) if verify else {})
 
 
 def margin_stage(process: str) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.early_checks import check_is_export, check_is_object
 from tbcad.cli.options import (
     Distance,
     Exports,
@@ -137,6 +138,7 @@ def ssim_command(
     distance: Distance = 640.0,
 ) -> int:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
+    check_is_object(object_file)
     from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.simulate.study.pixels import parse_sensor
     from tbcad.simulate.study.resolution import default_sensors
@@ -165,6 +167,8 @@ def prototype_command(
     ] = 3,
 ) -> int:
     """Compare views from the prototype's merged photographs with those of the full shell."""
+    check_is_export(folder)
+    check_is_object(object_file)
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.simulate.study.prototype_vs_shell import prototype_vs_shell
@@ -205,6 +209,8 @@ def low_pass_command(
     ] = 2,
 ) -> int:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
+    check_is_export(folder)
+    check_is_object(object_file)
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.simulate.study.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export
+from tbcad.cli.early_checks import check_is_export, check_is_object
 from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
 from tbcad.screen import paragraph, stages
 
@@ -54,20 +54,21 @@ def tolerance(
     Writes tolerance.json, tables, notes and plots.
     """
     from tbcad.cli.tolerance_times import tolerance_times
+    from tbcad.tolerance.options import ToleranceOptions
     from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
 
     changes = list(settings or [])
     name = load_process(process or DEFAULT_PROCESS, changes).name
-    check_is_export(folder)  # as the process, refused before the heavy libraries are loaded
-    from tbcad.api import analyse
-    from tbcad.simulate.study.study import check_study_folder, write_study
-    from tbcad.tolerance.analysis import ToleranceOptions
-    from tbcad.tolerance.report import json_text, summary_text, tolerance_study
-    from tbcad.tolerance.stages import TABLES
-
     options = ToleranceOptions(
         builds, seed, share, calibrated_mrad / 1000, scheduler, margins=margins
     )
+    check_is_export(folder)
+    check_is_object(object_file)  # as all before, refused before the heavy libraries are loaded
+    from tbcad.api import analyse
+    from tbcad.simulate.study.study import check_study_folder, write_study
+    from tbcad.tolerance.report import json_text, summary_text, tolerance_study
+    from tbcad.tolerance.stages import TABLES
+
     check_study_folder(out)
     with stages(tolerance_times(folder, name, builds, process is None, margins)) as screen:
         analysis = analyse(

@@ -3,20 +3,20 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import cadquery
-from cadquery.occ_impl.assembly import toCAF
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
 from OCP.TCollection import TCollection_HAsciiString
+from OCP.TDocStd import TDocStd_Document
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
 from tbcad.formats.step import StepError, configure, write_header
+from tbcad.loading import large_libraries
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 
@@ -30,7 +30,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
         StepError: when the kernel fails.
         OSError: when the file cannot be written in full.
     """
-    _, document = toCAF(_tree(name, groups), True)
+    document = _document(name, groups)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetColorMode(False)
     writer.SetNameMode(True)
@@ -48,14 +48,18 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     path.write_text(text + colours + end + rest, encoding="ascii")
 
 
-def _tree(name: str, groups: Sequence[SolidGroup]) -> cadquery.Assembly:
+def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
+    """The tree of named solids as the kernel's document."""
+    with large_libraries():  # seconds that other files need not wait for
+        import cadquery
+        from cadquery.occ_impl.assembly import toCAF
     tree = cadquery.Assembly(name=name)
     for group in groups:
         branch = cadquery.Assembly(name=group.name)
         for body in group.bodies:
             branch.add(cadquery.Shape.cast(body.shape), name=body.name)
         tree.add(branch)
-    return tree
+    return toCAF(tree, True)[1]
 
 
 def _number_occurrences(writer: STEPControl_Writer) -> None:

@@ -1,18 +1,20 @@
 """An export: the record, what was asked for, and the manifest."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from tbcad.background import Submit, background_process
+from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.camera.sheet import write_camera_sheet
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
-from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
+from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
-from tbcad.shell.files import shell_envelope, write_shells
+from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -38,6 +40,7 @@ def write_export(
     folder: Path,
     parts: Sequence[str] = PARTS,
     progress: Progress = lambda _: None,
+    submit: Submit = at_once,
     *,
     optional_prototype: bool = False,
 ) -> Export:
@@ -48,29 +51,47 @@ def write_export(
         folder: to write into.
         parts: some of PARTS.
         progress: called with each stage.
+        submit: takes what can be done meanwhile.
         optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
         InvalidSolidError: when the kernel fails.
     """
-    if PROTOTYPE not in parts:
-        write_shells(design, folder, progress)
-        export = Export(design.spec, (SHELL,))
-    elif SHELL not in parts:
-        with background_process() as submit:
-            export = Export(export_prototype(design, folder, progress, submit), (PROTOTYPE,))
-    else:
-        shell_envelope(design)  # refuses flanges that do not fit before anything is built
-        with background_process() as submit:
-            submit(write_shells, design, folder)
-            export = _prototype_with_shells(design, folder, progress, submit, optional_prototype)
-            progress("shells")
-    radius = design.spec.optics.capture_diameter_mm / 2
-    write_camera_sheet(folder, design.arrays[0], radius)
+    pending: list[Future[Any]] = []
+
+    def submit_file(work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        pending.append(submit(work, *arguments))
+        return pending[-1]
+
+    export = _write_parts(design, folder, parts, progress, submit_file, optional_prototype)
+    write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
+    for future in pending:
+        future.result()
     write_record(folder, replace(design, spec=export.spec), SHELL in parts)
     progress("manifest")
     write_manifest(folder)
+    return export
+
+
+def _write_parts(
+    design: MirrorDesign,
+    folder: Path,
+    parts: Sequence[str],
+    progress: Progress,
+    submit: Submit,
+    optional_prototype: bool,
+) -> Export:
+    if SHELL not in parts:
+        return Export(export_prototype(design, folder, progress, submit), (PROTOTYPE,))
+    envelope = shell_envelope(design)  # refuses flanges that do not fit
+    submit(write_shell_meshes, design, envelope, folder)
+    if PROTOTYPE not in parts:
+        write_shell_solids(design, envelope, folder, progress)
+        return Export(design.spec, (SHELL,))
+    submit(write_shell_solids, design, envelope, folder)
+    export = _prototype_with_shells(design, folder, progress, submit, optional_prototype)
+    progress("shells")
     return export
 
 
@@ -83,5 +104,5 @@ def _prototype_with_shells(
         if optional:
             return Export(design.spec, (SHELL,), f"no prototype: {error}")
         if isinstance(error, SpecError):
-            raise SpecError(f"{error}; or leave the prototype out with --parts shell") from None
+            raise only_shell_remains(error) from None
         raise

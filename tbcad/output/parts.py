@@ -1,7 +1,11 @@
 """What a build is asked to make; read before anything heavy is loaded."""
 
+from collections.abc import Sequence
+
 from tbcad.errors import InputError
+from tbcad.prototype.suitable import check_suitable
 from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
 
 SHELL, PROTOTYPE = "shell", "prototype"
 PARTS = (SHELL, PROTOTYPE)
@@ -24,3 +28,22 @@ def parse_parts(text: str) -> tuple[str, ...]:
 def default_parts(spec: Spec) -> tuple[str, ...]:
     """What is built when nobody says what: all, but no balls for planar mirrors."""
     return (SHELL,) if spec.mirrors.radius_rule == "flat" else PARTS
+
+
+def check_parts(spec: Spec, parts: Sequence[str]) -> None:
+    """Refuse a prototype where the spec alone says that none can be made.
+
+    Raises:
+        SpecError: as said.
+    """
+    if PROTOTYPE not in parts:
+        return
+    try:
+        check_suitable(spec)
+    except SpecError as error:
+        raise (only_shell_remains(error) if SHELL in parts else error) from None
+
+
+def only_shell_remains(error: SpecError) -> SpecError:
+    """The error of a prototype that is built with the shell, and could be left out."""
+    return SpecError(f"{error}; or leave the prototype out with --parts shell")

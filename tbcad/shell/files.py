@@ -17,26 +17,38 @@ from tbcad.shell.mesh import shell_mesh
 from tbcad.types import Progress
 
 
-def write_shells(design: MirrorDesign, folder: Path, progress: Progress = lambda _: None) -> None:
-    """Write both shells as STEP, STL and 3MF into a folder.
+def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -> None:
+    """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
+    mesh = camera_a_mesh(design, envelope)
+    for array in design.arrays:
+        files = shell_record(array)
+        own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
+        write_stl(folder / files["stl"], own_mesh)
+        write_3mf(folder / files["3mf"], files["name"], own_mesh)
+
+
+def write_shell_solids(
+    design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
+) -> None:
+    """Write both shells as STEP into a folder.
+
+    Args:
+        design: the mirrors.
+        envelope: that closes camera a's half.
+        folder: to write into.
+        progress: called with each stage.
 
     Raises:
-        SpecError: when flanges or holes do not fit.
         InvalidSolidError: when the kernel finds a solid invalid.
     """
-    envelope = shell_envelope(design)
-    progress("facets")
-    mesh, known = camera_a_mesh(design, envelope), None
+    known = None
     for array in design.arrays:
         files = shell_record(array)
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
-        own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
         known = known.mirrored() if known else properties(solid.shape)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
-        write_stl(folder / files["stl"], own_mesh)
-        write_3mf(folder / files["3mf"], files["name"], own_mesh)
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:

@@ -15,9 +15,7 @@ from pydantic_core import CoreSchema, core_schema
 class Section(BaseModel):
     """A frozen table of the design; unknown keys and wrong types are errors."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ BAD_INPUT = (
     ("build", "--set", "optics.n=many"),
     ("build", "--n", "999"),
     ("build", "--parts", "wheel"),
+    ("build", "--parts", "prototype", "--radius-rule", "flat"),
+    ("build", "--parts", "shell,prototype", "--set", "optics.camera_mm=[100, 5, -100]"),
     ("build", "--for-process", "woodwork"),
     ("build", "--for-process", "sla", "--yield", "2"),
     ("verify", "absent"),
@@ -30,12 +32,17 @@ BAD_INPUT = (
     ("tolerance", "absent", "--process", "woodwork"),
     ("tolerance", "absent", "--set", "sphere_um=3"),
     ("tolerance", "absent", "--builds", "many"),
+    ("tolerance", "absent", "--yield", "2"),
+    ("tolerance", ".", "--object", "absent.ply"),
     ("capture", "absent"),
+    ("capture", ".", "--object", "absent.ply"),
     ("capture", "absent", "--mesh", "--prototype"),
     ("view", "absent"),
     ("refocus", "absent"),
     ("picture", "absent"),
     ("study", "no-such-study"),
+    ("study", "prototype", "absent"),
+    ("study", "low-pass", ".", "--object", "absent.ply"),
 )
 LOADED = """
 import sys
@@ -64,8 +71,10 @@ def test_help_loads_no_heavy_library(words: Words, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("words", BAD_INPUT, ids=" ".join)
 def test_bad_input_loads_no_heavy_library(words: Words, tmp_path: Path) -> None:
-    (tmp_path / "broken.toml").write_text("[optics\nn = 3\n")
+    given = {"broken.toml": "[optics\nn = 3\n", "design.json": "{}"}
+    for name, text in given.items():
+        (tmp_path / name).write_text(text)
     code, modules = code_and_modules(words, tmp_path)
     assert code == 2
     assert not modules & set(HEAVY)
-    assert [path.name for path in tmp_path.iterdir()] == ["broken.toml"]
+    assert {path.name for path in tmp_path.iterdir()} == given.keys()

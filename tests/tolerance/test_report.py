@@ -15,7 +15,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.study import SUMMARY_COLUMNS, study_files
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.analysis import Analysis, ProcessOption, PrototypeYield, ToleranceOptions
+from tbcad.tolerance.analysis import Analysis, ProcessOption, PrototypeYield
 from tbcad.tolerance.margin import Margin
 from tbcad.tolerance.montecarlo.builds import (
     CoverageResult,
@@ -28,6 +28,7 @@ from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
+from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import ErrorSpec, load_process
 from tbcad.tolerance.report import UNITS, json_text, report_dict, summary_text, tolerance_study
 
