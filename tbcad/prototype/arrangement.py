@@ -21,6 +21,7 @@ from tbcad.prototype.base.mass import carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
 from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
@@ -157,10 +158,10 @@ def _frame_attempts(
         base = base_layout(chosen.prototype.base, layout)
         try:
             estimate = _estimated_drive(chosen, layout, base, parts)
+            keep_out = _keep_out(chosen, layout, base)
         except SpecError as error:  # whatever boss and pads
             yield chosen, error
             return False
-        keep_out = _keep_out(chosen, layout, base)
         try:
             chosen, stage, wiring = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
@@ -209,7 +210,11 @@ def _with_base(spec: Spec, **values: object) -> Spec:
 
 
 def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
-    approach = float(np.radians(spec.prototype.motion.approach_deg))
+    motion = spec.prototype.motion
+    approach = float(np.radians(motion.approach_deg))
+    if motion.controller == "grblhal":
+        lowest = np.radians(home_angles(layout, motion).switch - OVERTRAVEL_DEG)
+        approach = max(approach, float(layout.stops.angle[0] - lowest))
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
 
 

@@ -124,13 +124,15 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     printer, parts = spec.printer, arrangement.parts
     progress("prototype: base")
     carrier = carrier_parts(base, arrangement.split, printer)
-    masses = _masses(carrier, printer.density_g_cm3)
+    disc = placed_component(arrangement.frame.homing.disc, printer)
+    masses = _masses([*carrier, disc], printer.density_g_cm3)
     faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
     stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
     if drive != arrangement.drive:  # the mass of the solids asks for another
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
+        disc = placed_component(frame.homing.disc, printer)
     static = [
         *_components("stage", stage.components, printer),
         *_components("frame", frame.printed, printer),
@@ -138,6 +140,7 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     progress("prototype: caps and coupon")
     printed = (
         *(PrintedPart(part, "base", CARRIER_PURPOSE) for part in carrier),
+        PrintedPart(disc, "base", frame.homing.disc.what),
         *_caps(base, layout),
         *static,
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in coupon_plates(base, printer)),

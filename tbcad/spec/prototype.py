@@ -170,7 +170,10 @@ class MotionSpec(Section):
     trigger: Literal["coolant", "pause"] = "coolant"
     """What triggers a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
     home_deg: float = Field(0.0, ge=-180, le=180)
-    """Base angle at which the program starts: at the base's mark, or after homing."""
+    """Base angle at which the program ends, and starts with GRBL 1.1: 0 is where the pin fits."""
+    home_trim_deg: float = Field(0.0, ge=-5, le=5)
+    """Base angle that homing ends at, beyond the drawn one: less the angle that the controller
+    shows with the zero pin in."""
     approach_deg: float = Field(1.0, ge=0, le=30)
     """Angle below the first stop at which the base starts, so that all stops are reached from one
     side."""

@@ -14,7 +14,13 @@ from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import PrototypeSpec
 
 # One of its balls is so near to the hub that a motor's pinion clears it by 2 mm only.
-SMALL = load_spec(None, ["n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5"])
+SMALL = load_spec(
+    None,
+    [
+        *("n=6", "prototype.k=4", "prototype.base.hub_boss_mm=35"),
+        "prototype.frame.clearance_mm=1.5",
+    ],
+)
 CAPTURE_RADIUS = 30.0
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from tbcad.geometry.rotations import bolt_circle
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec, Drive
@@ -15,6 +17,9 @@ DISC_MM = 10.0  # thickness of the disc
 DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
 MIN_DISC_RADIUS_MM = 30.0  # with a boss
 BELOW_HEAD_MM = 6.0  # material below a counterbore
+ZERO_DISC_MM = 5.0  # thickness of the disc between hub and drive
+# Dowel that gives the disc its place about the axis, on the drive's circle between two holes.
+KEY_MM, KEY_DEPTH_MM = 3.0, 6.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,7 @@ class Hub:
         head: diameter and depth of their counterbores from the front; zero: none.
         lock: how the shaft is held; None without a boss.
         lock_z: z of the lock's screws.
+        key_radius: distance of the key's hole from the axis.
     """
 
     front: float
@@ -75,6 +81,17 @@ class Hub:
     head: tuple[float, float]
     lock: str | None
     lock_z: float
+    key_radius: float
+
+    @property
+    def mount(self) -> float:
+        """Z of the zero disc's outer face, where wheel, coupling or stage is bolted on."""
+        return self.face - ZERO_DISC_MM
+
+    @property
+    def key(self) -> Floats:
+        """Place (2,) of the key's hole across the axis."""
+        return np.array([self.key_radius, 0.0])
 
 
 def hub_layout(spec: BaseSpec, front: float) -> Hub:
@@ -107,6 +124,7 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         head=pattern.head,
         lock=spec.lock if pattern.boss else None,
         lock_z=(back + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
+        key_radius=pattern.circle / 2,
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import M3_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
@@ -44,10 +45,21 @@ def fasteners(base: BaseLayout, split: BaseSplit) -> dict[str, int]:
     """
     parts = load_parts()
     counts, insert = _hub_fasteners(base, parts), _insert(base.spec, parts)
+    counts[_key(parts)] += 1
     for joint in split.joints:
         hardware, screws = joint_hardware(base.spec), len(joint.screws)
         counts.update({hardware.dowel: len(joint.dowels), hardware.screw: screws, insert: screws})
     return dict(+counts)
+
+
+def _key(parts: Parts) -> str:
+    """The longest dowel through the zero disc into the hub's hole."""
+    dowels = of_kind(parts, "dowels", diameter_mm=KEY_MM)
+    room = ZERO_DISC_MM + KEY_DEPTH_MM
+    dowels = [dowel for dowel in dowels if dowel["length_mm"] <= room]
+    if not dowels:
+        raise SpecError(f"no dowel of {KEY_MM:g} mm is at most {room:g} mm long: add one")
+    return max(dowels, key=lambda part: part["length_mm"]).name
 
 
 def magnet_name(base: BaseLayout, diameter: float, parts: Parts) -> str:

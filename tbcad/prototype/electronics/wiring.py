@@ -45,6 +45,12 @@ RELEASE: Row = {
     "connector": BOARD,
     "path": "relay, camera's release",
 }
+HOME: Row = {
+    "signal": "home",
+    "part": "SWITCH-SS-5GL2",
+    "connector": BOARD,
+    "path": "common and normally closed contact of the switch, input and ground",
+}
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,7 @@ class Wiring:
         wire: of the LEDs; None without LEDs.
         lengths: of each LED's cable to the controller, mm.
         trigger: whether a relay releases the camera.
+        axis: of the controller.
     """
 
     lights: tuple[Light, ...]
@@ -72,6 +79,7 @@ class Wiring:
     wire: PurchasedPart | None
     lengths: tuple[float, ...]
     trigger: bool
+    axis: str
 
     @property
     def parts(self) -> Parts:
@@ -113,11 +121,12 @@ def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiri
         wire=wire,
         lengths=_lengths(spec, stage),
         trigger=spec.motion.trigger == "coolant",
+        axis=spec.motion.axis,
     )
 
 
 def wiring_rows(wiring: Wiring) -> list[Row]:
-    """One row for each line of the controller: lights by output, then the camera's release."""
+    """One row for each line of the controller: lights by output, release, switch."""
     outputs = {light.name: light.output for light in wiring.lights}
     rows = [_row({"signal": LAMP, "part": "lamp", "supply_v": wiring.supply_v}, outputs)]
     for i in range(wiring.leds):
@@ -125,6 +134,7 @@ def wiring_rows(wiring: Wiring) -> list[Row]:
         rows.append(_row({"signal": name, **_led_cells(wiring, i)}, outputs))
     if wiring.trigger:
         rows.append(RELEASE)
+    rows.append(HOME | {"output": f"limit {wiring.axis}"})
     empty: Row = dict.fromkeys(COLUMNS)
     return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
 

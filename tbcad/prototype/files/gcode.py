@@ -6,72 +6,27 @@ GRBL 1.1 knows the axes X, Y and Z only and refuses the word A, so its X takes d
 millimetres; controllers with more axes take A. It drops comments in round brackets, shows none of
 them itself, and reads lines of at most 79 characters. M8, M9 and G4 wait for the motion to end; M64
 and M65 are done when they are read, so a dwell comes before them after every motion.
-The program does not home: $H needs switches on axes that do not exist, unless GRBL is built for
-it. It starts at a known base angle: at a mark, or where homing ended.
+With grblHAL the program homes; its settings tell which axis. GRBL 1.1 homes X alone only if it is
+built for that, so there a person puts the base to angle zero by the pin.
 Sources: grblHAL core gcode.c; grbl/gcode.c, grbl/protocol.h and doc/markdown/settings.md of GRBL
 1.1h.
 """
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.drive.travel import StopSequence, home_angles, stop_sequence
 from tbcad.prototype.electronics.outputs import LIT, Phase, phases
-from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec
-from tbcad.types import Floats
 
 MAX_LINE_LENGTH = 79
 RUNS = 2  # one for each turn of the object
 DECIMALS = 4  # of a degree: far below a microstep, and 7 digits are what GRBL's floats hold
 SYNC_S = 0.01  # shortest dwell, which makes the controller wait for the end of a motion
 SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
-
-
-@dataclass(frozen=True)
-class StopSequence:
-    """The stops of the base in one run; there are two runs, one for each turn of the object.
-
-    Attributes:
-        start: base angle below all stops, degrees.
-        angle: of the stops, degrees, ascending, (s,).
-        mirrors: shown at each stop, (s,).
-    """
-
-    start: float
-    angle: Floats
-    mirrors: NDArray[np.int64]
-
-
-def stop_sequence(prototype: PrototypeLayout, motion: MotionSpec) -> StopSequence:
-    """The stops, and a start below them so that play in the drive is taken up before the first.
-
-    Raises:
-        SpecError: when the base cannot be where the program starts, for post or camera.
-    """
-    low, high = free_base_angles(prototype)
-    home = math.radians(motion.home_deg)
-    if not low <= home <= high:
-        raise SpecError(
-            f"prototype.motion.home_deg is {motion.home_deg:g}, but the base is free from "
-            f"{math.degrees(low):.1f} to {math.degrees(high):.1f} degrees: choose one of these"
-        )
-    angle = np.degrees(prototype.stops.angle)
-    start = max(float(angle[0]) - motion.approach_deg, min(math.degrees(low), float(angle[0])))
-    return StopSequence(start, angle, np.bincount(prototype.stops.stop, minlength=len(angle)))
-
-
-def free_base_angles(prototype: PrototypeLayout) -> tuple[float, float]:
-    """Base angles between which no ball meets post or camera, within the largest swing, radians."""
-    problem, azimuth = prototype.problem, prototype.placement.azimuth
-    low = max(float((problem.min_azimuth - azimuth).max()), -problem.max_swing / 2)
-    return low, min(float((problem.max_azimuth - azimuth).min()), problem.max_swing / 2)
 
 
 def gcode_program(
@@ -91,9 +46,7 @@ def gcode_program(
     sequence, lit = stop_sequence(prototype, motion), phases(leds, motion)
     lines = [
         *_header(sequence, drive, motion, lit),
-        f"M0 (MSG, base at {motion.home_deg:g} degrees, object straight? Then resume)",
-        "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
-        f"G92 {_axis_word(motion.home_deg, motion)}",
+        *_known_angle(prototype, motion),
         *(f"M65 P{phase.output}" for phase in lit if phase.output is not None),
         *_photographs(sequence, motion, lit),
         f"G1 {_axis_word(sequence.start, motion)}",
@@ -105,6 +58,21 @@ def gcode_program(
     ]
     assert max(len(line) for line in lines) <= MAX_LINE_LENGTH
     return lines
+
+
+def _known_angle(prototype: PrototypeLayout, motion: MotionSpec) -> Iterator[str]:
+    """The base to a known angle: by homing, or by a person."""
+    modes = "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)"
+    if motion.controller == "grbl":
+        yield f"M0 (MSG, base at {motion.home_deg:g} degrees, object straight? Then resume)"
+        yield modes
+        yield f"G92 {_axis_word(motion.home_deg, motion)}"
+        return
+    homed = round(home_angles(prototype, motion).homed + motion.home_trim_deg, DECIMALS)
+    yield "M0 (MSG, zero pin out, object straight? Then resume)"
+    yield "$H"
+    yield modes
+    yield f"G92 {_axis_word(homed, motion)}"
 
 
 def write_program(path: Path, lines: list[str]) -> None:

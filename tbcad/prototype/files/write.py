@@ -15,9 +15,10 @@ from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.balls.fit import ball_alternatives
+from tbcad.prototype.drive.travel import stop_sequence
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv
+from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv, settings
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.parts import PrintedPart, part_mesh
 from tbcad.prototype.stage.layout import led_poses
@@ -108,6 +109,13 @@ def document(built: PrototypeModel, alternatives: list[dict[str, Any]]) -> dict[
             for name, position, direction in led_poses(built.stage)
         ],
         "controller": _controller(built),
+        "home": {
+            "switch_deg": built.frame.homing.angles.switch,
+            "homed_deg": built.frame.homing.angles.homed,
+            "travel_deg": built.frame.homing.angles.travel,
+            "pin": built.frame.homing.pin,
+            "zero_error_deg": built.frame.homing.error_deg,
+        },
         "bought": [
             {"name": item.name, "what": item.what, "part": item.part, "turns": item.rotates}
             for item in built.frame.purchased
@@ -152,9 +160,11 @@ def _controller(built: PrototypeModel) -> dict[str, Any]:
 
 
 def _swing(built: PrototypeModel, motion: MotionSpec) -> list[float]:
-    """Base angles that the program drives between: it starts below the first stop."""
-    todo = gcode.stop_sequence(built.layout, motion)
+    """Base angles that the program drives between: from the switch, or from the start."""
+    todo = stop_sequence(built.layout, motion)
     angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
+    if motion.controller == "grblhal":
+        angles.append(built.frame.homing.angles.switch)
     return [min(angles), max(angles)]
 
 
@@ -193,3 +203,6 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
         write_table(folder / name, columns, rows)
     program = gcode.gcode_program(layout, built.drive, motion, len(built.stage.leds))
     gcode.write_program(folder / "rotation_plan.nc", program)
+    values = settings.settings(built.drive, motion, built.frame.homing.angles)
+    title = f"settings of {built.spec.name} for {motion.controller}"
+    settings.write_settings(folder / settings.NAME, settings.settings_lines(title, values))

@@ -4,7 +4,7 @@ It is a plate across the axis with a tube for the bearings, held by a flange on 
 webs between plate and flange leave space for tube and motor.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,12 +32,24 @@ from tbcad.prototype.frame.purchased import (
     purchased_components,
     wheel_radius,
 )
+from tbcad.prototype.homing.sizes import (
+    BRACKET_EDGE_MM,
+    BRACKET_HIGH_MM,
+    BRACKET_LOW_MM,
+    MARK_DEPTH_MM,
+    MARK_END_MM,
+    MARK_MM,
+    MIN_PLATE_MM,
+    PIN_HOLE_MM,
+    PIN_OUT_MM,
+    tab_radius,
+)
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
-GAP_MM = 3.0  # between what turns and the plate
+GAP_MM = 5.0  # between what turns and the plate: the heads of the wheel's screws are in it
 SHOULDER_MM = 3.0  # width of the shoulder behind a bearing
 TUBE_WALL_MM = 6.0  # of the tube round the bearings
 MIN_TUBE_MM = 45.0  # length
@@ -60,6 +72,7 @@ class BearingHead:
 
     Attributes:
         component: the printed part.
+        plate: across the axis.
         purchased: what is in it: bearings, shaft, collar, wheels, motor.
         rear: coordinate of the tube's end along w, from the origin, mm.
         shaft: in the bearings, if any.
@@ -68,6 +81,7 @@ class BearingHead:
     """
 
     component: Component
+    plate: HeadPlate
     purchased: tuple[Component, ...]
     rear: float
     shaft: PurchasedPart | None
@@ -90,7 +104,7 @@ def bearing_head(
     Raises:
         SpecError: when there is no bearing or shaft for the hub's bore, or the motor meets it.
     """
-    plate = _head_plate(spec, base, drive)
+    plate = _behind_disc(_head_plate(spec, base, drive), base, axes)
     shaft_parts = _shaft_parts(base, plate, parts) if drive.belt else None
     edge = axes @ hub_point(base, plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
@@ -99,6 +113,7 @@ def bearing_head(
     body = box(np.array([plate.back, plate.low, -plate.half_width]), corner, base.frame)
     added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
     removed = _motor_holes(spec, base, drive, plate)
+    removed += _zero_holes(base, plate)
     removed += _screws(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))
     if shaft_parts:
         rear, radius = shaft_parts.rear, shaft_parts.tube
@@ -114,6 +129,7 @@ def bearing_head(
     )
     return BearingHead(
         component=component,
+        plate=plate,
         purchased=purchased_components(base, drive, plate, shaft_parts),
         rear=shaft_parts.rear if shaft_parts else plate.back,
         shaft=shaft_parts.shaft if shaft_parts else None,
@@ -122,8 +138,16 @@ def bearing_head(
     )
 
 
+def _behind_disc(plate: HeadPlate, base: BaseLayout, axes: Floats) -> HeadPlate:
+    """A plate that reaches so far below the axis that the zero disc clears the flange there."""
+    along, out = axes[0] @ base.frame[0], axes[0] @ base.frame[1]
+    behind = (base.hub.mount - plate.back) * along - OVERLAP_MM - GAP_MM
+    low = behind / out - tab_radius(plate.half_width) if out > 0 else plate.low
+    return replace(plate, low=min(plate.low, float(low)))
+
+
 def _head_plate(spec: FrameSpec, base: BaseLayout, drive: Drive) -> HeadPlate:
-    reach, face, half_webs = drive.centre_mm, base.hub.face, WEB_MM + spec.web_mm + WEB_EDGE_MM
+    reach, face, half_webs = drive.centre_mm, base.hub.mount, WEB_MM + spec.web_mm + WEB_EDGE_MM
     if drive.wheel and drive.belt:
         half_motor = drive.motor["frame_mm"] / 2 + spec.belt_travel_mm / 2
         if reach < half_motor + 2 * TUBE_WALL_MM + base.spec.shaft_mm:
@@ -138,9 +162,9 @@ def _head_plate(spec: FrameSpec, base: BaseLayout, drive: Drive) -> HeadPlate:
     if drive.coupling:
         half = drive.motor["frame_mm"] / 2 + EDGE_MM
         width = max(half, half_webs)
-        return HeadPlate(face - COUPLING_MM, -half, max(half, REACH_MM), width)
+        return HeadPlate(face - COUPLING_MM, -half, max(half, MIN_PLATE_MM), width)
     half = max(drive.motor["top_mm"] / 2 + EDGE_MM, half_webs)
-    return HeadPlate(face - STAGE_HEIGHT_MM, -half, max(half, REACH_MM), half)
+    return HeadPlate(face - STAGE_HEIGHT_MM, -half, max(half, MIN_PLATE_MM), half)
 
 
 def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts:
@@ -182,6 +206,22 @@ def _screws(
     half = spec.uprights_mm / 2
     places = [np.array([face, y, z]) @ axes for z in heights for y in (-half, half)]
     return drilled_holes(places, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
+
+
+def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
+    """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
+    spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
+    pin = hub_point(base, plate.back - THROUGH_MM, PIN_OUT_MM)
+    mark = np.array([plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2])
+    end = np.array([plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2])
+    holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
+    holes.append(box(mark, end, base.frame))
+    middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
+    for out in (BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM):
+        inner = hub_point(base, middle, out, deep)
+        outer = hub_point(base, middle, out, plate.half_width + THROUGH_MM)
+        holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
+    return holes
 
 
 def _seats(

@@ -10,8 +10,10 @@ import numpy as np
 
 from tbcad.geometry.primitives import Component, Cylinder, box
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.hub import BELOW_HEAD_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.drive.travel import home_angles
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
@@ -24,6 +26,13 @@ from tbcad.prototype.frame.brackets import (
 from tbcad.prototype.frame.feet import camera_bracket, stage_foot, upright_foot
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.purchased import PLATE_MM
+from tbcad.prototype.homing.layout import (
+    PILOT_DEPTH_MM,
+    SWITCH_MM,
+    HomingLayout,
+    homing_layout,
+)
+from tbcad.prototype.homing.sizes import BRACKET_MM
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.prototype.stage.layout import StageLayout
@@ -37,6 +46,10 @@ MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
 UPRIGHT_SCREWS = 4 + 2 * 2  # of the head, and of two feet
 FOOT_INSERT, FOOT_SCREW_MM = "INSERT-M4", (4.0, 20.0)  # of the stage's clamp: thread, length
 CAMERA_SCREW = "UNC1/4-20x12.7"
+BRACKET_INSERT = "INSERT-M3"
+HUB_SCREWS = 4
+COUPLING_FLANGE_MM = 3.0  # thickness; no list gives it
+M6_ENGAGEMENT_MM = 6.0
 TNUT, POST_SCREW = "TNUT-M5-6", "SET-M3x6"
 MAY_BE_LIT = ("camera",)  # light goes into it
 MAY_BE_SWEPT = ("rotary_stage",)  # the hub is bolted on it
@@ -50,6 +63,7 @@ class FrameLayout:
     Attributes:
         axes: of the frame, as rows: level under the axis w, across it, up, (3, 3).
         head: bearings and motor.
+        homing: zero disc, and switch with its bracket.
         printed: brackets to print.
         purchased: simple bodies of purchased parts, for the assembly.
         holes: tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2).
@@ -65,6 +79,7 @@ class FrameLayout:
 
     axes: Floats
     head: BearingHead
+    homing: HomingLayout
     printed: tuple[Component, ...]
     purchased: tuple[Component, ...]
     holes: Floats
@@ -73,7 +88,7 @@ class FrameLayout:
     plate: PurchasedPart
     upright: PurchasedPart
     length: float
-    screws: dict[str, int]
+    screws: Counter[str]
     light: dict[str, float]
     swept: dict[str, float]
 
@@ -103,15 +118,17 @@ def frame_layout(
     """
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
+    homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
     brackets = _brackets(spec, prototype, axes, stage, head, parts)
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
-    purchased = (plate_body, *bars, *head.purchased, *_camera(spec, prototype))
-    printed = (head.component, *(bracket.component for bracket in brackets))
+    purchased = (plate_body, *bars, *head.purchased, homing.switch, *_camera(spec, prototype))
+    printed = (head.component, homing.bracket, *(bracket.component for bracket in brackets))
     light, swept = _check_clearances((*printed, *purchased), keep_out, spec.frame.clearance_mm)
     return FrameLayout(
         axes=axes,
         head=head,
+        homing=homing,
         printed=printed,
         purchased=purchased,
         holes=np.vstack([bracket.holes for bracket in brackets]),
@@ -120,7 +137,7 @@ def frame_layout(
         plate=plate,
         upright=upright,
         length=length,
-        screws=_screws(spec, drive, brackets, parts),
+        screws=_screws(spec, drive, brackets, parts) + _homing_parts(drive, homing, parts),
         light=light,
         swept=swept,
     )
@@ -203,7 +220,7 @@ def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
 
 def _screws(
     spec: PrototypeSpec, drive: Drive, brackets: list[Bracket], parts: Parts
-) -> dict[str, int]:
+) -> Counter[str]:
     """Screws and nuts: on the uprights with T-nuts, in the plate, of motor, clamp and camera."""
     flange, in_plate = spec.frame.flange_mm, sum(len(bracket.holes) for bracket in brackets)
     counts = Counter({TNUT: UPRIGHT_SCREWS, FOOT_INSERT: 1, choose_screw(parts, *FOOT_SCREW_MM): 1})
@@ -215,7 +232,21 @@ def _screws(
         counts[choose_screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)] += 4
     if spec.camera_diameter_mm > 0:
         counts[CAMERA_SCREW] += 1
-    return dict(counts)
+    return counts
+
+
+def _homing_parts(drive: Drive, homing: HomingLayout, parts: Parts) -> Counter[str]:
+    """Pin, switch and its screws, and the screws that hold drive and zero disc to the hub."""
+    counts = Counter({homing.pin: 1, str(homing.switch.part): 1, BRACKET_INSERT: 2})
+    counts[choose_screw(parts, 2.0, SWITCH_MM + PILOT_DEPTH_MM / 2)] += 2
+    counts[choose_screw(parts, 3.0, BRACKET_MM + ENGAGEMENT_MM)] += 2
+    if drive.motor.kind == "motors":
+        on_hub = drive.wheel["width_mm"] if drive.wheel else COUPLING_FLANGE_MM
+        counts[choose_screw(parts, 3.0, on_hub + ZERO_DISC_MM + ENGAGEMENT_MM)] += HUB_SCREWS
+    else:
+        length = BELOW_HEAD_MM + ZERO_DISC_MM + M6_ENGAGEMENT_MM
+        counts[choose_screw(parts, 6.0, length)] += HUB_SCREWS
+    return counts
 
 
 def _check_clearances(

@@ -68,7 +68,7 @@ def purchased_components(
     base: BaseLayout, drive: Drive, plate: HeadPlate, shaft_parts: ShaftParts | None
 ) -> tuple[Component, ...]:
     """Simple bodies of all purchased parts of the head."""
-    face, components = base.hub.face, [_motor(base, drive, plate)]
+    face, components = base.hub.mount, [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
         components += [
             _wheel("wheel", base, drive.wheel, 0.0, rotates=True),
@@ -113,7 +113,7 @@ def _wheel(
     name: str, base: BaseLayout, part: PurchasedPart, out: float, rotates: bool = False
 ) -> Component:
     """A toothed wheel behind the hub's face, on the axis or out from it."""
-    start, end = base.hub.face, base.hub.face - part["width_mm"]
+    start, end = base.hub.mount, base.hub.mount - part["width_mm"]
     bore = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2, out)
     body = axial_cylinder(base, start, end, wheel_radius(part), out)
     return _component(name, part, body, bore, rotates=rotates)
@@ -123,13 +123,13 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
     """A motor behind the plate with its pilot and shaft, or a stage before it."""
     motor = drive.motor
     if motor.kind == "stages":
-        body = axial_cylinder(base, base.hub.face, plate.front, motor["top_mm"] / 2)
+        body = axial_cylinder(base, base.hub.mount, plate.front, motor["top_mm"] / 2)
         return _component("rotary_stage", motor, body)
     half_width, out = motor["frame_mm"] / 2, drive.centre_mm
     low = np.array([plate.back - motor["length_mm"], out - half_width, -half_width])
     pilot = plate.back - OVERLAP_MM, plate.back + motor["pilot_height_mm"]
     # Through the pinion, or into the coupling.
-    tip = base.hub.face - (0.0 if drive.belt else SHAFT_GAP_MM)
+    tip = base.hub.mount - (0.0 if drive.belt else SHAFT_GAP_MM)
     added = (
         box(low, np.array([plate.back, out + half_width, half_width]), base.frame),
         axial_cylinder(base, *pilot, motor["pilot_mm"] / 2, out),

@@ -22,11 +22,11 @@ def wiring(spec: PrototypeSpec, stage: StageLayout) -> Wiring:
 def test_a_line_for_each_light_and_the_release(wiring: Wiring) -> None:
     rows = wiring_rows(wiring)
     assert all(set(row) == set(COLUMNS) for row in rows)
-    signals = ["lamp", "led_1", "led_2", "led_3", "led_4", "release"]
+    signals = ["lamp", "led_1", "led_2", "led_3", "led_4", "release", "home"]
     assert [row["signal"] for row in rows] == signals
-    assert [row["on"] for row in rows] == [*(f"M64 P{i}" for i in range(5)), "M8"]
-    assert [row["off"] for row in rows] == [*(f"M65 P{i}" for i in range(5)), "M9"]
-    pins = " ".join(str(row["pins"]) for row in rows[1:-1])
+    assert [row["on"] for row in rows] == [*(f"M64 P{i}" for i in range(5)), "M8", None]
+    assert [row["off"] for row in rows] == [*(f"M65 P{i}" for i in range(5)), "M9", None]
+    pins = " ".join(str(row["pins"]) for row in rows[1:-2])
     assert pins == "1 2 3 4 5 6 7 8"
 
 
@@ -37,7 +37,7 @@ def test_without_outputs_lights_are_switched_by_hand(
         update={"motion": spec.motion.model_copy(update={"controller": "grbl"})}
     )
     wiring = wiring_layout(plain, stage, PARTS)
-    assert {row["output"] for row in wiring_rows(wiring)} == {"by hand", "coolant"}
+    assert {row["output"] for row in wiring_rows(wiring)} == {"by hand", "coolant", "limit X"}
     assert "MOSFET" not in wiring.purchased
 
 
@@ -56,7 +56,7 @@ def test_wires_reach_the_controller_and_are_bought(
 def test_a_stage_without_leds(spec: PrototypeSpec, stage: StageLayout) -> None:
     bare = replace(stage, leds=np.zeros((0, 3)))
     wiring = wiring_layout(spec, bare, PARTS)
-    assert [row["signal"] for row in wiring_rows(wiring)] == ["lamp", "release"]
+    assert [row["signal"] for row in wiring_rows(wiring)] == ["lamp", "release", "home"]
     assert wiring.purchased == {"MOSFET": 1}
 
 

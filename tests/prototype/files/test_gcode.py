@@ -11,13 +11,12 @@ import pytest
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_sequence
 from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files.gcode import (
     DECIMALS,
     duration_minutes,
-    free_base_angles,
     gcode_program,
-    stop_sequence,
     write_program,
 )
 from tbcad.prototype.purchased.parts import load_parts
@@ -46,6 +45,7 @@ class Grbl:
         feed: degrees a minute.
         relay: whether it is closed.
         ended: after M2.
+        homed: after $H.
         rest: seconds of dwell.
         moves: every place it was sent to.
         lights: outputs that are on.
@@ -59,6 +59,7 @@ class Grbl:
     feed: float = 0.0
     relay: bool = False
     ended: bool = False
+    homed: bool = False
     rest: float = 0.0
     lights: set[float] = field(default_factory=set)
     lit: list[set[float]] = field(default_factory=list)
@@ -74,6 +75,9 @@ class Grbl:
         assert line.count("(") == line.count(")") <= 1
         comment = "".join(re.findall(r"\((.*)\)", line))
         words = re.findall(r"([A-Z])(-?\d+\.?\d*)", re.sub(r"\(.*\)|\s", "", line))
+        if line == "$H":
+            self.homed = True
+            return
         assert "".join(a + b for a, b in words) == re.sub(r"\(.*\)|\s", "", line)
         self._block([a + b for a, b in words], {a: float(b) for a, b in words}, comment)
 
@@ -172,6 +176,16 @@ def test_lights_wait_for_the_end_of_the_motion(layout: PrototypeLayout, drive: D
 def test_grbl_photographs_the_lit_object_only(layout: PrototypeLayout, drive: Drive) -> None:
     plain = sent(gcode_program(layout, drive, MotionSpec(controller="grbl"), LEDS))
     assert plain.lit == [set()] * 2 * len(layout.stops)
+    assert "base at 0 degrees" in plain.pauses[0][1]
+    assert not plain.homed
+
+
+def test_the_controller_knows_the_angle_after_homing(layout: PrototypeLayout, drive: Drive) -> None:
+    lines = gcode_program(layout, drive, MotionSpec(home_trim_deg=0.25), LEDS)
+    homed = home_angles(layout, MotionSpec()).homed
+    (line,) = (line for line in lines if line.startswith("G92 "))
+    assert float(line.removeprefix("G92 X")) == pytest.approx(homed + 0.25, abs=1e-4)
+    assert lines.index("$H") < lines.index(line)
 
 
 def test_more_leds_than_outputs(layout: PrototypeLayout, drive: Drive) -> None:
@@ -206,7 +220,8 @@ def test_every_stop_is_reached_from_below(controller: Grbl) -> None:
 def test_pauses_for_people(layout: PrototypeLayout, controller: Grbl) -> None:
     (before, first), (between, second) = controller.pauses
     assert before is None
-    assert "base at 0 degrees" in first
+    assert "zero pin out" in first
+    assert controller.homed
     assert "turn the object by 180 degrees" in second
     assert between == pytest.approx(stop_sequence(layout, MOTION).start, abs=1e-3)
 

@@ -59,7 +59,7 @@ def in_rig(folder: Path, part: dict[str, Any]) -> trimesh.Trimesh:
 def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     own = {part[kind] for part in record["parts"] for kind in ("step", "stl", "3mf")}
     tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
-    tables |= {"plate_holes.csv", "wiring.csv"}
+    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt"}
     whole = {"prototype.json", "prototype.step", "prototype.glb"}
     records = {"design.json", "mirrors.csv", "manifest.json"}
     assert {p.name for p in folder.iterdir()} == own | tables | whole | records
@@ -116,7 +116,7 @@ def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any
     rows = read_csv(folder / "plate_holes.csv")
     assert {row["holds"] for row in rows} == {
         part["name"] for part in record["parts"] if part["role"] == "frame"
-    } - {"bearing_head"}
+    } - {"bearing_head", "home_bracket"}
     scene = trimesh.load(folder / "prototype.glb")
     matrix, name = scene.graph["plate"]
     points = 1000 * trimesh.transform_points(scene.geometry[name].vertices, matrix)

@@ -138,11 +138,13 @@ class TestFrame:
         for name, count in found.items():
             kinds[PARTS[name].kind] += count
         assert kinds["bearings"] == 2
-        assert kinds["shafts"] == kinds["collars"] == kinds["plates"] == 1
+        assert kinds["shafts"] == 2  # the base's, and the rod of angle zero
+        assert kinds["collars"] == kinds["plates"] == 1
         assert kinds["extrusions"] == 2
         assert kinds["tnuts"] == 8
-        # Every hole of the plate has a screw, every T-nut one, the motor four, clamp, camera.
-        assert kinds["screws"] == len(frame.holes) + 8 + 4 + 1 + 1
+        # Every hole of the plate has a screw, every T-nut one, motor and hub four each, clamp,
+        # camera, bracket and switch two each.
+        assert kinds["screws"] == len(frame.holes) + 8 + 4 + 4 + 1 + 1 + 2 + 2
 
     def test_uprights_are_cut_from_what_is_sold(self, frame: FrameLayout) -> None:
         bars = [item for item in frame.purchased if item.name.startswith("upright")]

@@ -10,6 +10,7 @@ from tests.verify.corpus.prototype_changes import (
     HOLES,
     PROGRAM,
     RECORD,
+    SETTINGS,
     STEP,
     WIRING,
     compact,
@@ -31,6 +32,7 @@ from tests.verify.corpus.prototype_changes import (
     shifted,
     step_text,
     table,
+    text_of,
     together,
     undrawn,
     unlisted,
@@ -50,6 +52,14 @@ PROGRAMS: tuple[Mutation, ...] = (
         for word in WORDS
     ),
     fails("program: G92 X50", PROGRAM, program("G92 X.*", "G92 X50.0000"), PLAN, "swing"),
+    fails("program: no homing", PROGRAM, program(r"\$H\n", ""), PLAN, "before a person"),
+    fails(
+        "program: homing with the pin in",
+        PROGRAM,
+        program(r"M0 \(MSG, zero pin.*\n", ""),
+        PLAN,
+        "before the zero pin",
+    ),
     fails("program: M2 halfway", PROGRAM, program(DWELL, "M2\n", 1), PLAN, "after the end"),
     fails("program: never turned", PROGRAM, program(r"M0 \(MSG, turn.*\n", ""), PLAN, "pauses for"),
     fails("program: no dwell", PROGRAM, program("G4 .*\n", ""), PLAN, "0 s after the motion"),
@@ -160,7 +170,8 @@ PURCHASES: tuple[Mutation, ...] = (
         fails(f"nothing bought: {name}", BILL, unlisted(name), LIST, name.partition("x")[0])
         for name in (
             *("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1"),
-            *("MOSFET", "XH-8", "R-0.6W-2200", "WIRE-30"),
+            *("MOSFET", "XH-8", "R-0.6W-2200", "WIRE-30", "ROD-4x40", "M2x12", "SWITCH-SS-5GL2"),
+            *("M3x20", "DOWEL-3x10"),
         )
     ),
     fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
@@ -272,6 +283,77 @@ WIRES: tuple[Mutation, ...] = (
     ),
 )
 
+HOMING: tuple[Mutation, ...] = (
+    *(
+        fails(
+            f"settings: {name}",
+            SETTINGS,
+            text_of(SETTINGS, pattern, new),
+            "controller settings",
+            words,
+        )
+        for name, pattern, new, words in (
+            ("steps of another gear", r"\$100=.*", "$100=80", "$100 is 80"),
+            ("another speed", r"\$110=.*", "$110=90000", "$110 is 90000"),
+            ("another acceleration", r"\$120=.*", "$120=5000", "$120 is 5000"),
+            ("too short a travel", r"\$130=.*", "$130=100", "do not hold the program"),
+            ("too long a travel", r"\$130=.*", "$130=360", "above the program"),
+            ("no travel", r"\$130=.*\n", "", "do not hold the program"),
+            ("homing upward", r"\$23=.*", "$23=0", "$23 is 0"),
+            ("a switch that closes", r"\$5=.*", "$5=0", "$5 is 0"),
+            ("no soft limits", r"\$20=.*", "$20=0", "$20 is 0"),
+            ("the motor turned off", r"\$1=.*", "$1=25", "$1 is 25"),
+            ("homing of all axes", r"\$45=.*", "$45=3", "$45 is 3"),
+            ("homing too fast", r"\$25=.*", "$25=3000", "homing at 3000"),
+            ("a setting too many", r"\$26=", "$32=1\n$26=", "$32 is not needed"),
+            ("a setting twice", r"\$26=", "$22=1\n$26=", "$22 is there twice"),
+            ("no setting at all", r"\$26=", "G28\n$26=", "is no setting"),
+        )
+    ),
+    fails(
+        "settings: soft limits before homing",
+        SETTINGS,
+        together(
+            text_of(SETTINGS, r"\$20=1\n", ""),
+            text_of(SETTINGS, r"\$22=1\n", "$20=1\n$22=1\n"),
+        ),
+        "controller settings",
+        "$20 before $22",
+    ),
+    fails(
+        "home: another angle of the switch",
+        RECORD,
+        record(lambda r: r["home"].update(switch_deg=r["home"]["switch_deg"] + 5)),
+        "homing",
+        "the switch trips at",
+    ),
+    fails(
+        "home: another end of homing",
+        RECORD,
+        record(lambda r: r["home"].update(homed_deg=0.0)),
+        "homing",
+        "homing ends at 0",
+    ),
+    fails(
+        "home: too short a pin",
+        RECORD,
+        record(lambda r: r["home"].update(pin="ROD-4x10")),
+        "homing",
+        "does not reach",
+    ),
+    fails(
+        "home: an angle zero that is not known",
+        RECORD,
+        record(lambda r: r["home"].update(zero_error_deg=5.0)),
+        "homing",
+        "angle zero is known to 5.00 deg",
+    ),
+    fails("no zero disc", "all", without_part("zero_disc"), "inventory", "base part zero_disc"),
+    fails("no bracket", "all", without_part("home_bracket"), "inventory", "part home_bracket"),
+    fails("no switch", RECORD, record(not_bought("home_switch")), "inventory", "part home_switch"),
+    refused("no home", RECORD, record(lambda r: r.pop("home")), RECORD, "home is missing"),
+)
+
 DRIVES: tuple[Mutation, ...] = (
     *(
         fails(f"drive: {key}", RECORD, scaled(key, 1.1), "drive", key)
@@ -300,4 +382,12 @@ GOOD: tuple[Mutation, ...] = (
     Mutation("prototype.json in one line", RECORD, compact, 0),
     Mutation("a note in the record", RECORD, together(record(lambda r: r.update(note="mine"))), 0),
 )
-PROTOTYPES: tuple[Mutation, ...] = (*PROGRAMS, *PARTS, *ASSEMBLIES, *PURCHASES, *WIRES, *DRIVES)
+PROTOTYPES: tuple[Mutation, ...] = (
+    *PROGRAMS,
+    *PARTS,
+    *ASSEMBLIES,
+    *PURCHASES,
+    *WIRES,
+    *HOMING,
+    *DRIVES,
+)

@@ -88,9 +88,10 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".3mf": elements,
     ".stl": facets,
     ".nc": words,
+    ".txt": words,
     ".glb": scene,
 }
-NAMED = {".json", ".csv", ".nc", ".glb"}  # files that are unlike others of their kind
+NAMED = {".json", ".csv", ".nc", ".txt", ".glb"}  # files that are unlike others of their kind
 
 
 def fields(folder: Path) -> dict[str, set[str]]:

@@ -20,7 +20,7 @@ Record = dict[str, Any]
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
-WIRING = "wiring.csv"
+WIRING, SETTINGS = "wiring.csv", "grbl_settings.txt"
 
 
 def record(
@@ -57,13 +57,18 @@ def row(name: str, number: int, **cells: object) -> Job:
 
 def program(pattern: str, new: str, count: int = 0) -> Job:
     """Change the program, with a regular expression."""
+    return text_of(PROGRAM, pattern, new, count)
+
+
+def text_of(name: str, pattern: str, new: str, count: int = 0) -> Job:
+    """Change a text, with a regular expression."""
 
     def how(data: bytes) -> bytes:
         text = re.sub(pattern, new, data.decode(), count=count)
         assert text.encode() != data
         return text.encode()
 
-    return lambda folder: change(folder, PROGRAM, how) or ()
+    return lambda folder: change(folder, name, how) or ()
 
 
 def together(*jobs: Job) -> Job:

@@ -43,7 +43,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 # What is not made: no STEP assembly, no parts list, names and balls of its own, no weight.
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
-    "wiring",
+    *("wiring", "homing", "controller settings"),
     *("drive", "ball labels", "radius rule"),
 }
 STEPS = 200 * 16 * 3 / 360
@@ -270,6 +270,11 @@ def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
     return out
 
 
+def switch_angle(stops: list[list[Any]]) -> float:
+    """Base angle at which the switch trips, below all stops."""
+    return float(np.floor(min(stops[0][1], 0.0))) - 8.0
+
+
 def program(stops: list[list[Any]]) -> str:
     """As tbcad writes it, by hand: times and speeds are those of the paper's design."""
     at = [f"X{np.trunc(row[1] * 1e4) / 1e4:.4f}" for row in stops]
@@ -283,9 +288,10 @@ def program(stops: list[list[Any]]) -> str:
         "($120=50: degrees/s^2)",
         "(digital output 1: led_1)",
         "(digital output 0: lamp)",
-        "M0 (MSG, base at 0 degrees, object straight? Then resume)",
+        "M0 (MSG, zero pin out, object straight? Then resume)",
+        "$H",
         "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
-        "G92 X0.0000",
+        f"G92 X{switch_angle(stops) + 2:.4f}",
         "M65 P1",
         "M65 P0",
     ]
@@ -357,6 +363,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             "stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg", stops
         ),
         "rotation_plan.nc": program(stops).encode(),
+        "grbl_settings.txt": b"($1)\n",
     }
     entries = []
     drawn = {"motor": facets(box(*spec.motor))}
@@ -389,7 +396,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         "target_mm": spec.target,
         "picture": "moved" if spec.moved else "fixed",
         "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
-        "swing_deg": [stops[0][1], stops[-1][1]],
+        "swing_deg": [switch_angle(stops), stops[-1][1]],
         "target_pad_um": 10,
         "balls": "balls.csv",
         "seats": [
@@ -411,6 +418,13 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
                 {"name": name, "output": output}
                 for name, output in (("dark", None), ("led_1", 1), ("lit", 0))
             ],
+        },
+        "home": {
+            "switch_deg": switch_angle(stops),
+            "homed_deg": switch_angle(stops) + 2,
+            "travel_deg": 200.0,
+            "pin": "ROD-4x40",
+            "zero_error_deg": 0.3,
         },
         "drive": DRIVE,
         "bought": [{"name": "motor", "what": "a box", "part": "NEMA17-40", "turns": False}],

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.gcode_checks import program_check
+from tbcad_verify.prototype.gcode_checks import homing, program_check
 from tbcad_verify.prototype.gcode_machine import run_program
 from tbcad_verify.record.export import read_export
 
@@ -93,23 +93,32 @@ FOREIGN = (
     *("G1 X1.0000 (take care!)", "T1", "G1 X1.00001", "G1 X1e3", "(turn the object by 90 degrees)"),
 )
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
-    "another base angle by G92": (once("G92 X0.0000", "G92 X50.0000"), "deg is beyond the swing"),
+    "another base angle by G92": (
+        lambda text: re.sub("G92 X.*", "G92 X50.0000", text),
+        "deg is beyond the swing",
+    ),
     "G92 on the way": (after_a_move("G92 X0.0000"), "sets a coordinate after a motion"),
     "the end halfway": (after_a_move("M2"), "stands after the end"),
     "no end": (at_end("M2\n", ""), "the program has no end"),
     "cut in a line": (lambda text: text[:-2], "the last line is cut"),
     "the object never turned": (
         without(r"M0 \(MSG, turn.*\n"),
-        "pauses for base, not for base, turn",
+        "pauses for pin, not for pin, turn",
     ),
     "the object turned at once": (
         lambda text: once(
-            "G92 X0", "M0 (MSG, turn the object by 180 degrees about z, then resume)\nG92 X0"
+            "G92 X", "M0 (MSG, turn the object by 180 degrees about z, then resume)\nG92 X"
         )(without(r"M0 \(MSG, turn.*\n")(text)),
         "photograph 1 with the object turned 1 times",
     ),
-    "no pause at the start": (without(r"M0 \(MSG, base.*\n"), "before a person has put the base"),
-    "another start": (once("base at 0", "base at 5"), "starts at 5 deg"),
+    "no pause at the start": (without(r"M0 \(MSG, zero.*\n"), "before the zero pin is told"),
+    "no homing": (without(r"\$H\n"), "before a person has put the base"),
+    "homing after the coordinate is set": (
+        lambda text: once("M65 P1\n", "$H\nM65 P1\n")(without(r"\$H\n")(text)),
+        "before a person has put the base",
+    ),
+    "homing with a light on": (once("$H\n", "M64 P1\n$H\n"), "with a light on"),
+    "homing twice": (once("$H\n", "$H\n$H\n"), "homes"),
     "no dwell before photographs": (without("G4 P0.[15]00\n"), "0 s after the motion"),
     "a dwell too short": (once("G4 P0.500", "G4 P0.100"), "photograph 1 0.2 s after the motion"),
     "a light without a dwell": (without("G4 P0.500\n(?=G4 P0.100\n)"), "0.1 s after the motion"),
@@ -178,7 +187,7 @@ def test_what_is_wrong_with_a_program_is_said(context: PrototypeContext, how: st
     change, words = FAULTS[how]
     text = change(context.prototype.program)
     assert text != context.prototype.program
-    machine = "; ".join(run_program(text).faults)
+    machine = "; ".join(run_program(text, *homing(context)).faults)
     detail = said(context, text)
     assert detail
     assert words in detail or words in machine, (detail, machine)

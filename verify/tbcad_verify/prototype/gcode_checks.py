@@ -17,10 +17,12 @@ from tbcad_verify.record.spec import MotionSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
 
 PROGRAM_DEG = 1.0001e-4  # the digits of angles in the program
+PROGRAM_DIGITS = 4
 PROGRAM_S = 5.1e-4  # of durations
 SHARE = 1e-5  # of other numbers, which have six digits
 RUNS = 2  # one for each turn of the object
-PAUSES = ["base", "turn"]
+PAUSES = {"grblhal": ["pin", "turn"], "grbl": ["base", "turn"]}
+PULL_OFF_DEG = 2.0
 SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
 MINUTES = 1.0  # by which the duration in the comment may be off, and
 MINUTES_SHARE = 0.1
@@ -29,7 +31,7 @@ SETTINGS = ("steps", "speed", "acceleration")
 
 def program_check(name: CheckName, context: PrototypeContext) -> Check:
     """Run the program, and compare what it does with the stops."""
-    machine = run_program(context.prototype.program)
+    machine = run_program(context.prototype.program, *homing(context))
     faults = [*machine.faults, *_deviations(context, machine)]
     return at_most(name, len(faults), 0, short_list(faults))
 
@@ -53,12 +55,20 @@ def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
             if (one.stop, one.mirrors) != (stop + 1, stops.mirrors[stop]):
                 yield f"photograph {k + 1} has another comment than its stop"
             yield from (f"photograph {k + 1} {what}" for what in _unlike_light(one, lights, phase))
-    low = context.prototype.swing[0]
+    low = min(machine.driven, default=np.nan)
     for k, one in enumerate(machine.photographs):
         if not one.rising and one.angle > low + PROGRAM_DEG:
             yield f"photograph {k + 1} is approached from above"
         switched = len(lights) > 1
         yield from (f"photograph {k + 1} {what}" for what in _unlike_motion(one, motion, switched))
+
+
+def homing(context: PrototypeContext) -> tuple[float, float]:
+    """Base angles at which the switch trips and homing ends, degrees; NaN without homing."""
+    motion, home = context.export.spec.prototype.motion, context.prototype.home
+    if motion.controller == "grbl":
+        return np.nan, np.nan
+    return home.switch, round(home.switch + PULL_OFF_DEG + motion.home_trim_deg, PROGRAM_DIGITS)
 
 
 def expected_lights(context: PrototypeContext) -> list[tuple[float, frozenset[int]]]:
@@ -103,8 +113,11 @@ def _unlike_motion(one: Photograph, motion: MotionSpec, switched: bool) -> Itera
 def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     motion = context.export.spec.prototype.motion
     low, high = context.prototype.swing
-    if machine.pauses != PAUSES:
-        yield f"pauses for {', '.join(machine.pauses) or 'nothing'}, not for {', '.join(PAUSES)}"
+    pauses = PAUSES[motion.controller]
+    if machine.pauses != pauses:
+        yield f"pauses for {', '.join(machine.pauses) or 'nothing'}, not for {', '.join(pauses)}"
+    if machine.homes != (motion.controller == "grblhal"):
+        yield f"homes {machine.homes} times"
     for angle in machine.bases:
         if not _is_close(angle, motion.home_deg):
             yield f"starts at {angle:g} deg"

@@ -19,6 +19,7 @@ COMMANDS = (
     r"G92\.1",
     r"M[0289]",
     r"M6[45] P\d",
+    r"\$H",
 )
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d\d)?"
 LED = r"led_\d+"
@@ -33,18 +34,20 @@ COMMENTS = (
     r"the camera's release is a relay on the coolant output",
     r"a degree for a millimetre, absolute, units a minute",
     rf"MSG, base at (?P<base>{NUMBER}) degrees, object straight\? Then resume",
+    r"MSG, zero pin (?P<pin>out), object straight\? Then resume",
     r"MSG, turn the object by (?P<turn>180) degrees about z, then resume",
     rf"digital output (?P<output>\d): (?P<light>lamp|{LED})",
     rf"MSG, stop (?P<photograph>\d+): (?:(?P<phase>dark|{LED}|lit), )?photograph, then resume",
     r"stop (?P<stop>\d+) of (?P<count>\d+): (?P<mirrors>\d+) mirrors",
 )
 LINE = re.compile(rf"(?P<command>{'|'.join(COMMANDS)})?(?: ?\((?P<comment>[^()]+)\))?")
-WORD = re.compile(r"([A-Z])(\S+)")
+WORD = re.compile(r"([A-Z$])(\S+)")
 FORMS = tuple(re.compile(form) for form in COMMENTS)
 
 
 LAMP = -1.0  # number that stands for the lamp where LEDs are numbered from 1
 LIGHTS = {"dark": 0.0, "lit": LAMP, "lamp": LAMP}
+OUT = {"out": 1.0}  # the pin is
 
 
 @dataclass(frozen=True)
@@ -100,4 +103,5 @@ def _number(value: str) -> float:
     """A number, or that of a light: 0 for none."""
     if value.startswith("led_"):
         return float(value.removeprefix("led_"))
-    return LIGHTS[value] if value in LIGHTS else float(value)
+    words = LIGHTS | OUT
+    return words[value] if value in words else float(value)

@@ -56,6 +56,8 @@ class Machine:
     """The controller's state, and the record of what it did.
 
     Attributes:
+        switch: base angle at which homing finds the switch, and
+        homed: at which it ends, degrees; NaN: there is no switch.
         modes_set: millimetres, absolute, units a minute, first coordinate system.
         axis: letter of the axis; empty before it is used.
         angle: of the base, degrees; NaN before a person has put it to a known one.
@@ -71,7 +73,8 @@ class Machine:
         ended: the program has ended.
         moves: base angles driven to, degrees.
         photographs: in order.
-        pauses: what a person does at each but photographs: "base" or "turn".
+        homes: how often the base was homed; each adds the switch's angle and its end to `moves`.
+        pauses: what a person does at each but photographs: "base", "pin" or "turn".
         bases: angle to which a person puts the base, degrees.
         feeds: every speed that is set.
         told: what comments tell, by name, each with all of its values.
@@ -79,6 +82,8 @@ class Machine:
         faults: what no program may do, a few words each.
     """
 
+    switch: float = math.nan
+    homed: float = math.nan
     modes_set: bool = False
     axis: str = ""
     angle: float = math.nan
@@ -93,6 +98,7 @@ class Machine:
     release: float = math.nan
     ended: bool = False
     moves: list[float] = field(default_factory=list)
+    homes: int = 0
     photographs: list[Photograph] = field(default_factory=list)
     pauses: list[str] = field(default_factory=list)
     bases: list[float] = field(default_factory=list)
@@ -105,6 +111,11 @@ class Machine:
     def angles(self) -> Floats:
         """(P,) base angles at which photographs are taken, degrees."""
         return np.array([one.angle for one in self.photographs], dtype=np.float64)
+
+    @property
+    def driven(self) -> list[float]:
+        """Base angles that the program itself drives to, without homing."""
+        return self.moves[2 * self.homes :]
 
     def last_told(self, name: str) -> int:
         """The last number that a comment told by this name; 0 without."""
@@ -127,6 +138,7 @@ class Machine:
     def _command(self, line: Line) -> str:
         values = line.values
         return {
+            "$H": self._home,
             "G21": self._set_modes,
             "G92": lambda: self._set_offset(values[self.axis]),
             "G92.1": self._drop_offset,
@@ -142,6 +154,19 @@ class Machine:
 
     def _set_modes(self) -> str:
         self.modes_set = True
+        return ""
+
+    def _home(self) -> str:
+        """Down to the switch and up again; nothing may be in the way of the pin's hole."""
+        if math.isnan(self.homed):
+            return "homes without a switch"
+        if "pin" not in self.pauses:
+            return "homes before the zero pin is told to be out"
+        if self.moves or self.lights:
+            return "homes after a motion, or with a light on"
+        self.moves += [self.switch, self.homed]
+        self.angle, self.rising = self.homed, True
+        self.homes += 1
         return ""
 
     def _drop_offset(self) -> str:
@@ -185,7 +210,7 @@ class Machine:
     def _set_offset(self, coordinate: float) -> str:
         if math.isnan(self.angle):
             return "sets a coordinate before a person has put the base to a known angle"
-        if self.moves:
+        if len(self.moves) > 2 * self.homes:
             return "sets a coordinate after a motion"
         self.offset = self.angle - coordinate
         return ""
@@ -270,16 +295,25 @@ class Machine:
             self.bases.append(says["base"])
             self.angle = says["base"]
             return ""
+        if "pin" in says:
+            self.pauses.append("pin")
+            return ""
         if "turn" in says:
             self.pauses.append("turn")
             return ""
         return "pauses, and does not say for what"
 
 
-def run_program(text: str) -> Machine:
-    """Run a program from its first line to its last."""
+def run_program(text: str, switch: float = math.nan, homed: float = math.nan) -> Machine:
+    """Run a program from its first line to its last.
+
+    Args:
+        text: of the program.
+        switch: base angle at which homing finds the switch, degrees.
+        homed: base angle at which homing ends, degrees.
+    """
     lines, faults = parse_program(text)
-    machine = Machine(faults=faults)
+    machine = Machine(faults=faults, switch=switch, homed=homed)
     for line in lines:
         if wrong := machine.run(line):
             machine.faults.append(f"line {line.number} {wrong}")

@@ -21,8 +21,11 @@ from tbcad_verify.step.solids_text import TextSolid, holes, read_solids
 from tbcad_verify.types import Floats
 
 STAGE = frozenset({"stage_disc", "stage_crown", "stage_post"})
-FRAME = frozenset({"bearing_head", "upright_foot_front", "upright_foot_back", "stage_foot"})
-STOCK = frozenset({"plate", "upright_left", "upright_right"})
+ZERO_DISC = "zero_disc"  # of the base, beside its carrier
+FRAME = frozenset(
+    {"bearing_head", "home_bracket", "upright_foot_front", "upright_foot_back", "stage_foot"}
+)
+STOCK = frozenset({"plate", "upright_left", "upright_right", "home_switch"})
 # Bought bodies of each drive; those that turn with the base.
 DRIVES: dict[str, frozenset[str]] = {
     "nema17-belt": frozenset(
@@ -156,6 +159,9 @@ def _record_faults(context: PrototypeContext) -> Iterable[str]:
         yield from _differences(names, by_role.pop(role, set()), f"{role} part")
     for role, stem in (("base", "carrier"), ("tool", "coupon")):
         found = by_role.pop(role, set())
+        if role == "base":
+            yield from () if ZERO_DISC in found else [f"{role} part {ZERO_DISC} is missing"]
+            found -= {ZERO_DISC}
         if not found or not all(re.fullmatch(stem + NUMBERED, name) for name in found):
             yield f"{role} parts are {short_list(sorted(found)) or 'missing'}"
         elif len(found) > 1 and found != {f"{stem}_{k}" for k in range(1, len(found) + 1)}:

@@ -31,6 +31,9 @@ UPRIGHT_SCREWS = 8  # of the head and of two feet, each with a nut in the slot
 LEAST_GRIP_MM = 4.0  # of a screw beyond the flange
 MOTOR_SCREWS = 4
 HUB_INSERTS = {"nema17-belt": 4, "nema17-direct": 4, "stage-60": 0}  # for wheel or coupling
+HUB_SCREWS = 4  # of wheel, coupling or stage, through the zero disc
+BRACKET_SCREWS = SWITCH_SCREWS = 2
+KEY_MM = 3.0  # dowel between hub and zero disc
 LOCK_SCREWS = {"set-screws": 2, "clamp": 1}  # of a shaft, each with an insert
 CUT = ", cut to "  # of what is bought longer
 SHARE = 1e-9  # of figures that follow from others
@@ -43,7 +46,7 @@ class Solids:
     """Solids whose holes are counted.
 
     Attributes:
-        base: of all pieces of the base.
+        base: of all pieces of the carrier.
         caps: of all caps.
         assembly: of the assembly, by name.
     """
@@ -56,6 +59,11 @@ class Solids:
         """Holes of a radius in the base, or in base and caps."""
         some = [*self.base, *(self.caps if caps else ())]
         return sum(len(holes(solid.faces, radius, HOLE_MM)) for solid in some)
+
+    def in_head(self, radius: float) -> int:
+        """Holes of a radius in the bearing head."""
+        head = self.assembly.get("bearing_head")
+        return len(holes(head.faces, radius, HOLE_MM)) if head else 0
 
 
 def checks(
@@ -132,13 +140,18 @@ def _fasteners(context: PrototypeContext, solids: Solids) -> dict[str, int]:
         r"M5x\d+": UPRIGHT_SCREWS + in_plate,
         r"INSERT-M4": 1,
         r"M4x\d+": 1,
-        r"INSERT-M3": inserts,
+        r"INSERT-M3": inserts + solids.in_head(base.insert_hole_mm / 2),
+        r"ROD-4x\d+": 1,
+        r"M2x\d+": SWITCH_SCREWS,
         r"UNC1/4-20x[\d.]+": int(spec.camera_diameter_mm > 0),
         r"GT2-\d+-\d+": int(base.drive == "nema17-belt"),
-        r"DOWEL-\S+": solids.count((base.dowel_mm + base.dowel_press_mm) / 2),
+        r"DOWEL-\S+": sum(
+            solids.count((diameter + base.dowel_press_mm) / 2)
+            for diameter in {base.dowel_mm, KEY_MM}
+        ),
         r"SET-M3x\d+": 1 + set_screws,
-        r"M3x\d+": in_base + (0 if stage else MOTOR_SCREWS),
-        r"M6x\d+": MOTOR_SCREWS if stage else 0,
+        r"M3x\d+": in_base + BRACKET_SCREWS + (0 if stage else MOTOR_SCREWS + HUB_SCREWS),
+        r"M6x\d+": MOTOR_SCREWS + HUB_SCREWS if stage else 0,
     }
     return {pattern: quantity for pattern, quantity in found.items() if quantity}
 

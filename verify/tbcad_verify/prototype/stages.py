@@ -15,6 +15,7 @@ from tbcad_verify.prototype import (
     ball_views,
     caps,
     drive_checks,
+    homing_checks,
     inventory,
     leds,
     plan_checks,
@@ -38,7 +39,7 @@ from tbcad_verify.prototype.measured_parts import (
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import PARTS_LIST, WIRING, Prototype
+from tbcad_verify.record.prototype import PARTS_LIST, SETTINGS, WIRING, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
@@ -137,7 +138,7 @@ def _purchases(
     part_files, no_part_files = attempt(lambda: inventory.part_solids(context))
     counted, no_solids = attempt(
         lambda: purchases.Solids(
-            _of_role(context, "base", require(part_files, no_part_files)),
+            _carriers(context, require(part_files, no_part_files)),
             _of_role(context, "cap", require(part_files, no_part_files)),
             require(drawn_solids, reason),
         )
@@ -154,8 +155,26 @@ def _purchases(
         ),
     )
     _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
+    _add(
+        sink,
+        homing_checks,
+        SETTINGS,
+        lambda: (
+            context,
+            require(drawn_solids, reason),
+            _carriers(context, require(part_files, no_part_files)),
+        ),
+    )
     _add(sink, wiring_checks, WIRING, lambda: (context, require(drawn_solids, reason)))
     _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(drawn_solids, reason)))
+
+
+def _carriers(context: PrototypeContext, solids: dict[str, TextSolid]) -> list[TextSolid]:
+    return [
+        solids[part.name]
+        for part in context.prototype.parts
+        if part.role == "base" and part.name != inventory.ZERO_DISC
+    ]
 
 
 def _of_role(context: PrototypeContext, role: str, solids: dict[str, TextSolid]) -> list[TextSolid]:

@@ -89,7 +89,7 @@ def _lines(context: PrototypeContext) -> Iterator[str]:
     lines = require(context.prototype.wiring, f"there is no {WIRING}")
     motion, leds = context.export.spec.prototype.motion, len(context.prototype.leds)
     signals = ["lamp", *(f"led_{k}" for k in range(1, leds + 1))]
-    expected = [*signals, *(["release"] if motion.trigger == "coolant" else [])]
+    expected = [*signals, *(["release"] if motion.trigger == "coolant" else []), "home"]
     if lines.signal.tolist() != expected or lines.line.tolist() != [*range(1, len(expected) + 1)]:
         yield f"lines are {short_list(lines.signal.tolist())}, not {short_list(expected)}"
         return
@@ -101,8 +101,11 @@ def _lines(context: PrototypeContext) -> Iterator[str]:
             yield f"{signal} is switched by {' '.join(told)}"
     for k in range(leds):
         yield from (f"led_{k + 1}: {what}" for what in _led(context, lines, k))
+    told = (str(lines.output[-1]), str(lines.part[-1]))
+    if told != (f"limit {motion.axis}", "SWITCH-SS-5GL2"):
+        yield f"the switch is {told[1]} on {told[0]}"
     if motion.trigger == "coolant":
-        told = tuple(str(column[-1]) for column in (lines.output, lines.on, lines.off, lines.part))
+        told = tuple(str(column[-2]) for column in (lines.output, lines.on, lines.off, lines.part))
         if told != ("coolant", "M8", "M9", "RELAY"):
             yield f"the release is switched by {' '.join(told)}"
 

@@ -42,6 +42,7 @@ SCHEMA = "tbcad-prototype/2"
 RECORD = "prototype.json"
 PARTS_LIST, PLATE_HOLES, WIRING = "bom.csv", "plate_holes.csv", "wiring.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
+SETTINGS = "grbl_settings.txt"
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 
@@ -151,6 +152,16 @@ class Controller(Strict):
     phases: list[LightPhase] = Field(min_length=1, max_length=99)
 
 
+class Home(Strict):
+    """Base angles of homing in degrees, the rod that fixes angle zero, and that angle's error."""
+
+    switch: Angle = Field(alias="switch_deg")
+    homed: Angle = Field(alias="homed_deg")
+    travel: Annotated[float, Field(alias="travel_deg", ge=0, le=720)]
+    pin: str = Field(max_length=WIDEST)
+    zero_error: Annotated[float, Field(alias="zero_error_deg", ge=0, le=10)]
+
+
 Amount = Annotated[float, Field(ge=0, le=LARGEST)]
 
 
@@ -198,6 +209,7 @@ class Prototype(Strict):
         parts: printed.
         leds: of the stage.
         controller: of motion and lights.
+        home: angles of homing.
         bought: purchased parts other than balls.
         frame_stock: parts of the frame that are cut or drilled.
         assembly: files of the whole.
@@ -209,6 +221,7 @@ class Prototype(Strict):
         parts_list: what to buy and to print; None without the file.
         plate_holes: of the base plate; None without the file.
         program: text of the controller's program.
+        settings: text of the controller's settings.
         digests: file name -> (size, sha256), of what was parsed.
     """
 
@@ -222,6 +235,7 @@ class Prototype(Strict):
     parts: list[Printed] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     controller: Controller
+    home: Home
     bought: list[Bought] = Field(max_length=MOST)
     frame_stock: FrameStock
     assembly: Assembly = Assembly()
@@ -233,6 +247,7 @@ class Prototype(Strict):
     parts_list: PartsList | None
     plate_holes: PlateHoles | None
     program: str
+    settings: str
     digests: Mapping[str, tuple[int, str]]
 
     @model_validator(mode="after")
@@ -267,7 +282,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
     Raises:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
-    names = (RECORD, BALLS, PLAN, STOPS, PROGRAM)
+    names = (RECORD, BALLS, PLAN, STOPS, PROGRAM, SETTINGS)
     optional = [name for name in (PARTS_LIST, PLATE_HOLES, WIRING) if (folder / name).exists()]
     texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (*names, *optional)}
     value = parse_json(texts[RECORD], SCHEMA)
@@ -283,6 +298,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
         "wiring": Wiring.read(texts[WIRING]) if WIRING in texts else None,
         "program": texts[PROGRAM].text(),
+        "settings": texts[SETTINGS].text(),
         "digests": {name: blob.digest for name, blob in texts.items()},
     }
     prototype = validated(RECORD, Prototype, value | tables)

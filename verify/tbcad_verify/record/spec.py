@@ -150,6 +150,7 @@ class MotionSpec(Strict):
     controller: Literal["grblhal", "grbl"]
     trigger: Literal["coolant", "pause"]
     home_deg: float = Field(ge=-180, le=180)
+    home_trim_deg: float = Field(ge=-5, le=5)
     approach_deg: float = Field(ge=0, le=30)
     feed_deg_min: float = Field(ge=1, le=100000)
     acceleration_deg_s2: float = Field(gt=0, le=10000)

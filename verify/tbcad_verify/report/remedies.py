@@ -34,6 +34,8 @@ REMEDIES = {
     "parts list": _RECORD,
     "plate holes": _RECORD,
     "wiring": _RECORD,
+    "homing": _RECORD,
+    "controller settings": _RECORD,
     "leds as designed": _RECORD,
     "cell areas": _RECORD,
     "watertight": _MESH,

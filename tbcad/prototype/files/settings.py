@@ -1,0 +1,69 @@
+"""grbl_settings.txt: the controller's settings, worked out from the drive, to be sent line by line.
+
+A comment in round brackets is on a line of its own before each setting. After homing GRBL sets the
+machine's coordinate to minus the travel plus the pull-off, and soft limits keep it between minus
+the travel and zero; grblHAL keeps the pull-off from both ends.
+Sources: doc/markdown/settings.md and grbl/limits.c of GRBL 1.1h; settings.h and machine_limits.c of
+grblHAL core.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.drive.travel import PULL_OFF_DEG, HomeAngles
+from tbcad.spec.prototype import MotionSpec
+
+NAME = "grbl_settings.txt"
+AXES = "XYZA"  # a bit of a mask each, and the last digit of $100, $110, $120, $130
+SEEK_DEG_MIN, LOCATE_DEG_MIN = 360.0, 60.0
+DEBOUNCE_MS = 25
+TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
+Setting = tuple[int, float, str]
+
+
+def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setting]:
+    """Number, value and meaning of each setting, in an order in which GRBL takes them."""
+    axis = AXES.index(motion.axis)
+    travel = math.ceil(angles.travel / TRAVEL_STEP_DEG - TRAVEL_STEP_DEG) * TRAVEL_STEP_DEG
+    common: list[Setting] = [
+        (1, 255, "motor always on, for the base falls without it"),
+        (3, 0, f"{1 << axis} if the base turns against its arrow"),
+        (100 + axis, drive.steps_per_deg(motion.microsteps), "steps a degree"),
+        (110 + axis, motion.feed_deg_min, "degrees a minute, at most"),
+        (120 + axis, motion.acceleration_deg_s2, "degrees/s^2"),
+        (130 + axis, travel, "degrees of travel"),
+    ]
+    return common + (_homing(1 << axis, motion) if motion.controller == "grblhal" else [])
+
+
+def _homing(mask: int, motion: MotionSpec) -> list[Setting]:
+    seek = min(SEEK_DEG_MIN, motion.feed_deg_min)
+    return [
+        (5, mask, "the switch opens when it is pressed: a broken wire stops the base"),
+        (22, 1, "homing"),
+        (44, mask, "homing: this axis"),
+        (45, 0, "homing: no other axis"),
+        (46, 0, "homing: no other axis"),
+        (23, mask, "homing: toward negative angles"),
+        (24, min(LOCATE_DEG_MIN, seek), "homing: degrees a minute, to find the switch again"),
+        (25, seek, "homing: degrees a minute, to find the switch"),
+        (26, DEBOUNCE_MS, "homing: ms until the switch has settled"),
+        (27, PULL_OFF_DEG, "homing: degrees of pull-off"),
+        (20, 1, "soft limits"),
+        (21, 1, "hard limit: the switch stops the base"),
+    ]
+
+
+def settings_lines(title: str, values: list[Setting]) -> Iterator[str]:
+    """Lines of the file: a title, and for each setting its meaning and its value."""
+    yield f"({title})"
+    for number, value, meaning in values:
+        yield f"({meaning})"
+        yield f"${number}={value:.7g}"
+
+
+def write_settings(path: Path, lines: Iterator[str]) -> None:
+    """Write grbl_settings.txt."""
+    path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")

@@ -1,0 +1,248 @@
+"""The zero disc on the hub, and the switch beside the head's plate that its tab presses.
+
+A rod through disc and plate fixes angle zero. The disc bears marks and an arrow in the sense of
+positive angles. Lengths are along the axis, out from it at azimuth zero, and to the side.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.geometry.primitives import (
+    Component,
+    Cylinder,
+    Primitive,
+    Prism,
+    box,
+    cylinder_between,
+    rectangle,
+)
+from tbcad.geometry.rotations import unit_circle
+from tbcad.prototype.base.hub import KEY_MM, SCREW_MM, ZERO_DISC_MM
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.travel import HomeAngles
+from tbcad.prototype.frame.brackets import THROUGH_MM, choose_part
+from tbcad.prototype.frame.purchased import HeadPlate, axial_cylinder, hub_point
+from tbcad.prototype.homing.sizes import (
+    BRACKET_EDGE_MM,
+    BRACKET_HIGH_MM,
+    BRACKET_LOW_MM,
+    BRACKET_MM,
+    FREE_MM,
+    MARK_DEPTH_MM,
+    MARK_MM,
+    PIN_HOLE_MM,
+    PIN_MM,
+    PIN_OUT_MM,
+    switch_place,
+    tab_radius,
+)
+from tbcad.prototype.purchased.parts import Parts
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats
+
+SWITCH = "SWITCH-SS-5GL2"
+# Of the switch, from the line of its holes: toward the axis to its body's end, outward to the
+# other, half its length; to the roller when fully pressed.
+BODY_IN_MM, BODY_OUT_MM, BODY_HALF_MM = 7.3, 2.9, 9.9
+PRESSED_MM = 13.2
+SWITCH_MM, SWITCH_HOLES_MM, SWITCH_HOLE_MM = 6.4, 9.5, 2.35  # thickness, distance, diameter
+ROLLER_MM, ROLLER_LENGTH_MM = 4.8, 3.4
+LEVER_FROM_MM, LEVER_TO_MM, LEVER_HALF_MM = 9.0, 7.0, 6.0
+PILOT_MM, PILOT_DEPTH_MM = 1.7, 8.0  # hole that an M2 screw cuts its thread in
+DISC_BELOW_MM = 0.8  # of the disc below the free roller
+BORE_PLAY_MM, KEY_SLIP_MM = 0.5, 0.2  # on the diameter
+RAMP_DEG, TAB_DEG, MIN_TAB_DEG = 5.0, 30.0, 6.0
+PART_DEG = 3.0  # of the tab's outline
+FREE_DEG = 30.0  # that tab and switch keep beyond the swing
+TAB_ROOT_MM = 5.0  # by which the tab reaches into the disc
+PIN_GRIP_MM = 10.0  # of the rod beyond the plate
+MIN_EDGE_MM = 2.0  # of the disc beyond the pin's hole
+# The arrow: a bar and a triangle across the disc's face, and a plus, (out, side).
+BAR_MM = rectangle((-3.0, 40.2), (8.0, 41.2))
+HEAD_MM = np.array([[-3.0, 37.7], [-3.0, 43.7], [-9.0, 40.7]])
+PLUS_MM = rectangle((11.0, 40.2), (16.0, 41.2)), rectangle((13.0, 38.2), (14.0, 43.2))
+
+
+@dataclass(frozen=True)
+class HomingLayout:
+    """Zero disc, bracket and switch.
+
+    Attributes:
+        angles: of homing.
+        disc: the printed part that turns with the base.
+        bracket: the printed part on the head's plate.
+        switch: body of the switch, drawn pressed.
+        pin: name of the rod that fixes angle zero.
+        error_deg: largest error of angle zero from the play of rod and key.
+    """
+
+    angles: HomeAngles
+    disc: Component
+    bracket: Component
+    switch: Component
+    pin: str
+    error_deg: float
+
+
+def homing_layout(
+    base: BaseLayout, plate: HeadPlate, angles: HomeAngles, parts: Parts
+) -> HomingLayout:
+    """Disc, bracket and switch for a base and the plate behind it.
+
+    Raises:
+        SpecError: when the swing leaves no room for the tab.
+    """
+    place = _SwitchPlace.beside(base, plate)
+    length = base.hub.face - plate.back + PIN_GRIP_MM
+    hint = "add a longer one"
+    pin = choose_part(parts, "shafts", "the zero pin", hint, diameter_mm=PIN_MM, length_mm=length)
+    play, key = PIN_HOLE_MM - PIN_MM, base.spec.dowel_press_mm + KEY_SLIP_MM
+    error = play / PIN_OUT_MM + key / 2 / base.hub.key_radius
+    return HomingLayout(
+        angles=angles,
+        disc=_disc(base, place, angles),
+        bracket=_bracket(base, plate, place),
+        switch=_switch(base, place, parts),
+        pin=pin.name,
+        error_deg=math.degrees(error),
+    )
+
+
+@dataclass(frozen=True)
+class _SwitchPlace:
+    """Radius and azimuth of the switch's holes, place along the axis; radius of the tab."""
+
+    radius: float
+    azimuth: float
+    low: float
+    tab: float
+
+    @classmethod
+    def beside(cls, base: BaseLayout, plate: HeadPlate) -> "_SwitchPlace":
+        (out, side), tab = switch_place(plate.half_width), tab_radius(plate.half_width)
+        low = base.hub.face - (ZERO_DISC_MM + SWITCH_MM) / 2
+        return cls(math.hypot(out, side), math.atan2(side, out), low, tab)
+
+    @property
+    def disc(self) -> float:
+        """Radius of the disc, which the free roller clears."""
+        return self.radius - FREE_MM - DISC_BELOW_MM
+
+    def axes(self, base: BaseLayout) -> Floats:
+        """Rows: away from the axis, around it, along it, (3, 3)."""
+        (out, side), w = unit_circle(np.array(self.azimuth)), base.frame[0]
+        radial = out * base.frame[1] + side * base.frame[2]
+        return np.stack([radial, np.cross(w, radial), w])
+
+
+def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Component:
+    hub, w = base.hub, base.frame[0]
+    back = hub.face - ZERO_DISC_MM
+    if place.disc < PIN_OUT_MM + PIN_HOLE_MM / 2 + MIN_EDGE_MM:
+        raise SpecError("the zero disc has no room for its pin: make prototype.frame.web_mm larger")
+    added: list[Primitive] = [
+        axial_cylinder(base, back, hub.face, place.disc),
+        _prism(base, _tab(place, angles), back, ZERO_DISC_MM),
+    ]
+    holes = [(0.0, 0.0, 2 * hub.bore + BORE_PLAY_MM), (PIN_OUT_MM, 0.0, PIN_HOLE_MM)]
+    holes += [(*hub.key.tolist(), KEY_MM + KEY_SLIP_MM)]
+    screw = SCREW_MM if hub.boss else hub.hole
+    holes += [(out, side, screw) for out, side in hub.holes.tolist()]
+    removed: list[Primitive] = [_hole(base, hub.face, back, *hole) for hole in holes]
+    rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
+    removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))
+    engraved = hub.face - MARK_DEPTH_MM
+    removed += [
+        _prism(base, shape, engraved, MARK_DEPTH_MM + THROUGH_MM)
+        for shape in (BAR_MM, HEAD_MM, *PLUS_MM)
+    ]
+    what = "disc with mark, arrow and the tab of the switch, between hub and drive"
+    return Component("zero_disc", what, tuple(added), tuple(removed), (-w, w), rotates=True)
+
+
+def _hole(
+    base: BaseLayout, front: float, back: float, out: float, side: float, diameter: float
+) -> Cylinder:
+    start, end = (hub_point(base, z, out, side) for z in (back - THROUGH_MM, front + THROUGH_MM))
+    return cylinder_between(start, end, diameter / 2)
+
+
+def _prism(base: BaseLayout, polygon: Floats, back: float, height: float) -> Prism:
+    """A convex polygon (n, 2) of (out, side) across the axis."""
+    corners = np.array([hub_point(base, back, out, side) for out, side in polygon.tolist()])
+    return Prism(corners, height * base.frame[0])
+
+
+def _tab(place: _SwitchPlace, angles: HomeAngles) -> Floats:
+    """The tab's outline (n, 2) at angle zero: a ramp, and the arc that keeps the switch pressed.
+
+    Its arc begins where the switch is when the base is at the switch's angle.
+    """
+    room = 360.0 - (angles.travel + FREE_DEG)
+    if room < MIN_TAB_DEG:
+        raise SpecError(
+            f"a travel of {angles.travel:.0f} degrees leaves no room for the tab of the switch: "
+            "make prototype.max_swing_deg smaller"
+        )
+    start, arc = place.azimuth - math.radians(angles.switch), math.radians(min(TAB_DEG, room))
+    along = np.linspace(start, start + arc, 1 + math.ceil(math.degrees(arc) / PART_DEG))
+    root = place.disc - TAB_ROOT_MM
+    foot = place.disc * unit_circle(np.array([start - math.radians(RAMP_DEG)]))
+    ends = root * unit_circle(np.array([start + arc, start - math.radians(RAMP_DEG)]))
+    return np.vstack([foot, place.tab * unit_circle(along), ends])
+
+
+def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Component:
+    """A block on the plate's side, as high as the disc, that the switch lies on."""
+    near, far, side = plate.half_width, plate.half_width + BRACKET_MM, base.frame[2]
+    low = np.array([plate.back, BRACKET_LOW_MM, near])
+    body = box(low, np.array([place.low, BRACKET_HIGH_MM, far]), base.frame)
+    removed: list[Primitive] = []
+    for out in screw_places():
+        middle = plate.back + (plate.front - plate.back) / 2
+        inner = hub_point(base, middle, out, near - THROUGH_MM)
+        outer = hub_point(base, middle, out, far + THROUGH_MM)
+        removed.append(cylinder_between(inner, outer, SCREW_MM / 2))
+    axes = place.axes(base)
+    for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2):
+        top = np.array([place.radius, around, place.low + THROUGH_MM]) @ axes
+        depth = PILOT_DEPTH_MM + THROUGH_MM
+        removed.append(Cylinder(top, -base.frame[0], PILOT_MM / 2, depth))
+    downs = (-side, side, -base.frame[0], base.frame[1], -base.frame[1])
+    return Component("home_bracket", "bracket of the switch", (body,), tuple(removed), downs)
+
+
+def screw_places() -> tuple[float, float]:
+    """Out of the bracket's two screws."""
+    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
+
+
+def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
+    """Body, lever and roller, pressed."""
+    axes, r, z = place.axes(base), place.radius, place.low
+
+    def at(away: float, around: float, along: float) -> Floats:
+        return np.asarray(np.array([r - away, around, z + along]))
+
+    roller = at(PRESSED_MM - ROLLER_MM / 2, 0.0, (SWITCH_MM - ROLLER_LENGTH_MM) / 2) @ axes
+    added = (
+        box(at(BODY_IN_MM, -BODY_HALF_MM, 0.0), at(-BODY_OUT_MM, BODY_HALF_MM, SWITCH_MM), axes),
+        box(
+            at(LEVER_FROM_MM, -LEVER_HALF_MM, (SWITCH_MM - ROLLER_LENGTH_MM) / 2),
+            at(LEVER_TO_MM, LEVER_HALF_MM, (SWITCH_MM + ROLLER_LENGTH_MM) / 2),
+            axes,
+        ),
+        Cylinder(roller, axes[2], ROLLER_MM / 2, ROLLER_LENGTH_MM),
+    )
+    holes = tuple(
+        Cylinder(
+            at(0.0, around, -THROUGH_MM) @ axes,
+            axes[2],
+            SWITCH_HOLE_MM / 2,
+            SWITCH_MM + 2 * THROUGH_MM,
+        )
+        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
+    )
+    return Component("home_switch", parts[SWITCH].what, added, holes, part=SWITCH)

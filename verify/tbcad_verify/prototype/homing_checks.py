@@ -1,0 +1,222 @@
+"""Angle zero, the switch and the controller's settings, from solids, program and text.
+
+The angle of the switch is measured: from the tab of the zero disc and the roller of the switch in
+the STEP assembly. Limits are the verifier's own.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.gcode_checks import homing
+from tbcad_verify.prototype.gcode_machine import run_program
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
+from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
+from tbcad_verify.types import Floats
+
+PIN_MM = 4.0  # diameter of the rod
+PIN_HOLE_MM = 4.2
+SCREW_HOLE_MM, STAGE_HOLE_MM, KEY_MM, KEY_HOLE_MM, HUB_SCREWS = 3.4, 6.6, 3.0, 3.2, 4
+MIN_PIN_OUT_MM = 40.0  # of the pin from the axis: for 0.3 degrees
+SAME_MM = 1e-6
+ROLLER_MM = 2.4  # radius
+PRESSED_MM = (0.05, 1.5)  # of the tab from the pressed roller
+SWITCH_DEG = 1.5  # of the switch's angle from the record's
+MIN_FREE_DEG = 2.5  # of the switch below all that the program drives to
+MAX_ZERO_ERROR_DEG = 1.0
+TOP_MM = 0.01  # of the tab's corners
+SETTING = re.compile(r"\$(\d{1,3})=(-?\d+(?:\.\d+)?(?:e-?\d+)?)")
+COMMENT = re.compile(r"\([^()]{1,76}\)")
+SHARE = 1e-6
+FULL_STEPS = 200.0
+MAX_STEPS_S = 30_000.0  # that GRBL makes
+MAX_SEEK_DEG_MIN = 720.0
+PULL_OFF_DEG = 2.0
+MAX_BEYOND_DEG = 4.0  # of soft limits beyond the program
+AXES = "XYZA"
+CHECKS = {"homing": "faults", "controller settings": "faults"}
+
+
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    solids: Mapping[str, TextSolid],
+    carriers: Sequence[TextSolid],
+) -> list[Check]:
+    """Pin, tab, switch and screws in the solids; settings against drive and program."""
+    home = [*_pin(context, solids), *_switch(context, solids), *_on_hub(context, solids, carriers)]
+    found = [*_settings(context)]
+    return [
+        at_most(name, len(faults), 0, short_list(faults))
+        for name, faults in zip(names, (home, found), strict=True)
+    ]
+
+
+def _pin(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
+    """One hole in the disc, one in the head, in line at base angle zero; the rod is long enough."""
+    axis, places = context.frame[0], {}
+    for name in ("zero_disc", "bearing_head"):
+        solid = require(solids.get(name), f"the assembly has no {name}")
+        found = [
+            hole
+            for hole in holes(solid.faces, PIN_HOLE_MM / 2, SAME_MM)
+            if abs(hole.axis @ axis) > 1 - SAME_MM
+        ]
+        if len(found) != 1:
+            yield f"{name} has {len(found)} holes for the zero pin"
+            return
+        places[name] = found[0].point
+    disc, head = places["zero_disc"], places["bearing_head"]
+    if distance_to_line(disc, head, axis) > SAME_MM:
+        yield "the zero pin's holes are not in line at base angle zero"
+    if distance_to_line(disc, np.zeros(3), axis) < MIN_PIN_OUT_MM:
+        yield "the zero pin is too near to the axis"
+    along = [solids[name].corners @ axis for name in places]
+    path = max(values.max() for values in along[:1]) - (head @ axis)
+    home = context.prototype.home
+    rod = re.fullmatch(r"ROD-4x(\d+)", home.pin)
+    if not rod or float(rod[1]) < path:
+        yield f"{home.pin} does not reach through {path:.0f} mm"
+    if home.zero_error > MAX_ZERO_ERROR_DEG:
+        yield f"angle zero is known to {home.zero_error:.2f} deg"
+
+
+def _on_hub(
+    context: PrototypeContext, solids: Mapping[str, TextSolid], carriers: Sequence[TextSolid]
+) -> Iterator[str]:
+    """The disc's screws and key have their holes in the hub."""
+    base, disc = context.export.spec.prototype.base, solids["zero_disc"]
+    stage = base.drive == "stage-60"
+    screw, below = (STAGE_HOLE_MM,) * 2 if stage else (SCREW_HOLE_MM, base.insert_hole_mm)
+    pairs = (
+        ("screw", HUB_SCREWS, screw, below),
+        ("key", 1, KEY_HOLE_MM, KEY_MM + base.dowel_press_mm),
+    )
+    for name, count, diameter, in_hub in pairs:
+        own = holes(disc.faces, diameter / 2, SAME_MM)
+        others = [hole for one in carriers for hole in holes(one.faces, in_hub / 2, SAME_MM)]
+        if len(own) != count:
+            yield f"the zero disc has {len(own)} holes for a {name}"
+        for hole in own:
+            found = [
+                one
+                for one in others
+                if abs(one.axis @ hole.axis) > 1 - SAME_MM
+                and distance_to_line(one.point, hole.point, hole.axis) < SAME_MM
+            ]
+            if not found:
+                yield f"a {name} of the zero disc has no hole in the hub"
+
+
+def _polar(context: PrototypeContext, points: Floats) -> Floats:
+    """(n, 2) distance from the axis in mm, and azimuth in degrees, of points (n, 3)."""
+    _, out, side = context.frame @ points.T
+    return np.stack([np.hypot(out, side), np.degrees(np.arctan2(side, out))], axis=1)
+
+
+def _switch(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
+    """The base angle at which the tab's arc begins at the roller, and what the tab presses then."""
+    switch = require(solids.get("home_switch"), "the assembly has no home_switch")
+    disc = require(solids.get("zero_disc"), "the assembly has no zero_disc")
+    rollers = [
+        face
+        for face in switch.faces
+        if face.kind == "cylinder" and not face.hollow and abs(face.radius - ROLLER_MM) < SAME_MM
+    ]
+    if not rollers:
+        raise Unknown("the switch has no roller")
+    distance, azimuth = _polar(context, rollers[0].point[None])[0].tolist()
+    corners = _polar(context, disc.corners)
+    top = float(corners[:, 0].max())
+    gap = distance - ROLLER_MM - top
+    if not PRESSED_MM[0] <= gap <= PRESSED_MM[1]:
+        yield f"the tab is {gap:.2f} mm from the pressed roller"
+    arc = corners[corners[:, 0] > top - TOP_MM, 1]
+    first, width = _arc(arc)
+    measured, home = (azimuth - first + 180) % 360 - 180, context.prototype.home
+    if abs((measured - home.switch + 180) % 360 - 180) > SWITCH_DEG:
+        yield f"the switch trips at {measured:.1f} deg, not at {home.switch:.1f}"
+    if abs(home.homed - home.switch - PULL_OFF_DEG) > SHARE:
+        yield f"homing ends at {home.homed:.4f} deg"
+    stops = context.prototype.stops.angle
+    pressed = [(azimuth - first - angle) % 360 for angle in stops.tolist()]
+    if any(value < width + MIN_FREE_DEG or value > 360 - MIN_FREE_DEG for value in pressed):
+        yield "the tab presses the switch at a stop"
+
+
+def _arc(azimuth: Floats) -> tuple[float, float]:
+    """First azimuth of an arc of corners, and its width, degrees."""
+    ordered = np.sort(azimuth)
+    gaps = np.diff(np.append(ordered, ordered[0] + 360))
+    last = int(gaps.argmax())
+    first = float(ordered[(last + 1) % len(ordered)])
+    return first, 360.0 - float(gaps[last])
+
+
+def _settings(context: PrototypeContext) -> Iterator[str]:
+    values, faults = _parsed(context.prototype.settings)
+    yield from faults
+    motion, drive = context.export.spec.prototype.motion, context.prototype.drive
+    axis = AXES.index(motion.axis)
+    expected: dict[int, float] = {
+        1: 255,
+        3: 0,
+        100 + axis: FULL_STEPS * motion.microsteps * drive.ratio / 360,
+        110 + axis: motion.feed_deg_min,
+        120 + axis: motion.acceleration_deg_s2,
+    }
+    mask = float(1 << axis)
+    if motion.controller == "grblhal":
+        expected |= {5: mask, 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
+        expected |= {44: mask, 45: 0, 46: 0}
+    for number, value in expected.items():
+        if not math.isclose(values.get(number, math.nan), value, rel_tol=SHARE):
+            yield f"${number} is {values.get(number, 'missing')}, not {value:g}"
+    others = {24, 25, 26} if motion.controller == "grblhal" else set()
+    if foreign := set(values) - set(expected) - {130 + axis} - others:
+        yield f"${min(foreign)} is not needed"
+    steps = values.get(110 + axis, 0.0) / 60 * values.get(100 + axis, 0.0)
+    if steps > MAX_STEPS_S:
+        yield f"{steps:.0f} steps/s, a controller makes {MAX_STEPS_S:.0f}"
+    yield from _limits(context, values, values.get(130 + axis, math.nan))
+
+
+def _parsed(text: str) -> tuple[dict[int, float], list[str]]:
+    """Settings by number; what is wrong with other lines. Soft limits need homing before them."""
+    values: dict[int, float] = {}
+    faults = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if found := SETTING.fullmatch(line):
+            if int(found[1]) in values:
+                faults.append(f"${found[1]} is there twice")
+            values[int(found[1])] = float(found[2])
+        elif not COMMENT.fullmatch(line):
+            faults.append(f"line {number} is no setting")
+    order = list(values)
+    if 20 in order and (22 not in order or order.index(22) > order.index(20)):
+        faults.append("$20 before $22, which GRBL refuses")
+    return values, faults
+
+
+def _limits(context: PrototypeContext, values: Mapping[int, float], travel: float) -> Iterator[str]:
+    """Soft limits hold the program and little more; homing is slow, and finds the switch again."""
+    switch, homed = homing(context)
+    if math.isnan(switch):
+        return
+    machine = run_program(context.prototype.program, switch, homed)
+    driven = machine.driven or [math.nan]
+    low, high = switch + PULL_OFF_DEG, switch + travel - PULL_OFF_DEG
+    trim = abs(context.export.spec.prototype.motion.home_trim_deg)
+    if not (low <= min(driven) + trim + SHARE and max(driven) <= high + trim + SHARE):
+        yield f"soft limits {low:.1f} to {high:.1f} deg do not hold the program"
+    if not high - max(driven) <= MAX_BEYOND_DEG + trim:
+        yield f"the upper soft limit is {high - max(driven):.1f} deg above the program"
+    locate, seek = values.get(24, math.nan), values.get(25, math.nan)
+    feed = context.export.spec.prototype.motion.feed_deg_min
+    if not 0 < locate <= seek <= min(MAX_SEEK_DEG_MIN, feed):
+        yield f"homing at {seek:g} and {locate:g} degrees a minute"
