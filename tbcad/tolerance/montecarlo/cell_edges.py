@@ -90,7 +90,7 @@ def trace_cell_edges(
                 if halved[i] and other == len(result):
                     continue
                 reflect_samples(surfaces[i], view, samples)
-                result[i, CROSSINGS] += screen_crossings(view, screen[i], samples)
+                result[i, CROSSINGS] += screen_crossings(screen[i], samples)
                 if count == len(parts):
                     parts = np.concatenate((parts, np.empty_like(parts)))
                 _put_part(parts[count], i, edge, low, high, samples)

@@ -4,6 +4,8 @@ The samples lie side by side in one array, quantity after quantity, so that the 
 become vector instructions of the processor. The points are those of both mirrors at the edge.
 """
 
+from math import sqrt
+
 from tbcad.simulate.parallel import compiled_loop
 from tbcad.tolerance.montecarlo.visible_edges import (
     APEX,
@@ -20,14 +22,13 @@ from tbcad.types import Floats
 # Samples of an edge, and places from one quantity of the samples to the next.
 SAMPLES = 9
 STRIDE = 16
-# Quantities, the first three and the last of three numbers: the point before its shell is scaled,
-# and after; the ray to it; the ray that is reflected there.
-POINT, SCALED, RAY, REFLECTED = 0, 3 * STRIDE, 6 * STRIDE, 9 * STRIDE
+# Quantities of three numbers: the point before its shell is scaled, and after; the ray to it; the
+# ray that is reflected there, and its moment about the object's centre.
+POINT, SCALED, RAY, REFLECTED, MOMENT = (3 * k * STRIDE for k in range(5))
 # Quantities of one number: the reflected ray's distance squared from the object's centre, its
 # place on the screen, the point's place in the picture.
-DISTANCE, SCREEN_X, SCREEN_Y = 12 * STRIDE, 13 * STRIDE, 14 * STRIDE
-PICTURE_X, PICTURE_Y = 15 * STRIDE, 16 * STRIDE
-PLACES = 17 * STRIDE
+DISTANCE, SCREEN_X, SCREEN_Y, PICTURE_X, PICTURE_Y = (k * STRIDE for k in range(15, 20))
+PLACES = 20 * STRIDE
 # Rows of a view; axes of a screen.
 PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
 FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
@@ -74,7 +75,7 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
 
 @compiled_loop
 def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
-    """Fill in the rays that a surface (7,) reflects at the points, and their distances squared."""
+    """Fill in the rays that a surface (7,) reflects at the points, their moments and distances."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     for s in range(SAMPLES):
@@ -85,19 +86,26 @@ def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
         out = plus_scaled(ray, -(2 * dot(ray, across) / dot(across, across)), across)
         moment = cross(minus(_get(samples, SCALED, s), middle), out)
         _put(samples, REFLECTED, s, out)
+        _put(samples, MOMENT, s, moment)
         samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
 
 
 @compiled_loop
-def screen_crossings(view: Floats, screen: Floats, samples: Floats) -> int:
-    """How often the reflected line on a screen crosses the positive half of its first axis."""
-    middle, facing = vector(view[OBJECT]), vector(screen[FACING])
+def screen_crossings(screen: Floats, samples: Floats) -> int:
+    """How often the reflected line on a screen crosses the positive half of its first axis.
+
+    A ray is not followed to the screen, which it may meet far away or never. It is turned about the
+    object's centre, by the smallest angle, until it is square to the screen. That takes a moment
+    M of a ray d to M + (M . u) / (|d| - d . u) (d - |d| u), with u the screen's normal; where the
+    turned ray meets the screen is that moment turned by a right angle. Its scale does not matter.
+    """
+    facing = vector(screen[FACING])
     first, second = vector(screen[FIRST_AXIS]), vector(screen[SECOND_AXIS])
     for s in range(SAMPLES):
-        out, from_object = _get(samples, REFLECTED, s), minus(_get(samples, SCALED, s), middle)
-        image = plus_scaled(from_object, -dot(from_object, facing) / dot(out, facing), out)
-        samples[SCREEN_X + s] = dot(image, first)
-        samples[SCREEN_Y + s] = dot(image, second)
+        out, moment = _get(samples, REFLECTED, s), _get(samples, MOMENT, s)
+        against, along = sqrt(dot(out, out)) - dot(out, facing), dot(moment, facing)
+        samples[SCREEN_X + s] = against * dot(moment, second) + along * dot(out, second)
+        samples[SCREEN_Y + s] = -against * dot(moment, first) - along * dot(out, first)
     count = 0
     for s in range(SAMPLES - 1):
         a, b = SCREEN_X + s, SCREEN_Y + s

@@ -64,7 +64,7 @@ def _trace(surfaces, pairs, halved, view, screen):  # type: ignore[no-untyped-de
                     if halved[i] and other == len(result):
                         continue
                     reflect_samples(surfaces[i], view, samples)
-                    result[i, CROSSINGS] += screen_crossings(view, screen[i], samples)
+                    result[i, CROSSINGS] += screen_crossings(screen[i], samples)
                     for _ in range(ROUNDS - 1):
                         best, step = least_sample(samples), (high - low) / (SAMPLES - 1)
                         low, high = (

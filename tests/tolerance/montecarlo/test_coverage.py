@@ -114,6 +114,15 @@ def test_mirror_that_looks_past_the_object_sees_nothing(
     assert wanted[whole].all() == all_look
 
 
+def test_mirror_that_sends_light_sideways_surrounds_the_object() -> None:
+    """Off mirror a0022 rays fan out to 96 degrees from its axis: some never meet the screen."""
+    options = ["n=3", "camera_mm=[70, 0, -38.8]", "semi_minor_mm=33.8", "capture_diameter_mm=20"]
+    mirrors = design(load_spec(None, options))
+    a, b = (edge_model(at) for at in reflectors(mirrors))
+    sees, _ = coverage((a, b), none((a, b)))
+    assert sees[0, : len(a)] == pytest.approx(mirrors.arrays[0].coverage, abs=1e-3)
+
+
 def test_errors_larger_than_a_mirror_are_refused(halves: EdgeModels) -> None:
     draws = draw(Errors(sphere_radius=Error(0, -1e3)), 1, range(1), len(halves[0]))
     with pytest.raises(InputError, match=r"sphere_radius_um.*make the errors smaller"):
