@@ -18,7 +18,7 @@ from tbcad.prototype.balls.fit import ball_alternatives
 from tbcad.prototype.drive.travel import stop_sequence
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.files import balls_csv, bom_csv, gcode, plan_csv, settings
+from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.parts import PrintedPart, part_mesh
 from tbcad.prototype.stage.layout import led_poses
@@ -206,3 +206,9 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
     values = settings.settings(built.drive, motion, built.frame.homing.angles)
     title = f"settings of {built.spec.name} for {motion.controller}"
     settings.write_settings(folder / settings.NAME, settings.settings_lines(title, values))
+    if motion.controller == "grblhal":
+        angles, lights = built.frame.homing.angles, built.wiring.lights
+        translated = klipper.klipper_program(program, motion, angles)
+        gcode.write_program(folder / klipper.PROGRAM, [*translated])
+        config = klipper.klipper_config(built.drive, motion, lights)
+        gcode.write_program(folder / klipper.CONFIG, [*config])

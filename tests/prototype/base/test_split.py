@@ -203,7 +203,11 @@ class TestBought:
         # From the shaft to no farther than the hub's face.
         assert load_parts()[screw].sizes[1] <= 19.0 - 4.0
         assert set(counts) <= set(load_parts())
-        assert not any(name.startswith(("DOWEL", "M3x")) for name in counts)
+        assert not any(name.startswith("M3x") for name in counts)
+        # The zero disc's key.
+        assert {name: n for name, n in counts.items() if name.startswith("DOWEL")} == {
+            "DOWEL-3x10": 1
+        }
 
     def test_joints_need_more(self, cut: tuple[BaseLayout, BaseSplit]) -> None:
         base, plan = cut
@@ -222,7 +226,7 @@ class TestBought:
         stage = base_purchased_parts(
             base_layout(changed_spec(drive="stage-60", hold="glue"), small_prototype), whole
         )
-        assert stage == {}
+        assert stage == {"DOWEL-3x10": 1}
 
     def test_not_in_a_list(self, small_prototype: PrototypeLayout) -> None:
         with pytest.raises(SpecError, match=r"no magnet of \d+ x 4 mm is in magnets\.csv"):

@@ -59,7 +59,8 @@ def in_rig(folder: Path, part: dict[str, Any]) -> trimesh.Trimesh:
 def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     own = {part[kind] for part in record["parts"] for kind in ("step", "stl", "3mf")}
     tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
-    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt"}
+    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
+    tables |= {"rotation_plan_klipper.gcode"}
     whole = {"prototype.json", "prototype.step", "prototype.glb"}
     records = {"design.json", "mirrors.csv", "manifest.json"}
     assert {p.name for p in folder.iterdir()} == own | tables | whole | records

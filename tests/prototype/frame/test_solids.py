@@ -53,7 +53,7 @@ def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
 
 class TestSolids:
     def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
-        assert len(solids) == 5
+        assert len(solids) == 6
         for part in solids.values():
             mesh = as_trimesh(part.shape)
             assert mesh.is_watertight
@@ -139,7 +139,8 @@ class TestSolids:
     def test_bought_bodies_have_their_volumes(
         self, purchased: dict[str, TopoDS_Shape], frame: FrameLayout
     ) -> None:
-        shaft = np.pi * 4**2 * 100
+        assert frame.head.shaft
+        shaft = np.pi * 4**2 * frame.head.shaft["length_mm"]
         ring = np.pi * (11**2 - 4**2) * 7
         assert volume(purchased["shaft"]) == pytest.approx(shaft, rel=1e-9)
         assert volume(purchased["bearing_front"]) == pytest.approx(ring, rel=1e-9)
@@ -191,7 +192,7 @@ class TestClearance:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=4)
         away = np.asarray(cKDTree(points).query(np.vstack(found))[0])
         assert away.min() > FRAME.clearance_mm
-        assert away.min() < 20
+        assert away.min() < 25  # so near that the distance means something
 
     def test_no_ray_hits_the_frame(
         self,

@@ -8,6 +8,7 @@ from tests.verify.corpus.prototype_changes import (
     BILL,
     GLB,
     HOLES,
+    KLIPPER,
     PROGRAM,
     RECORD,
     SETTINGS,
@@ -347,6 +348,26 @@ HOMING: tuple[Mutation, ...] = (
         record(lambda r: r["home"].update(zero_error_deg=5.0)),
         "homing",
         "angle zero is known to 5.00 deg",
+    ),
+    *(
+        fails(f"klipper: {name}", KLIPPER, text_of(KLIPPER, pattern, new, 1), "klipper", words)
+        for name, pattern, new, words in (
+            ("another angle", r"(?<=: 2 mirrors\n)(.*MOVE=).*?( SPEED)", r"\g<1>5\2", "is another"),
+            ("another speed", r"(MOVE=.* SPEED=)15", r"\g<1>1500", "a speed of 1500"),
+            ("a light left on", r"SET_PIN PIN=lamp VALUE=0\n(?=; stop)", "", "with lamp on"),
+            ("no LED", r"SET_PIN PIN=led_2 VALUE=1\n", "", "is another"),
+            ("no homing", r".*STOP_ON_ENDSTOP=1\n.*SET_POSITION.*\n", "", "before homing"),
+            ("another switch", r"SET_POSITION=-\S+", "SET_POSITION=-50", "deg at the switch"),
+            ("never turned", r'RESPOND MSG="turn.*\nPAUSE\n', "", "is another"),
+            ("a foreign line", r"(?=; stop 1 )", "G28\n", "is none that a plan has"),
+        )
+    ),
+    fails(
+        "klipper: another gear",
+        "klipper.cfg",
+        text_of("klipper.cfg", "gear_ratio: .*", "gear_ratio: 5:1"),
+        "klipper",
+        "gear_ratio is 5:1",
     ),
     fails("no zero disc", "all", without_part("zero_disc"), "inventory", "base part zero_disc"),
     fails("no bracket", "all", without_part("home_bracket"), "inventory", "part home_bracket"),

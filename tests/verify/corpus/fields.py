@@ -74,6 +74,12 @@ def words(path: Path) -> set[str]:
     return found
 
 
+def forms(path: Path) -> set[str]:
+    """Lines without their numbers."""
+    lines = path.read_text(encoding="ascii").splitlines()
+    return {re.sub(r"-?[0-9][0-9.]*", "N", line) for line in lines}
+
+
 def scene(path: Path) -> set[str]:
     """Paths of the JSON in a GLB."""
     data = path.read_bytes()
@@ -88,10 +94,13 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".3mf": elements,
     ".stl": facets,
     ".nc": words,
-    ".txt": words,
+    ".txt": forms,
+    ".gcode": forms,
+    ".cfg": forms,
     ".glb": scene,
 }
-NAMED = {".json", ".csv", ".nc", ".txt", ".glb"}  # files that are unlike others of their kind
+# Files that are unlike others of their kind.
+NAMED = {".json", ".csv", ".nc", ".txt", ".gcode", ".cfg", ".glb"}
 
 
 def fields(folder: Path) -> dict[str, set[str]]:

@@ -21,6 +21,7 @@ RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
 WIRING, SETTINGS = "wiring.csv", "grbl_settings.txt"
+KLIPPER = "rotation_plan_klipper.gcode"
 
 
 def record(

@@ -43,7 +43,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 # What is not made: no STEP assembly, no parts list, names and balls of its own, no weight.
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
-    *("wiring", "homing", "controller settings"),
+    *("wiring", "homing", "controller settings", "klipper"),
     *("drive", "ball labels", "radius rule"),
 }
 STEPS = 200 * 16 * 3 / 360

@@ -234,9 +234,9 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
         "deg",
     ),
     "a stop beyond the swing": (
-        in_record("swing_deg", to=lambda swing: [swing[0] + 1e-6, swing[1]]),
+        in_record("swing_deg", to=lambda swing: [swing[0], swing[1] - 1e-6]),
         ("plan stops", "plan program"),
-        "stop 1 beyond",
+        "beyond the swing",
     ),
     "program driven beyond the swing": (
         program("G4 P0.500", "G1 X179.0000"),

@@ -17,6 +17,7 @@ from tbcad_verify.prototype import (
     drive_checks,
     homing_checks,
     inventory,
+    klipper_checks,
     leds,
     plan_checks,
     purchases,
@@ -39,7 +40,7 @@ from tbcad_verify.prototype.measured_parts import (
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import PARTS_LIST, SETTINGS, WIRING, Prototype
+from tbcad_verify.record.prototype import KLIPPER, PARTS_LIST, SETTINGS, WIRING, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
@@ -165,6 +166,7 @@ def _purchases(
             _carriers(context, require(part_files, no_part_files)),
         ),
     )
+    _add(sink, klipper_checks, KLIPPER, lambda: (context,))
     _add(sink, wiring_checks, WIRING, lambda: (context, require(drawn_solids, reason)))
     _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(drawn_solids, reason)))
 

@@ -43,6 +43,8 @@ RECORD = "prototype.json"
 PARTS_LIST, PLATE_HOLES, WIRING = "bom.csv", "plate_holes.csv", "wiring.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
+KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
+OPTIONAL = (PARTS_LIST, PLATE_HOLES, WIRING, KLIPPER, KLIPPER_CONFIG)
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 
@@ -222,6 +224,8 @@ class Prototype(Strict):
         plate_holes: of the base plate; None without the file.
         program: text of the controller's program.
         settings: text of the controller's settings.
+        klipper: text of the program for Klipper, and
+        klipper_config: of its configuration; None without the file.
         digests: file name -> (size, sha256), of what was parsed.
     """
 
@@ -248,6 +252,8 @@ class Prototype(Strict):
     plate_holes: PlateHoles | None
     program: str
     settings: str
+    klipper: str | None
+    klipper_config: str | None
     digests: Mapping[str, tuple[int, str]]
 
     @model_validator(mode="after")
@@ -283,7 +289,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     names = (RECORD, BALLS, PLAN, STOPS, PROGRAM, SETTINGS)
-    optional = [name for name in (PARTS_LIST, PLATE_HOLES, WIRING) if (folder / name).exists()]
+    optional = [name for name in OPTIONAL if (folder / name).exists()]
     texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (*names, *optional)}
     value = parse_json(texts[RECORD], SCHEMA)
     if value.get("balls") != BALLS:
@@ -299,6 +305,8 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "wiring": Wiring.read(texts[WIRING]) if WIRING in texts else None,
         "program": texts[PROGRAM].text(),
         "settings": texts[SETTINGS].text(),
+        "klipper": texts[KLIPPER].text() if KLIPPER in texts else None,
+        "klipper_config": texts[KLIPPER_CONFIG].text() if KLIPPER_CONFIG in texts else None,
         "digests": {name: blob.digest for name, blob in texts.items()},
     }
     prototype = validated(RECORD, Prototype, value | tables)

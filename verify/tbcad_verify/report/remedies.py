@@ -35,6 +35,7 @@ REMEDIES = {
     "plate holes": _RECORD,
     "wiring": _RECORD,
     "homing": _RECORD,
+    "klipper": _RECORD,
     "controller settings": _RECORD,
     "leds as designed": _RECORD,
     "cell areas": _RECORD,
