@@ -20,6 +20,7 @@ BELOW_HEAD_MM = 6.0  # material below a counterbore
 ZERO_DISC_MM = 5.0  # thickness of the disc between hub and drive
 # Dowel that gives the disc its place about the axis, on the drive's circle between two holes.
 KEY_MM, KEY_DEPTH_MM = 3.0, 6.0
+KEY_HOLE_MM = 3.1  # in hub and disc; printed holes come out smaller
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
-from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_MM, SCREW_MM, SLIT_MM, Hub
+from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, SCREW_MM, SLIT_MM, Hub
 from tbcad.prototype.base.profile import meridian
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
@@ -29,8 +29,7 @@ def hub_holes(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
     blind = hub.depth < hub.front - hub.face
     holes = [cylinder(start * UP, UP, hub.bore, through)]
     key = np.array([*hub.key, start])
-    radius = (KEY_MM + spec.dowel_press_mm) / 2
-    holes.append(cylinder(key, UP, radius, KEY_DEPTH_MM + THROUGH_MM))
+    holes.append(cylinder(key, UP, KEY_HOLE_MM / 2, KEY_DEPTH_MM + THROUGH_MM))
     for place in hub.holes:
         length = hub.depth + THROUGH_MM if blind else through
         holes.append(cylinder(np.array([*place, start]), UP, hub.hole / 2, length))

@@ -19,7 +19,7 @@ from tbcad.geometry.primitives import (
     rectangle,
 )
 from tbcad.geometry.rotations import unit_circle
-from tbcad.prototype.base.hub import KEY_MM, SCREW_MM, ZERO_DISC_MM
+from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.frame.brackets import THROUGH_MM, choose_part
@@ -52,7 +52,7 @@ ROLLER_MM, ROLLER_LENGTH_MM = 4.8, 3.4
 LEVER_FROM_MM, LEVER_TO_MM, LEVER_HALF_MM = 9.0, 7.0, 6.0
 PILOT_MM, PILOT_DEPTH_MM = 1.7, 8.0  # hole that an M2 screw cuts its thread in
 DISC_BELOW_MM = 0.8  # of the disc below the free roller
-BORE_PLAY_MM, KEY_SLIP_MM = 0.5, 0.2  # on the diameter
+BORE_PLAY_MM = 0.5  # on the diameter
 RAMP_DEG, TAB_DEG, MIN_TAB_DEG = 5.0, 30.0, 6.0
 PART_DEG = 3.0  # of the tab's outline
 FREE_DEG = 30.0  # that tab and switch keep beyond the swing
@@ -98,8 +98,8 @@ def homing_layout(
     length = base.hub.face - plate.back + PIN_GRIP_MM
     hint = "add a longer one"
     pin = choose_part(parts, "shafts", "the zero pin", hint, diameter_mm=PIN_MM, length_mm=length)
-    play, key = PIN_HOLE_MM - PIN_MM, base.spec.dowel_press_mm + KEY_SLIP_MM
-    error = play / PIN_OUT_MM + key / 2 / base.hub.key_radius
+    # Either moves by half of its play in each of its two holes.
+    error = (PIN_HOLE_MM - PIN_MM) / PIN_OUT_MM + (KEY_HOLE_MM - KEY_MM) / base.hub.key_radius
     return HomingLayout(
         angles=angles,
         disc=_disc(base, place, angles),
@@ -147,7 +147,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
         _prism(base, _tab(place, angles), back, ZERO_DISC_MM),
     ]
     holes = [(0.0, 0.0, 2 * hub.bore + BORE_PLAY_MM), (PIN_OUT_MM, 0.0, PIN_HOLE_MM)]
-    holes += [(*hub.key.tolist(), KEY_MM + KEY_SLIP_MM)]
+    holes += [(*hub.key.tolist(), KEY_HOLE_MM)]
     screw = SCREW_MM if hub.boss else hub.hole
     holes += [(out, side, screw) for out, side in hub.holes.tolist()]
     removed: list[Primitive] = [_hole(base, hub.face, back, *hole) for hole in holes]

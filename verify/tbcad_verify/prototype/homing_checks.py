@@ -21,7 +21,7 @@ from tbcad_verify.types import Floats
 
 PIN_MM = 4.0  # diameter of the rod
 PIN_HOLE_MM = 4.2
-SCREW_HOLE_MM, STAGE_HOLE_MM, KEY_MM, KEY_HOLE_MM, HUB_SCREWS = 3.4, 6.6, 3.0, 3.2, 4
+SCREW_HOLE_MM, STAGE_HOLE_MM, KEY_HOLE_MM, HUB_SCREWS = 3.4, 6.6, 3.1, 4
 MIN_PIN_OUT_MM = 40.0  # of the pin from the axis: for 0.3 degrees
 SAME_MM = 1e-6
 ROLLER_MM = 2.4  # radius
@@ -95,7 +95,7 @@ def _on_hub(
     screw, below = (STAGE_HOLE_MM,) * 2 if stage else (SCREW_HOLE_MM, base.insert_hole_mm)
     pairs = (
         ("screw", HUB_SCREWS, screw, below),
-        ("key", 1, KEY_HOLE_MM, KEY_MM + base.dowel_press_mm),
+        ("key", 1, KEY_HOLE_MM, KEY_HOLE_MM),
     )
     for name, count, diameter, in_hub in pairs:
         own = holes(disc.faces, diameter / 2, SAME_MM)

@@ -33,7 +33,7 @@ MOTOR_SCREWS = 4
 HUB_INSERTS = {"nema17-belt": 4, "nema17-direct": 4, "stage-60": 0}  # for wheel or coupling
 HUB_SCREWS = 4  # of wheel, coupling or stage, through the zero disc
 BRACKET_SCREWS = SWITCH_SCREWS = 2
-KEY_MM = 3.0  # dowel between hub and zero disc
+KEY_HOLE_MM = 3.1  # of the dowel between hub and zero disc
 LOCK_SCREWS = {"set-screws": 2, "clamp": 1}  # of a shaft, each with an insert
 CUT = ", cut to "  # of what is bought longer
 SHARE = 1e-9  # of figures that follow from others
@@ -146,8 +146,8 @@ def _fasteners(context: PrototypeContext, solids: Solids) -> dict[str, int]:
         r"UNC1/4-20x[\d.]+": int(spec.camera_diameter_mm > 0),
         r"GT2-\d+-\d+": int(base.drive == "nema17-belt"),
         r"DOWEL-\S+": sum(
-            solids.count((diameter + base.dowel_press_mm) / 2)
-            for diameter in {base.dowel_mm, KEY_MM}
+            solids.count(diameter / 2)
+            for diameter in {round(base.dowel_mm + base.dowel_press_mm, 9), KEY_HOLE_MM}
         ),
         r"SET-M3x\d+": 1 + set_screws,
         r"M3x\d+": in_base + BRACKET_SCREWS + (0 if stage else MOTOR_SCREWS + HUB_SCREWS),
