@@ -203,15 +203,17 @@ class StageSpec(Section):
     """Height of the disc that carries the object; it must be inside the capture sphere."""
     disc_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=4, le=500)
     """Diameter of that disc, which is turned by 180 degrees for the other half."""
+    object_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=1, le=1000)
+    """Diameter of the room on the disc that stage and LEDs leave free: an upright cylinder."""
     led: Led = "LED-3"
     """LEDs in the pockets."""
     leds_mm: Annotated[Places, OR_AUTO] = AUTO
-    """Centres of the LEDs' domes, not in one plane and none hidden from a mirror; [] for none."""
+    """Centres of the LEDs' domes, not in one plane, two or more seen by a mirror; [] for none."""
     led_ma: float = Field(10.0, ge=0.5, le=100)
     """Current of an LED, at most; the resistor is the next larger of the series E24."""
     led_supply_v: float = Field(24.0, ge=3, le=48)
     """Voltage that LED and resistor are in series at."""
-    led_wall_mm: float = Field(2.0, ge=0.8, le=20)
+    led_wall_mm: float = Field(1.2, ge=0.8, le=20)
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)
     """Width of the wires' channels."""

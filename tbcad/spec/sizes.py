@@ -25,16 +25,17 @@ POST_MM, MIN_POST_MM, POST_OF_CAPTURE = 20.0, 8.0, 1 / 3
 CAMERA_MM, MIN_CAMERA_MM, CAMERA_OF_DISTANCE = 60.0, 25.0, 0.56
 CAMERA_STEP_MM = 5.0
 DISC_OF_CAPTURE, MIN_DISC_MM = 17 / 60, 12.0
-TOP_OF_CAPTURE = -1 / 3
+TOP_OF_CAPTURE = -19 / 60
+OBJECT_OF_CAPTURE = 2 / 3
 # The crown is this much lower than the disc's face, and stays inside the sphere by the second.
 CROWN_MM, INSIDE_MM = 4.8, 0.3
 # Places of the LEDs in a capture sphere of 60 mm; smaller spheres have no room for any.
 LEDS_MM, LEDS_CAPTURE_MM = (
     (
-        (10.6, 7.5, -19.0),
-        (3.4, -12.6, -17.0),
-        (-3.4, 12.6, -13.5),
-        (-10.6, -7.5, -7.0),
+        (18.8, 14.0, -8.0),
+        (14.6, -18.3, -8.0),
+        (-10.4, -20.9, -4.7),
+        (-5.8, 22.7, -0.5),
     ),
     60.0,
 )
@@ -88,6 +89,7 @@ def _stage_sizes(optics: OpticsSpec) -> dict[str, Any]:
     return {
         "disc_mm": disc,
         "top_mm": min(max(_rounded(TOP_OF_CAPTURE * capture), -_rounded(depth)), 0.0),
+        "object_diameter_mm": _rounded(OBJECT_OF_CAPTURE * capture),
         "leds_mm": led_places(capture),
     }
 

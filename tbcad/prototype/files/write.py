@@ -21,6 +21,7 @@ from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
 from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.parts import PrintedPart, part_mesh
+from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
@@ -108,6 +109,7 @@ def document(built: PrototypeModel, alternatives: list[dict[str, Any]]) -> dict[
             }
             for name, position, direction in led_poses(built.stage)
         ],
+        "calibration": _calibration(built),
         "controller": _controller(built),
         "home": {
             "switch_deg": built.frame.homing.angles.switch,
@@ -144,6 +146,14 @@ def _part_record(part: PrintedPart) -> dict[str, Any]:
         "axes": (part.solid.axes + 0.0).tolist(),
         "origin_mm": (part.solid.origin + 0.0).tolist(),
     }
+
+
+def _calibration(built: PrototypeModel) -> dict[str, float] | None:
+    """What the LEDs will tell of the balls' centres; None without LEDs."""
+    if not len(built.stage.leds):
+        return None
+    capture, stage = built.spec.optics.capture_diameter_mm / 2, built.spec.prototype.stage
+    return calibration_estimate(stage, built.layout.array, built.stage.leds, capture).record()
 
 
 def _controller(built: PrototypeModel) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from tbcad.geometry.primitives import (
 from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.prototype.stage.arms import Arm, arm_axes
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import StageSpec
@@ -37,6 +38,8 @@ STUD_PLACE = 0.65  # of the disc's radius
 STUD_GAP_MM, STUD_EDGE_MM = 0.2, 0.8  # material between a stud and the bore, and the disc's edge
 POCKET = 0.75  # height of a pocket's wall: share of the LED's body below the centre of its dome
 THROUGH_MM = 1.0  # by which a removed body extends beyond the part
+ROOM_GAP_MM = 0.1  # between arms and the level of the disc's face, above which the object may be
+ROOT_SHARE = 0.4  # of the plate's width, from its rim inward, that an arm's root covers
 ROOT_MM = 1.0  # by which studs reach into the plate
 SCREW_DIRECTION = np.array([0.0, -1.0, 0.0])
 LEVEL, _, UP = np.eye(3)
@@ -73,8 +76,9 @@ class CrownSizes:
 def crown_component(
     stage: StageSpec, led: PurchasedPart, leds: Floats, pockets: Floats, sizes: CrownSizes
 ) -> Component:
-    """Plate, neck and plug in one revolved body, with pillars and studs on it."""
+    """Plate, neck and plug in one revolved body, with studs and pillars or arms for LEDs on it."""
     stud, root = _stud_radius(stage), sizes.plate - ROOT_MM
+    pillar = pillar_radius(stage, led)
     added: list[Primitive] = [Revolved(_profile(sizes))]
     added += [
         Cylinder(np.array([*place, root]), UP, stud, STUD_HEIGHT_MM + ROOT_MM)
@@ -83,9 +87,14 @@ def crown_component(
     removed: list[Primitive] = []
     for dome, floor in zip(leds, pockets.tolist(), strict=True):
         rim = floor + POCKET * (float(dome[2]) - floor)
-        foot, top = np.array([*dome[:2], sizes.plate - INSIDE_MM]), np.array([*dome[:2], rim])
-        added.append(cylinder_between(foot, top, pillar_radius(stage, led)))
-        removed += _pocket(stage, led, dome, (floor, rim), sizes.plate)
+        top, arm = (
+            np.array([*dome[:2], rim]),
+            led_arm(dome, pillar_radius(stage, led), floor, sizes),
+        )
+        foot = np.array([*dome[:2], (floor if arm else sizes.plate) - INSIDE_MM])
+        added.append(cylinder_between(foot, top, pillar))
+        added += arm.bodies() if arm else []
+        removed += _pocket(stage, led, dome, (floor, rim), sizes.plate, arm)
     seat = (sizes.plug - SEAT_MM) * SCREW_DIRECTION + [0, 0, sizes.joint - PLUG_MM / 2]
     removed.append(Cylinder(seat, SCREW_DIRECTION, SET_SCREW_MM / 2, SEAT_MM + THROUGH_MM))
     return Component(
@@ -113,25 +122,47 @@ def _profile(sizes: CrownSizes) -> Floats:
 
 
 def _pocket(
-    stage: StageSpec, led: PurchasedPart, dome: Floats, heights: tuple[float, float], plate: float
+    stage: StageSpec,
+    led: PurchasedPart,
+    dome: Floats,
+    heights: tuple[float, float],
+    plate: float,
+    arm: Arm | None,
 ) -> list[Primitive]:
     """Pocket between two heights, the wires' way down, and their groove to the bore."""
     floor, rim = heights
     radius, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
     low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
+    length = arm.root[0] if arm else float(norm(dome[:2]))
+    way = cylinder_between(low, bottom + THROUGH_MM * UP, stage.wire_mm / 2)
     return [
         cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
-        cylinder_between(low, bottom + THROUGH_MM * UP, stage.wire_mm / 2),
-        _groove(stage, dome, groove, plate + OPEN_MM),
+        *(arm.grooves(stage.wire_mm) if arm else [way]),
+        _groove(stage, dome, (groove, plate + OPEN_MM), length),
     ]
 
 
-def _groove(stage: StageSpec, dome: Floats, low: float, high: float) -> Prism:
-    """A groove from the axis outward to an LED, between two heights."""
-    out = np.array([*dome[:2], 0.0]) / norm(dome[:2])
-    axes = np.stack([out, np.cross(UP, out), UP])
-    half, length = stage.wire_mm / 2, float(norm(dome[:2]))
-    return box(np.array([0.0, -half, low]), np.array([length, half, high]), axes)
+def _groove(stage: StageSpec, dome: Floats, heights: tuple[float, float], length: float) -> Prism:
+    """A groove from the axis outward toward an LED, between two heights."""
+    half, (low, high) = stage.wire_mm / 2, heights
+    return box(np.array([0.0, -half, low]), np.array([length, half, high]), arm_axes(dome))
+
+
+def led_arm(dome: Floats, pillar: float, floor: float, sizes: CrownSizes) -> Arm | None:
+    """The arm of an LED (3,) whose pillar does not stand on the plate; None where it does."""
+    distance = float(norm(dome[:2]))
+    if distance + pillar <= sizes.rim:
+        return None
+    return Arm(
+        axes=arm_axes(dome),
+        inner=distance - pillar,
+        outer=distance + pillar,
+        floor=floor,
+        turn=sizes.plate + DISC_MM - ROOM_GAP_MM,
+        root=(sizes.rim - ROOT_SHARE * (sizes.rim - sizes.wire), sizes.plate),
+        low=sizes.plate - RIM_MM,
+        sphere=float(np.hypot(sizes.rim, sizes.plate - RIM_MM)),
+    )
 
 
 def _stud_radius(stage: StageSpec) -> float:

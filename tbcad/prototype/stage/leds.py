@@ -1,6 +1,7 @@
-"""Whether LEDs on the stage can be used: inside the sphere, apart, not in one plane, not hidden."""
+"""Whether LEDs on the stage can be used: inside the sphere, apart, not in one plane, seen."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -11,6 +12,7 @@ from tbcad.types import Floats
 
 POCKET_PLAY_MM = 0.1  # to either side
 MIN_FLATNESS_MM = 1.0  # of the LEDs about the nearest plane, square root of the sum of squares
+MIN_SEEN = 2  # LEDs that fix a sphere's centre, two figures each, where its radius is known
 TINY = 1e-12  # keeps a division by zero away
 
 
@@ -22,7 +24,7 @@ def check_leds(
     pockets: Floats,
     plate: float,
 ) -> None:
-    """Refuse LEDs that are outside the sphere, collide, are in one plane or hidden.
+    """Refuse LEDs that are outside the sphere, collide, are in one plane or seen too little.
 
     Args:
         stage: section of the stage.
@@ -37,31 +39,31 @@ def check_leds(
     """
     domes, pillar = np.array(stage.leds_mm).reshape(-1, 3), pillar_radius(stage, led)
     from_axis, tip = norm(domes[:, :2]), led["diameter_mm"] / 2
-    reach = np.hypot(from_axis + pillar, plate).clip(norm(domes) + tip)
-    min_from_axis = pillar + stage.disc_mm / 2 + POCKET_PLAY_MM
+    reach = np.hypot(from_axis + pillar, pockets).clip(norm(domes) + tip)
+    min_from_axis = pillar + max(stage.disc_mm, stage.object_diameter_mm) / 2 + POCKET_PLAY_MM
     for i, dome in enumerate(domes):
         name = f"prototype.stage.leds_mm: LED {i + 1}"
-        if reach[i] > capture:
-            raise SpecError(
-                f"{name} with its pillar reaches {reach[i]:.1f} mm from the origin, beyond the "
-                f"capture sphere of {capture:g} mm: move it inward, or set leds_mm to []"
-            )
         if pockets[i] < plate:
             raise SpecError(
                 f"{name} is too low for its pocket: make its z at least "
                 f"{dome[2] + plate - pockets[i]:.1f}, or prototype.stage.top_mm smaller"
             )
+        if reach[i] > capture:
+            raise SpecError(
+                f"{name} with its pillar reaches {reach[i]:.1f} mm from the origin, beyond the "
+                f"capture sphere of {capture:g} mm: move it inward, or set leds_mm to []"
+            )
         if from_axis[i] < min_from_axis:
             raise SpecError(
-                f"{name} is inside the disc: move it outward to {min_from_axis:.1f} mm from the "
-                "axis, or make prototype.stage.disc_mm smaller"
+                f"{name} is in the object's room: move it outward to {min_from_axis:.1f} mm from "
+                "the axis, or make prototype.stage.object_diameter_mm or disc_mm smaller"
             )
         for j in range(i):
             if norm(dome[:2] - domes[j, :2]) < 2 * pillar:
                 raise SpecError(f"{name} collides with LED {j + 1}: move one of them")
     if len(domes):
         _check_flatness(domes)
-        _check_visible(domes, prototype, pillar, tip)
+        _check_seen(stage, domes, prototype, led, capture)
 
 
 def _check_flatness(domes: Floats) -> None:
@@ -73,12 +75,37 @@ def _check_flatness(domes: Floats) -> None:
         )
 
 
-def _check_visible(domes: Floats, prototype: PrototypeLayout, pillar: float, tip: float) -> None:
-    """Refuse an LED that another pillar hides from a virtual camera.
+def _check_seen(
+    stage: StageSpec, domes: Floats, prototype: PrototypeLayout, led: PurchasedPart, capture: float
+) -> None:
+    """Refuse LEDs of which some mirror sees too few to find its centre."""
+    seen = visible(stage, domes, virtual_cameras(prototype), led, capture).sum(axis=1)
+    if seen.min() < MIN_SEEN:
+        mirror = int(seen.argmin())
+        raise SpecError(
+            f"prototype.stage.leds_mm: mirror {prototype.array.ids[mirror]} sees {seen[mirror]} of "
+            f"{len(domes)} LEDs past an object in its room and other LEDs, but needs {MIN_SEEN}: "
+            "put LEDs on all sides of the object, or make prototype.stage.object_diameter_mm "
+            "smaller"
+        )
 
-    A pillar is taken to reach as high as its LED.
+
+def visible(
+    stage: StageSpec, domes: Floats, cameras: Floats, led: PurchasedPart, capture: float
+) -> NDArray[np.bool_]:
+    """Which of l LEDs (l, 3) are seen from which of m points (m, 3), (m, l).
+
+    Past an object that fills its room, and past the pillars of the other LEDs.
     """
-    cameras = prototype.array.ellipsoid.camera_distance * prototype.array.u
+    tip = led["diameter_mm"] / 2
+    hidden = hidden_by_object(stage, domes, cameras, capture)
+    return ~(hidden | _hidden_by_pillars(domes, cameras, pillar_radius(stage, led), tip))
+
+
+def _hidden_by_pillars(
+    domes: Floats, cameras: Floats, pillar: float, tip: float
+) -> NDArray[np.bool_]:
+    """A pillar is taken to reach as high as its LED, (m, l)."""
     sight = cameras[:, None] - domes
     level = np.maximum(norm(sight[..., :2]), TINY)[..., None]
     direction = sight[..., :2] / level
@@ -89,12 +116,32 @@ def _check_visible(domes: Floats, prototype: PrototypeLayout, pillar: float, tip
     height = domes[:, 2, None] - tip + enters * (sight[..., 2, None] / level)
     hidden = (beside < pillar**2) & (along > 0) & (height < domes[:, 2] + tip)
     hidden[:, np.arange(len(domes)), np.arange(len(domes))] = False
-    if hidden.any():
-        mirror, i, j = (int(axis[0]) for axis in np.nonzero(hidden))
-        raise SpecError(
-            f"prototype.stage.leds_mm: LED {i + 1} is hidden from mirror "
-            f"{prototype.array.ids[mirror]} by LED {j + 1}: move them, the higher ones to smaller x"
-        )
+    return np.asarray(hidden.any(axis=2))
+
+
+def virtual_cameras(prototype: PrototypeLayout) -> Floats:
+    """From where the m mirrors see the object, mm, (m, 3)."""
+    return np.asarray(prototype.array.ellipsoid.camera_distance * prototype.array.u)
+
+
+def hidden_by_object(
+    stage: StageSpec, domes: Floats, cameras: Floats, capture: float
+) -> NDArray[np.bool_]:
+    """Which of l LEDs an object that fills its room hides from which of m points, (m, l).
+
+    The room is an upright cylinder from the disc to the capture sphere's height at its radius.
+    """
+    radius = stage.object_diameter_mm / 2
+    high = np.sqrt(max(capture**2 - radius**2, 0.0))
+    sight = cameras[:, None] - domes
+    a = (sight[..., :2] ** 2).sum(axis=-1)
+    b = (sight[..., :2] * domes[:, :2]).sum(axis=-1)
+    root = b**2 - a * ((domes[:, :2] ** 2).sum(axis=-1) - radius**2)
+    reach = np.sqrt(np.maximum(root, 0)), np.maximum(a, TINY)
+    ends = np.stack([(-b - reach[0]) / reach[1], (-b + reach[0]) / reach[1]])
+    height = domes[:, 2] + np.clip(ends, 0, 1) * sight[..., 2]
+    crosses = (root > 0) & (ends[1] > 0) & (ends[0] < 1)
+    return np.asarray(crosses & (height.min(axis=0) < high) & (height.max(axis=0) > stage.top_mm))
 
 
 def pillar_radius(stage: StageSpec, led: PurchasedPart) -> float:

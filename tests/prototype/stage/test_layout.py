@@ -33,6 +33,7 @@ from tbcad.prototype.keepout import (
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
+from tbcad.prototype.stage.leds import hidden_by_object, virtual_cameras, visible
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
@@ -114,7 +115,7 @@ class TestStage:
             ({"top_mm": 5.0}, "to 0"),
             ({"disc_mm": 60.0}, "does not fit into the capture sphere"),
             ({"disc_mm": 6.0}, "no room for its studs"),
-            ({"led": "LED-5"}, "for its pocket"),
+            ({"led": "LED-5"}, "LED 1 with its pillar reaches"),
         ],
     )
     def test_what_does_not_fit_is_refused(
@@ -135,11 +136,10 @@ class TestStage:
     @pytest.mark.parametrize(
         ("number", "place", "message"),
         [
-            (1, (20.0, 7.5, -19.0), "LED 1 with its pillar reaches"),
+            (1, (20.0, 17.5, -15.0), "LED 1 with its pillar reaches"),
             (1, (10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
-            (3, (-3.4, 8.0, -13.5), "LED 3 is inside the disc"),
-            (4, (-5.4, 12.0, -7.0), "LED 4 collides with LED 3"),
-            (1, (10.6, 7.5, -5.0), "is hidden from mirror"),
+            (3, (-3.4, 8.0, -13.5), "LED 3 is in the object's room: move it outward to 23.3 mm"),
+            (4, (-11.4, -21.9, -3.0), "LED 4 collides with LED 3"),
         ],
     )
     def test_unusable_leds_are_refused(
@@ -154,8 +154,14 @@ class TestStage:
         assert message in refusal(leds_mm=places)
 
     def test_leds_in_one_plane_are_refused(self, refusal: Callable[..., str]) -> None:
-        places = [(x, y, -15.0) for x, y, _ in SIZED.stage.leds_mm]
+        places = [(x, y, -8.0) for x, y, _ in SIZED.stage.leds_mm]
         assert "nearly in one plane" in refusal(leds_mm=places)
+
+    def test_leds_on_one_side_of_the_object_are_refused(self, refusal: Callable[..., str]) -> None:
+        places = [(23.4, 0.0, -8.0), (18.8, 14.0, -6.0), (18.8, -14.0, -3.0), (10.4, 20.9, -8.0)]
+        message = refusal(leds_mm=places)
+        assert "of 4 LEDs past an object in its room" in message
+        assert "but needs 2" in message
 
     def test_a_floor_too_high_is_refused(self, refusal: Callable[..., str]) -> None:
         assert "make prototype.frame.floor_mm" in refusal(floor_mm=-60.0)
@@ -164,20 +170,39 @@ class TestStage:
         with pytest.raises(ValidationError, match="4 to 12 places"):
             StageSpec.model_validate({"leds_mm": SIZED.stage.leds_mm[:3]})
 
-    def test_no_led_is_hidden_in_a_march_along_its_rays(
+    def test_leds_are_seen_as_in_a_march_along_their_rays(
         self, small_prototype: PrototypeLayout, stage: StageLayout
     ) -> None:
-        crown = stage.components[1]
+        """Two or more from each camera; a pillar counts as high as its LED, so fewer are said."""
+        crown, room = stage.components[1], SIZED.stage.object_diameter_mm / 2
         pillars = [body for body in crown.added[3:] if isinstance(body, Cylinder)]
         assert len(pillars) == 4
-        cameras = small_prototype.array.ellipsoid.camera_distance * small_prototype.array.u
+        cameras = virtual_cameras(small_prototype)
+        seen = visible(SIZED.stage, stage.leds, cameras, stage.led, CAPTURE)
+        assert seen.sum(axis=1).min() >= 2
         for i, place in enumerate(stage.leds):
             way = unit(cameras - place)
-            points = place + np.arange(0.0, 60.0, 0.25)[:, None, None] * way
-            for j, pillar in enumerate(pillars):
+            points = place + np.arange(0.0, 80.0, 0.1)[:, None, None] * way
+            across, height = norm(points[..., :2]), points[..., 2]
+            inside = (across < room) & (height > SIZED.stage.top_mm)
+            object_hides = (inside & (height < np.sqrt(CAPTURE**2 - room**2))).any(axis=0)
+            others = [pillar for j, pillar in enumerate(pillars) if j != i]
+            pillar_hides = np.zeros(len(cameras), dtype=bool)
+            for pillar in others:
                 low = points[..., 2] < pillar.start[2] + pillar.length
                 near = norm(points[..., :2] - pillar.start[:2]) < pillar.radius
-                assert i == j or not (low & near).any()
+                pillar_hides |= (low & near).any(axis=0)
+            hidden = hidden_by_object(SIZED.stage, stage.leds, cameras, CAPTURE)[:, i]
+            assert (hidden != object_hides).mean() < 0.02  # rays that graze, between two steps
+            assert not (seen[:, i] & pillar_hides).any()
+
+    def test_nothing_is_in_the_objects_room(self, stage: StageLayout) -> None:
+        """Corners and axes of all bodies; the disc's face is the room's floor."""
+        room, floor = SIZED.stage.object_diameter_mm / 2, SIZED.stage.top_mm
+        for component in stage.components:
+            for body in component.added:
+                points = enclosing_triangles(body).reshape(-1, 3)
+                assert points[norm(points[:, :2]) < room - 1e-9][:, 2].max(initial=-99) <= floor
 
 
 class TestKeepOut:

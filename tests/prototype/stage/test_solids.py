@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.geometry.vectors import norm
+from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.printing.component_solids import placed_component
 from tbcad.prototype.printing.placing import PlacedSolid
@@ -20,6 +20,7 @@ from tests.helpers import as_trimesh
 
 CAPTURE = 30.0
 PRINTER = PrinterSpec()
+SIZED = load_spec(None).prototype.stage
 
 
 def placed(stage: StageLayout, printer: PrinterSpec) -> dict[str, PlacedSolid]:
@@ -82,23 +83,32 @@ class TestSolids:
     def test_wires_come_from_every_pocket_to_the_bores_end(
         self, stage: StageLayout, crown: trimesh.Trimesh
     ) -> None:
-        """A way of points in the open: down from the pocket, along the groove, down the bore."""
-        groove = stage.sizes.plate - 0.8
+        """A way of points in the open: inward from the pocket, down and along the arm's inner
+
+        faces, then along the groove and down the bore.
+        """
+        groove, face = stage.sizes.plate - 0.8, stage.sizes.plate + DISC_MM
         end = crown.bounds[0, 2] - 1
         steps = np.linspace(0, 1, 40)[:, None]
         for place in stage.leds:
             floor = place[2] - (stage.led["height_mm"] - stage.led["diameter_mm"] / 2)
+            out = np.array([*unit(place[:2]), 0.0])
+            inner = float(norm(place[:2])) - (stage.led["flange_mm"] / 2 + 0.1 + SIZED.led_wall_mm)
+            root = stage.sizes.rim - 0.4 * (stage.sizes.rim - stage.sizes.wire)
             corners = np.array(
                 [
-                    [*place[:2], floor + 0.5],
-                    [*place[:2], groove],
+                    [*place[:2], floor - 0.4],
+                    (inner + 0.4) * out + [0, 0, floor - 0.4],
+                    (inner + 0.4) * out + [0, 0, face - 0.3],
+                    (root - 0.3) * out + [0, 0, groove + 0.5],
                     [0, 0, groove],
                     [0, 0, end],
                 ]
             )
             way = np.vstack([a + steps * (b - a) for a, b in pairwise(corners)])
             assert not crown.contains(way).any()
-            assert crown.contains(way[39:41] - [0, 0, 1.5]).all()  # the plate below the groove
+            # Material behind the groove, all the way up the arm.
+            assert crown.contains(way[40:80] + 1.0 * out).all()
 
     def test_all_inside_the_sphere_is_inside_or_in_the_dark(
         self, solids: dict[str, PlacedSolid], keep_out: KeepOut

@@ -13,6 +13,7 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.prototype import (
     assembly,
     ball_views,
+    calibration,
     caps,
     drive_checks,
     homing_checks,
@@ -213,6 +214,8 @@ def _swing(
     _add(sink, swing, files, lambda: (measured(), parts, require(bought, reason)))
     _add(sink, assembly, file, lambda: (context, parts, drawn()))
     _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
+    static = of_roles(parts, "stage", "frame")
+    _add(sink, calibration, stl_names(static, "stage", "frame"), lambda: (context, static))
 
 
 def json_rows(

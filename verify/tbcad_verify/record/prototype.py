@@ -115,6 +115,24 @@ class Led(Strict):
     direction: Vector
 
 
+class Calibration(Strict):
+    """What one photograph of each LED tells of the spheres' centres, with known radii.
+
+    Attributes:
+        noise_px: standard deviation of a highlight's place.
+        leds_seen_min: LEDs that every mirror sees past an object.
+        centre_um_median: standard deviation in a centre's least certain direction.
+        centre_um_95: the same, of 95 % of the mirrors at most.
+        across_um_median: standard deviation across the line of sight.
+    """
+
+    noise_px: float = Field(gt=0, le=10)
+    leds_seen_min: int = Field(ge=0, le=MOST)
+    centre_um_median: float = Field(ge=0, le=LARGEST)
+    centre_um_95: float = Field(ge=0, le=LARGEST)
+    across_um_median: float = Field(ge=0, le=LARGEST)
+
+
 class Bought(Strict):
     """A purchased part, whose shape only the assembly has.
 
@@ -210,6 +228,7 @@ class Prototype(Strict):
         seats: one for each ball.
         parts: printed.
         leds: of the stage.
+        calibration: by the LEDs; None without any.
         controller: of motion and lights.
         home: angles of homing.
         bought: purchased parts other than balls.
@@ -238,6 +257,7 @@ class Prototype(Strict):
     seats: list[Seat] = Field(max_length=MOST)
     parts: list[Printed] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
+    calibration: Calibration | None = None
     controller: Controller
     home: Home
     bought: list[Bought] = Field(max_length=MOST)

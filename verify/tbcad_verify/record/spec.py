@@ -167,6 +167,7 @@ class StageSpec(Strict):
 
     top_mm: Annotated[float, Field(ge=-1000, le=1000), OR_AUTO]
     disc_mm: Annotated[float, Field(ge=4, le=500), OR_AUTO]
+    object_diameter_mm: Annotated[float, Field(ge=1, le=1000), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
     leds_mm: Annotated[list[Place], Field(max_length=12), OR_AUTO]
     led_ma: float = Field(ge=0.5, le=100)

@@ -71,6 +71,8 @@ REMEDIES = {
     "balls apart": _SPACE,
     "assembly": "prototype.glb differs from the parts: build again",
     "leds": _LEDS,
+    "object room": _LEDS,
+    "calibration": _RECORD,
     "plan": _PLAN,
     "print pose": _RECORD,
     "on the bed": _RECORD,
