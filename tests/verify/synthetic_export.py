@@ -32,7 +32,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
         "camera_diameter_mm": 60.0,
     },
     "base": {"pad_angle_deg": 50.0, "hold": "magnet", "hub_boss_mm": 20.0},
-    "stage": {"top_mm": -20.0, "disc_mm": 17.0, "leds_mm": []},
+    "stage": {"top_mm": -20.0, "disc_mm": 17.0, "object_diameter_mm": 40.0, "leds_mm": []},
     "frame": {"floor_mm": -230.0},
 }
 MANIFEST_SCHEMA = "tbcad-manifest/1"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
+from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tbcad.spec.prototype import StageSpec
@@ -12,7 +12,7 @@ from tbcad.types import Floats
 
 NOISE_PX = 0.05  # standard deviation of a highlight's place in a photograph, each way
 STEP_MM = 1e-3  # of the centres, for derivatives
-ITERATIONS = 60  # of the search for the point of reflection; each gains a digit or so
+ITERATIONS = 40  # of the search for the point of reflection; each gains a digit or so
 
 
 @dataclass(frozen=True)
@@ -72,12 +72,17 @@ def calibration_estimate(
 def reflection_points(centre: Floats, radius: Floats, place: Floats, pinhole: Floats) -> Floats:
     """Where spheres (m,) show a place (3,) to a pinhole (3,), mm, (m, 3).
 
-    There the normal bisects both directions: a fixed point, found from the normal to the pinhole.
+    There the normal bisects both directions. A normal that turns by one angle turns the bisector
+    back by about r (1/a + 1/b) / 2 of it, at distances a and b, so the new normal is their mean
+    with that weight.
     """
     normal = unit(pinhole - centre)
     for _ in range(ITERATIONS):
         point = centre + radius[:, None] * normal
-        normal = unit(unit(place - point) + unit(pinhole - point))
+        ways = place - point, pinhole - point
+        weight = radius / 2 * (1 / norm(ways[0]) + 1 / norm(ways[1]))
+        bisector = unit(unit(ways[0]) + unit(ways[1]))
+        normal = unit(bisector + weight[:, None] * normal)
     return np.asarray(centre + radius[:, None] * normal)
 
 

@@ -108,7 +108,7 @@ class TestSolids:
             way = np.vstack([a + steps * (b - a) for a, b in pairwise(corners)])
             assert not crown.contains(way).any()
             # Material behind the groove, all the way up the arm.
-            assert crown.contains(way[40:80] + 1.0 * out).all()
+            assert crown.contains(way[46:80] + 1.0 * out).all()
 
     def test_all_inside_the_sphere_is_inside_or_in_the_dark(
         self, solids: dict[str, PlacedSolid], keep_out: KeepOut

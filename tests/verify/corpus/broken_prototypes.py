@@ -133,6 +133,50 @@ PARTS: tuple[Mutation, ...] = (
         "4 pockets",
     ),
     fails(
+        "a wider room for the object",
+        RECORD,
+        record(
+            lambda r: None,
+            lambda d: d["spec"]["prototype"]["stage"].update(object_diameter_mm=44.0),
+        ),
+        "object room",
+        "stage_crown",
+    ),
+    fails(
+        "a lower floor of the object's room",
+        RECORD,
+        record(lambda r: None, lambda d: d["spec"]["prototype"]["stage"].update(top_mm=-21.0)),
+        "object room",
+        "stage_disc",
+    ),
+    fails(
+        "all LEDs on one side",
+        RECORD,
+        record(
+            lambda r: [one.update(position_mm=[23.0, k, -5.0]) for k, one in enumerate(r["leds"])]
+        ),
+        "leds seen",
+        "seen past an object",
+    ),
+    fails(
+        "a better calibration",
+        RECORD,
+        record(
+            lambda r: r["calibration"].update(
+                centre_um_median=r["calibration"]["centre_um_median"] / 2
+            )
+        ),
+        "calibration",
+        "centre_um_median",
+    ),
+    fails(
+        "no calibration",
+        RECORD,
+        record(lambda r: r.update(calibration=None)),
+        "calibration",
+        "missing",
+    ),
+    fails(
         "an LED that shines down",
         RECORD,
         record(lambda r: r["leds"][0].update(direction=[0.0, 0.0, -1.0])),

@@ -40,11 +40,12 @@ POLAR = (55.0, 80.0, 100.0, 122.0)
 AZIMUTH = (30.0, 0.0, -35.0, 40.0)
 CAP, EDGE = 3, 5.0  # the last of them, from 0; radius of its front's edge
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how parts lie on the bed
-# What is not made: no STEP assembly, no parts list, names and balls of its own, no weight.
+# What is not made: no STEP assembly, no parts list, names and balls of its own, no weight;
+# and its only LED stands where the object is.
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
     *("wiring", "homing", "controller settings", "klipper"),
-    *("drive", "ball labels", "radius rule"),
+    *("drive", "ball labels", "radius rule", "object room", "leds seen", "calibration"),
 }
 STEPS = 200 * 16 * 3 / 360
 DRIVE = {
