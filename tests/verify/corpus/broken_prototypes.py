@@ -14,12 +14,14 @@ from tests.verify.corpus.prototype_changes import (
     SETTINGS,
     STEP,
     WIRING,
+    better_calibration,
     compact,
     drive,
     empty_step,
     exchange,
     glb,
     led,
+    leds_on_one_side,
     moved_part,
     moved_point,
     no_led,
@@ -31,6 +33,7 @@ from tests.verify.corpus.prototype_changes import (
     row,
     scaled,
     shifted,
+    stage_key,
     step_text,
     table,
     text_of,
@@ -134,41 +137,20 @@ PARTS: tuple[Mutation, ...] = (
     ),
     fails(
         "a wider room for the object",
-        RECORD,
-        record(
-            lambda r: None,
-            lambda d: d["spec"]["prototype"]["stage"].update(object_diameter_mm=44.0),
-        ),
+        "design.json",
+        stage_key(object_diameter_mm=44.0),
         "object room",
         "stage_crown",
     ),
     fails(
         "a lower floor of the object's room",
-        RECORD,
-        record(lambda r: None, lambda d: d["spec"]["prototype"]["stage"].update(top_mm=-21.0)),
+        "design.json",
+        stage_key(top_mm=-21.0),
         "object room",
         "stage_disc",
     ),
-    fails(
-        "all LEDs on one side",
-        RECORD,
-        record(
-            lambda r: [one.update(position_mm=[23.0, k, -5.0]) for k, one in enumerate(r["leds"])]
-        ),
-        "leds seen",
-        "seen past an object",
-    ),
-    fails(
-        "a better calibration",
-        RECORD,
-        record(
-            lambda r: r["calibration"].update(
-                centre_um_median=r["calibration"]["centre_um_median"] / 2
-            )
-        ),
-        "calibration",
-        "centre_um_median",
-    ),
+    fails("LEDs on one side", RECORD, record(leds_on_one_side), "leds seen", "past an object"),
+    fails("a better calibration", RECORD, record(better_calibration), "calibration", "median"),
     fails(
         "no calibration",
         RECORD,

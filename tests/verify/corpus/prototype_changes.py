@@ -157,6 +157,20 @@ def led(by: float, *, spec: bool) -> Job:
     return record(how, design if spec else None)
 
 
+def stage_key(**values: object) -> Job:
+    """Other keys of the stage in the spec."""
+    return record(lambda _: None, lambda d: d["spec"]["prototype"]["stage"].update(values))
+
+
+def leds_on_one_side(value: Record) -> None:
+    for k, led in enumerate(value["leds"]):
+        led["position_mm"] = [-23.0, float(k), -5.0]
+
+
+def better_calibration(value: Record) -> None:
+    value["calibration"]["centre_um_median"] /= 2
+
+
 def no_led(value: Record) -> None:
     value["leds"].pop()
 
