@@ -36,7 +36,10 @@ WIRES = 2  # of an LED
 SWITCH_MODULE = "MOSFET"
 PATH = "groove below the disc, bore of crown and post, channel of the stage's foot, controller"
 BOARD = "board"  # connector: terminals of the controller
+CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamp, camera's release and switch
 RELEASE: Row = {
+    "wire": CABLE,
+    "length_mm": CABLE_MM,
     "signal": "release",
     "part": "RELAY",
     "output": "coolant",
@@ -46,6 +49,8 @@ RELEASE: Row = {
     "path": "relay, camera's release",
 }
 HOME: Row = {
+    "wire": CABLE,
+    "length_mm": CABLE_MM,
     "signal": "home",
     "part": "SWITCH-SS-5GL2",
     "connector": BOARD,
@@ -94,6 +99,8 @@ class Wiring:
             counts[self.resistor.part.name] += self.leds
             counts[self.connector.name] += 1
             counts[self.wire.name] += math.ceil(WIRES * sum(self.lengths) / METRE_MM)
+        cables = 2 + self.trigger  # of lamp, switch and release
+        counts[CABLE] += math.ceil(cables * CABLE_MM / METRE_MM)
         return dict(+counts)
 
 
@@ -128,7 +135,8 @@ def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiri
 def wiring_rows(wiring: Wiring) -> list[Row]:
     """One row for each line of the controller: lights by output, release, switch."""
     outputs = {light.name: light.output for light in wiring.lights}
-    rows = [_row({"signal": LAMP, "part": "lamp", "supply_v": wiring.supply_v}, outputs)]
+    lamp: Row = {"signal": LAMP, "part": "lamp", "supply_v": wiring.supply_v}
+    rows = [_row(lamp | {"wire": CABLE, "length_mm": CABLE_MM}, outputs)]
     for i in range(wiring.leds):
         name = f"led_{i + 1}"
         rows.append(_row({"signal": name, **_led_cells(wiring, i)}, outputs))

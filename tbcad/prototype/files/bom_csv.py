@@ -18,7 +18,7 @@ COLUMNS = (
     *("item", "quantity", "part", "what", "material", "mass_g", "total_mass_g"),
     *("print_volume_mm3", "from"),
 )
-ALWAYS = {"GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
+ALWAYS = {"GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
 PRINT_MATERIAL = "PETG"
 
 

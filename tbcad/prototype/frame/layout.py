@@ -50,6 +50,7 @@ BRACKET_INSERT = "INSERT-M3"
 HUB_SCREWS = 4
 COUPLING_FLANGE_MM = 3.0  # thickness; no list gives it
 M6_ENGAGEMENT_MM = 6.0
+PLATE_WASHER = "WASHER-5"
 TNUT, POST_SCREW = "TNUT-M5-6", "SET-M3x6"
 MAY_BE_LIT = ("camera",)  # light goes into it
 MAY_BE_SWEPT = ("rotary_stage",)  # the hub is bolted on it
@@ -226,6 +227,7 @@ def _screws(
     counts = Counter({TNUT: UPRIGHT_SCREWS, FOOT_INSERT: 1, choose_screw(parts, *FOOT_SCREW_MM): 1})
     counts[choose_screw(parts, 5.0, flange + ENGAGEMENT_MM)] += UPRIGHT_SCREWS
     counts[choose_screw(parts, 5.0, flange + 2 * ENGAGEMENT_MM)] += in_plate
+    counts[PLATE_WASHER] += in_plate  # some of their holes are slots
     if drive.motor.kind == "motors":
         counts[choose_screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)] += 4
     else:

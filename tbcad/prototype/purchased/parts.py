@@ -30,6 +30,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     "electronics": (),
     "extrusions": ("side_mm", "slot_mm", "length_mm"),
     "tnuts": ("thread_mm", "slot_mm"),
+    "washers": ("thread_mm", "outer_mm", "thickness_mm"),
     "collars": ("bore_mm", "outer_mm", "width_mm"),
     "plates": ("length_mm", "width_mm", "thickness_mm"),
 }

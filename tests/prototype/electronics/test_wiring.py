@@ -57,7 +57,7 @@ def test_a_stage_without_leds(spec: PrototypeSpec, stage: StageLayout) -> None:
     bare = replace(stage, leds=np.zeros((0, 3)))
     wiring = wiring_layout(spec, bare, PARTS)
     assert [row["signal"] for row in wiring_rows(wiring)] == ["lamp", "release", "home"]
-    assert wiring.purchased == {"MOSFET": 1}
+    assert wiring.purchased == {"MOSFET": 1, "CABLE-2x0.25": 5}
 
 
 def test_wires_that_do_not_fit(spec: PrototypeSpec, stage: StageLayout) -> None:

@@ -60,7 +60,9 @@ def test_rows(read: Rows) -> None:
 def test_totals_are_the_sum_of_the_parts(layout: PrototypeLayout, drive: Drive, read: Rows) -> None:
     balls = layout.mass_g + 1.27e-3 * cap_volume(layout.balls).sum()
     bought = sum(count * PARTS[name].mass_g for name, count in PURCHASED.items())
-    electronics = sum(PARTS[name].mass_g for name in ("GRBL-BOARD", "RELAY", "SUPPLY-24V"))
+    electronics = sum(
+        PARTS[name].mass_g for name in ("GLUE-EPOXY", "GRBL-BOARD", "RELAY", "SUPPLY-24V")
+    )
     expected = balls + bought + electronics + 1.27e-3 * (5e5 + 1e3)
     expected += sum(part.mass_g for part in drive.parts)
     assert sum(float(row["total_mass_g"]) for row in read) == pytest.approx(expected)

@@ -198,7 +198,7 @@ PURCHASES: tuple[Mutation, ...] = (
         for name in (
             *("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1"),
             *("MOSFET", "XH-8", "R-0.6W-2200", "WIRE-30", "ROD-4x40", "M2x12", "SWITCH-SS-5GL2"),
-            *("M3x20", "DOWEL-3x10"),
+            *("M3x20", "DOWEL-3x10", "WASHER-5", "CABLE-2x0.25", "GLUE-EPOXY"),
         )
     ),
     fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),

@@ -22,7 +22,7 @@ from tbcad_verify.report.checks import Check, CheckName, at_most, require, short
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
 from tbcad_verify.types import Floats
 
-ELECTRONICS = ("GRBL-BOARD", "RELAY", "SUPPLY-24V")
+ELECTRONICS = ("GLUE-EPOXY", "GRBL-BOARD", "RELAY", "SUPPLY-24V")
 MATERIAL = "PETG"
 HOLE_MM = 1e-6  # of radii and places
 TAPPED_M5_MM, CLEARANCE_M5_MM = 4.2, 5.5
@@ -138,6 +138,7 @@ def _fasteners(context: PrototypeContext, solids: Solids) -> dict[str, int]:
     found = {
         r"TNUT-M5-\d+": UPRIGHT_SCREWS,
         r"M5x\d+": UPRIGHT_SCREWS + in_plate,
+        r"WASHER-5": in_plate,
         r"INSERT-M4": 1,
         r"M4x\d+": 1,
         r"INSERT-M3": inserts + solids.in_head(base.insert_hole_mm / 2),

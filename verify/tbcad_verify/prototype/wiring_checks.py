@@ -28,6 +28,7 @@ E24 = frozenset(
 STEP = 1.11  # largest ratio of two neighbours of the series, rounded up
 DERATING = 2.0  # of a resistor's rating over what it dissipates
 WIRE_MM = {"WIRE-28": 0.9, "WIRE-30": 0.5}
+CABLE, LEAST_CABLE_MM = "CABLE-2x0.25", 1000.0  # of lamp, release and switch
 MAX_FILL = 0.5  # of the bore's section by the wires' squares
 LEAST_LEAD_MM = 500.0  # of wire beyond the stage
 WIRES = 2  # of an LED
@@ -68,6 +69,9 @@ def bought(context: PrototypeContext) -> dict[str, int]:
         found |= dict.fromkeys(map(str, set(lines.resistor[of_leds].tolist())), leds)
         metres = math.ceil(WIRES * float(lines.length_mm[of_leds].sum()) / 1000)
         found |= dict.fromkeys(map(str, set(lines.wire[of_leds].tolist())), metres)
+    if (lines := context.prototype.wiring) is not None:
+        cables = lines.length_mm[lines.wire == CABLE]
+        found[CABLE] = math.ceil(float(cables.sum()) / 1000)
     return {name: count for name, count in found.items() if count}
 
 
@@ -101,6 +105,9 @@ def _lines(context: PrototypeContext) -> Iterator[str]:
             yield f"{signal} is switched by {' '.join(told)}"
     for k in range(leds):
         yield from (f"led_{k + 1}: {what}" for what in _led(context, lines, k))
+    for k in {0, *range(1 + leds, len(expected))}:
+        if lines.wire[k] != CABLE or not lines.length_mm[k] >= LEAST_CABLE_MM:
+            yield f"{expected[k]} has {lines.length_mm[k]:g} mm of {lines.wire[k] or 'no cable'}"
     told = (str(lines.output[-1]), str(lines.part[-1]))
     if told != (f"limit {motion.axis}", "SWITCH-SS-5GL2"):
         yield f"the switch is {told[1]} on {told[0]}"
