@@ -1,7 +1,7 @@
 """What is wired to the controller, line by line, and the way of the LEDs' cable through the rig.
 
 A light's circuit: supply, resistor, LED, switch module to ground. An LED's two wires go from its
-pocket through the groove below the disc, down crown and post, and out of the foot's channel, to a
+pocket through the grooves of arm and crown, down the post, and out of the foot's channel, to a
 connector; resistors and switch modules are beside the controller.
 """
 
@@ -17,7 +17,7 @@ from tbcad.prototype.electronics.outputs import LAMP, Light, lights
 from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
 from tbcad.prototype.frame.brackets import choose_part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.prototype.stage.crown import GROOVE_MM
+from tbcad.prototype.stage import arms, crown
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec, StageSpec
@@ -34,7 +34,7 @@ CUT_MM = 50.0  # wires are cut to multiples of this
 METRE_MM = 1000.0
 WIRES = 2  # of an LED
 SWITCH_MODULE = "MOSFET"
-PATH = "groove below the disc, bore of crown and post, channel of the stage's foot, controller"
+PATH = "grooves of arm and crown, bore of crown and post, channel of the stage's foot, controller"
 BOARD = "board"  # connector: terminals of the controller
 CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamp, camera's release and switch
 RELEASE: Row = {
@@ -180,7 +180,8 @@ def _led_cells(wiring: Wiring, index: int) -> Row:
 def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Parts) -> PurchasedPart:
     """The thickest wire of which an LED's two go through a groove, and all through the bore."""
     wires, bore = WIRES * len(stage.leds), 2 * stage.sizes.wire
-    thickest = min(GROOVE_MM, section.wire_mm / WIRES, bore * math.sqrt(MAX_FILL / wires))
+    groove = min(arms.GROOVE_MM, crown.GROOVE_MM, section.wire_mm / WIRES)
+    thickest = min(groove, bore * math.sqrt(MAX_FILL / wires))
     fitting = [
         wire
         for wire in of_kind(parts, "wires")
@@ -199,5 +200,5 @@ def _lengths(spec: PrototypeSpec, stage: StageLayout) -> tuple[float, ...]:
     leds = stage.leds
     down = leds[:, 2] - spec.frame.floor_mm
     inward: list[float] = norm(leds[:, :2]).tolist() if len(leds) else []
-    total = np.array(inward) + down + CHANNEL_MM + LEAD_MM + GROOVE_MM
+    total = np.array(inward) + down + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
     return tuple((CUT_MM * np.ceil(total / CUT_MM)).tolist())

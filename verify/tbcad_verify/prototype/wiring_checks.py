@@ -30,6 +30,7 @@ DERATING = 2.0  # of a resistor's rating over what it dissipates
 WIRE_MM = {"WIRE-28": 0.9, "WIRE-30": 0.5}
 CABLE, LEAST_CABLE_MM = "CABLE-2x0.25", 1000.0  # of lamp, release and switch
 MAX_FILL = 0.5  # of the bore's section by the wires' squares
+GROOVE_MM = 0.8  # depth of the arms' grooves
 LEAST_LEAD_MM = 500.0  # of wire beyond the stage
 WIRES = 2  # of an LED
 SHARE = 1e-9
@@ -183,5 +184,5 @@ def _bore(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterato
         room = MAX_FILL * (2 * min(bores, default=0.0)) ** 2
         if WIRES * leds * thick**2 > room * (1 + SHARE):
             yield f"{WIRES * leds} wires {name} do not go through the crown's bore"
-        if WIRES * thick > context.export.spec.prototype.stage.wire_mm:
+        if thick > GROOVE_MM or WIRES * thick > context.export.spec.prototype.stage.wire_mm:
             yield f"two wires {name} do not go through a groove"
