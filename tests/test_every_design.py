@@ -57,6 +57,7 @@ def optics(draw: st.DrawFn) -> list[str]:
 @example(options=of_optics([62.3, 0, -50.2], 36.1, 22.2))  # the same, at sharper corners
 @example(options=of_optics([70.0, 0, -38.8], 33.8, 20))  # light fans out by a right angle
 @example(options=of_optics([163.6, 0, -127], 67.9, 24.6))  # a cell whose foot side bends inward
+@example(options=of_optics([216.3, -19.4, -109.2], 64.6, 26.2))  # not symmetrical
 @settings(
     max_examples=60,
     deadline=None,

@@ -41,13 +41,15 @@ def write_shell_solids(
     Raises:
         InvalidSolidError: when the kernel finds a solid invalid.
     """
-    known = None
+    # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
+    # design is symmetrical about y = 0.
+    known, symmetric = None, design.spec.optics.camera_mm[1] == 0
     for array in design.arrays:
         files = shell_record(array)
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
-        known = known.mirrored() if known else properties(solid.shape)
+        known = known.mirrored() if known and symmetric else properties(solid.shape)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
 
 
