@@ -28,6 +28,7 @@ def test_all_files_are_there(exported: Path) -> None:
     kinds = ("step", "stl", "3mf")
     shells = [f"shell_{camera}.{kind}" for camera in "ab" for kind in kinds]
     assert {p.name for p in exported.iterdir()} == {
+        "camera.json",
         "design.json",
         "mirrors.csv",
         "manifest.json",
