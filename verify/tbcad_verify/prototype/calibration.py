@@ -123,8 +123,9 @@ def _hidden_by_room(context: PrototypeContext) -> Bools:
 
 
 def _hidden_by_parts(context: PrototypeContext, fixed: list[MeasuredPart]) -> Bools:
-    """(l, m) whether a facet of a part is on the way."""
+    """(l, m) whether a facet of a part is on the way to the mirror; beyond it is no light."""
     mesh, _ = joined_meshes(fixed)
+    apex = context.export.mirrors.take(context.mirror_rows).columns("px", 3)
     scene, (leds, sight) = build_scene(mesh), _sights(context)
     hidden = np.zeros((len(leds), sight.shape[2]), dtype=np.bool_)
     for k, place in enumerate(leds):
@@ -132,7 +133,7 @@ def _hidden_by_parts(context: PrototypeContext, fixed: list[MeasuredPart]) -> Bo
         facet = first_hits(scene, start, d)
         hit = np.flatnonzero(facet >= 0)
         reach = distances_to_planes(scene, facet[hit], start[:, hit], d[:, hit])
-        hidden[k, hit] = reach < norm(sight[k][:, hit])
+        hidden[k, hit] = reach < norm(apex[:, hit] - place[:, None])
     return hidden
 
 
