@@ -198,9 +198,10 @@ PURCHASES: tuple[Mutation, ...] = (
         for name in (
             *("NEMA17-40", "M5x16", "INSERT-M3", "MAGNET-15x3", "LED-3", "RELAY", "cap 1"),
             *("MOSFET", "XH-8", "R-0.6W-2200", "WIRE-30", "ROD-4x40", "M2x12", "SWITCH-SS-5GL2"),
-            *("M3x20", "DOWEL-3x10", "WASHER-5", "CABLE-2x0.25", "GLUE-EPOXY"),
+            *("M3x20", "WASHER-5", "CABLE-2x0.25", "GLUE-EPOXY"),
         )
     ),
+    fails("no key of the zero disc", BILL, unlisted("DOWEL-3x10"), LIST, "DOWEL"),
     fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
     fails("another volume", BILL, row(BILL, 0, print_volume_mm3=1.0), LIST, "its volume"),
     fails("another mass", BILL, row(BILL, 6, mass_g=1.0), LIST, "its mass"),
