@@ -144,11 +144,12 @@ def build(
     started = monotonic()
     progress("mirrors: radii and cells")
     mirrors = design(chosen, detail=detail)
-    with replacing(out, force) as folder, background_process() as submit:
-        made = submit(_as_made, mirrors) if verify and SHELL in asked else None
-        export = write_export(
-            mirrors, folder, asked, progress, submit, optional_prototype=parts is None
-        )
+    with replacing(out, force) as folder:
+        with background_process() as submit:
+            simulated = submit(_as_made, mirrors) if verify and SHELL in asked else None
+            export = write_export(
+                mirrors, folder, asked, progress, submit, optional_prototype=parts is None
+            )
         finished = Design(export.spec, mirrors.arrays)
         report = None
         if verify:
@@ -157,7 +158,7 @@ def build(
                 _verify(folder, progress=progress),
                 folder=out,
                 note=export.note,
-                as_made=made.result() if made else None,
+                as_made=simulated.result() if simulated else None,
                 seconds=monotonic() - started,
             )
     return Build(out, finished, export.parts, export.note, report)

@@ -18,46 +18,46 @@ FIXED_SHARE = 0.2
 
 Seconds = dict[str, float]
 
-MIRRORS: Seconds = {"mirrors: radii and cells": 3.0}
+MIRRORS: Seconds = {"mirrors: radii and cells": 1.0}
 SHELLS: Seconds = {
-    "shell_a: solid": 3.0,
-    "shell_a: files": 6.0,
-    "shell_b: solid": 3.0,
-    "shell_b: files": 3.0,
+    "shell_a: solid": 2.0,
+    "shell_a: files": 5.0,
+    "shell_b: solid": 2.0,
+    "shell_b: files": 2.0,
 }
 PROTOTYPE_PARTS: Seconds = {
-    "prototype: balls, their places, stops": 4.0,
+    "prototype: balls, their places, stops": 3.0,
     "prototype: base": 11.0,
     "prototype: stage and frame": 2.0,
     "prototype: caps and coupon": 2.0,
-    "prototype: files": 1.0,
-    "prototype: assembly": 2.0,
+    "prototype: files": 0.5,
+    "prototype: assembly": 3.0,
 }
-WAIT_FOR_SHELLS: Seconds = {"shells": 2.0}
-MANIFEST: Seconds = {"manifest": 2.0}
+WAIT_FOR_SHELLS: Seconds = {"shells": 1.0}
+MANIFEST: Seconds = {"manifest": 1.0}
 VERIFY: Seconds = {
     "verification: reading": 0.5,
-    "verification: 3MF": 3.0,
+    "verification: 3MF": 2.0,
     "verification: files and record": 0.3,
-    "verification: meshes and mirrors": 3.0,
-    "verification: printability": 3.0,
+    "verification: meshes and mirrors": 2.5,
+    "verification: printability": 2.5,
 }
 VERIFY_SHELLS: Seconds = {
-    "verification: optical setup": 2.0,
-    "verification: coverage": 1.0,
-    "verification: every pixel": 2.0,
+    "verification: optical setup": 1.5,
+    "verification: coverage": 0.7,
+    "verification: every pixel": 2.5,
 }
 VERIFY_PROTOTYPE: Seconds = {
     "verification: prototype's record": 0.1,
     "verification: printed parts": 0.3,
     "verification: parts and purchases": 0.7,
-    "verification: seats": 0.5,
-    "verification: light paths of the balls": 2.0,
-    "verification: swing": 2.0,
-    "verification: printability of the prototype": 1.0,
+    "verification: seats": 0.4,
+    "verification: light paths of the balls": 1.5,
+    "verification: swing": 1.0,
+    "verification: printability of the prototype": 0.7,
 }
-VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 2.0}
-VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 1.0}
+VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 0.3}
+VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 0.2}
 AS_MADE: Seconds = {"simulated builds by each process": 3.0}
 MARGIN_SECONDS = 45.0  # a search for the margin of a process
 

@@ -121,7 +121,9 @@ class BallChoices:
 
     spec: Spec
     array: MirrorArray
-    _chosen: dict[int, tuple[MirrorGroups, Balls, BallFit]] = field(default_factory=dict)
+    _chosen: dict[int, tuple[MirrorGroups, Balls, BallFit]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def groups(self, k: int) -> MirrorGroups:
         """The mirrors in k groups."""
