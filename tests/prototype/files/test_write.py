@@ -62,7 +62,7 @@ def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
     tables |= {"rotation_plan_klipper.gcode"}
     whole = {"prototype.json", "prototype.step", "prototype.glb"}
-    records = {"design.json", "mirrors.csv", "manifest.json"}
+    records = {"design.json", "mirrors.csv", "manifest.json", "camera.json"}
     assert {p.name for p in folder.iterdir()} == own | tables | whole | records
     assert json.loads((folder / "design.json").read_text())["parts"] == []
 
