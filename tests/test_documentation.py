@@ -15,6 +15,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 import tbcad.cli  # noqa: F401 - adds all commands
+from tbcad.camera.catalogue import CAMERA_COLUMNS, LENS_COLUMNS
 from tbcad.cli import run
 from tests.cli.commands import commands
 
@@ -198,6 +199,8 @@ def test_commands_work_one_after_the_other(
     shutil.copytree(ROOT / "designs", tmp_path / "designs")
     for name in ("my.ply", "bunny.ply", "dragon.ply"):
         trimesh.creation.icosphere(2, 20.0).export(tmp_path / name)
+    for name, columns in (("my-cameras.csv", CAMERA_COLUMNS), ("my-lenses.csv", LENS_COLUMNS)):
+        (tmp_path / name).write_text(",".join(columns) + "\n")
     (tmp_path / "captures").mkdir()
     for shown in EVERY:
         if shown.document != document or not shown.whole or {*NOT_RUN} & {*shown.words}:
