@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.camera.candidates import Candidate, candidates
-from tbcad.camera.catalogue import load_cameras, load_lenses
+from tbcad.camera.catalogue import CameraBody, RectilinearLens, load_cameras, load_lenses
 from tbcad.camera.requirements import CameraRequirements, camera_requirements, exposure_seconds
 from tbcad.mirrors.array import MirrorArray
 
@@ -27,20 +27,17 @@ def write_camera_sheet(folder: Path, array: MirrorArray, radius: float) -> None:
         radius: of the capture sphere, mm.
     """
     needed = camera_requirements(array, radius)
-    text = json.dumps(sheet_record(needed, best_lenses(needed)), indent=1) + "\n"
+    best = best_lenses(needed, load_cameras(), load_lenses())
+    text = json.dumps(sheet_record(needed, best), indent=1) + "\n"
     (folder / CAMERA_FILE).write_text(text, encoding="utf-8")
 
 
 def best_lenses(
-    needed: CameraRequirements, cameras: Path | None = None, lenses: Path | None = None
+    needed: CameraRequirements, cameras: Sequence[CameraBody], lenses: Sequence[RectilinearLens]
 ) -> list[Candidate]:
-    """The best lens of each camera of the lists, the best camera first; see `candidates`.
-
-    Raises:
-        InputError: a user's list cannot be read.
-    """
+    """The best lens of each camera, the best camera first; see `candidates`."""
     best: dict[str, Candidate] = {}
-    for one in candidates(needed, load_cameras(cameras), load_lenses(lenses)):
+    for one in candidates(needed, cameras, lenses):
         best.setdefault(one.camera.name, one)
     return list(best.values())
 

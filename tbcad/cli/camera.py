@@ -45,16 +45,20 @@ def camera(
 
     Exit code 0: some camera of the lists does. 1: none does. 2: bad input.
     """
-    from tbcad.api import design as mirror_design
-    from tbcad.camera.requirements import camera_requirements
-    from tbcad.camera.sheet import best_lenses, sheet_lines, sheet_record
+    from tbcad.camera.catalogue import load_cameras, load_lenses
     from tbcad.spec.load import load_spec
 
     options = list(settings or []) + ([f"optics.n={n}"] if n is not None else [])
     spec = load_spec(design, options)
+    listed = load_cameras(cameras), load_lenses(lenses)
+
+    from tbcad.api import design as mirror_design
+    from tbcad.camera.requirements import camera_requirements
+    from tbcad.camera.sheet import best_lenses, sheet_lines, sheet_record
+
     array = mirror_design(spec).arrays[0]
     needed = camera_requirements(array, spec.optics.capture_diameter_mm / 2)
-    best = best_lenses(needed, cameras, lenses)
+    best = best_lenses(needed, *listed)
     record = sheet_record(needed, best)
     typer.echo(json_text.dumps(record, indent=1) if json else "\n".join(sheet_lines(needed, best)))
     return 0 if any(not one.faults for one in best) else 1

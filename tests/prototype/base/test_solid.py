@@ -35,7 +35,7 @@ from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.cap_solids import cap_parts, cap_pocket, flat_depth
 from tbcad.prototype.base.coupon import _wall_section as seat_section
 from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
-from tbcad.prototype.base.hub import hub_layout
+from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
 from tbcad.prototype.base.split import downward_directions, split_base
@@ -293,7 +293,8 @@ class TestHub:
         solid = cut(fused(hub_solids.hub_bodies(hub)), hub_solids.hub_holes(hub, keys))
         thick = hub.front - hub.face
         hole = 3.3**2 * (thick - 6.5) + 5.5**2 * 6.5
-        expected = np.pi * (hub.disc**2 * thick - 4.0**2 * thick - 4 * hole)
+        key = (KEY_HOLE_MM / 2) ** 2 * KEY_DEPTH_MM
+        expected = np.pi * (hub.disc**2 * thick - 4.0**2 * thick - 4 * hole - key)
         assert volume(solid) == pytest.approx(expected)
 
 

@@ -127,7 +127,7 @@ def closed_cap(radius: float, warp: float) -> Mesh:
 def test_concave_edges_inside_a_sphere_do_not_split_it(radius: float) -> None:
     mesh = closed_cap(radius, 0.12)
     edges = measure_edges(mesh)
-    inside = edges.array[creases(mesh, edges) & (edges.angle < 0)]
+    inside = edges.half[creases(mesh, edges) & (edges.angle < 0)]
     assert inside.size > 20  # or the test tests nothing
     found = recover(mesh, PINHOLE, 30)
     assert found.mirror.sum() == 1
@@ -236,7 +236,7 @@ def test_a_mirror_ends_where_the_foot_goes_on_smoothly(
     assert found.mirror.sum() == len(designed.arrays[0])
     foot = (mesh.points[mesh.faces][:, :, 2] == np.float32(designed.arrays[0].foot)).all(axis=1)
     mirror = found.mirror[found.segments.label]
-    one, two = edges.array // 3, mesh.twin[edges.array] // 3
+    one, two = edges.half // 3, mesh.twin[edges.half] // 3
     border = (foot[one] & mirror[two]) | (mirror[one] & foot[two])
     assert 0.1 < edges.angle[border].min() < 0.2
     assert creases(mesh, edges)[border].all()
