@@ -12,7 +12,7 @@ from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.record.prototype import Printed
+from tbcad_verify.record.prototype_sections import Printed
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

@@ -17,7 +17,8 @@ from pydantic import Field, field_validator, model_validator
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.prototype import RECORD, Printed, Prototype, read_prototype
+from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
+from tbcad_verify.record.prototype_sections import Printed
 from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, Spec
 from tbcad_verify.record.validation import (
     Name,
