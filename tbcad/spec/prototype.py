@@ -90,6 +90,8 @@ class BaseSpec(Section):
     """Gap between a ball and its cup everywhere but at the pads."""
     pad_mm: float = Field(3.0, ge=0.5, le=20)
     """Diameter of the three pads that carry a ball; smaller for balls of less than 4.5 pads."""
+    pad_offset_mm: float = Field(0.0, ge=-0.05, le=0.3)
+    """By how much pads are printed off their places, away from the balls: the coupon's result."""
     pad_angle_deg: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=70)
     """Angle between a pad's normal and the axis of its seat; auto: the first of 50, 40 and 30 whose
     seats stay out of the light."""

@@ -47,6 +47,7 @@ class Seats:
         pocket: radius of its pocket, or of the well, mm, (k,).
         bottom: length at which the pocket ends, mm, (k,).
         insertion: from the centre to where the ball is free when it is taken out, mm, (k, 3).
+        pad_offset: by how much pads are printed off their places, away from the balls, mm.
     """
 
     centre: Floats
@@ -63,6 +64,7 @@ class Seats:
     pocket: Floats
     bottom: Floats
     insertion: Floats
+    pad_offset: float
 
     def __len__(self) -> int:
         """Number of seats."""
@@ -92,8 +94,9 @@ class Seats:
 
     @property
     def contacts(self) -> Floats:
-        """Points where the pads touch the ball, the middles of the pads, mm, (k, 3, 3)."""
-        return self.centre[:, None] - self.radius[:, None, None] * self.pad_normals
+        """The middles of the pads as they are printed, mm, (k, 3, 3)."""
+        distance = self.radius[:, None, None] + self.pad_offset
+        return self.centre[:, None] - distance * self.pad_normals
 
 
 def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
@@ -126,6 +129,7 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
         pocket=pocket,
         bottom=bottom,
         insertion=(prototype.balls.body_depth + cup)[:, None] * prototype.normals(),
+        pad_offset=spec.pad_offset_mm,
     )
     return _with_clear_pads(_with_clear_paths(seats))
 
@@ -147,9 +151,10 @@ def _check_cups(
             f"prototype.base.pad_mm less than {spec.pad_mm:g}"
         )
     # The pads stand out of the cup up to their edges.
-    sunk = radius**2 + pad**2 >= (radius + MIN_PAD_RELIEF * spec.clearance_mm) ** 2
+    edge = np.hypot(radius + spec.pad_offset_mm, pad) - radius
+    sunk = edge >= MIN_PAD_RELIEF * spec.clearance_mm
     if sunk.any():
-        minimum = float((np.sqrt(radius**2 + pad**2) - radius).max()) / MIN_PAD_RELIEF
+        minimum = float(edge.max()) / MIN_PAD_RELIEF
         raise SpecError(
             f"the pads of ball {_first_ball(sunk)} do not stand out of its cup: make "
             f"prototype.base.clearance_mm more than {minimum:.2f} or prototype.base.pad_mm smaller"

@@ -87,7 +87,7 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: cups with their pockets, paths of the balls, holes."""
-    cups = [seat_solids.seat_hollow(seats, k) for k in range(len(seats))]
+    cups = [seat_solids.seat_hollow(seats, k, seats.pad_offset) for k in range(len(seats))]
     paths = [seat_solids.insertion_path(seats, k) for k in range(len(seats))]
     holes = hub_solids.hub_holes(base.hub, base.spec)
     return [*_at_seats(seats, cups), *_at_seats(seats, paths), *holes]

@@ -433,6 +433,16 @@ class TestCoupon:
             area = solid.area_faces[in_plane(solid, plane, normal)].sum()
             assert area == pytest.approx(np.pi * pad**2, rel=0.02)
 
+    def test_the_carriers_pads_are_moved_by_the_spec(self, prototype: PrototypeLayout) -> None:
+        """A tool with the pads' posts left out reaches farther by the offset, and no less."""
+        near, far = (base_layout(BaseSpec(pad_offset_mm=by), prototype) for by in (0.0, 0.2))
+        seats, normal = near.seats, near.seats.pad_normals[0, 0]
+        plane = seats.centre[0] - (seats.radius[0] + 0.2) * normal
+        for base, found in ((near, 0.0), (far, np.pi * seats.pad[0] ** 2)):
+            tool = as_trimesh(removed_solids(base, base.seats)[0])
+            area = tool.area_faces[in_plane(tool, plane, -normal)].sum()
+            assert area == pytest.approx(found, rel=0.02, abs=1e-6)
+
     def test_a_row_wider_than_the_bed_becomes_several(self, prototype: PrototypeLayout) -> None:
         """Every offset of a size has one seat, and no row is wider than the bed."""
         offsets = tuple(0.1 * k for k in range(9))

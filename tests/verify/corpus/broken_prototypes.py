@@ -149,6 +149,16 @@ PARTS: tuple[Mutation, ...] = (
         "object room",
         "stage_disc",
     ),
+    fails(
+        "pads that are moved otherwise",
+        "design.json",
+        record(
+            lambda _: None,
+            lambda d: d["spec"]["prototype"]["base"].update(pad_offset_mm=0.1),
+        ),
+        "ball centres",
+        "um",
+    ),
     fails("LEDs on one side", RECORD, record(leds_on_one_side), "leds seen", "past an object"),
     fails("a better calibration", RECORD, record(better_calibration), "calibration", "median"),
     fails(

@@ -70,7 +70,10 @@ class Pad:
 
 
 def measure_seats(context: PrototypeContext, base: Mesh) -> list[MeasuredSeat]:
-    """Recover the balls' centres from the mesh of all base parts, in the frame of the shell."""
+    """Recover the balls' centres from the mesh of all base parts, in the frame of the shell.
+
+    The spec moves pads off the balls by what a printer adds to them: as printed they touch.
+    """
     return [_seat(context, base, k) for k in range(len(context.prototype.balls))]
 
 
@@ -116,7 +119,8 @@ def _seat(context: PrototypeContext, base: Mesh, k: int) -> MeasuredSeat:
             _pad(base, near, contact, normal, pad_radius)
             for contact, normal in zip(seat.contacts, seat.normals, strict=True)
         ]
-        centre = touching_sphere([p.normal for p in pads], [p.offset for p in pads], radius)
+        off = radius + context.export.spec.prototype.base.pad_offset_mm
+        centre = touching_sphere([p.normal for p in pads], [p.offset for p in pads], off)
     except Unknown as error:
         return MeasuredSeat(np.full(3, np.nan), -np.inf, -np.inf, str(error))
     margin = min(_margin(base, pad, centre) - INSIDE * _radius(base, pad) for pad in pads)

@@ -113,6 +113,7 @@ class BaseSpec(Strict):
     light_clearance_mm: float = Field(ge=0, le=20)
     clearance_mm: float = Field(ge=0.1, le=5)
     pad_mm: float = Field(ge=0.5, le=20)
+    pad_offset_mm: float = Field(ge=-0.05, le=0.3)
     pad_angle_deg: Annotated[float, Field(ge=20, le=70), OR_AUTO]
     cup_wall_mm: float = Field(ge=0.8, le=20)
     floor_mm: float = Field(ge=0.6, le=20)
