@@ -25,7 +25,7 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.refocus import Focus, lens_pinholes, refocus
+from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Floats
@@ -33,7 +33,7 @@ from tbcad.types import Floats
 Cameras = Sequence[Reflector]
 
 PLACE = np.radians(30), np.radians(30), 640.0
-LENS = Focus(aperture_mm=300, plane_mm=5)
+LENS = ThinLens(aperture_mm=300, plane_mm=5)
 PER_CENT = 100
 BOTH = "- seconds of both cores together"
 

@@ -191,7 +191,7 @@ def refocus(
     from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
     from tbcad.simulate.scene.ground_truth import lens_picture
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.simulate.views.refocus import Focus, refocus_sweep
+    from tbcad.simulate.views.refocus import ThinLens, refocus_sweep
     from tbcad.simulate.views.refocus import refocus as refocused
 
     _check_pictures(capture_folder, out, force)
@@ -200,7 +200,7 @@ def refocus(
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
-        lens = Focus(aperture, focus)
+        lens = ThinLens(aperture, focus)
         lens.check(at, source.capture_mm)
         tiles, scene = MirrorTiles(source), _scene(capture_folder)
         screen.stage("69 pinholes")

@@ -8,7 +8,7 @@ from typing import Any
 from tbcad import schedule
 from tbcad.errors import InputError
 from tbcad.simulate.prototype.plan import read_plan
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector
@@ -130,7 +130,7 @@ class Analysis:
 
 
 def analyse(
-    export: Exported,
+    export: ExportedDesign,
     process: Process,
     scene_object: SceneObject,
     options: ToleranceOptions,
@@ -182,7 +182,7 @@ def analyse(
     )  # fmt: skip
 
 
-def _refuse_planar(export: Exported) -> None:
+def _refuse_planar(export: ExportedDesign) -> None:
     if not (export.reflectors[0].mirrors.curvature > 0).all():
         raise InputError(
             f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
@@ -194,7 +194,7 @@ def _refuse_planar(export: Exported) -> None:
 class _Simulator:
     """Simulates builds of one export, all with the same seed and scheduler."""
 
-    export: Exported
+    export: ExportedDesign
     options: ToleranceOptions
     edge_models: EdgeModels
     detail: Progress

@@ -8,7 +8,7 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.scene.exported import Exported, read_export
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
@@ -20,7 +20,7 @@ CAPTURE_MM = 60.0
 
 
 @pytest.fixture(scope="session")
-def exported(record: Path) -> Exported:
+def exported(record: Path) -> ExportedDesign:
     return read_export(record)
 
 

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Literal
 
-from tbcad.simulate.capture.photograph import Band, Samples, photograph
+from tbcad.simulate.capture.photograph import RowBand, Samples, photograph
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
@@ -16,11 +16,11 @@ from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.types import Progress
 
 Geometry = Literal["spheres", "mesh", "prototype"]
-CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[Band]]]]
+CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[RowBand]]]]
 
 
 def camera_photographs(
-    export: Exported, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
+    export: ExportedDesign, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
 ) -> CameraPhotographs:
     """Both cameras, each with what takes its photograph.
 
@@ -43,7 +43,7 @@ def camera_photographs(
         ]
     shells = read_shell_meshes(export) if geometry == "mesh" else None
 
-    def photograph_of(reflector: Reflector) -> Iterable[Band]:
+    def photograph_of(reflector: Reflector) -> Iterable[RowBand]:
         trace = mesh_tracer(shells, reflector) if shells else exact_tracer(reflector)
         return photograph(reflector.camera, trace, scene, samples, progress)
 

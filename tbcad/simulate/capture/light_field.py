@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.capture.photograph import Band
+from tbcad.simulate.capture.photograph import RowBand
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
@@ -130,7 +130,7 @@ class LightField:
         return f"<LightField of {self.facts.get('object', 'an object')}: {sizes}>"
 
 
-def band_arrays(band: Band) -> dict[str, NDArray[Any]]:
+def band_arrays(band: RowBand) -> dict[str, NDArray[Any]]:
     """The arrays of a band as the file has them."""
     rays = band.rays
     raw = (band.colour, rays.mirror, rays.origin, rays.direction)
@@ -141,7 +141,7 @@ def band_arrays(band: Band) -> dict[str, NDArray[Any]]:
 
 
 def light_field_in_memory(
-    photographs: Iterable[tuple[Reflector, Iterable[Band]]],
+    photographs: Iterable[tuple[Reflector, Iterable[RowBand]]],
     capture_mm: float,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> LightField:

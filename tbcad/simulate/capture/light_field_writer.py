@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.simulate.capture.light_field import MIRROR_ARRAYS, PIXEL_ARRAYS, SCHEMA, band_arrays
-from tbcad.simulate.capture.photograph import BAND_ROWS, Band
+from tbcad.simulate.capture.photograph import BAND_ROWS, RowBand
 from tbcad.simulate.parallel import in_threads
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Bytes
@@ -34,7 +34,7 @@ def create_light_field(
 
 
 def write_camera(
-    store: h5py.File, reflector: Reflector, bands: Iterable[Band]
+    store: h5py.File, reflector: Reflector, bands: Iterable[RowBand]
 ) -> tuple[Bytes, dict[str, int]]:
     """Write one camera's bands as they come, each a row of chunks.
 
@@ -73,7 +73,7 @@ def write_camera(
     return picture, counts
 
 
-def _write_chunks(planes: Mapping[str, h5py.Dataset], band: Band) -> None:
+def _write_chunks(planes: Mapping[str, h5py.Dataset], band: RowBand) -> None:
     """Write a band, a row of chunks, as HDF5 would, but compress in several threads."""
     arrays = band_arrays(band)
     width, step = band.colour.shape[1], planes["colour"].chunks[1]

@@ -23,7 +23,7 @@ CENTRE: Shift = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Band:
+class RowBand:
     """Rows of a photograph.
 
     Attributes:
@@ -43,7 +43,7 @@ def photograph(
     scene: Scene,
     samples: Samples = 1,
     progress: Progress = lambda _: None,
-) -> Iterator[Band]:
+) -> Iterator[RowBand]:
     """The bands of a camera's picture from top to bottom; few are in memory at a time.
 
     Args:
@@ -70,13 +70,13 @@ def to_bytes(colours: NDArray[np.floating]) -> Bytes:
     return np.asarray(np.rint(colours), dtype=np.uint8)
 
 
-def _band(view: Camera, trace: Tracer, scene: Scene, samples: Samples, rows: range) -> Band:
+def _band(view: Camera, trace: Tracer, scene: Scene, samples: Samples, rows: range) -> RowBand:
     rays, colour = _through(view, trace, scene, rows, CENTRE)
     shifts = sample_shifts(samples)
     if shifts != [CENTRE]:
         colours = (_through(view, trace, scene, rows, shift)[1] for shift in shifts)
         colour = sum(colours, np.zeros_like(colour)) / np.float32(len(shifts))
-    return Band(rows, rays, to_bytes(colour))
+    return RowBand(rows, rays, to_bytes(colour))
 
 
 def sample_shifts(samples: Samples) -> list[Shift]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tbcad.geometry.vectors import unit
 from tbcad.simulate.capture.photograph import (
     CENTRE,
-    Band,
+    RowBand,
     Samples,
     Tracer,
     row_bands,
@@ -79,7 +79,7 @@ def merge_run(
     resample: Resample = "photograph",
     samples: Samples = 1,
     progress: Progress = lambda _: None,
-) -> Iterator[Band]:
+) -> Iterator[RowBand]:
     """Bands of the merged picture from top to bottom, as those of tbcad.simulate.capture.
 
     Args:
@@ -165,7 +165,7 @@ def _pixels_of(mirror: NDArray[np.uint16], box: Ints, number: int) -> Ints:
     return np.column_stack([column + x0, row + y0])
 
 
-def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> Band:
+def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> RowBand:
     mirror, hits, front, _ = _merged_pixels(plan, rows, CENTRE)
     shape = (len(rows), plan.run.reflector.camera.width_px)
     if picture is None:
@@ -179,7 +179,7 @@ def _band(plan: MergePlan, picture: Bytes | None, rows: range) -> Band:
         hits.direction.reshape(*shape, 3),
     )
     removed = (hits.ball == 0) | front
-    return Band(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
+    return RowBand(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
 
 
 def _traced(plan: MergePlan, rows: range) -> Bytes:

@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 from tbcad.formats.checked_files import REBUILD, Finite, Record, Vector, read_csv, read_json
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.scene.exported import ROUNDING, Exported
+from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign
 from tbcad.types import Floats, Ints
 
 SCHEMA = "tbcad-prototype/2"
@@ -107,7 +107,7 @@ class Plan:
         return self.apex - self.radius[:, None] * self.normal
 
 
-def read_plan(exported: Exported) -> Plan:
+def read_plan(exported: ExportedDesign) -> Plan:
     """Read balls and plan of a folder that `tbcad build` wrote with a prototype.
 
     Raises:
@@ -139,7 +139,7 @@ def read_plan(exported: Exported) -> Plan:
     return plan
 
 
-def _check_frame(path: Path, exported: Exported, frame: Floats) -> None:
+def _check_frame(path: Path, exported: ExportedDesign, frame: Floats) -> None:
     a, b = exported.reflectors
     pinhole = a.camera.pinhole
     offset = norm(pinhole) * frame[0] - pinhole
@@ -223,7 +223,9 @@ def _name(camera: int, mirror: int) -> str:
     return f"{'ab'[camera]}{mirror + 1:04d}"
 
 
-def _check_errors(path: Path, pictures: list[_Picture], plan: Plan, exported: Exported) -> None:
+def _check_errors(
+    path: Path, pictures: list[_Picture], plan: Plan, exported: ExportedDesign
+) -> None:
     """The balls must stand where the plan says: as far from each mirror's direction as it says."""
     said = np.zeros(plan.ball.shape)
     for one in pictures:

@@ -62,7 +62,7 @@ class _Document(Record):
     mirrors: Literal["mirrors.csv"]
 
 
-class Exported(Record):
+class ExportedDesign(Record):
     """What the simulation needs of an export.
 
     Attributes:
@@ -80,7 +80,7 @@ class Exported(Record):
     reflectors: tuple[Reflector, Reflector]
 
 
-def read_export(folder: Path) -> Exported:
+def read_export(folder: Path) -> ExportedDesign:
     """Read the record of a folder that `tbcad build` wrote.
 
     Raises:
@@ -96,7 +96,7 @@ def read_export(folder: Path) -> Exported:
         _reflector(table, document, camera, [one for one in mirrors if one.camera == camera.id])
         for camera in document.cameras
     )
-    return Exported(
+    return ExportedDesign(
         folder=folder, spec=document.spec, capture_mm=document.target_mm, reflectors=(a, b)
     )
 

@@ -7,7 +7,7 @@ from tbcad.simulate.capture.photograph import subpixel_shifts
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.viewpoint import view_directions
-from tbcad.simulate.views.refocus import Focus, lens_rays
+from tbcad.simulate.views.refocus import ThinLens, lens_rays
 from tbcad.types import Colours, Floats, Progress
 
 RAYS_PER_CHUNK = 1 << 15
@@ -26,7 +26,7 @@ def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
 def lens_picture(
     scene: Scene,
     view: Camera,
-    focus: Focus,
+    focus: ThinLens,
     samples: int = 256,
     progress: Progress = lambda _: None,
 ) -> Colours:

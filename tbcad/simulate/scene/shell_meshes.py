@@ -18,7 +18,7 @@ from tbcad.errors import InputError
 from tbcad.formats.checked_files import REBUILD
 from tbcad.geometry.vectors import unit
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.simulate.scene.rays import MirrorNumbers, ReflectedRays, pixel_directions, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector
@@ -49,7 +49,7 @@ class ShellMeshes:
     surfaces: tuple[Surfaces, Surfaces]
 
 
-def read_shell_meshes(export: Exported) -> ShellMeshes:
+def read_shell_meshes(export: ExportedDesign) -> ShellMeshes:
     """Read both shells' STL files.
 
     Raises:

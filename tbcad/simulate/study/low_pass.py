@@ -10,7 +10,7 @@ from tbcad.simulate.capture.geometry import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import Samples, to_bytes
 from tbcad.simulate.capture.pixel_response import defocus_shifts, low_pass_shifts
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ground_truth import lens_picture
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
@@ -26,7 +26,7 @@ from tbcad.simulate.study.viewpoints import (
     view_quality,
 )
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.refocus import Focus, refocus
+from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.types import Bytes, Floats, Progress
 
 WHERE = "section 5.3, Fig. 11"
@@ -116,11 +116,11 @@ class _Targets:
     truths: list[Bytes]
     lenses: list[Camera]
     lens_truths: list[Bytes]
-    focus: Focus
+    focus: ThinLens
 
 
 def low_pass(
-    export: Exported,
+    export: ExportedDesign,
     subject: SceneObject,
     viewpoints: Viewpoints,
     options: BlurOptions,
@@ -155,13 +155,13 @@ def low_pass(
 
 
 def _targets(
-    export: Exported, subject: SceneObject, viewpoints: Viewpoints, progress: Progress
+    export: ExportedDesign, subject: SceneObject, viewpoints: Viewpoints, progress: Progress
 ) -> _Targets:
     scene = prepared_scene(subject)
     pinholes = viewpoints.cameras(export.capture_mm)
     near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
     lenses = near.cameras(export.capture_mm, LENS_SIZE)
-    focus = Focus(claimed("prototype_aperture"), 0.0)
+    focus = ThinLens(claimed("prototype_aperture"), 0.0)
     lens_truths = []
     for k, view in enumerate(lenses):
         progress(f"truth of the aperture {k + 1} of {len(lenses)}")
@@ -170,7 +170,9 @@ def _targets(
     return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
 
 
-def _light_field(export: Exported, scene: Scene, case: Blur, progress: Progress) -> LightField:
+def _light_field(
+    export: ExportedDesign, scene: Scene, case: Blur, progress: Progress
+) -> LightField:
     geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
     cameras = camera_photographs(export, scene, geometry, case.samples, progress)
     return light_field_in_memory(((at, bands()) for at, bands in cameras), export.capture_mm)

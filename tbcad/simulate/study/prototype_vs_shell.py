@@ -7,7 +7,7 @@ from scipy.stats import ttest_rel
 
 from tbcad.simulate.capture.geometry import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import light_field_in_memory
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.study.plots import Panel, Series
@@ -40,7 +40,7 @@ def mean_difference_interval(one: Floats, other: Floats) -> tuple[float, float]:
 
 
 def prototype_vs_shell(
-    export: Exported,
+    export: ExportedDesign,
     subject: SceneObject,
     viewpoints: Viewpoints,
     method: Method,
@@ -84,7 +84,7 @@ def prototype_vs_shell(
 
 
 def _tiles(
-    export: Exported, scene: Scene, kind: Geometry, samples: int, progress: Progress
+    export: ExportedDesign, scene: Scene, kind: Geometry, samples: int, progress: Progress
 ) -> MirrorTiles:
     cameras = camera_photographs(export, scene, kind, samples, progress)
     photographs = ((reflector, bands()) for reflector, bands in cameras)

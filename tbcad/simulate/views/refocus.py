@@ -28,7 +28,7 @@ LATTICE_RADIUS2 = 20
 
 
 @dataclass(frozen=True)
-class Focus:
+class ThinLens:
     """A lens.
 
     Attributes:
@@ -66,7 +66,7 @@ def lens_pinholes() -> Floats:
 
 
 def lens_rays(
-    view: Camera, focus: Focus, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
+    view: Camera, focus: ThinLens, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
 ) -> Rays:
     """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
 
@@ -85,7 +85,7 @@ def lens_rays(
     return np.broadcast_to(view.pinhole + offset, direction.shape), direction
 
 
-def refocus(tiles: MirrorTiles, view: Camera, focus: Focus) -> SynthesisedView:
+def refocus(tiles: MirrorTiles, view: Camera, focus: ThinLens) -> SynthesisedView:
     """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
     Args:
@@ -131,5 +131,5 @@ def refocus_sweep(
     pictures = []
     for k, plane in enumerate(np.linspace(-half, half, count).tolist()):
         progress(f"picture {k + 1} of {count}")
-        pictures.append(refocus(tiles, view, Focus(aperture_mm, plane)).image)
+        pictures.append(refocus(tiles, view, ThinLens(aperture_mm, plane)).image)
     return pictures

@@ -10,7 +10,7 @@ from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.shell.files import camera_a_mesh
 from tbcad.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
-from tbcad.simulate.scene.exported import Exported
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
@@ -98,9 +98,9 @@ def test_progress(cameras: Cameras, knot: Scene) -> None:
 def with_meshes(
     low_resolution_design: MirrorDesign,
     record: Path,
-    exported: Exported,
+    exported: ExportedDesign,
     tmp_path_factory: pytest.TempPathFactory,
-) -> Exported:
+) -> ExportedDesign:
     """The record with shells beside it, as STL."""
     folder, mesh = tmp_path_factory.mktemp("meshes"), camera_a_mesh(low_resolution_design)
     write_stl(folder / "shell_a.stl", mesh)
@@ -108,7 +108,7 @@ def with_meshes(
     return exported.model_copy(update={"folder": folder})
 
 
-def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
+def test_spheres_and_meshes_agree(with_meshes: ExportedDesign, knot: Scene) -> None:
     shells = read_shell_meshes(with_meshes)
     for at in with_meshes.reflectors:
         rows = range(at.camera.height_px)
@@ -128,7 +128,7 @@ def test_spheres_and_meshes_agree(with_meshes: Exported, knot: Scene) -> None:
 
 
 def test_facets_of_a_mirror_have_its_area(
-    with_meshes: Exported, low_resolution_design: MirrorDesign
+    with_meshes: ExportedDesign, low_resolution_design: MirrorDesign
 ) -> None:
     """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
     corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles

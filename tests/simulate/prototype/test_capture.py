@@ -15,7 +15,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
-from tbcad.simulate.capture.photograph import CENTRE, Band
+from tbcad.simulate.capture.photograph import CENTRE, RowBand
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
 from tbcad.simulate.prototype.ball_rays import (
     image_points,
@@ -328,7 +328,7 @@ class TestMerged:
 RAYS = ("mirror", "origin", "direction")
 
 
-def joined(bands: list[Band], name: str) -> np.ndarray:
+def joined(bands: list[RowBand], name: str) -> np.ndarray:
     return np.concatenate([getattr(band.rays, name) for band in bands])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.simulate.scene.exported import Exported, read_export
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tests.exported_files import Rows, edit_csv, edit_json
@@ -18,7 +18,7 @@ Document = dict[str, Any]
 
 
 def test_the_record_gives_the_designs_rays(
-    exported: Exported, cameras: tuple[Reflector, Reflector]
+    exported: ExportedDesign, cameras: tuple[Reflector, Reflector]
 ) -> None:
     assert exported.capture_mm == 60
     assert exported.spec.optics.n == 6

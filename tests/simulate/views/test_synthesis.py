@@ -15,7 +15,7 @@ from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.refocus import Focus, lens_pinholes, lens_rays, refocus, refocus_sweep
+from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, lens_rays, refocus, refocus_sweep
 from tbcad.simulate.views.synthesis import horizon_search_radius, synthesise
 from tbcad.simulate.views.two_plane import two_plane_along
 
@@ -47,7 +47,7 @@ def test_the_number_of_threads_does_not_matter(
 ) -> None:
     view = view_from(50, 30)
     before = synthesise(tiles, view, "blend").colour
-    focus = Focus(200, 0)
+    focus = ThinLens(200, 0)
     mean = refocus(tiles, view, focus).colour
     monkeypatch.setattr("tbcad.simulate.parallel.THREADS", 1)
     assert np.array_equal(synthesise(tiles, view, "blend").colour, before)
@@ -74,7 +74,7 @@ def test_without_captured_rays_only_what_misses_the_capture_sphere_is_complete(
     miss = np.linalg.norm(np.cross(view.pinhole, view_directions(view)), axis=2)
     for picture in (
         synthesise(MirrorTiles(empty), view),
-        refocus(MirrorTiles(empty), view, Focus(1e-6, 0)),
+        refocus(MirrorTiles(empty), view, ThinLens(1e-6, 0)),
     ):
         assert np.array_equal(picture.seen, miss > 30.0)
         assert not picture.colour.any()
@@ -105,17 +105,17 @@ def test_views_from_the_horizon_have_no_holes(tiles: MirrorTiles, azimuth: float
 
 def test_refocus_is_a_lens(tiles: MirrorTiles, knot: Scene) -> None:
     """Nearer to a real lens of that focus than to one of another, or to a pinhole."""
-    view, focus = view_from(30, 45), Focus(250, 0)
+    view, focus = view_from(30, 45), ThinLens(250, 0)
     picture = refocus(tiles, view, focus).image
     alike = image_quality(to_bytes(lens_picture(knot, view, focus, 64)), picture)
-    elsewhere = image_quality(to_bytes(lens_picture(knot, view, Focus(250, 25), 64)), picture)
+    elsewhere = image_quality(to_bytes(lens_picture(knot, view, ThinLens(250, 25), 64)), picture)
     sharp = image_quality(to_bytes(pinhole_picture(knot, view)), picture)
     assert alike.psnr_db > max(elsewhere.psnr_db, sharp.psnr_db) + 3
 
 
 def test_a_lens_without_width_is_a_pinhole(knot: Scene) -> None:
     view = view_from(10, 50)
-    narrow = lens_picture(knot, view, Focus(1e-6, 0), 16)
+    narrow = lens_picture(knot, view, ThinLens(1e-6, 0), 16)
     assert image_quality(to_bytes(pinhole_picture(knot, view)), to_bytes(narrow)).psnr_db > 35
 
 
@@ -128,7 +128,7 @@ def test_the_papers_69_pinholes() -> None:
 
 
 def test_rays_through_the_lens_meet_on_the_sharp_plane() -> None:
-    view, focus = view_from(70, 25), Focus(300, 12.0)
+    view, focus = view_from(70, 25), ThinLens(300, 12.0)
     middle = lens_rays(view, focus, np.zeros(2))
     assert middle[1] == pytest.approx(view_directions(view))
     edge = lens_rays(view, focus, np.array([100.0, -80.0]))
@@ -145,7 +145,7 @@ def test_a_sweep_goes_through_the_object(tiles: MirrorTiles) -> None:
     messages: list[str] = []
     frames = refocus_sweep(tiles, view, 250, 3, messages.append)
     assert len(messages) == len(frames) == 3
-    assert np.array_equal(frames[1], refocus(tiles, view, Focus(250, 0)).image)
+    assert np.array_equal(frames[1], refocus(tiles, view, ThinLens(250, 0)).image)
     assert not np.array_equal(frames[0], frames[2])
 
 
@@ -166,7 +166,7 @@ def test_viewpoints_refused(elevation: float, distance: float, wrong: str) -> No
 )  # fmt: skip
 def test_lenses_refused(aperture: float, plane: float, wrong: str) -> None:
     with pytest.raises(InputError, match=wrong):
-        Focus(aperture, plane).check(view_from(0, 0), 60.0)
+        ThinLens(aperture, plane).check(view_from(0, 0), 60.0)
 
 
 def test_the_capture_sphere_fills_a_view() -> None:

@@ -12,7 +12,7 @@ from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.record.prototype_sections import Printed
+from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -49,7 +49,7 @@ class MeasuredPart:
         edges: of the mesh.
     """
 
-    part: Printed
+    part: PrintedPart
     checks: list[Check]
     reason: str = ""
     mesh: Mesh | None = None
@@ -71,7 +71,7 @@ class MeasuredPart:
         return self.placed
 
 
-def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
+def measure_part(part: PrintedPart, facets: Facets) -> MeasuredPart:
     """Measure one part's mesh."""
     solid, pose = check_names(TOPOLOGY | FOLDS, part.stl), check_names(POSE, part.stl)
     try:
@@ -90,14 +90,14 @@ def measure_part(part: Printed, facets: Facets) -> MeasuredPart:
     return MeasuredPart(part, checks, "", mesh, placed, topology, mass, placed_mass, edges)
 
 
-def put_back(mesh: Mesh, part: Printed) -> Mesh:
+def put_back(mesh: Mesh, part: PrintedPart) -> Mesh:
     """A mesh moved from the bed to the frame of the shell."""
     points = np.einsum("ni,ji->nj", mesh.points - part.origin, part.axes)
     area = np.einsum("ji,in->jn", part.axes, mesh.area)
     return replace(mesh, points=points, area=area)
 
 
-def pose_checks(names: list[CheckName], part: Printed, mesh: Mesh) -> list[Check]:
+def pose_checks(names: list[CheckName], part: PrintedPart, mesh: Mesh) -> list[Check]:
     """The pose is a rotation without mirroring, and the part touches the bed from above."""
     rotation, bed = names
     gram = np.abs(part.axes @ part.axes.T - np.eye(3)).max()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype_sections import Printed
+from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import Check, Unknown, guarded
 from tbcad_verify.step.part_checks import CHECKS, PartComparison, names_of, run_checks
 from tbcad_verify.step.step_file import StepFile, known
@@ -31,7 +31,7 @@ def part_step_checks(
 
 
 def _part(
-    export: Export, part: Printed, file: StepFile | Unknown, mass: MassProperties | None
+    export: Export, part: PrintedPart, file: StepFile | Unknown, mass: MassProperties | None
 ) -> list[Check]:
     def compared() -> list[Check]:
         comparison = PartComparison(part.name, known(file), mass, export.mesh_error_mm, CLAIM_SHARE)

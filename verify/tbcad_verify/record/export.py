@@ -18,7 +18,7 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
-from tbcad_verify.record.prototype_sections import Printed
+from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, Spec
 from tbcad_verify.record.validation import (
     Name,
@@ -170,7 +170,7 @@ class Export:
     prototype: Prototype | None = None
 
     @property
-    def printed(self) -> tuple[Printed, ...]:
+    def printed(self) -> tuple[PrintedPart, ...]:
         """Parts of the prototype."""
         return tuple(self.prototype.parts) if self.prototype else ()
 

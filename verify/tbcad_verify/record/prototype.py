@@ -16,7 +16,6 @@ from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import (
     Angle,
     Assembly,
-    Bought,
     Calibration,
     Controller,
     DriveRecord,
@@ -24,7 +23,8 @@ from tbcad_verify.record.prototype_sections import (
     FrameStock,
     Home,
     Led,
-    Printed,
+    PrintedPart,
+    PurchasedBody,
     Seat,
 )
 from tbcad_verify.record.prototype_tables import (
@@ -93,12 +93,12 @@ class Prototype(Strict):
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
     pad_um: float = Field(alias="target_pad_um", ge=1e-3, le=1e4)
     seats: list[Seat] = Field(max_length=MOST)
-    parts: list[Printed] = Field(min_length=1, max_length=MOST)
+    parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     calibration: Calibration | None = None
     controller: Controller
     home: Home
-    bought: list[Bought] = Field(max_length=MOST)
+    bought: list[PurchasedBody] = Field(max_length=MOST)
     frame_stock: FrameStock
     assembly: Assembly = Assembly()
     drive: DriveRecord

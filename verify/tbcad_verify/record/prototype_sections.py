@@ -46,7 +46,7 @@ class Seat(Strict):
     pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)
 
 
-class Printed(PartFiles):
+class PrintedPart(PartFiles):
     """One part to be printed; y = x @ axes + origin lays it on the bed.
 
     The meshes are on the bed, the STEP file has the solid in its place.
@@ -99,7 +99,7 @@ class Calibration(Strict):
     across_um_median: float = Field(ge=0, le=LARGEST)
 
 
-class Bought(Strict):
+class PurchasedBody(Strict):
     """A purchased part, whose shape only the assembly has.
 
     Attributes:
