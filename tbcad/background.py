@@ -1,5 +1,6 @@
 """Work in a process of its own while this one does something else."""
 
+import ctypes
 import multiprocessing
 import signal
 import sys
@@ -9,6 +10,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any, TypeAlias
+
+PR_SET_PDEATHSIG = 1  # prctl(2): the signal to get when the parent ends
 
 Submit: TypeAlias = Callable[..., "Future[Any]"]
 """Takes a function of a module and its arguments, which are copied; the result comes later."""
@@ -32,7 +35,7 @@ def background_process() -> Iterator[Submit]:
         RuntimeError: the process ended before its work was done.
     """
     others, futures = multiprocessing.active_children(), list[Future[Any]]()
-    with ProcessPoolExecutor(1, _context(), initializer=_ignore_interrupts) as pool:
+    with ProcessPoolExecutor(1, _context(), initializer=_begin) as pool:
 
         def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
             futures.append(pool.submit(work, *arguments))
@@ -61,6 +64,8 @@ def _context() -> multiprocessing.context.BaseContext:
     return multiprocessing.get_context("fork" if alone else "spawn")
 
 
-def _ignore_interrupts() -> None:
-    """An interrupt is for the process that waits, which then ends this one."""
+def _begin() -> None:
+    """End with the process that waits, also when that is killed; leave interrupts to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -1,5 +1,7 @@
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +10,8 @@ import pytest
 
 from tbcad.background import at_once, background_process
 from tbcad.spec.errors import SpecError
+
+ROOT = Path(__file__).parents[1]
 
 
 def write(path: Path, text: str) -> None:
@@ -66,3 +70,27 @@ def test_a_block_that_fails_ends_the_work(tmp_path: Path) -> None:
         in_background(wait_and_write, tmp_path / "late", error=KeyError)
     time.sleep(3.5)
     assert not list(tmp_path.iterdir())
+
+
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from tbcad.background import background_process
+from tests.test_background import wait_and_write, write
+
+with background_process() as submit:
+    submit(write, Path(sys.argv[1]) / "begun", "").result()
+    submit(wait_and_write, Path(sys.argv[1]) / "late")
+    time.sleep(0.5)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems let it finish its work")
+def test_it_ends_with_the_process_that_waits(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", KILLED, str(tmp_path)]
+    killed = subprocess.run(command, check=False, cwd=ROOT)
+    assert killed.returncode == -signal.SIGKILL
+    assert (tmp_path / "begun").exists()
+    time.sleep(4)
+    assert not (tmp_path / "late").exists()

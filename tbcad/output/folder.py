@@ -150,12 +150,25 @@ def _prefix(target: Path) -> str:
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    _LOCKS.add(descriptor)
     try:
         with suppress(OSError):  # a file system without locks: see _is_written
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
+        _LOCKS.discard(descriptor)
         os.close(descriptor)
+
+
+def _leave_locks() -> None:
+    """In a copy of this process: a lock must end with the process that took it."""
+    for descriptor in _LOCKS:
+        os.close(descriptor)
+    _LOCKS.clear()
+
+
+_LOCKS: set[int] = set()  # descriptors of locked folders
+os.register_at_fork(after_in_child=_leave_locks)
 
 
 def _clear(out: Path, target: Path) -> None:
