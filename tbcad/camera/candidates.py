@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from tbcad.camera.catalogue import CameraBody, RectilinearLens
 from tbcad.camera.lens import aperture_stop, lens_for
-from tbcad.camera.requirements import WAVELENGTH_MM, WIDE_OPEN, CameraRequirements
+from tbcad.camera.requirements import WIDE_OPEN, CameraRequirements
 
 ENOUGH = 0.999  # of an angle or of pixels: figures of makers are rounded
 MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
@@ -71,16 +71,16 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
     image = _image_distance(focal, needed.focus_mm)
     f_number = min(max(focal / needed.pupil_mm, lens.f_number_min), lens.f_number_max)
     one = Candidate(
-        camera,
-        lens,
-        focal,
-        image / focal - 1,
-        min(longest / image, 1.0),
-        2 * across * image / camera.pixel_mm,
-        f_number,
-        _blur(needed, focal / f_number),
-        _close_up(needed.focus_mm, focal, lens.min_focus_mm, image),
-        (),
+        camera=camera,
+        lens=lens,
+        focal_mm=focal,
+        magnification=image / focal - 1,
+        view=min(longest / image, 1.0),
+        pixels_across=2 * across * image / camera.pixel_mm,
+        f_number=f_number,
+        total_px=_blur(needed, focal / f_number),
+        close_up_dpt=_close_up(needed.focus_mm, focal, lens.min_focus_mm, image),
+        faults=(),
     )
     return replace(one, faults=tuple(_faults(needed, one, image)))
 
@@ -90,7 +90,7 @@ def _image_distance(focal: float, focus: float) -> float:
 
 
 def _blur(needed: CameraRequirements, pupil: float) -> float:
-    lens = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN, WAVELENGTH_MM)
+    lens = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN)
     return aperture_stop(lens, needed.depths, pupil)["total_px"]
 
 

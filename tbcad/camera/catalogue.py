@@ -16,12 +16,12 @@ LENS_SIZES = (
 )
 LENS_COLUMNS = ("name", "mounts", *LENS_SIZES, "source")
 MAX_VALUE = 1e5  # of any figure
+_MIRRORLESS = ("Canon RF", "Nikon Z", "Sony E", "Fujifilm G")
 # Mounts on which lenses of another mount sit by a plain ring, which keeps the lens's distance.
-_SHORT = ("Canon RF", "Nikon Z", "Sony E", "Fujifilm G")  # distances from flange to sensor
 ADAPTERS = {
-    "Canon EF": _SHORT,
+    "Canon EF": _MIRRORLESS,
     "Canon EF-S": ("Canon RF", "Sony E"),
-    "Nikon F": (*_SHORT, "Canon EF"),
+    "Nikon F": (*_MIRRORLESS, "Canon EF"),
     "C": ("CS",),
 }
 

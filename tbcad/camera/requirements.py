@@ -9,7 +9,6 @@ from tbcad.camera.lens import DepthRange, aperture_stop, lens_for, sharpest
 from tbcad.camera.virtual_images import virtual_images
 from tbcad.mirrors.array import MirrorArray
 
-WAVELENGTH_MM = 550e-6
 ROUNDING_PX = 1e-6
 WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
 # Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
@@ -72,7 +71,7 @@ def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements
     view, depth = array.camera, virtual_images(array, radius).depth
     across, down = _half_sizes(array)
     over = DepthRange(float(depth.min()), float(depth.max()))
-    lens = lens_for(view.hfov, view.width_px, 1.0, WIDE_OPEN, WAVELENGTH_MM)
+    lens = lens_for(view.hfov, view.width_px, 1.0, WIDE_OPEN)
     pupil = sharpest(lens, over)
     blur = aperture_stop(lens, over, pupil)
     return CameraRequirements(

@@ -17,9 +17,8 @@ from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
-SWITCH_BELOW_DEG = (
-    8.0  # of the switch below the lowest angle of the program: its lever is free there
-)
+# Of the switch below the lowest angle of the program, so that its lever is free there.
+SWITCH_BELOW_DEG = 8.0
 MIN_BELOW_DEG = 3.0
 PULL_OFF_DEG = 2.0
 OVERTRAVEL_DEG = 2.0  # below the switch, before the base stops

@@ -8,7 +8,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tbcad.spec.prototype import StageSpec
-from tbcad.types import Floats
+from tbcad.types import Floats, Ints
 
 NOISE_PX = 0.05  # standard deviation of a highlight's place in a photograph, each way
 STEP_MM = 1e-3  # of the centres, for derivatives
@@ -25,7 +25,7 @@ class CalibrationEstimate:
         across: in the directions across the line of sight, root mean square, mm, (m,).
     """
 
-    seen: Floats
+    seen: Ints
     worst: Floats
     across: Floats
 
@@ -63,7 +63,7 @@ def calibration_estimate(
     along = np.einsum("mi,mij,mj->m", sight, covariance, sight)
     total = np.trace(covariance, axis1=1, axis2=2)
     return CalibrationEstimate(
-        seen=seen.sum(axis=1).astype(np.float64),
+        seen=seen.sum(axis=1),
         worst=np.sqrt(np.linalg.eigvalsh(covariance)[:, -1]),
         across=np.sqrt(np.maximum(total - along, 0) / 2),
     )

@@ -16,7 +16,7 @@ from tbcad.geometry.primitives import (
 from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.prototype.stage.arms import Arm, arm_axes
+from tbcad.prototype.stage.arms import UP, Arm, arm_axes
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import StageSpec
@@ -42,7 +42,7 @@ ROOM_GAP_MM = 0.1  # between arms and the level of the disc's face, above which 
 ROOT_SHARE = 0.4  # of the plate's width, from its rim inward, that an arm's root covers
 ROOT_MM = 1.0  # by which studs reach into the plate
 SCREW_DIRECTION = np.array([0.0, -1.0, 0.0])
-LEVEL, _, UP = np.eye(3)
+LEVEL = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.stage.arms import UP
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,
     PLUG_MM,
     RIM_MM,
     SHOULDER_MM,
-    UP,
     CrownSizes,
     crown_component,
     disc_component,
