@@ -1,7 +1,7 @@
 """The design spec: what a user may choose, in named units, checked before anything is computed.
 
-Every key, its unit, range and default stand here once; `designs/turtleback.toml` explains them
-at length and equals the defaults, which are the design of the paper.
+Every key, its unit, range and default stand here once; `designs/turtleback.toml` explains
+them at length and equals the defaults, which are the design of the paper.
 """
 
 from __future__ import annotations
@@ -41,7 +41,11 @@ Point: TypeAlias = Annotated[
     ],
     BeforeValidator(as_tuple),
 ]
+EdgeKind: TypeAlias = Literal["valley", "pedestal"]
 RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
+MAX_MARGIN = 20.0
+MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
+Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
 
 
 class OpticsSpec(Section):
@@ -74,12 +78,28 @@ class MirrorsSpec(Section):
 
     radius_rule: RadiusRule = "traced"
     """Radii from exact ray tracing, from eqs. 1 and 2 of the paper, or planar mirrors."""
-    margin_mm: float = Field(0.6, ge=0, le=20)
+    margin_mm: float = Field(0.6, ge=0, le=MAX_MARGIN)
     """Coverage added to the capture diameter as the target of rule traced."""
+    own_margins_mm: Annotated[tuple[Margin, ...], BeforeValidator(as_tuple)] = Field(
+        (), max_length=MAX_MIRRORS
+    )
+    """The same for each mirror, in the order of one camera's, none below margin_mm; empty: every
+    mirror has margin_mm. tbcad build --for-process computes them."""
     max_radius_widths: float = Field(30.0, ge=5, le=1000)
     """Largest radius in half widths l; a mirror that needs less curvature is nearly flat."""
     coating_um: float = Field(0.0, ge=0, le=500)
     """Thickness of the mirror coat; the modelled sphere is smaller by it."""
+
+    @model_validator(mode="after")
+    def _own_margins_fit(self) -> Self:
+        least = min(self.own_margins_mm, default=self.margin_mm)
+        if least < self.margin_mm:
+            raise ValueError(
+                f"own_margins_mm has a margin of {least:g}, less than margin_mm "
+                f"{self.margin_mm:g}, which every mirror has at least: make margin_mm smaller or "
+                "leave own_margins_mm out"
+            )
+        return self
 
 
 class FlangeSpec(Section):
@@ -118,10 +138,14 @@ class FootFlangeSpec(FlangeSpec):
 
 
 class ShellSpec(Section):
-    """The body behind the mirrors."""
+    """The body behind the mirrors, and the edges between them."""
 
     wall_mm: float = Field(3.0, ge=0.4, le=50)
-    """Material behind the deepest valley between mirrors."""
+    """Material behind the deepest valley or groove between mirrors."""
+    edges: EdgeKind = "valley"
+    """Where mirrors end: where neighbouring spheres meet, or on pedestals of their own."""
+    groove_mm: float = Field(0.1, ge=0.02, le=5)
+    """Width of the grooves between pedestals at the mirrors' corners; without pedestals unused."""
     seam_flange: FlangeSpec = FlangeSpec()
     """Joins the two halves at x = 0."""
     foot_flange: FootFlangeSpec = FootFlangeSpec()

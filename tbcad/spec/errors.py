@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from difflib import SequenceMatcher
-from typing import Any, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ValidationError
@@ -56,16 +57,24 @@ def allowed_text(kind: Any, limits: Iterable[object] = ()) -> str:
 
 def _allowed_value(kind: Any, limits: Iterable[object]) -> str:
     if get_origin(kind) is tuple:
-        return "[" + ", ".join(_allowed_item(item) for item in get_args(kind)) + "]"
+        return _allowed_list(get_args(kind))
     if get_origin(kind) is Literal:
         return " or ".join(str(choice) for choice in get_args(kind))
+    if get_origin(kind) in (Union, UnionType):
+        return ", or ".join(_allowed_item(choice) for choice in get_args(kind))
     words = {int: "a whole number", float: "a number", bool: "true or false", str: "text"}
     return " ".join([words.get(kind, "a table"), *_limits(limits)])
 
 
+def _allowed_list(items: tuple[Any, ...]) -> str:
+    shown = ["..." if item is Ellipsis else _allowed_item(item) for item in items]
+    return "[" + ", ".join(shown) + "]"
+
+
 def _allowed_item(item: Any) -> str:
-    kind, *metadata = get_args(item) or (item,)
-    return allowed_text(kind, [limit for field in metadata for limit in field.metadata])
+    kind, *metadata = get_args(item) if get_origin(item) is Annotated else (item,)
+    fields = [field for field in metadata if isinstance(field, FieldInfo)]
+    return allowed_text(kind, [limit for field in fields for limit in field.metadata])
 
 
 def _limits(limits: Iterable[object]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError, dotted_fields, section_of, unknown_key, validation_error
 from tbcad.spec.files import Table, read_toml, toml_value
+from tbcad.spec.shipped import design_source
 
 _BUILT_IN = "built-in design"
 
@@ -18,14 +19,14 @@ def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = 
     """Return the design in a TOML file, or the built-in one, with options on top.
 
     Args:
-        path: a TOML file; None for the built-in design.
+        path: a TOML file, or the name of a design that comes with tbcad; None for the built-in one.
         overrides: "key=value" texts, or a mapping of them, the later over the earlier. A key is
             dotted, or the end of exactly one dotted key; a value is TOML, or else text.
 
     Raises:
         SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
-    table = {} if path is None else read_toml(path, str(path), "design")
+    table = {} if path is None else read_toml(design_source(path), str(path), "design")
     options = [_option(text) for text in option_texts(overrides)]
     for key, value in options:
         _put(table, key.split("."), value)
@@ -38,8 +39,7 @@ def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = 
 
 def spec_dict(spec: Spec) -> Table:
     """Return the design as plain JSON values, keys in the order of the spec."""
-    # Without warnings: a key may hold a word in place of a value of its type.
-    return spec.model_dump(mode="json", by_alias=True, warnings=False)
+    return spec.model_dump(mode="json", by_alias=True)
 
 
 def option_texts(overrides: Mapping[str, str] | Sequence[str]) -> list[str]:

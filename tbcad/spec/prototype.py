@@ -1,5 +1,6 @@
 """The section [prototype] of the design: steel balls on a base that turns, and its sections."""
 
+from collections.abc import Callable
 from typing import Annotated, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field
@@ -39,6 +40,7 @@ _Coordinate: TypeAlias = Annotated[float, Field(ge=-1000, le=1000)]
 _Place: TypeAlias = Annotated[
     tuple[_Coordinate, _Coordinate, _Coordinate], BeforeValidator(as_tuple)
 ]
+_Count: TypeAlias = Annotated[int, Field(ge=1, le=MOST_BALLS)]
 
 
 def _count(value: object) -> object:
@@ -49,13 +51,16 @@ def _count(value: object) -> object:
     )
 
 
-def _names(value: object) -> object:
-    names = as_tuple(value)
-    if isinstance(names, tuple) and names and all(isinstance(name, str) for name in names):
-        return names
-    raise ValueError(
-        f'{short_text(value)} is not allowed: give a list such as ["metric", "my.csv"]'
-    )
+def _names(example: str) -> Callable[[object], object]:
+    """A check that a value is a list of names; the example is for the error."""
+
+    def check(value: object) -> object:
+        names = as_tuple(value)
+        if isinstance(names, tuple) and names and all(isinstance(name, str) for name in names):
+            return names
+        raise ValueError(f"{short_text(value)} is not allowed: give a list such as {example}")
+
+    return check
 
 
 def _places(value: object) -> object:
@@ -102,14 +107,18 @@ class BaseSpec(Section):
     hold: Annotated[Hold, OR_AUTO] = AUTO
     """How a ball is held on its pads: by a magnet below it, or by glue in a well; auto: magnets
     where they fit."""
-    magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0)
+    magnets_mm: Magnets = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0)
     """Diameters of the disc magnets on sale; each ball gets the largest that fits."""
     magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
     """Height of the magnets."""
+    strong_magnet_height_mm: float = Field(5.0, ge=0.5, le=20)
+    """Height of the magnets of balls that those of magnet_height_mm would not hold."""
     magnet_gap_mm: float = Field(0.5, ge=0.1, le=5)
     """Gap between ball and magnet, or depth of the glue well below the ball."""
     magnet_play_mm: float = Field(0.2, ge=0, le=1)
     """Play of the magnet in its pocket, on the diameter."""
+    cap_play_mm: float = Field(0.1, ge=0.02, le=0.5)
+    """Play on the diameter of a cap's spigot in its seat, which lets the cap tilt."""
     digit_mm: float = Field(6.0, ge=3, le=30)
     """Height of the digits in relief."""
     relief_mm: float = Field(0.6, ge=0.2, le=3)
@@ -224,6 +233,21 @@ class StageSpec(Section):
     it); less in posts of less than 18 mm."""
 
 
+class LightSpec(Section):
+    """Lamps that light the object, and a shroud of card that keeps other light away."""
+
+    lamp_z_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-1000, le=0)
+    """Height of the lamps' middles, 0 for none; auto: as high as light and base permit."""
+    strips: int = Field(2, ge=1, le=6)
+    """LED strips on each lamp, side by side."""
+    segments: int = Field(1, ge=1, le=6)
+    """Segments that each strip has, of 50 mm; of 25 mm where level strips of 50 have no room."""
+    shroud: Annotated[bool, OR_AUTO] = AUTO
+    """A box of matt black card round the whole rig; auto: where a sheet is large enough."""
+    shroud_gap_mm: float = Field(10.0, ge=2, le=500)
+    """Minimum distance of the card from everything in it."""
+
+
 class FrameSpec(Section):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
@@ -252,7 +276,7 @@ class FrameSpec(Section):
 class PrototypeSpec(Section):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
-    k: Annotated[int | Literal["auto"], BeforeValidator(_count)] = "auto"
+    k: Annotated[_Count | Literal["auto"], BeforeValidator(_count)] = "auto"
     """Number of balls, or auto: the smallest number within the limits below that has room."""
     radius_weight_deg: float = Field(0.25, ge=0, le=100)
     """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm."""
@@ -262,8 +286,15 @@ class PrototypeSpec(Section):
     """With k auto: largest median error of direction."""
     auto_lost_percent: float = Field(25.0, ge=0, le=100)
     """With k auto: largest share of the shell's pixels that the balls lose."""
-    catalogues: Annotated[tuple[str, ...], BeforeValidator(_names)] = ("metric", "inch")
+    catalogues: Annotated[tuple[str, ...], BeforeValidator(_names('["metric", "my.csv"]'))] = (
+        "metric",
+        "inch",
+    )
     """Lists of balls on sale: metric, inch, or CSV files."""
+    prices: Annotated[
+        tuple[str, ...], BeforeValidator(_names('["my_prices.csv", "estimates"]'))
+    ] = ("estimates",)
+    """Lists of prices: estimates, or CSV files; the first that has a part counts."""
     grade: GradeName = "G40"
     """Grade of the balls by ISO 3290-1; only sizes sold in it are used."""
     largest_ball_mm: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=1000)
@@ -296,5 +327,7 @@ class PrototypeSpec(Section):
     """How the base is driven from stop to stop."""
     stage: StageSpec = StageSpec()
     """Stage for the object."""
+    light: LightSpec = LightSpec()
+    """Lamps and shroud."""
     frame: FrameSpec = FrameSpec()
     """Frame for stage, base and camera."""

@@ -15,7 +15,10 @@ from pydantic_core import CoreSchema, core_schema
 class Section(BaseModel):
     """A frozen table of the design; unknown keys and wrong types are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    # Deferred: sections are validated with the design, never alone; each would be prepared twice.
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,11 @@ class OrWord:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Let the word through; check everything else as the type does."""
-        return core_schema.no_info_wrap_validator_function(self._checked, handler(source))
+        # What is written is as it is: as a number the word would be one of the wrong type.
+        written = core_schema.simple_ser_schema("any")
+        return core_schema.no_info_wrap_validator_function(
+            self._checked, handler(source), serialization=written
+        )
 
     def _checked(self, value: object, check: ValidatorFunctionWrapHandler) -> object:
         return value if value == self.word else check(value)

@@ -29,13 +29,15 @@ TOP_OF_CAPTURE = -19 / 60
 OBJECT_OF_CAPTURE = 2 / 3
 # The crown is this much lower than the disc's face, and stays inside the sphere by the second.
 CROWN_MM, INSIDE_MM = 4.8, 0.3
-# Places of the LEDs in a capture sphere of 60 mm; smaller spheres have no room for any.
+# Places of the LEDs in a capture sphere of 60 mm; smaller spheres have no room for any. Each is the
+# other of its pair turned by 180 degrees about z, so that the object's half turn leaves the
+# shadows of their arms on it as they were.
 LEDS_MM, LEDS_CAPTURE_MM = (
     (
-        (18.8, 14.0, -8.0),
-        (14.6, -18.3, -8.0),
-        (-10.4, -20.9, -4.7),
-        (-5.8, 22.7, -0.5),
+        (23.1, -4.1, -8.0),
+        (-23.1, 4.1, -8.0),
+        (4.1, 23.1, -2.0),
+        (-4.1, -23.1, -2.0),
     ),
     60.0,
 )
