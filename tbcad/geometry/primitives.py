@@ -4,7 +4,7 @@ Layout and solids share them: clearances are measured on the primitives that sol
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -37,9 +37,14 @@ class Prism:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A polygon (n, 2) of (z, r) revolved about the z axis of the shell's frame, mm."""
+    """A polygon (n, 2) of (z, r) revolved about the last row of axes (3, 3) through start, mm.
+
+    By default that is the z axis of the shell's frame.
+    """
 
     profile: Floats
+    axes: Floats = field(default_factory=lambda: np.eye(3))
+    start: Floats = field(default_factory=lambda: np.zeros(3))
 
 
 Primitive: TypeAlias = Cylinder | Prism | Revolved
@@ -82,6 +87,11 @@ def box(low: Floats, high: Floats, axes: Floats) -> Prism:
     """The box between two points (3,) whose coordinates are along the rows of axes (3, 3)."""
     corners = np.column_stack([rectangle(low, high), np.full(4, low[2])])
     return Prism(corners @ axes, (high[2] - low[2]) * axes[2])
+
+
+def revolved_along(profile: Floats, start: Floats, along: Floats) -> Revolved:
+    """A polygon (n, 2) of (z, r) revolved about a unit vector (3,) through a point (3,), mm."""
+    return Revolved(profile, np.vstack([perpendicular_axes(along), along]), start)
 
 
 def slot(
@@ -127,7 +137,7 @@ def enclosing_triangles(body: Primitive) -> Floats:
     if isinstance(body, Cylinder):
         corners = body.start + body.radius * circumscribed @ perpendicular_axes(body.axis)
         return _prism_triangles(corners, body.length * body.axis)
-    return _revolved_triangles(body.profile, circumscribed)
+    return body.start + _revolved_triangles(body.profile, circumscribed) @ body.axes
 
 
 def _prism_triangles(corners: Floats, along: Floats) -> Floats:

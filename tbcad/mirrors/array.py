@@ -12,15 +12,21 @@ from tbcad.optics import flat
 from tbcad.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic
-from tbcad.optics.power_diagram import bounded_triangulation
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
-from tbcad.spec.design import FIT, MAX_HFOV, CameraSpec, Spec
+from tbcad.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
 # Directions that differ by less than rounding have equal heights or azimuths.
 DIRECTION_DIGITS = 9
 HFOV_DIGITS = 12
+
+
+def mirror_ids(camera_id: str, mirrors: int) -> list[str]:
+    """Names of a camera's mirrors: a0001, a0002 ..."""
+    return [f"{camera_id}{i + 1:04d}" for i in range(mirrors)]
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class MirrorArray:
     @property
     def ids(self) -> list[str]:
         """Names of the mirrors: a0001, a0002 ...; b0001 is the mirror image of a0001."""
-        return [f"{self.camera_id}{i + 1:04d}" for i in range(len(self))]
+        return mirror_ids(self.camera_id, len(self))
 
     @property
     def mirrors(self) -> Surfaces:
@@ -180,7 +186,9 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
         triangles=bounded_triangulation(faces, every, _in_half_a(every)),
         pinhole=ellipsoid.pinhole,
         min_curvature=1 / (spec.mirrors.max_radius_widths * half_width),
-        target=optics.capture_diameter_mm + spec.mirrors.margin_mm,
+        diameter=optics.capture_diameter_mm,
+        margin=mirror_margins(spec.mirrors, len(u)),
+        groove=spec.shell.groove_mm if spec.shell.edges == "pedestal" else None,
     )
     # Radii take long: no frame holds the mirrors if none holds their apices.
     _view_angle_deg(spec.camera, ellipsoid.pinhole, problem.mirrors.apex)
@@ -201,6 +209,21 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
         area=cell_areas(cells),
         coverage=coverage,
     )
+
+
+def mirror_margins(spec: MirrorsSpec, mirrors: int) -> Floats:
+    """Margin of each of m mirrors of a camera, mm, (m,).
+
+    Raises:
+        SpecError: the spec has margins of its own for another number of mirrors.
+    """
+    own = np.array(spec.own_margins_mm)
+    if len(own) not in (0, mirrors):
+        raise SpecError(
+            f"mirrors.own_margins_mm has {len(own)} margins, but a camera has {mirrors} mirrors: "
+            "leave them out by --set mirrors.own_margins_mm=[], or compute others by --for-process"
+        )
+    return own if len(own) else np.full(mirrors, spec.margin_mm)
 
 
 def _camera(sensor: CameraSpec, pinhole: Floats, corners: Floats) -> Camera:
@@ -243,5 +266,13 @@ def _cells_under_coat(cells: Cells, coating: float) -> Cells:
             f"mirrors.coating_um {coating * 1000:g} is more than the smallest mirror radius "
             f"{np.nanmin(mirrors.radius):.3g} mm: make the coat thinner"
         )
+    if isinstance(cells, PedestalCells):
+        try:
+            return cells.with_mirrors(mirrors.offset(-coating))
+        except NotRegularError:
+            raise SpecError(
+                f"mirrors.coating_um {coating * 1000:g} is more than the grooves between pedestals "
+                "are deep: make the coat thinner or shell.groove_mm larger"
+            ) from None
     modelled = mirrors.offset(-coating).joined(cells.surfaces.subset(slice(cells.mirrors, None)))
     return cells_of(modelled, cells.triangles)

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.mirrors.seam import aimed, cut_positions, seam_gaps
 from tbcad.optics.cells import Cells, cells_of
+from tbcad.optics.pedestals import flattened, pedestal_cells
 from tbcad.optics.power_diagram import NotRegularError
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.trace import coverage_diameters
@@ -30,7 +32,10 @@ class RadiusProblem:
         triangles: dual triangulation, (t, 3).
         pinhole: of the camera, mm, (3,).
         min_curvature: smallest curvature a sphere may have, 1/mm, (m,).
-        target: coverage diameter that the rule traced gives every mirror, mm.
+        diameter: of the capture sphere, mm.
+        margin: that the rule traced adds to it for each mirror, mm, (m,).
+        groove: width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres
+            meet.
     """
 
     mirrors: Surfaces
@@ -38,13 +43,51 @@ class RadiusProblem:
     triangles: Ints
     pinhole: Floats
     min_curvature: Floats
-    target: float
+    diameter: float
+    margin: Floats
+    groove: float | None = None
 
-    def cells(self, curvature: Floats, triangles: Ints | None = None) -> Cells:
-        """Cells for curvatures (m,), from the given triangulation or the first one."""
-        surfaces = self.mirrors.with_curvature(curvature).joined(self.planes)
+    @property
+    def target(self) -> Floats:
+        """Coverage diameter that the rule traced gives each mirror, mm, (m,)."""
+        return self.diameter + self.margin
+
+    def cells(
+        self, curvature: Floats, aim: Floats | None = None, triangles: Ints | None = None
+    ) -> Cells:
+        """Cells for curvatures (m,) and aims (m,), from the given triangulation or the first.
+
+        Raises:
+            NotRegularError: the mirrors bound no proper cells.
+            SpecError: the grooves leave nothing of a mirror.
+        """
+        mirrors = self.mirrors.with_curvature(curvature)
+        mirrors = mirrors if aim is None else aimed(mirrors, self.pinhole, aim)
         start = self.triangles if triangles is None else triangles
-        return cells_of(surfaces, start)
+        if self.groove is None:
+            return cells_of(mirrors.joined(self.planes), start)
+        flat = flattened(mirrors.joined(self.planes), start, self.pinhole)
+        try:
+            return pedestal_cells(flat, mirrors, self.pinhole, self.groove)
+        except NotRegularError as error:
+            raise SpecError(f"{error}: make shell.groove_mm or optics.n smaller") from None
+
+    def coverage(self, cells: Cells) -> Floats:
+        """Coverage diameter of each mirror's virtual camera, mm, (m,).
+
+        That of a halved mirror falls short of the capture sphere by what neither half sees of it.
+        """
+        gap = seam_gaps(cells, self.pinhole, self.diameter / 2)
+        coverage = coverage_diameters(cells, self.pinhole)
+        return np.where(gap > 0, np.minimum(coverage, self.diameter - gap), coverage)
+
+    def missing_aim(self, cells: Cells) -> Floats:
+        """How much farther beyond the seam each halved mirror has to be aimed, mm, (m,).
+
+        Both halves are to see as far beyond x = 0 as each other edge has for a margin.
+        """
+        position = cut_positions(cells, self.pinhole, self.target / 2)
+        return np.where(cells.halved, position + self.margin / 2, 0.0)
 
     @property
     def paper_curvature(self) -> Floats:
@@ -76,40 +119,48 @@ def solve_radii(
             f"mirrors with radius rule {rule} do not close to one array ({error}): "
             "change mirrors.radius_rule, optics.n or optics.capture_diameter_mm"
         ) from None
-    return cells, coverage_diameters(cells, problem.pinhole)
+    return cells, problem.coverage(cells)
 
 
 def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
-    curvature is scaled by target / coverage, all together, until none is off. Where a step goes
-    so far that spheres no longer meet it is halved: flat mirrors always close.
+    curvature is scaled by target / coverage, all together, until none is off; the mirrors that the
+    seam halves are aimed farther beyond it by what they miss. Where a step goes so far that spheres
+    no longer meet it is halved: flat mirrors always close.
     """
     curvature, lowest = problem.paper_curvature, problem.min_curvature
-    closed, triangles = np.zeros(len(curvature)), problem.triangles
+    aim = np.zeros(len(curvature))
+    closed, triangles = (np.zeros(len(curvature)), aim), problem.triangles
     coverage, error, halvings = np.zeros(len(curvature)), np.full(len(curvature), np.inf), 0
     for _ in range(MAX_ITERATIONS):
         try:
-            cells = problem.cells(curvature, triangles)
+            cells = problem.cells(curvature, aim, triangles)
         except NotRegularError:
             halvings += 1
             if halvings > MAX_HALVINGS:
                 break
-            curvature = (curvature + closed) / 2
+            curvature, aim = (curvature + closed[0]) / 2, (aim + closed[1]) / 2
             lowest = np.minimum(lowest, curvature)
             continue
-        closed, triangles = curvature, cells.triangles
+        closed, triangles = (curvature, aim), cells.triangles
         coverage = coverage_diameters(cells, problem.pinhole)
         error = np.where(curvature > lowest, np.abs(coverage - problem.target), 0.0)
         error = np.maximum(error, problem.target - coverage)
+        # A half that sees beyond the seam without being aimed stays as it is.
+        step = np.maximum(problem.missing_aim(cells), -aim)
+        error = np.maximum(error, np.abs(step))
         if error.max() < CONVERGED_MM:
-            return cells, coverage
+            return cells, problem.coverage(cells)
         progress(f"largest error of coverage {error.max():.1g} mm")
         curvature = np.maximum(curvature * problem.target / coverage, lowest)
+        aim = aim + step
     worst = np.argsort(-error)[:NAMED_MIRRORS]
-    named = ", ".join(f"a{i + 1:04d} ({coverage[i]:.3f} mm)" for i in worst)
+    named = ", ".join(
+        f"a{i + 1:04d} ({coverage[i]:.3f} of {problem.target[i]:g} mm)" for i in worst
+    )
     raise SpecError(
-        f"no radius gives these mirrors a coverage of {problem.target:g} mm: {named}: change "
-        "optics.n, optics.capture_diameter_mm or mirrors.margin_mm"
+        f"no radius gives these mirrors the coverage that is wanted: {named}: change optics.n, "
+        "optics.capture_diameter_mm or mirrors.margin_mm"
     )

@@ -79,18 +79,7 @@ class Cells:
             Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell
             follows it from start to end, 2 a + 1 where it goes back along it.
         """
-        ends, twin = half_edges(self.triangles)
-        _, first = np.unique(ends[:, 0], return_index=True)
-        first = first[: self.mirrors]
-        degree = np.bincount(ends[:, 0], minlength=self.mirrors)[: self.mirrors]
-        around = [first]
-        for _ in range(int(degree.max()) - 1):
-            before = around[-1] // 3 * 3 + (around[-1] + 2) % 3
-            around.append(twin[before])
-        table = np.stack(around, axis=1)
-        sides = self.arcs.side_of_half_edge[table]
-        listed = (np.arange(table.shape[1]) < degree[:, None]) & (sides >= 0)
-        return np.concatenate([[0], np.cumsum(listed.sum(axis=1))]), sides[listed]
+        return rings_of(self.triangles, self.mirrors, self.arcs.side_of_half_edge)
 
 
 @dataclass(frozen=True)
@@ -136,6 +125,27 @@ class Arcs:
         return np.asarray(weighted / basis.sum(axis=-1)[..., None])
 
 
+def rings_of(triangles: Ints, mirrors: int, side_of_half_edge: Ints) -> tuple[Ints, Ints]:
+    """Sides round each mirror's cell, as `Cells.rings` has them.
+
+    Args:
+        triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
+        mirrors: number of mirrors m, the first of the faces.
+        side_of_half_edge: side for each directed edge of the triangles, -1 for none, (3 t,).
+    """
+    ends, twin = half_edges(triangles)
+    _, first = np.unique(ends[:, 0], return_index=True)
+    degree = np.bincount(ends[:, 0], minlength=mirrors)[:mirrors]
+    around = [first[:mirrors]]
+    for _ in range(int(degree.max()) - 1):
+        before = around[-1] // 3 * 3 + (around[-1] + 2) % 3
+        around.append(twin[before])
+    table = np.stack(around, axis=1)
+    sides = side_of_half_edge[table]
+    listed = (np.arange(table.shape[1]) < degree[:, None]) & (sides >= 0)
+    return np.concatenate([[0], np.cumsum(listed.sum(axis=1))]), sides[listed]
+
+
 def _arcs(cells: Cells) -> Arcs:
     """Arcs in closed form from the corners and the faces' gradients there.
 
@@ -172,7 +182,21 @@ def _curves(
     swap = surfaces.curvature[right] > surfaces.curvature[left]
     p, q = np.where(swap, right, left), np.where(swap, left, right)
     plane, _ = radical_planes(surfaces, p, q)
-    plane = unit(plane)
+    return plane_sections(surfaces, p, unit(plane), start, end)
+
+
+def plane_sections(
+    surfaces: Surfaces, p: Ints, plane: Floats, start: Floats, end: Floats
+) -> tuple[Floats, Floats]:
+    """Control polygon (e, 3, 3) and weight (e,) of arcs in which planes cut surfaces.
+
+    Args:
+        surfaces: spheres or planes.
+        p: index of the surface, (e,).
+        plane: unit normal of the plane, (e, 3).
+        start: of the arc, on both, mm, (e, 3).
+        end: of the arc, on both, mm, (e, 3).
+    """
     chord = end - start
     half = norm(chord) / 2
     tilt = dot(surfaces.gradient(p, start), plane)

@@ -47,7 +47,14 @@ class Windows:
         ray = unit(point - self.pinhole)
         return rotated(ray, axis[self.mirror][:, None], angle[self.mirror][:, None])
 
-    def coverage(self, centre: Floats, radius: Floats, axis: Floats, angle: Floats) -> Floats:
+    def coverage(
+        self,
+        centre: Floats,
+        radius: Floats,
+        axis: Floats,
+        angle: Floats,
+        pinhole: Floats | None = None,
+    ) -> Floats:
         """Coverage diameter (m,) of one ball for each mirror within its rotated window, mm.
 
         It is twice the smallest distance from the origin of all rays through the window's edge
@@ -59,14 +66,16 @@ class Windows:
             radius: of the balls, mm, (m,).
             axis: unit vectors that the windows are rotated about, (m, 3).
             angle: radians, (m,).
+            pinhole: of the camera that sees the balls, mm, (3,); by default the windows' own.
 
         Returns:
             Infinite for mirrors without sides.
         """
+        place = self.pinhole if pinhole is None else pinhole
         centres, radii = centre[self.mirror][:, None], radius[self.mirror][:, None]
 
         def miss(t: Floats) -> Floats:
-            return sphere_miss_distances(self.pinhole, self.rays(t, axis, angle), centres, radii)
+            return sphere_miss_distances(place, self.rays(t, axis, angle), centres, radii)
 
         smallest = samples_about_minima(miss, len(self.arc), ROUNDS).min(axis=1)
         return 2 * minima_by_mirror(self.mirror, smallest, self.cells.mirrors)
