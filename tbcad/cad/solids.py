@@ -3,6 +3,7 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
+import multiprocessing
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ from OCP.BRepBuilderAPI import (
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepClass3d import BRepClass3d
-from OCP.BRepGProp import BRepGProp
+from OCP.BRepGProp import BRepGProp, BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
@@ -38,13 +39,20 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeRevol,
     BRepPrimAPI_MakeSphere,
 )
-from OCP.GeomAbs import GeomAbs_Plane
+from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_REVERSED,
+    TopAbs_ShapeEnum,
+    TopAbs_SOLID,
+    TopAbs_VERTEX,
+)
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
@@ -164,13 +172,18 @@ def _boolean(
     operation.SetTools(_list(second))
     operation.SetFuzzyValue(same)
     # Both only spare time: faces come in the same order, tests compare the bytes.
-    operation.SetRunParallel(len(first) + len(second) > FEW)
+    operation.SetRunParallel(len(first) + len(second) > FEW and _has_threads())
     operation.SetUseOBB(True)
     operation.SetToFillHistory(False)
     operation.Build()
     if not operation.IsDone():
         raise InvalidSolidError("the kernel cannot join or cut these solids")
     return operation.Shape()
+
+
+def _has_threads() -> bool:
+    """Whether the kernel's threads are there: a copy of a process would wait for them for ever."""
+    return multiprocessing.parent_process() is None
 
 
 def to_bytes(shape: TopoDS_Shape) -> bytes:
@@ -204,6 +217,17 @@ def solids(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
 def faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
     """All faces of a shape, each once."""
     return [TopoDS.Face_s(face) for face in _parts(shape, TopAbs_FACE)]
+
+
+def edges(shape: TopoDS_Shape) -> list[TopoDS_Edge]:
+    """All edges of a shape, each once."""
+    return [TopoDS.Edge_s(edge) for edge in _parts(shape, TopAbs_EDGE)]
+
+
+def cylinder_radius(face: TopoDS_Face) -> float:
+    """Radius of the cylinder that a face is on, mm; 0 for other faces."""
+    surface = BRepAdaptor_Surface(face)
+    return surface.Cylinder().Radius() if surface.GetType() == GeomAbs_Cylinder else 0.0
 
 
 def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
@@ -248,6 +272,55 @@ def properties(shape: TopoDS_Shape) -> SolidProperties:
     BRepGProp.SurfaceProperties_s(shape, surface)
     centre = inside.CentreOfMass()
     return SolidProperties(inside.Mass(), surface.Mass(), (centre.X(), centre.Y(), centre.Z()))
+
+
+@dataclass(frozen=True)
+class FaceIntegrals:
+    """Integrals over faces, by which they add up to those of a solid.
+
+    Attributes:
+        origin: any point near the faces, mm, (3,): the nearer, the less errors of the kernel count.
+        volume: between the origin and the faces, mm^3.
+        volume_moment: of the distance from the origin over that volume, mm^4, (3,).
+        area: mm^2.
+    """
+
+    origin: Floats
+    volume: float
+    volume_moment: Floats
+    area: float
+
+    def __add__(self, other: "FaceIntegrals") -> "FaceIntegrals":
+        """Those of both together; they have the same origin."""
+        return FaceIntegrals(
+            self.origin,
+            self.volume + other.volume,
+            self.volume_moment + other.volume_moment,
+            self.area + other.area,
+        )
+
+    @property
+    def properties(self) -> SolidProperties:
+        """Those of the solid that the faces close."""
+        x, y, z = (self.origin + self.volume_moment / self.volume).tolist()
+        return SolidProperties(self.volume, self.area, (x, y, z))
+
+
+def mean_corner(shape: TopoDS_Shape) -> Floats:
+    """Mean of a shape's corners, mm, (3,)."""
+    corners = map(TopoDS.Vertex_s, _parts(shape, TopAbs_VERTEX))
+    points = np.array([BRep_Tool.Pnt_s(corner).Coord() for corner in corners])
+    return np.asarray(points.mean(axis=0))
+
+
+def face_integrals(face: TopoDS_Face, origin: Floats) -> FaceIntegrals:
+    """Integrals over a face by the kernel."""
+    inside, surface = BRepGProp_Vinert(), GProp_GProps()
+    inside.SetLocation(gp_Pnt(*origin.tolist()))
+    inside.Perform(BRepGProp_Face(face), BRepGProp_Domain(face))
+    BRepGProp.SurfaceProperties_s(face, surface)
+    moment = inside.Mass() * (np.array(inside.CentreOfMass().Coord()) - origin)
+    return FaceIntegrals(origin, inside.Mass(), moment, surface.Mass())
 
 
 def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
@@ -311,13 +384,16 @@ def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
     net = BRep_Tool.Triangulation_s(face, place)
     if net is None:
         raise InvalidSolidError("the kernel cannot mesh a face")
-    move = place.Transformation()
-    corners = [net.Node(i).Transformed(move) for i in range(1, net.NbNodes() + 1)]
+    nodes = (net.Node(i) for i in range(1, net.NbNodes() + 1))
+    if not place.IsIdentity():
+        move = place.Transformation()
+        nodes = (node.Transformed(move) for node in nodes)
+    corners = [node.Coord() for node in nodes]
     facets = [net.Triangle(i).Get() for i in range(1, net.NbTriangles() + 1)]
     triangle = np.array(facets, dtype=np.int64).reshape(-1, 3) - 1
     if face.Orientation() == TopAbs_REVERSED:
         triangle = triangle[:, ::-1]
-    return np.array([(p.X(), p.Y(), p.Z()) for p in corners]), triangle
+    return np.array(corners), triangle
 
 
 def _joined(points: Floats, triangles: Ints) -> Mesh:

@@ -44,6 +44,12 @@ class CellOutlines:
         """Point at each place, mm, (b, 3)."""
         return self.vertices[self.vertex]
 
+    def at(self, arc: Ints, step: Ints) -> Ints:
+        """Vertices (k,) that many segments from the starts of arcs (k,)."""
+        inner = self.first_inner[arc] + step - 1
+        last = np.where(step == self.segments[arc], self.end[arc], inner)
+        return np.where(step == 0, self.start[arc], last)
+
     def along(self, chain: list[tuple[int, bool]]) -> Ints:
         """Vertices along a chain of arcs and whether each runs forward, its ends included."""
         lines = [self._line(arc, forward) for arc, forward in chain]

@@ -1,15 +1,28 @@
 """All files of both shells, from a design to a folder."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import one_solid, properties
+from tbcad.cad.solids import (
+    FaceIntegrals,
+    SolidProperties,
+    face_integrals,
+    faces,
+    mean_corner,
+    one_solid,
+    properties,
+)
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import shell_record
+from tbcad.optics.cell_moments import cell_moments
+from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.wall_moments import wall_moments
 from tbcad.shell.casing import casing_faces
 from tbcad.shell.envelope import Envelope, closing_envelope
 from tbcad.shell.front import front_edges
@@ -49,7 +62,7 @@ def write_shell_solids(
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
-        known = known.mirrored() if known and symmetric else properties(solid.shape)
+        known = known.mirrored() if known and symmetric else shell_properties(solid, array)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
 
 
@@ -73,11 +86,41 @@ def camera_solid(
         InvalidSolidError: when the kernel finds the solid invalid.
     """
     name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
-    mirrors = front_edges(maker, design.arrays[0].modelled_cells)
+    cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
+    mirrors = front_edges(maker, cells)
     casing = casing_faces(mirrors, envelope or shell_envelope(design))
-    faces = [*zip(array.ids, mirrors.faces(), strict=True), *casing]
+    walls = zip(wall_names(array.ids, cells), mirrors.walls(), strict=True)
+    faces = [*zip(array.ids, mirrors.faces(), strict=True), *walls, *casing]
     solid = one_solid(name, maker.solid([face for _, face in faces]))
     return Solid(name, solid, tuple(faces))
+
+
+def wall_names(ids: Sequence[str], cells: Cells) -> list[str]:
+    """Names of the pedestals' walls: that of a0001 toward a0002 is a0001_a0002."""
+    if not isinstance(cells, PedestalCells):
+        return []
+    return [f"{ids[mirror]}_{ids[across]}" for mirror, across in cells.walls.tolist()]
+
+
+def shell_properties(solid: Solid, array: MirrorArray) -> SolidProperties:
+    """Volume, area and centroid of a camera's half.
+
+    Mirrors that are spheres are integrated along their arcs, and so are walls of pedestals: the
+    kernel takes seconds for them.
+    """
+    cells = array.modelled_cells
+    if not (cells.mirror_surfaces.curvature > 0).all():
+        return properties(solid.shape)
+    origin = mean_corner(solid.shape)
+    mirrors = cell_moments(cells, origin)
+    total = FaceIntegrals(origin, mirrors.volume, mirrors.volume_moment, float(mirrors.area.sum()))
+    if isinstance(cells, PedestalCells):
+        walls = wall_moments(cells, origin)
+        area = float(walls.area.sum())
+        total += FaceIntegrals(origin, walls.volume, walls.volume_moment, area)
+    for face in faces(solid.shape)[len(array) + len(wall_names(array.ids, cells)) :]:
+        total += face_integrals(face, origin)
+    return total.properties
 
 
 def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:

@@ -9,8 +9,10 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
 from tbcad.cad.brep import Maker, Side
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Arcs, Cells
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import PLANES
 from tbcad.shell.boundary import boundary_chain
-from tbcad.types import Floats
+from tbcad.types import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,24 @@ class FrontEdges:
     def _rings(self) -> list[list[Side]]:
         """Edges round each cell, counter-clockwise seen from the light, the solid's outer side."""
         offsets, sides = self.cells.rings
-        every = [(self.edges[side // 2], bool(side % 2)) for side in sides.tolist()]
+        every = self._edges(sides)
         return [every[a:b][::-1] for a, b in pairwise(offsets.tolist())]
+
+    def walls(self) -> list[TopoDS_Face]:
+        """Faces of the walls below mirrors on pedestals, none where neighbouring spheres meet."""
+        cells, maker = self.cells, self.maker
+        if not isinstance(cells, PedestalCells):
+            return []
+        surfaces = cells.surfaces.subset(slice(cells.mirrors + PLANES, None))
+        poses = zip(surfaces.apex, surfaces.normal, cells.wall_rings, strict=True)
+        return [
+            maker.face(maker.plane(point, normal), [self._edges(sides)[::-1]], natural=True)
+            for point, normal, sides in poses
+        ]
+
+    def _edges(self, sides: Ints) -> list[Side]:
+        """Sides as edges, each followed the other way: seen from the light rings turn back."""
+        return [(self.edges[side // 2], bool(side % 2)) for side in sides.tolist()]
 
     def _face(self, apex: Floats, normal: Floats, radius: float, ring: list[Side]) -> TopoDS_Face:
         maker = self.maker

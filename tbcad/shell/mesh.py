@@ -8,10 +8,12 @@ from tbcad.geometry.conics import EllipseArc, Spheroid
 from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
 from tbcad.shell.boundary import boundary_chain
 from tbcad.shell.casing_edges import ARC_ENDS, casing_lines, outline
 from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, mirror_facets
+from tbcad.shell.walls import wall_facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
@@ -35,6 +37,8 @@ def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -
     """
     front = mirror_facets(spec, cells, distance)
     builder = _MeshBuilder(front, spec.mesh.structure_error_mm)
+    if isinstance(cells, PedestalCells):
+        builder.triangles.append(wall_facets(cells, front.outlines))
     _add_casing(builder, cells, front, envelope)
     return builder.mesh()
 

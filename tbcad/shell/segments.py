@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tbcad.mirrors.array import mirror_margins
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
 from tbcad.optics.trace import limiting_sides, minima_by_mirror
@@ -69,7 +70,7 @@ def _excess(spec: Spec, cells: Cells, counts: Ints) -> Floats:
     pinhole = np.array(spec.optics.camera_mm)
     exact = miss_distances(pinhole, points, normals).min(axis=0)
     off_facets = miss_distances(pinhole, points[[0, 2]], normals[1]).min(axis=0)
-    target = spec.optics.capture_diameter_mm + spec.mirrors.margin_mm
+    target = spec.optics.capture_diameter_mm + mirror_margins(spec.mirrors, cells.mirrors)
     seen = np.minimum(minima_by_mirror(mirror, exact, cells.mirrors), target / 2)
     excess = np.zeros(len(counts))
     np.maximum.at(
