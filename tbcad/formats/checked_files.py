@@ -25,13 +25,13 @@ class Record(BaseModel):
 Model = TypeVar("Model", bound=Record)
 
 
-def read_json(path: Path, model: type[Model], schema: str, missing: str) -> Model:
+def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:
     """The JSON object in a file.
 
     Args:
         path: the file.
         model: that the object must fit.
-        schema: that the object must name.
+        schema: that the object must name; None: it names none.
         missing: what to do if there is no such file, for the error.
 
     Raises:

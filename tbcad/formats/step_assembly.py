@@ -3,20 +3,26 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from OCP.BRep import BRep_Builder
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
-from OCP.TCollection import TCollection_HAsciiString
+from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
+from OCP.XCAFApp import XCAFApp_Application
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
 from tbcad.formats.step import StepError, configure, write_header
-from tbcad.loading import large_libraries
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 
@@ -49,17 +55,36 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
 
 
 def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
-    """The tree of named solids as the kernel's document."""
-    with large_libraries():  # seconds that other files need not wait for
-        import cadquery
-        from cadquery.occ_impl.assembly import toCAF
-    tree = cadquery.Assembly(name=name)
+    """The tree of named solids as the kernel's document.
+
+    As cadquery's `Assembly` has it; cadquery takes longer to load than the tree to be made.
+    """
+    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    tool.SetAutoNaming_s(False)
+    top = _named(tool.NewShape(), name)
     for group in groups:
-        branch = cadquery.Assembly(name=group.name)
+        branch = _named(tool.NewShape(), group.name)
         for body in group.bodies:
-            branch.add(cadquery.Shape.cast(body.shape), name=body.name)
-        tree.add(branch)
-    return toCAF(tree, True)[1]
+            part = _named(tool.NewShape(), body.name)
+            tool.SetShape(part, _compound(body.shape))
+            _named(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
+        tool.AddComponent(top, branch, TopLoc_Location())
+    tool.UpdateAssemblies()
+    return document
+
+
+def _named(label: TDF_Label, name: str) -> TDF_Label:
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+    return label
+
+
+def _compound(shape: TopoDS_Shape) -> TopoDS_Compound:
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    builder.Add(compound, shape)
+    return compound
 
 
 def _number_occurrences(writer: STEPControl_Writer) -> None:

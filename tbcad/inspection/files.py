@@ -1,0 +1,162 @@
+"""The folder of an inspection: a table and a STEP file with tolerances for each half, a record."""
+
+import json
+from dataclasses import dataclass
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.cad.brep import Solid
+from tbcad.cad.solids import cylinder_radius
+from tbcad.errors import InputError
+from tbcad.formats.csv_table import Row, write_table
+from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
+from tbcad.inspection.deviations import MM_PER_UM
+from tbcad.inspection.limits import Limits
+from tbcad.inspection.read_back import check_read_back
+from tbcad.inspection.sensitivity import Sensitivities
+from tbcad.mirrors.array import mirror_ids
+from tbcad.optics.surfaces import Surfaces
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.types import Floats
+
+SCHEMA = "tbcad-inspection/1"
+RECORD = "inspection.json"
+DATUM_FACES = {"A": "foot", "B": "seam"}
+WAVELENGTH_NM = 550.0  # the middle of the visible
+SCATTERED = 0.01  # share of the light that roughness may scatter: a judgement
+UNITS = ("offset_um", "tilt_mrad", "radius_mm")
+COLUMNS = (
+    *("id", "centre_x_mm", "centre_y_mm", "centre_z_mm", "radius_mm"),
+    *("apex_x_mm", "apex_y_mm", "apex_z_mm", "normal_x", "normal_y", "normal_z"),
+    *("offset_limit_um", "tilt_limit_mrad", "radius_limit_mm", "profile_mm"),
+    *("offset_sigma_um", "tilt_sigma_mrad", "radius_sigma_mm"),
+)
+
+
+@dataclass(frozen=True)
+class Half:
+    """One half of the shell, as its solid is.
+
+    Attributes:
+        name: of its solid, "shell_a".
+        ids: of its mirrors.
+        surfaces: of the solid, below the coat.
+        limits: of the mirrors.
+        dowel_mm: diameter of the holes for dowel pins.
+    """
+
+    name: str
+    ids: tuple[str, ...]
+    surfaces: Surfaces
+    limits: Limits
+    dowel_mm: float
+
+    @property
+    def profile_mm(self) -> Floats:
+        """Width of the zone about each mirror that its offset leaves, mm, (m,)."""
+        return np.round(2 * MM_PER_UM * self.limits.each[:, 0], 6)
+
+    def rows(self) -> list[Row]:
+        """Rows of the table."""
+        numbers = np.column_stack(
+            [
+                *(self.surfaces.centre, self.surfaces.radius, self.surfaces.apex),
+                *(self.surfaces.normal, self.limits.each, self.profile_mm, self.limits.sigma),
+            ]
+        ).tolist()
+        named = zip(self.ids, numbers, strict=True)
+        return [dict(zip(COLUMNS, (name, *row), strict=True)) for name, row in named]
+
+
+def halves(export: ExportedDesign, limits: Limits) -> tuple[Half, Half]:
+    """Both halves of an export with their part of the limits."""
+    coat = export.spec.mirrors.coating_um * MM_PER_UM
+    m = len(export.reflectors[0])
+    a, b = (
+        Half(
+            f"shell_{one.camera_id}",
+            tuple(mirror_ids(one.camera_id, m)),
+            one.mirrors.offset(-coat),
+            Limits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
+            export.spec.shell.foot_flange.dowel_hole_mm,
+        )
+        for k, one in enumerate(export.reflectors)
+    )
+    return a, b
+
+
+def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
+    """Write table and STEP file of one half, read the tolerances back, and name both files.
+
+    Raises:
+        InputError: the export has no such solid, or it is not that of its mirrors.
+    """
+    table, step = f"inspection_{half.name[-1]}.csv", f"{half.name}_tolerances.step"
+    write_table(folder / table, COLUMNS, half.rows())
+    solid = read_named_solid(export / f"{half.name}.step")
+    names = {name for name, _ in solid.faces}
+    missing = sorted({*half.ids, *DATUM_FACES.values()} - names)
+    if missing:
+        raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
+    given = tolerances(half, dowel_face(solid, half.dowel_mm))
+    write_tolerances(folder / step, solid, given)
+    check_read_back(folder / step, given, dict(zip(half.ids, half.surfaces.centre, strict=True)))
+    return {"table": table, "solid": step}
+
+
+def tolerances(half: Half, dowel: str) -> FaceTolerances:
+    """What the faces of a half may be off."""
+    seat = half.limits.seat_um * MM_PER_UM
+    radius = zip(half.surfaces.radius.tolist(), half.limits.each[:, 2].tolist(), strict=True)
+    return FaceTolerances(
+        datums=DATUM_FACES | {"C": dowel},
+        flatness=dict.fromkeys(DATUM_FACES.values(), seat),
+        profile=dict(zip(half.ids, half.profile_mm.tolist(), strict=True)),
+        radius=dict(zip(half.ids, radius, strict=True)),
+        notes=notes(),
+    )
+
+
+def dowel_face(solid: Solid, diameter: float) -> str:
+    """Name of the first dowel hole in the foot flange."""
+    holes = (one for one in solid.faces if one[0].startswith("foot_hole"))
+    return next(name for name, face in holes if isclose(2 * cylinder_radius(face), diameter))
+
+
+def notes() -> dict[str, str]:
+    """What tolerances of faces cannot say."""
+    return {
+        "surface finish": f"mirrors polished, Rq {roughness_nm():.1f} nm or better",
+        "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",
+        "datums": "A foot plane, B seam plane, C dowel hole",
+    }
+
+
+def roughness_nm() -> float:
+    """RMS roughness that scatters the share of light: (4 pi Rq / wavelength)^2 (ISO 10110-8)."""
+    return WAVELENGTH_NM * float(np.sqrt(SCATTERED)) / (4 * np.pi)
+
+
+def write_record(
+    folder: Path, found: Sensitivities, limits: Limits, facts: dict[str, Any]
+) -> dict[str, Any]:
+    """Write the record of an inspection, and return it."""
+    smallest = limits.each.min(axis=0).tolist()
+    median = np.median(limits.each, axis=0).tolist()
+    record = {
+        "schema": SCHEMA,
+        **facts,
+        "designed_minimum_mm": float(found.coverage.min()),
+        "limits": {
+            "smallest": dict(zip(UNITS, smallest, strict=True)),
+            "median": dict(zip(UNITS, median, strict=True)),
+            "seat_um": limits.seat_um,
+            "roughness_rq_nm": roughness_nm(),
+        },
+    }
+    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return record

@@ -1,0 +1,79 @@
+"""From an export to what a workshop is told of its shell."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.inspection.deviations import Deviation
+from tbcad.inspection.files import halves, write_half, write_record
+from tbcad.inspection.limits import Limits, mirror_limits
+from tbcad.inspection.sensitivity import sensitivities
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.tolerance.montecarlo.coverage import coverage
+from tbcad.tolerance.montecarlo.edge_model import edge_models
+from tbcad.types import Progress
+
+BUILDS, SEED = 50, 1
+
+
+def checked_export(folder: Path) -> ExportedDesign:
+    """Read an export whose shell can be inspected.
+
+    Raises:
+        InputError: it has no shell, or its mirrors are planar.
+    """
+    export = read_export(folder)
+    for name in ("shell_a.step", "shell_b.step"):
+        if not (folder / name).is_file():
+            raise InputError(f"{folder / name} is not there: build the shell too, tbcad build")
+    if not all((one.mirrors.curvature > 0).all() for one in export.reflectors):
+        raise InputError(f"{folder}: its mirrors are planar: limits are for spheres only")
+    return export
+
+
+def inspect(
+    export: ExportedDesign, wanted: float, folder: Path, progress: Progress
+) -> dict[str, Any]:
+    """Write the limits of every mirror into a folder, and return the record.
+
+    Args:
+        export: see `checked_export`.
+        wanted: yield with standard deviations as in the table.
+        folder: exists, and is the caller's to replace.
+        progress: called with the name of each stage.
+
+    Raises:
+        InputError: the shell leaves no deviation, or its solids are not those of its record.
+    """
+    progress("sensitivities")
+    found = sensitivities(export.reflectors)
+    limits = mirror_limits(found, export.capture_mm, wanted)
+    facts = {
+        "exports": str(export.folder),
+        "target_mm": export.capture_mm,
+        "yield": wanted,
+        "simulated_minimum_mm": minimum_at_limits(export, limits),
+    }
+    files = {}
+    for half in halves(export, limits):
+        progress(half.name)
+        files[half.name] = write_half(folder, export.folder, half)
+    return write_record(folder, found, limits, {**facts, "files": files})
+
+
+def minimum_at_limits(export: ExportedDesign, limits: Limits, builds: int = BUILDS) -> float:
+    """Minimum coverage of simulated shells whose mirrors are all at their limits, mm.
+
+    Each deviation is at its limit one way or the other, at random; tilts in random directions.
+    """
+    models, generator = edge_models(export.reflectors), np.random.default_rng(SEED)
+    draws = []
+    for model, each in zip(models, np.split(limits.each, 2), strict=True):
+        shape = (builds, len(model))
+        sign = generator.choice([-1.0, 1.0], (2, *shape))
+        angle = generator.uniform(0, 2 * np.pi, shape)
+        tilt = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * each[:, 1, None]
+        draws.append(Deviation(sign[0] * each[:, 0], tilt, sign[1] * each[:, 2]).draws(model))
+    return float(coverage(models, (draws[0], draws[1]), worst_only=True)[0].min())

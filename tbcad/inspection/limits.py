@@ -1,0 +1,74 @@
+"""Limits of each mirror that leave every virtual camera its coverage."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm as normal
+
+from tbcad.errors import InputError
+from tbcad.inspection.sensitivity import KINDS, Sensitivities
+from tbcad.types import Floats, Ints
+
+PLACES = np.array([3, 4, 5])  # decimals of limits: a nanometre, or what turns or bends by less
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of all mirrors, a's first, by offset (um), tilt (mrad) and radius (mm).
+
+    Attributes:
+        each: a mirror may be off by this, whatever the others do within theirs, (2 m, 3).
+        sigma: standard deviations with which the wanted share of shells is good, (2 m, 3).
+        seat_um: by which each half may sit wrong, also with all mirrors at their limits.
+    """
+
+    each: Floats
+    sigma: Floats
+    seat_um: float
+
+
+def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limits:
+    """Share each virtual camera's margin out to the mirrors that it depends on.
+
+    Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
+    mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
+    cameras ask for. Sums are linear for `each`, and of squares for `sigma`.
+
+    Args:
+        found: losses of the virtual cameras.
+        target_mm: that every virtual camera must see.
+        wanted: share of the pairs of shells in which all do, between 0 and 1.
+
+    Raises:
+        InputError: a virtual camera sees less than the target as designed.
+    """
+    margin = found.coverage - target_mm
+    if margin.min() <= 0:
+        raise InputError(
+            f"a virtual camera sees {found.coverage.min():.2f} mm as designed, of {target_mm:g} mm "
+            "that are asked for: no deviation is allowed; enlarge mirrors.margin_mm"
+        )
+    parts = len(KINDS) + 1
+    deviations = normal.ppf(wanted ** (1 / len(margin)))
+    each = margin[:, None] / parts / _positive(found.total())
+    variance = (margin / deviations)[:, None] ** 2 / parts
+    sigma = np.sqrt(variance / _positive(found.total(power=2)))
+    seat = margin / parts / _positive(found.seat)
+    each, sigma = (_smallest(found.mirror, of[found.camera]) for of in (each, sigma))
+    return Limits(_floor(each, PLACES), _floor(sigma, PLACES), float(_floor(seat.min(), 1)))
+
+
+def _positive(loss: Floats) -> Floats:
+    return np.where(loss > 0, loss, np.finfo(float).tiny)
+
+
+def _floor(limits: Floats, places: Ints | int) -> Floats:
+    """Round down to decimal places, as the files have them."""
+    scale = 10.0 ** np.asarray(places)
+    return np.asarray(np.floor(limits * scale) / scale)
+
+
+def _smallest(mirror: Ints, allowed: Floats) -> Floats:
+    result = np.full((int(mirror.max()) + 1, allowed.shape[1]), np.inf)
+    np.minimum.at(result, mirror, allowed)
+    return result

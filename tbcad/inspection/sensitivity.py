@@ -1,0 +1,135 @@
+"""What a deviation of a mirror, or of a whole half, costs the virtual cameras: finite differences.
+
+Only a mirror and those that touch it see a small deviation. So mirrors that share no neighbour
+deviate in the same simulated build.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.inspection.deviations import MM_PER_UM, Deviation, independent_classes
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.tolerance.montecarlo.coverage import coverage, virtual_camera_numbers
+from tbcad.tolerance.montecarlo.draws import ShellDraws
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.types import Floats, Ints
+
+KINDS = ("offset", "tilt", "radius")
+STEP = (1.0, 0.02, 0.05)  # um, mrad, mm: the edges of cells move by some micrometres
+SEAT_STEP_UM = 10.0
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Coverage that k pairs of a virtual camera and a mirror lose for a deviation of the mirror.
+
+    Attributes:
+        camera: number of the virtual camera, (k,).
+        mirror: number of the mirror, a's first, (k,).
+        loss: by offset (mm/um), tilt (mm/mrad) and radius (mm/mm), in the worse sense, (k, 3).
+        seat: lost when both halves sit wrong by a micrometre, mm/um, (v,).
+        coverage: of each virtual camera as designed, mm, (v,).
+    """
+
+    camera: Ints
+    mirror: Ints
+    loss: Floats
+    seat: Floats
+    coverage: Floats
+
+    def total(self, power: int = 1) -> Floats:
+        """Sum over a virtual camera's mirrors of the powers of its losses, (v, 3)."""
+        summed = np.zeros((len(self.coverage), len(KINDS)))
+        np.add.at(summed, self.camera, self.loss**power)
+        return summed
+
+
+def sensitivities(cameras: tuple[Reflector, Reflector]) -> Sensitivities:
+    """Losses of all virtual cameras by all that they depend on.
+
+    Args:
+        cameras: both, with their mirrors as designed, which are spheres.
+    """
+    models = edge_models(cameras)
+    designed = _coverage(models, Deviation.none(1, len(models[0])))[0]
+    halves = [_half(models, half, camera, designed) for half, camera in enumerate(cameras)]
+    camera, mirror, loss = map(np.concatenate, zip(*halves, strict=True))
+    seat = sum(_seat_losses(models, half, designed) for half in (0, 1))
+    return Sensitivities(camera, mirror, loss, np.asarray(seat), designed)
+
+
+def touching(camera: Reflector) -> list[Ints]:
+    """Numbers of the mirrors that share an edge with each."""
+    m, faces = len(camera), camera.cells.arcs.faces
+    both = np.concatenate([faces, faces[:, ::-1]])
+    both = np.unique(both[(both < m).all(axis=1)], axis=0)
+    return np.split(both[:, 1], np.searchsorted(both[:, 0], np.arange(1, m)))
+
+
+def _half(
+    models: EdgeModels, half: int, camera: Reflector, designed: Floats
+) -> tuple[Ints, Ints, Floats]:
+    """Virtual cameras (k,), mirrors (k,) and losses (k, 3) by the mirrors of one half."""
+    near, m = touching(camera), len(camera)
+    seen_by = np.split(virtual_camera_numbers(models[1].halved), 2)[half]
+    mirror = np.repeat(np.arange(m), [len(one) + 1 for one in near])
+    seen = seen_by[np.concatenate([np.append(one, i) for i, one in enumerate(near)])]
+    seen, mirror = np.unique(np.column_stack([seen, mirror]), axis=0).T
+    classes = independent_classes(near)
+    lost = [_losses(models, half, classes, kind, designed) for kind in range(len(KINDS))]
+    return seen, mirror + half * m, np.stack([one[classes[mirror], seen] for one in lost], axis=1)
+
+
+def _losses(models: EdgeModels, half: int, classes: Ints, kind: int, designed: Floats) -> Floats:
+    """Coverage lost for a unit of one kind of deviation of each class of mirrors, (c, v)."""
+    step = STEP[kind] * (classes == np.arange(classes.max() + 1)[:, None])
+    axes = [_only(kind, step)]
+    if KINDS[kind] == "tilt":
+        axes.append(replace(axes[0], tilt=axes[0].tilt[..., ::-1]))
+    worse = [_worse(designed, (_coverage(models, one, half) for one in (a, -a))) for a in axes]
+    return np.asarray(np.sqrt(sum(one**2 for one in worse)) / STEP[kind])
+
+
+def _only(kind: int, amount: Floats) -> Deviation:
+    """One kind of deviation: amounts (s, m); a tilt is about its first axis."""
+    none = Deviation.none(*amount.shape)
+    if KINDS[kind] == "tilt":
+        return replace(none, tilt=np.stack([amount, np.zeros_like(amount)], axis=-1))
+    return replace(none, **{KINDS[kind]: amount})
+
+
+def _coverage(models: EdgeModels, deviation: Deviation, half: int = 0) -> Floats:
+    """Coverage of all virtual cameras when one half deviates, (s, v)."""
+    builds, m = deviation.offset.shape
+    none = Deviation.none(builds, m)
+    draws = [(deviation if k == half else none).draws(model) for k, model in enumerate(models)]
+    return coverage(models, (draws[0], draws[1]))[0]
+
+
+def _worse(designed: Floats, coverages: Iterable[Floats]) -> Floats:
+    """What is lost in the worse sense."""
+    lowest = np.min(list(coverages), axis=0)
+    return np.asarray(np.maximum(designed - lowest, 0.0))
+
+
+def _seat_losses(models: EdgeModels, half: int, designed: Floats) -> Floats:
+    """Coverage lost by a half for a micrometre of its seat, mm/um, (v,).
+
+    The half is moved, and turned about the object's centre by as much over its own width.
+    """
+    y = models[half].apex[:, 1]
+    moved = SEAT_STEP_UM * MM_PER_UM * np.eye(3)
+    total = np.zeros_like(designed)
+    for field, step in (("shell_shift", moved), ("shell_tilt", moved / np.ptp(y))):
+        both = (_seated(models, half, field, sign * step) for sign in (1.0, -1.0))
+        total += np.sqrt((_worse(designed, both) ** 2).sum(axis=0)) / SEAT_STEP_UM
+    return total
+
+
+def _seated(models: EdgeModels, half: int, field: str, rows: Floats) -> Floats:
+    """Coverage of all virtual cameras when a half is moved or turned, (s, v)."""
+    draws: list[ShellDraws] = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
+    draws[half] = replace(draws[half], **{field: rows})
+    return coverage(models, (draws[0], draws[1]))[0]
