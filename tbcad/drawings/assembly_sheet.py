@@ -1,0 +1,195 @@
+"""The assembly: the whole machine from several sides, call-outs by number of the parts list."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from tbcad.drafting.sheet import (
+    A3,
+    LEFT_MM,
+    TITLE_MM,
+    Sheet,
+    TitleBlock,
+    border,
+    drawing_room,
+    notes,
+    placed,
+    title_block,
+)
+from tbcad.drafting.tables import table
+from tbcad.drafting.views import as_entities
+from tbcad.drawings.export import Export
+from tbcad.drawings.line_picture import LinePicture, line_picture
+from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
+from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.report.callouts import EDGE, RADIUS, Callout, place_callouts
+from tbcad.types import Floats
+
+NAME = "assembly"
+# Toward the eye: from the camera's side, from behind the uprights, from below to the balls.
+EYES = ((1.0, -1.0, 0.6), (-1.0, -1.0, 0.6), (0.6, -1.0, -0.35))
+VIEWS = (
+    "from the camera's side, without shroud",
+    "from behind, without shroud",
+    "from below, without shroud",
+)
+LEFT_OUT = ("shroud_", "capture_sphere", "camera_view")  # would hide the rest, or are no parts
+BALLOON_MM, TEXT_MM, DOT_MM = 2.8, 2.5, 0.5
+PIXELS = RADIUS / BALLOON_MM  # of the call-outs' own unit, 1/mm
+SCALES = (0.5, 0.4, 0.2, 0.1)
+PIECE_MM = 2.0  # edges are tested in pieces as long
+HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
+BESIDE_MM, TITLE_GAP_MM = 4.0, 6.0
+
+
+@dataclass(frozen=True)
+class AssemblyJob:
+    """What the assembly's sheets follow from.
+
+    Attributes:
+        path: GLB file of all bodies.
+        parts: part of each body.
+        items: number of each part.
+        quantities: of each part.
+        title: of the design.
+    """
+
+    path: Path
+    parts: dict[str, str]
+    items: dict[str, int]
+    quantities: dict[str, int]
+    title: str
+
+
+def assembly_job(export: Export, machine: Machine) -> AssemblyJob:
+    """What is needed to draw the assembly.
+
+    Raises:
+        InputError: its file is missing, or not as it was written.
+    """
+    path = export.file(machine.record["assembly"]["glb"])
+    fasteners = {one["name"]: one["part"] for one in machine.fasteners}
+    return AssemblyJob(
+        path, {**machine.bodies, **fasteners}, machine.items, machine.quantities, export.title
+    )
+
+
+def draw_assembly(job: AssemblyJob) -> list[Sheet]:
+    """A sheet for each side of the machine, with the numbers of what is seen there first."""
+    bodies = _bodies(job.path)
+    pictures = [line_picture(bodies, _axes(eye), PIECE_MM) for eye in EYES]
+    sheets, seen = list[Sheet](), set[str]()
+    for k, picture in enumerate(pictures):
+        anchors = _anchors(job, picture, seen)
+        seen |= anchors.keys()
+        sheets.append(_sheet(job, picture, anchors, k))
+    return sheets
+
+
+def _bodies(path: Path) -> dict[str, trimesh.Trimesh]:
+    """Bodies in mm and z up by their names."""
+    scene = trimesh.load_scene(path)
+    bodies = {}
+    for name in sorted(scene.graph.nodes_geometry):
+        if name.startswith(LEFT_OUT):
+            continue
+        place, geometry = scene.graph[name]
+        mesh = scene.geometry[geometry]
+        x, y, z = (1000 * trimesh.transform_points(mesh.vertices, place)).T
+        bodies[name] = trimesh.Trimesh(np.stack([x, -z, y], axis=-1), mesh.faces)
+    return bodies
+
+
+def _axes(eye: Sequence[float]) -> Floats:
+    toward = np.array(eye) / np.linalg.norm(eye)
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(toward, right), toward])
+
+
+def _anchors(
+    job: AssemblyJob, picture: LinePicture, seen: set[str]
+) -> dict[str, tuple[float, float]]:
+    """A point of each part that has no number yet: of its first body that is seen."""
+    anchors: dict[str, tuple[float, float]] = {}
+    for body, point in picture.anchors.items():
+        part = job.parts.get(body, "")
+        if part in job.items and part not in seen:
+            anchors.setdefault(part, point)
+    return anchors
+
+
+def _sheet(
+    job: AssemblyJob, picture: LinePicture, anchors: Mapping[str, tuple[float, float]], k: int
+) -> Sheet:
+    left, low, right, high = drawing_room(A3)
+    column = right - sum(WIDTHS_MM) - BESIDE_MM
+    scale, origin = _fitted(picture, (left, low, column, high))
+    block = TitleBlock(
+        title="general assembly",
+        design=job.title,
+        item="all",
+        quantity=1,
+        material="see the parts list",
+        view=VIEWS[k],
+        sheet=f"{k + 1} of {len(EYES)}",
+        tolerances="none",
+    )
+    rows = sorted((job.items[part], job.quantities[part], part) for part in anchors)
+    cells = [(str(item), str(quantity), part) for item, quantity, part in rows]
+    drawn = placed(as_entities(picture.lines, Layer.CUT), origin, scale)
+    text = (
+        "Numbers are those of the parts list, bom.csv.",
+        "What is hidden here is on another sheet; what is nowhere is inside others or has no body.",
+    )
+    entities = [
+        *border(A3),
+        *title_block(A3, scale, block),
+        *drawn,
+        *_balloons(job, anchors, (left, low, column, high), scale, origin),
+        *table((column + BESIDE_MM, high), WIDTHS_MM, (HEAD, *cells)),
+        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, text),
+    ]
+    name = NAME if k == 0 else f"{NAME}_{k + 1}"
+    return Sheet(name, block.title, NAME, A3, scale, origin, tuple(entities))
+
+
+def _fitted(picture: LinePicture, room: tuple[float, float, float, float]) -> tuple[float, Point]:
+    """Scale and place of a picture between two columns of numbers."""
+    points = np.array([end for line in picture.lines for end in line])
+    low, high = points.min(axis=0), points.max(axis=0)
+    edge = 2 * EDGE / PIXELS
+    space = np.array([room[2] - room[0] - 2 * edge, room[3] - room[1] - 2 * BESIDE_MM])
+    fitting = (one for one in SCALES if (one * (high - low) <= space).all())
+    scale = next(fitting, SCALES[-1])
+    middle = np.array([room[0] + room[2], room[1] + room[3]]) / 2 - scale * (low + high) / 2
+    return scale, (float(middle[0]), float(middle[1]))
+
+
+def _balloons(
+    job: AssemblyJob,
+    anchors: Mapping[str, tuple[float, float]],
+    room: tuple[float, float, float, float],
+    scale: float,
+    origin: Point,
+) -> Iterator[Entity]:
+    """Circles with numbers, and lines to the parts that do not cross."""
+    left, low, right, high = room
+    callouts = []
+    for part, (x, y) in anchors.items():
+        on_paper = origin[0] + scale * x, origin[1] + scale * y
+        pixel = (on_paper[0] - left) * PIXELS, (high - on_paper[1]) * PIXELS
+        callouts.append(Callout(job.items[part], 1, pixel))
+    size = round((right - left) * PIXELS), round((high - low) * PIXELS)
+    for callout, place in place_callouts(callouts, size):
+        x, y = left + place[0] / PIXELS, high - place[1] / PIXELS
+        tip = left + callout.anchor[0] / PIXELS, high - callout.anchor[1] / PIXELS
+        way = np.array([tip[0] - x, tip[1] - y])
+        start = np.array([x, y]) + BALLOON_MM * way / max(float(np.hypot(*way)), BALLOON_MM)
+        yield Line(Layer.DIMENSIONS, (float(start[0]), float(start[1])), tip)
+        yield Circle(Layer.DIMENSIONS, tip, DOT_MM)
+        yield Circle(Layer.DIMENSIONS, (x, y), BALLOON_MM)
+        yield Text(Layer.DIMENSIONS, (x, y - TEXT_MM / 2), TEXT_MM, str(callout.number), "centre")

@@ -1,0 +1,112 @@
+"""What drawings take from an export: files as they were written, or refused."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tbcad.errors import InputError
+from tbcad.formats.csv_table import Row
+from tbcad.output.manifest import MANIFEST, Manifest, is_listed, read_manifest
+from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+
+DESIGN, PROTOTYPE = "design.json", "prototype.json"
+SHELLS = ("shell_a", "shell_b")
+PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
+SCHEMA = "tbcad-design/2"
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Export:
+    """An export that is drawn.
+
+    Attributes:
+        folder: of it.
+        manifest: its files.
+        design: design.json.
+        machine: its prototype, None where it has none.
+        shells: names of the shells that it has.
+    """
+
+    folder: Path
+    manifest: Manifest
+    design: Record
+    machine: Machine | None
+    shells: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """Name of the design and its subdivision."""
+        spec = self.design["spec"]
+        return f"{spec['name']}, n = {spec['optics']['n']}"
+
+    @property
+    def parts(self) -> Mapping[str, Record]:
+        """Records of printed parts by name."""
+        return {one["name"]: one for one in self.machine.record["parts"]} if self.machine else {}
+
+    def row(self, part: Record) -> Row:
+        """A printed part's row in the parts list.
+
+        Raises:
+            InputError: it has none.
+        """
+        name = f"cap {part['ball']}" if part["role"] == "cap" else part["name"]
+        rows = self.machine.rows if self.machine else ()
+        row = next((one for one in rows if one["part"] == name), None)
+        if row is None:
+            raise InputError(f"{self.folder / 'bom.csv'} has no {name}: build the export again")
+        return row
+
+    def file(self, name: str) -> Path:
+        """A file of the export as it was written.
+
+        Raises:
+            InputError: it is missing, or another.
+        """
+        path = self.folder / name
+        if not path.is_file():
+            raise InputError(f"{path} is missing: build the export again")
+        if not is_listed(path, self.manifest.files.get(name)):
+            raise InputError(
+                f"{path} is not as tbcad wrote it (cut off, or changed since): build the export "
+                "again"
+            )
+        return path
+
+    def digest(self, name: str) -> str:
+        """The beginning of a file's SHA-256."""
+        return self.manifest.files[name].sha256[:12]
+
+
+def read_export(folder: Path) -> Export:
+    """The export in a folder.
+
+    Raises:
+        InputError: there is none, or a file is missing or not as it was written.
+    """
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise InputError(
+            f"{folder / MANIFEST} is missing or no manifest: name a folder that tbcad build wrote"
+        )
+    shells = tuple(name for name in SHELLS if f"{name}.step" in manifest.files)
+    export = Export(folder, manifest, {}, None, shells)
+    design = _design(export.file(DESIGN))
+    if PROTOTYPE not in manifest.files:
+        return Export(folder, manifest, design, None, shells)
+    for name in PROTOTYPE_FILES:
+        export.file(name)
+    return Export(folder, manifest, design, read_machine(folder), shells)
+
+
+def _design(path: Path) -> Record:
+    try:
+        design = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path} is no JSON ({error}): build again") from None
+    if not isinstance(design, dict) or design.get("schema") != SCHEMA:
+        raise InputError(f"{path} has another schema than {SCHEMA}: build again")
+    return design

@@ -1,0 +1,318 @@
+"""The optical layout: the section through both cameras, with the symbols of docs/glossary.md."""
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tbcad.drafting.dimensions import across, labels, leader
+from tbcad.drafting.sheet import (
+    A3,
+    LEFT_MM,
+    TITLE_MM,
+    Sheet,
+    TitleBlock,
+    border,
+    choose_scale,
+    drawing_room,
+    notes,
+    placed,
+    title_block,
+)
+from tbcad.drafting.tables import table
+from tbcad.drafting.views import straight
+from tbcad.drawings.export import Export, Record
+from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
+from tbcad.types import Floats
+
+NAME = "optical_layout"
+NOMINAL = "nominal sizes"
+PLANAR_MM = 1e6  # radius that stands for a plane: off by 1e-5 mm over a mirror of 10 mm
+IN_PLANE = 1e-9  # of a direction's y
+HEAD, WIDTHS_MM = ("symbol", "what", "value"), (16.0, 58.0, 30.0)
+NAMES = ("P", "C", "V")  # apex, centre and virtual camera of the mirror that is named
+ELLIPSE_POINTS = 361
+AROUND_MM, BESIDE_MM = 12.0, 4.0  # room round the drawing; from the border
+CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
+BEYOND = 1.6  # of the capture radius: where reflected rays end
+LEVEL_MM, LEADER_MM, LEADER_DEG = 8.0, 12.0, 200.0  # of a dimension and of the leader's corner
+SCALES_NOTE = "In the plane y = 0, x to the right, z up; all is to scale."
+
+
+@dataclass(frozen=True)
+class Mirrors:
+    """Mirrors of camera a whose directions are in the plane y = 0, by their angle.
+
+    Attributes:
+        apex: x and z, mm, (m, 2).
+        centre: x and z of the sphere, mm, (m, 2).
+        radius: mm, (m,); PLANAR_MM for planar ones.
+        direction: x and z of u, (m, 2).
+        theta: theta_0 and theta_1, deg, (m, 2).
+        ids: numbers of the mirrors.
+    """
+
+    apex: Floats
+    centre: Floats
+    radius: Floats
+    direction: Floats
+    theta: Floats
+    ids: tuple[str, ...]
+
+    def edges(self) -> Floats:
+        """Where neighbours' circles meet, nearest to their apices, mm, (m - 1, 2)."""
+        pairs = pairwise(range(len(self.radius)))
+        return np.array([self._meeting(i, j) for i, j in pairs]).reshape(-1, 2)
+
+    def _meeting(self, i: int, j: int) -> Floats:
+        between = self.centre[j] - self.centre[i]
+        distance = float(np.hypot(*between))
+        along = (distance**2 + self.radius[i] ** 2 - self.radius[j] ** 2) / (2 * distance)
+        height = math.sqrt(max(self.radius[i] ** 2 - along**2, 0.0))
+        unit = between / distance
+        foot, across_it = self.centre[i] + along * unit, np.array([-unit[1], unit[0]])
+        middle = (self.apex[i] + self.apex[j]) / 2
+        ends = np.stack([foot + height * across_it, foot - height * across_it])
+        return np.asarray(ends[np.argmin(np.hypot(*(ends - middle).T))])
+
+
+def layout_sheet(design: Record, rows: Sequence[Mapping[str, str]], title: str) -> list[Sheet]:
+    """The sheet of a design.
+
+    Args:
+        design: design.json.
+        rows: of mirrors.csv.
+        title: the design's name for the title block.
+    """
+    optics = design["spec"]["optics"]
+    pinhole = np.array(optics["camera_mm"])[[0, 2]]
+    mirrors, minor = _mirrors(rows), float(optics["semi_minor_mm"])
+    half_distance = _half(optics)
+    major = math.hypot(minor, half_distance)
+    capture = float(optics["capture_diameter_mm"]) / 2
+    reach = 2 * major
+    left, low, right, high = drawing_room(A3)
+    column = right - sum(WIDTHS_MM)
+    size = 2 * reach, reach - min(float(pinhole[1]), -capture)
+    room = column - left - 2 * AROUND_MM, high - low - 2 * AROUND_MM - LEVEL_MM
+    scale = choose_scale(size, room)
+    middle = (left + column) / 2, high - AROUND_MM - reach * scale
+    drawn = [
+        *_ellipses(pinhole, major, minor),
+        Circle(Layer.CUT, (0.0, 0.0), capture),
+        Arc(Layer.CENTRE, (0.0, 0.0), reach, 0.0, 180.0),
+        *_mirror_arcs(mirrors),
+        *_rays(mirrors, pinhole, capture),
+    ]
+    on_paper = placed(drawn, middle, scale)
+    block = TitleBlock(
+        "optical layout", title, "-", 1, "-", "section y = 0", tolerances="nominal sizes"
+    )
+    entities = [
+        *border(A3),
+        *title_block(A3, scale, block),
+        *on_paper,
+        *_places(mirrors, pinhole, reach, middle, scale, on_paper),
+        *_capture_length(capture, pinhole, middle, scale),
+        *table((column, high), WIDTHS_MM, (HEAD, *_values(rows, mirrors, optics, major))),
+        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, _text()),
+    ]
+    return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
+
+
+def layout_rows(export: Export) -> list[dict[str, str]]:
+    """Rows of the export's mirrors.csv.
+
+    Raises:
+        InputError: it is not as it was written.
+    """
+    with export.file("mirrors.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def has_layout(design: Record) -> bool:
+    """Whether the pinholes are in the plane y = 0, which the layout is drawn in."""
+    return abs(float(design["spec"]["optics"]["camera_mm"][1])) < IN_PLANE
+
+
+def _half(optics: Record) -> float:
+    """Half the distance of the foci, c, mm."""
+    return float(np.linalg.norm(optics["camera_mm"])) / 2
+
+
+def _text() -> tuple[str, ...]:
+    return (
+        SCALES_NOTE,
+        "O: centre of the capture sphere and focus of both ellipses; A, B: pinholes, the others.",
+        "Crosses: virtual cameras, each at d = 2a from O in the direction u of its mirror.",
+        "Rays: from A to both edges of the first, the middle and the last whole mirror in the",
+        "plane, and as they are reflected there, traced exactly.",
+        "Symbols as in docs/glossary.md.",
+    )
+
+
+def _mirrors(rows: Sequence[Mapping[str, str]]) -> Mirrors:
+    flat = [row for row in rows if row["camera"] == "a" and abs(float(row["uy"])) < IN_PLANE]
+    flat.sort(key=lambda row: math.atan2(float(row["ux"]), float(row["uz"])))
+
+    def columns(*names: str) -> Floats:
+        return np.array([[float(row[name]) for name in names] for row in flat]).reshape(
+            -1, len(names)
+        )
+
+    apex, normal = columns("px", "pz"), columns("nx", "nz")
+    radius = np.array([_radius(row) or PLANAR_MM for row in flat])
+    return Mirrors(
+        apex=apex,
+        centre=apex - radius[:, np.newaxis] * normal,
+        radius=radius,
+        direction=columns("ux", "uz"),
+        theta=columns("theta0_deg", "theta1_deg"),
+        ids=tuple(row["id"] for row in flat),
+    )
+
+
+def _radius(row: Mapping[str, str]) -> float:
+    """A mirror's radius, mm; 0 for a planar one."""
+    radius = float(row["radius_mm"] or 0.0)
+    return radius if math.isfinite(radius) else 0.0
+
+
+def _ellipses(pinhole: Floats, major: float, minor: float) -> Iterator[Entity]:
+    """Both ellipses, and lines through their foci."""
+    axis = pinhole / np.hypot(*pinhole)
+    angle = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)[:-1]
+    side = np.array([-axis[1], axis[0]])
+    points = (
+        pinhole / 2 + major * np.outer(np.cos(angle), axis) + minor * np.outer(np.sin(angle), side)
+    )
+    for sign in (1, -1):
+        corners = tuple((sign * x, z) for x, z in np.round(points, 4).tolist())
+        yield Polyline(Layer.DIMENSIONS, corners)
+        ends = np.stack([pinhole / 2 - major * axis, pinhole / 2 + major * axis]) * [sign, 1]
+        (x, z), (right, high) = ends.tolist()
+        yield Line(Layer.CENTRE, (x, z), (right, high))
+
+
+def _mirror_arcs(mirrors: Mirrors) -> Iterator[Entity]:
+    """Arcs of whole mirrors in the plane, for camera a and mirrored for b."""
+    edges = mirrors.edges()
+    for k in range(1, len(mirrors.radius) - 1):
+        for sign in (1, -1):
+            flip = np.array([sign, 1])
+            (x, z), radius = (flip * mirrors.centre[k]).tolist(), float(mirrors.radius[k])
+            if radius == PLANAR_MM:
+                (a, b), (c, d) = (flip * edges[k - 1 : k + 1]).tolist()
+                yield Line(Layer.CUT, (a, b), (c, d))
+                continue
+            ends = [
+                math.degrees(math.atan2(*reversed((flip * edge - (x, z)).tolist())))
+                for edge in (edges[k - 1], edges[k])
+            ]
+            first, last = ends if (ends[1] - ends[0]) % 360 < 180 else ends[::-1]
+            yield Arc(Layer.CUT, (x, z), radius, first % 360, last % 360)
+
+
+def _rays(mirrors: Mirrors, pinhole: Floats, capture: float) -> Iterator[Entity]:
+    """From the pinhole to edges of three mirrors, reflected, and on past the capture sphere."""
+    edges = mirrors.edges()
+    for k in _traced(mirrors):
+        for edge in (edges[k - 1], edges[k]):
+            incoming = edge - pinhole
+            normal = (edge - mirrors.centre[k]) / mirrors.radius[k]
+            out = incoming - 2 * (incoming @ normal) * normal
+            out /= np.hypot(*out)
+            end = edge + (-(edge @ out) + BEYOND * capture) * out
+            corners = [tuple(point) for point in np.round([pinhole, edge, end], 4).tolist()]
+            yield Polyline(Layer.RAYS, ((corners[0]), corners[1], corners[2]), closed=False)
+
+
+def _traced(mirrors: Mirrors) -> list[int]:
+    """The first, the middle and the last whole mirror of the plane."""
+    last = len(mirrors.radius) - 2
+    return sorted({1, (1 + last) // 2, last}) if last >= 1 else []
+
+
+def _places(
+    mirrors: Mirrors,
+    pinhole: Floats,
+    reach: float,
+    middle: Point,
+    scale: float,
+    drawn: Sequence[Entity],
+) -> Iterator[Entity]:
+    """Dots with names, and crosses of virtual cameras."""
+
+    def at(point: Floats) -> Point:
+        x, z = point.tolist()
+        return middle[0] + scale * x, middle[1] + scale * z
+
+    for virtual in mirrors.direction:
+        for x, y in {at(reach * virtual), at(reach * virtual * [-1, 1])}:
+            yield Line(Layer.DIMENSIONS, (x - CROSS_MM, y), (x + CROSS_MM, y))
+            yield Line(Layer.DIMENSIONS, (x, y - CROSS_MM), (x, y + CROSS_MM))
+    named = {"O": np.zeros(2), "A": pinhole, "B": pinhole * [-1, 1]}
+    if traced := _traced(mirrors):
+        k = traced[len(traced) // 2]
+        shown = (mirrors.apex[k], mirrors.centre[k], reach * mirrors.direction[k])
+        named |= dict(zip(NAMES, shown, strict=True))
+        if mirrors.radius[k] == PLANAR_MM:
+            del named["C"]
+        yield Line(Layer.CENTRE, middle, at(reach * mirrors.direction[k]))
+    dots = [Circle(Layer.CUT, at(point), DOT_MM) for point in named.values()]
+    yield from dots
+    yield from labels(dots, list(named), straight(drawn))
+
+
+def _capture_length(
+    capture: float, pinhole: Floats, middle: Point, scale: float
+) -> Iterator[Entity]:
+    """The capture sphere's diameter, and the distance of the pinholes."""
+    x, y = middle
+    turn = math.radians(LEADER_DEG)
+    tip = x + scale * capture * math.cos(turn), y + scale * capture * math.sin(turn)
+    corner = tip[0] - LEADER_MM, tip[1] - LEADER_MM
+    yield from leader(tip, corner, f"capture sphere Ø{2 * capture:g}")
+    low, reach = y + scale * float(pinhole[1]), abs(float(pinhole[0]))
+    left, right = (x - scale * reach, low), (x + scale * reach, low)
+    yield from across(left, right, low - LEVEL_MM, f"{2 * reach:g}")
+
+
+def _values(
+    rows: Sequence[Mapping[str, str]], mirrors: Mirrors, optics: Record, major: float
+) -> list[tuple[str, ...]]:
+    """Symbols, what they are, and their values."""
+    radii = [radius for row in rows if (radius := _radius(row))]
+    span = f"{min(radii):.3f} to {max(radii):.3f}" if radii else "all planar"
+    x, y, z = optics["camera_mm"]
+    half, minor = _half(optics), float(optics["semi_minor_mm"])
+    counted = (
+        f"{sum(row['camera'] == 'a' for row in rows)} + {sum(row['camera'] == 'b' for row in rows)}"
+    )
+    values: list[tuple[str, ...]] = [
+        ("n", "subdivision", f"{optics['n']}"),
+        ("", "mirrors of camera a + b", counted),
+        ("2 R", "diameter of the capture sphere, mm", f"{optics['capture_diameter_mm']:g}"),
+        ("A", "pinhole of camera a, mm", f"({x:g}, {y:g}, {z:g})"),
+        ("B", "pinhole of camera b, mm", f"({-x:g}, {y:g}, {z:g})"),
+        ("a", "semi-major axis of the ellipsoid, mm", f"{major:.4f}"),
+        ("b", "semi-minor axis, mm", f"{minor:g}"),
+        ("2 c", "distance of the foci O and A, mm", f"{2 * half:.4f}"),
+        ("d = 2 a", "from O to a virtual camera V, mm", f"{2 * major:.4f}"),
+        ("r", "radii of the mirrors, mm", span),
+    ]
+    if traced := _traced(mirrors):
+        k = traced[len(traced) // 2]
+        (x, z), (first, second) = mirrors.apex[k].tolist(), mirrors.theta[k].tolist()
+        own = "planar" if mirrors.radius[k] == PLANAR_MM else f"{mirrors.radius[k]:.3f}"
+        values += [
+            ("", "the mirror that is named", mirrors.ids[k]),
+            ("P", "its apex (x, z), mm", f"({x:.3f}, {z:.3f})"),
+            ("r", "its radius, C = P - r N, mm", own),
+            ("theta_0", "half angle of the flat mirror, deg", f"{first:.3f}"),
+            ("theta_1", "half angle wanted (eq. 1), deg", f"{second:.3f}"),
+        ]
+    return values

@@ -1,0 +1,312 @@
+"""The sheet of a part: three views, a picture, levels, table of holes, notes."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from tbcad.cad.features import Cylinder, bounds, cylinders, plane_levels
+from tbcad.cad.projection import Shape, project
+from tbcad.drafting.dimensions import (
+    across,
+    centre_cross,
+    labels,
+    ruler_across,
+    ruler_upward,
+    upward,
+)
+from tbcad.drafting.sheet import (
+    A3,
+    A4,
+    BORDER_MM,
+    LEFT_MM,
+    TITLE_MM,
+    Sheet,
+    TitleBlock,
+    border,
+    drawing_room,
+    notes,
+    title_block,
+)
+from tbcad.drafting.tables import ROW_MM, table
+from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.drawings.holes import (
+    HEAD,
+    VIEWS,
+    WIDTHS_MM,
+    Fastener,
+    Hole,
+    cells,
+    mm,
+    numbered_holes,
+)
+from tbcad.formats.entities import Circle, Entity, Layer, Point, Text
+from tbcad.formats.pdf import text_width
+from tbcad.types import Floats
+
+BEFORE_MM, BEHIND_MM = 30.0, 16.0  # room for levels left and below; for lengths above and right
+BETWEEN_MM = 18.0  # from view to view
+LENGTH_MM, LEVELS_MM = 9.0, 8.0  # of dimension lines, and of the levels' texts, from a view
+BESIDE_MM, NAME_MM, NAME_OFF_MM = 4.0, 2.5, 4.5  # height of a view's name and its place below
+# ISO 5455, with 1:2.5 of its extended list.
+SCALES = (5.0, 2.0, 1.0, 0.5, 0.4, 0.2, 0.1)
+MOST_HIDDEN = 300  # edges of a view; more hide what they are to show, and are left out
+LEVELS = 12  # at most along each axis, those of the largest faces
+PICTURE_MM, PICTURE_SHARE = 25.0, 0.9  # least room of the picture, and its share of it
+NAMES = {"A": "A, from the front", "B": "B, from above", "C": "C, from the left"}
+SAME_MM = 0.01
+
+
+@dataclass(frozen=True)
+class PartText:
+    """What a part's sheets say besides its shape.
+
+    Attributes:
+        name: of the files.
+        block: title block, its sheet open.
+        notes: lines.
+    """
+
+    name: str
+    block: TitleBlock
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where the views are on paper."""
+
+    paper: Point
+    scale: float
+    views: dict[str, View]
+    box: Floats
+    right: float
+
+    @property
+    def low(self) -> Floats:
+        """Least coordinates of the part."""
+        return np.asarray(self.box[0])
+
+    @property
+    def high(self) -> Floats:
+        """Greatest coordinates of the part."""
+        return np.asarray(self.box[1])
+
+
+def part_sheets(shape: Shape, fasteners: Sequence[Fastener], text: PartText) -> list[Sheet]:
+    """All sheets of a part: views and what fits of the table, then the rest of the table.
+
+    Args:
+        shape: in the drawing's frame, x to the right and z up in view A, its origin the datum.
+        fasteners: that go into it, in the same frame.
+        text: what is written.
+    """
+    box, found = bounds(shape), cylinders(shape)
+    holes = numbered_holes(found, fasteners)
+    frame = _frame(box, len(holes))
+    rows = [cells(number, hole) for number, hole in holes]
+    first, others = _pages(rows, frame.paper)
+    block = replace(text.block, sheet=f"1 of {1 + len(others)}")
+    low = drawing_room(frame.paper)[1]
+    lengths = [*_overall(frame, found)]
+    entities = [
+        *border(frame.paper),
+        *title_block(frame.paper, frame.scale, block),
+        *(one for letter in VIEWS for one in _view(shape, frame, letter, holes, straight(lengths))),
+        *_picture(shape, frame),
+        *_levels(shape, frame),
+        *lengths,
+        *_table(frame.paper, first),
+        *notes((LEFT_MM + BESIDE_MM, low), _notes_width(frame.paper), text.notes),
+    ]
+    origin = frame.views["A"].origin
+    sheet = Sheet(
+        text.name, block.title, text.name, frame.paper, frame.scale, origin, tuple(entities)
+    )
+    rest = [_table_sheet(text, page, k, 1 + len(others)) for k, page in enumerate(others, start=2)]
+    return [sheet, *rest]
+
+
+def _notes_width(paper: Point) -> float:
+    return paper[0] - BORDER_MM - TITLE_MM[0] - LEFT_MM - 2 * BESIDE_MM
+
+
+def _frame(box: Floats, holes: int) -> _Frame:
+    """Paper, scale and places: the smaller paper where it takes as large a scale, or full size."""
+    small, large = _scale(A4, box, holes), _scale(A3, box, holes)
+    paper, scale = (A4, small) if small >= min(large, 1.0) else (A3, large)
+    left, low, right, high = _room(paper, holes)
+    width, depth, height = (scale * (box[1] - box[0])).tolist()
+    spare_x = right - left - width - depth - BEFORE_MM - BETWEEN_MM - BEHIND_MM
+    spare_y = high - low - height - depth - BEFORE_MM - BETWEEN_MM - BEHIND_MM
+    x, y = left + BEFORE_MM + max(spare_x, 0.0) / 3, low + BEFORE_MM + max(spare_y, 0.0) / 2
+    y_front, x_left = y + depth + BETWEEN_MM, x + width + BETWEEN_MM
+    lo, hi = (scale * box).tolist()
+    views = {
+        "A": View(FRONT, (x - lo[0], y_front - lo[2]), scale),
+        "B": View(ABOVE, (x - lo[0], y - lo[1]), scale),
+        "C": View(LEFT, (x_left + hi[1], y_front - lo[2]), scale),
+    }
+    return _Frame(paper, scale, views, box, right)
+
+
+def _scale(paper: Point, box: Floats, holes: int) -> float:
+    left, low, right, high = _room(paper, holes)
+    width, depth, height = (box[1] - box[0]).tolist()
+    taken = BEFORE_MM + BETWEEN_MM + BEHIND_MM
+    fitting = (
+        one
+        for one in SCALES
+        if one * (width + depth) + taken <= right - left
+        and one * (height + depth) + taken <= high - low
+    )
+    return next(fitting, SCALES[-1])
+
+
+def _room(paper: Point, holes: int) -> tuple[float, float, float, float]:
+    """Room of the views: what border, title block and table leave."""
+    left, low, right, high = drawing_room(paper)
+    return left, low, right - (sum(WIDTHS_MM) + BESIDE_MM if holes else 0.0), high
+
+
+def _view(
+    shape: Shape,
+    frame: _Frame,
+    letter: str,
+    holes: Sequence[tuple[str, Hole]],
+    lines: Sequence[tuple[Point, Point]],
+) -> Iterator[Entity]:
+    """A view with its name and the numbers of its holes, which keep off lines."""
+    view = frame.views[letter]
+    edges = project(shape, view.axes)
+    crowded = len(edges.hidden) > MOST_HIDDEN
+    drawn = view.drawn(replace(edges, hidden=()) if crowded else edges)
+    (left, low), (_, high) = _outline(frame, letter)
+    level = high + NAME_OFF_MM - NAME_MM if letter == "B" else low - NAME_OFF_MM
+    words = f"{NAMES[letter]}, without hidden edges" if crowded else NAMES[letter]
+    name = Text(Layer.DIMENSIONS, (left, level), NAME_MM, words)
+    end = left + text_width(name.text, NAME_MM)
+    shown = [(number, hole) for number, hole in holes if hole.view == letter]
+    circles = [
+        Circle(Layer.CUT, view.at(hole.mouth), hole.cylinder.radius * frame.scale)
+        for _, hole in shown
+    ]
+    yield from (*drawn, name)
+    for circle, (_, hole) in zip(circles, shown, strict=True):
+        if not hole.is_tilted:
+            yield from centre_cross(circle)
+    numbers, taken = [number for number, _ in shown], [(left, level, end, level + NAME_MM)]
+    yield from labels(circles, numbers, [*straight(drawn), *lines], taken)
+
+
+def _outline(frame: _Frame, letter: str) -> tuple[Point, Point]:
+    """Lower left and upper right corner of a view on paper."""
+    one, other = (np.array(frame.views[letter].at(corner)) for corner in frame.box)
+    low, high = np.minimum(one, other).tolist(), np.maximum(one, other).tolist()
+    return (low[0], low[1]), (high[0], high[1])
+
+
+def _picture(shape: Shape, frame: _Frame) -> Iterator[Entity]:
+    """An isometric view where the views leave room, without hidden edges."""
+    _, (left, _) = _outline(frame, "B")
+    (_, top), _ = _outline(frame, "C")
+    left, low = left + BETWEEN_MM, drawing_room(frame.paper)[1] + 2 * BESIDE_MM
+    right, top = frame.right - BESIDE_MM, top - 2 * NAME_OFF_MM
+    if min(right - left, top - low) < PICTURE_MM:
+        return
+    axes = isometric()
+    corners = np.stack(np.meshgrid(*frame.box.T), -1).reshape(-1, 3)
+    flat = corners @ axes[:2].T
+    size, middle = np.ptp(flat, axis=0), (flat.min(axis=0) + flat.max(axis=0)) / 2
+    fit = PICTURE_SHARE * float(np.min(np.array([right - left, top - low]) / size))
+    scale = min(fit, frame.scale)
+    origin = (left + right) / 2 - scale * middle[0], (low + top) / 2 - scale * middle[1]
+    yield from View(axes, origin, scale).drawn(project(shape, axes, hidden=False))
+
+
+def _levels(shape: Shape, frame: _Frame) -> Iterator[Entity]:
+    """Running dimensions of plane faces: x below view B, y left of it, z left of view A."""
+    x, y, z = (_chosen(shape, frame, k) for k in range(3))
+    (left, low), _ = _outline(frame, "B")
+    above, side = frame.views["B"], frame.views["A"]
+    yield from ruler_across(
+        [(above.at(at * np.eye(3)[0])[0], mm(at)) for at in x], low, low - LEVELS_MM
+    )
+    yield from ruler_upward(
+        [(above.at(at * np.eye(3)[1])[1], mm(at)) for at in y], left, left - LEVELS_MM
+    )
+    (left, _), _ = _outline(frame, "A")
+    yield from ruler_upward(
+        [(side.at(at * np.eye(3)[2])[1], mm(at)) for at in z], left, left - LEVELS_MM
+    )
+
+
+def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
+    """Levels along an axis: both ends, the datum, and those of the largest faces between."""
+    ends = [float(frame.low[axis]), float(frame.high[axis])]
+    found = plane_levels(shape, np.eye(3)[axis])
+    by_area = sorted(found, key=lambda one: (-round(one[1], 2), one[0]))
+    chosen = [round(end, 2) + 0.0 for end in ends]
+    for level in [0.0, *(level for level, _ in by_area)]:
+        inside = ends[0] - SAME_MM < level < ends[1] + SAME_MM
+        if len(chosen) < LEVELS and inside and all(abs(level - one) > SAME_MM for one in chosen):
+            chosen.append(level)
+    return sorted(chosen)
+
+
+def _overall(frame: _Frame, found: Sequence[Cylinder]) -> Iterator[Entity]:
+    """Length, depth and height over all; diameters of round parts are marked."""
+    width, depth, height = (mm(value) for value in (frame.high - frame.low).tolist())
+    round_part = any(
+        not one.hollow
+        and abs(one.axis[2]) > 1 - SAME_MM
+        and np.allclose((frame.high - frame.low)[:2], 2 * one.radius, atol=SAME_MM)
+        for one in found
+    )
+    sign = "Ø" if round_part else ""
+    (left, _), (right, high) = _outline(frame, "A")
+    yield from across((left, high), (right, high), high + LENGTH_MM, sign + width)
+    (left, low), (right, high) = _outline(frame, "C")
+    yield from across((left, high), (right, high), high + LENGTH_MM, sign + depth)
+    yield from upward((right, low), (right, high), right + LENGTH_MM, height)
+
+
+def _pages(
+    rows: list[tuple[str, ...]], paper: Point
+) -> tuple[list[tuple[str, ...]], list[list[list[tuple[str, ...]]]]]:
+    """Rows of the first sheet, and columns of the sheets that follow."""
+    _, low, _, high = drawing_room(paper)
+    first = int((high - low - BESIDE_MM) / ROW_MM) - 1
+    _, low, _, high = drawing_room(A4)
+    column = int((high - low - BESIDE_MM) / ROW_MM) - 1
+    rest = rows[first:]
+    starts = [*range(0, len(rest), column), len(rest)]
+    columns = [rest[a:b] for a, b in pairwise(starts)]
+    return rows[:first], [columns[k : k + 2] for k in range(0, len(columns), 2)]
+
+
+def _table(paper: Point, rows: Sequence[tuple[str, ...]]) -> Iterator[Entity]:
+    if rows:
+        _, _, right, high = drawing_room(paper)
+        yield from table((right - sum(WIDTHS_MM), high), WIDTHS_MM, (HEAD, *rows))
+
+
+def _table_sheet(
+    text: PartText, columns: Sequence[list[tuple[str, ...]]], number: int, count: int
+) -> Sheet:
+    """What is left of the table of holes."""
+    block = replace(text.block, sheet=f"{number} of {count}")
+    left, _, _, high = drawing_room(A4)
+    step = sum(WIDTHS_MM) + BESIDE_MM
+    entities = [
+        *border(A4),
+        *title_block(A4, None, block),
+        *(
+            entity
+            for k, rows in enumerate(columns)
+            for entity in table((left + BESIDE_MM + k * step, high), WIDTHS_MM, (HEAD, *rows))
+        ),
+    ]
+    name = f"{text.name}_{number}"
+    return Sheet(name, block.title, text.name, A4, 1.0, (0.0, 0.0), tuple(entities), to_scale=False)

@@ -1,0 +1,121 @@
+"""Sheets of printed parts: their frames, fasteners and notes from the export's record."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.cad.features import Cylinder, bounds, cylinders
+from tbcad.cad.projection import Shape
+from tbcad.cad.solids import moved
+from tbcad.drafting.sheet import Sheet, TitleBlock
+from tbcad.drawings.export import Export, Record
+from tbcad.drawings.holes import Fastener, mm
+from tbcad.drawings.part_sheet import PartText, part_sheets
+from tbcad.formats.step_named import read_named_solid
+from tbcad.tolerance.process.process import load_process
+from tbcad.types import Floats
+
+RESIN, RESIN_PROCESS, FILAMENT_PROCESS = "resin", "sla", "fdm"
+MAKERS_SHARE = 4.0  # standard deviations that a maker's tolerance is taken for: decision 0007
+BASE = "base"
+ON_TOP = ("washers", "nuts")  # kinds that are on screws: a hole is for the screw
+ON_AXIS_MM, PARALLEL_COS = 1e-3, 1 - 1e-9
+CORNER = "lowest corner on the left and in front"
+AXES = {"axis": "axis of rotation, lowest face", "vertical": "axis of the stage, lowest face"}
+
+
+@dataclass(frozen=True)
+class PartJob:
+    """All that the sheets of a printed part follow from, to be sent to another process.
+
+    Attributes:
+        path: STEP file.
+        text: of the sheets; the note on the origin is added.
+        axes: what x, y and z become in the drawing, as rows, (3, 3).
+        lines: what may be the datum: its name, a point and a direction, in the drawing's frame.
+        origin: what the machine's origin becomes, (3,).
+        fasteners: that go into it, in the drawing's frame.
+    """
+
+    path: Path
+    text: PartText
+    axes: Floats
+    origin: Floats
+    lines: tuple[tuple[str, Floats, Floats], ...]
+    fasteners: tuple[Fastener, ...]
+
+
+def part_job(export: Export, part: Record) -> PartJob:
+    """What is needed to draw a printed part.
+
+    Raises:
+        InputError: its file is missing or not as it was written; it is not in the parts list.
+    """
+    assert export.machine is not None
+    record, path = export.machine.record, export.file(part["step"])
+    frame = np.array([record["frame"][key] for key in ("zero", "third", "axis")])
+    if part["role"] == BASE:  # as the machine is seen along its axis
+        axes, origin = frame.T, np.zeros(3)
+    else:  # as it lies on the printer's bed: its main faces are across x, y and z
+        axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
+    fasteners = tuple(
+        (one["part"], np.array(one["position_mm"]) @ axes + origin, np.array(one["along"]) @ axes)
+        for one in record["fasteners"]
+        if part["name"] in one["through"] and export.machine.kind(one["part"]) not in ON_TOP
+    )
+    directions = {"axis": frame[2], "vertical": np.array([0.0, 0.0, 1.0])}
+    lines = tuple((name, origin, one @ axes) for name, one in directions.items())
+    return PartJob(path, _text(export, part), axes, origin, lines, fasteners)
+
+
+def _text(export: Export, part: Record) -> PartText:
+    row, name = export.row(part), part["name"]
+    words = str(row["part"]).replace("_", " ")
+    block = TitleBlock(
+        title=words,
+        design=export.title,
+        item=f"{row['item']}: {row['part']}",
+        quantity=int(row["quantity"] or 0),
+        material=str(row["material"]),
+    )
+    return PartText(name, block, tuple(_notes(export, part, block.material)))
+
+
+def _notes(export: Export, part: Record, material: str) -> Iterator[str]:
+    yield f"{part['what'][:1].upper()}{part['what'][1:]}."
+    process = load_process(RESIN_PROCESS if material == RESIN else FILAMENT_PROCESS)
+    expected = MAKERS_SHARE * process.sphere_centre_um.magnitude / 1000
+    yield f"Expected as printed ({process.name}): ±{mm(expected)} mm on short lengths."
+    finish = f"Finish: {part['finish']}. " if part["finish"] else ""
+    yield f"{finish}Deburr; remove supports."
+    yield f"Shape and what has no size here: {part['step']},"
+    yield f"sha256 {export.digest(part['step'])}..."
+
+
+def draw_part(job: PartJob) -> list[Sheet]:
+    """All sheets of a printed part."""
+    shape = moved(read_named_solid(job.path).shape, job.axes, job.origin)
+    datum, what = _datum(shape, job)
+    shape = moved(shape, np.eye(3), -datum)
+    fasteners = [(part, place - datum, along) for part, place, along in job.fasteners]
+    first, *others = job.text.notes
+    lines = (first, f"Origin of x, y, z: {what}.", *others)
+    return part_sheets(shape, fasteners, PartText(job.text.name, job.text.block, lines))
+
+
+def _datum(shape: Shape, job: PartJob) -> tuple[Floats, str]:
+    """The drawing's origin: on an axis of the machine that the part has a cylinder on."""
+    low = bounds(shape)[0]
+    walls = cylinders(shape)
+    for name, point, along in job.lines:
+        if abs(along[2]) > PARALLEL_COS and any(_is_on(one, point, along) for one in walls):
+            return np.array([point[0], point[1], low[2]]), AXES[name]
+    return low, CORNER
+
+
+def _is_on(wall: Cylinder, point: Floats, along: Floats) -> bool:
+    """Whether a cylinder's axis is a line."""
+    off = np.cross(wall.start - point, along)
+    return bool(abs(wall.axis @ along) > PARALLEL_COS and np.linalg.norm(off) < ON_AXIS_MM)

@@ -1,0 +1,147 @@
+"""The sheet of a shell: its section through the camera's axis, and where its mirrors are listed."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.cad.projection import Curve, section
+from tbcad.drafting.dimensions import across, upward
+from tbcad.drafting.sheet import (
+    A3,
+    LEFT_MM,
+    TITLE_MM,
+    Sheet,
+    TitleBlock,
+    border,
+    drawing_room,
+    notes,
+    placed,
+    title_block,
+)
+from tbcad.drafting.views import FRONT, as_entities, straight
+from tbcad.drawings.export import Export
+from tbcad.drawings.holes import mm
+from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
+from tbcad.formats.step_named import read_named_solid
+from tbcad.types import Floats
+
+SCALES = (5.0, 2.0, 1.0, 0.5, 0.4, 0.2, 0.1)
+AROUND_MM, LENGTH_MM, BESIDE_MM, DOT_MM = 25.0, 10.0, 4.0, 0.6
+HATCH_MM = 2.0  # from line to line, on paper, at 45 degrees (ISO 128-3)
+UP_DEG = 45.0
+
+
+@dataclass(frozen=True)
+class ShellJob:
+    """What the sheet of a shell follows from.
+
+    Attributes:
+        path: STEP file.
+        block: title block.
+        notes: lines.
+        name: of the shell.
+    """
+
+    path: Path
+    block: TitleBlock
+    notes: tuple[str, ...]
+    name: str
+
+
+def shell_job(export: Export, name: str) -> ShellJob:
+    """What is needed to draw a shell.
+
+    Raises:
+        InputError: its file is missing, or not as it was written.
+    """
+    step, spec, camera = f"{name}.step", export.design["spec"], name[-1]
+    block = TitleBlock(
+        title=name.replace("_", " "),
+        design=export.title,
+        item=name,
+        quantity=1,
+        material="by process",
+        view="section y = 0",
+        tolerances="inspection table",
+    )
+    text = (
+        f"Wall {spec['shell']['wall_mm']:g} mm behind the deepest valley of the mirrors.",
+        f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
+        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad inspection.",
+        "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
+        f"Shape and what has no size here: {step},",
+        f"sha256 {export.digest(step)}...",
+    )
+    return ShellJob(export.file(step), block, text, name)
+
+
+def draw_shell(job: ShellJob) -> list[Sheet]:
+    """The sheet of a shell."""
+    curves = section(read_named_solid(job.path).shape, FRONT, 0.0)
+    low, high = _extent(curves)
+    left, bottom, right, top = drawing_room(A3)
+    room = np.array([right - left, top - bottom]) - 2 * AROUND_MM
+    size = np.maximum(high, 0.0) - np.minimum(low, 0.0)  # with the origin
+    scale = next((one for one in SCALES if (one * size <= room).all()), SCALES[-1])
+    middle = (np.maximum(high, 0.0) + np.minimum(low, 0.0)) / 2
+    origin = (
+        (left + right) / 2 - scale * float(middle[0]),
+        (bottom + top) / 2 - scale * float(middle[1]),
+    )
+    outline = placed(as_entities(curves, Layer.CUT), origin, scale)
+    entities = [
+        *border(A3),
+        *title_block(A3, scale, job.block),
+        *hatching(outline),
+        *outline,
+        Circle(Layer.DIMENSIONS, origin, DOT_MM),
+        *_lengths(low, high, origin, scale),
+        *notes(
+            (LEFT_MM + BESIDE_MM, bottom), right - TITLE_MM[0] - left - 2 * BESIDE_MM, job.notes
+        ),
+    ]
+    return [Sheet(job.name, job.block.title, job.name, A3, scale, origin, tuple(entities))]
+
+
+def hatching(outline: Sequence[Entity]) -> list[Entity]:
+    """Lines at 45 degrees inside closed outlines, by where each crosses them (even-odd rule)."""
+    pieces = np.array(straight(outline)).reshape(-1, 2, 2)
+    turn = math.radians(UP_DEG)
+    along, up = (
+        np.array([math.cos(turn), math.sin(turn)]),
+        np.array([-math.sin(turn), math.cos(turn)]),
+    )
+    s, t = pieces @ along, pieces @ up
+    first = math.ceil(t.min() / HATCH_MM) if len(pieces) else 0
+    last = math.floor(t.max() / HATCH_MM) if len(pieces) else -1
+    lines: list[Entity] = []
+    for k in range(first, last + 1):
+        level = (k + 1e-6) * HATCH_MM  # off corners on round places
+        crossed = (t[:, 0] < level) != (t[:, 1] < level)
+        share = (level - t[crossed, 0]) / (t[crossed, 1] - t[crossed, 0])
+        places = np.sort(s[crossed, 0] + share * (s[crossed, 1] - s[crossed, 0]))
+        for a, b in zip(places[::2], places[1::2], strict=False):
+            (x, y), (right, high) = ((at * along + level * up).tolist() for at in (a, b))
+            lines.append(Line(Layer.HATCH, (x, y), (right, high)))
+    return lines
+
+
+def _extent(curves: Sequence[Curve]) -> tuple[Floats, Floats]:
+    points = np.array([end for one in straight(as_entities(curves, Layer.CUT)) for end in one])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _lengths(low: Floats, high: Floats, origin: Point, scale: float) -> list[Entity]:
+    """Width and height of the section, and its lowest and highest level from the origin."""
+    (left, bottom), (right, top) = (
+        (origin[0] + scale * float(x), origin[1] + scale * float(y)) for x, y in (low, high)
+    )
+    width, height = (high - low).tolist()
+    return [
+        *across((left, top), (right, top), top + LENGTH_MM, mm(width)),
+        *upward((right, bottom), (right, top), right + LENGTH_MM, mm(height)),
+        *upward(origin, (left, top), left - LENGTH_MM, mm(float(high[1]))),
+    ]

@@ -1,0 +1,211 @@
+"""All sheets of an export as PDF and DXF, drawn in several processes."""
+
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from tbcad.atomic_files import refuse_existing, replace_files, write_errors_as_input_errors
+from tbcad.background import end_with_parent
+from tbcad.drafting.sheet import Sheet, paper_name, scale_text
+from tbcad.drawings.export import Export, read_export
+from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
+from tbcad.errors import InputError
+from tbcad.schedule import cores
+from tbcad.types import Progress
+
+SUFFIXES = (".pdf", ".dxf")
+OPTICAL_LAYOUT, ASSEMBLY = "optical_layout", "assembly"
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A sheet that was written.
+
+    Attributes:
+        name: of its files.
+        title: in its title block.
+        part: that it shows.
+        paper: A3 or A4.
+        scale: such as 1:2; None where nothing is to scale.
+    """
+
+    name: str
+    title: str
+    part: str
+    paper: str
+    scale: str | None
+
+    @property
+    def files(self) -> list[str]:
+        """Names of its files."""
+        return [self.name + suffix for suffix in SUFFIXES]
+
+
+@dataclass(frozen=True)
+class Job:
+    """Sheets that one process draws.
+
+    Attributes:
+        name: of the part, or of what is drawn.
+        draw: function of a module.
+        arguments: of it.
+    """
+
+    name: str
+    draw: Callable[..., list[Sheet]]
+    arguments: tuple[Any, ...]
+
+
+def write_drawings(
+    folder: Path,
+    out: Path,
+    only: Sequence[str] = (),
+    *,
+    force: bool = False,
+    progress: Progress = lambda _: None,
+    workers: int | None = None,
+) -> list[Drawing]:
+    """Draw an export.
+
+    Args:
+        folder: written by a build.
+        out: folder for the sheets; other files in it stay.
+        only: names of what is drawn; everything without names.
+        force: whether files that exist may be replaced.
+        progress: called with each sheet's name when its part is done.
+        workers: number of processes; None: one for each core.
+
+    Raises:
+        InputError: no export, a file of it is not as it was written, a name is unknown, or files
+            cannot be written or exist.
+    """
+    export = read_export(folder)
+    names = _chosen(export, only)
+    jobs = [_job(export, name) for name in names]
+    for job in jobs:
+        for suffix in SUFFIXES:
+            refuse_existing(out / f"{job.name}{suffix}", force)
+    with write_errors_as_input_errors(out):
+        out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
+        drawings = _drawn(jobs, Path(place), progress, workers or cores())
+        files = sorted(Path(place).iterdir())
+        for file in files:
+            refuse_existing(out / file.name, force)
+        replace_files(out, {file.name: file.read_bytes() for file in files})
+    return drawings
+
+
+def drawable(export: Export) -> list[str]:
+    """Names of all that can be drawn of an export, those that take longest first."""
+    parts = sorted(export.parts, key=lambda name: (not name.startswith("carrier"), name))
+    whole = [ASSEMBLY] if export.machine else []
+    return [
+        *export.shells,
+        *whole,
+        *parts,
+        *([OPTICAL_LAYOUT] if has_layout(export.design) else []),
+    ]
+
+
+def _chosen(export: Export, only: Sequence[str]) -> list[str]:
+    names = drawable(export)
+    if not names:
+        raise InputError(
+            f"{export.folder} has no prototype, and its pinholes are not in the plane y = 0 of the "
+            "optical layout: build it with --parts prototype"
+        )
+    for name in only:
+        if name not in names:
+            near = get_close_matches(name, names, 1) or names[:1]
+            raise InputError(
+                f"--only {name:.40} is nothing that this export can draw; the nearest is "
+                f"{near[0]}, all are: {', '.join(sorted(names))}"
+            )
+    return [name for name in names if name in only or not only]
+
+
+def _job(export: Export, name: str) -> Job:
+    from tbcad.drawings.assembly_sheet import assembly_job, draw_assembly
+    from tbcad.drawings.printed_parts import draw_part, part_job
+    from tbcad.drawings.shell_sheet import draw_shell, shell_job
+
+    if name == ASSEMBLY and export.machine:
+        return Job(name, draw_assembly, (assembly_job(export, export.machine),))
+    if name in export.shells:
+        return Job(name, draw_shell, (shell_job(export, name),))
+    if name == OPTICAL_LAYOUT:
+        rows = layout_rows(export)
+        return Job(name, layout_sheet, (export.design, rows, export.title))
+    return Job(name, draw_part, (part_job(export, export.parts[name]),))
+
+
+def _drawn(jobs: Sequence[Job], place: Path, progress: Progress, workers: int) -> list[Drawing]:
+    """Drawings in the order of their names."""
+    drawings = [
+        one for done in _results(jobs, place, progress, min(workers, len(jobs))) for one in done
+    ]
+    return sorted(drawings, key=lambda one: one.name)
+
+
+def _results(
+    jobs: Sequence[Job], place: Path, progress: Progress, workers: int
+) -> Iterator[list[Drawing]]:
+    if workers == 1:
+        for job in jobs:
+            yield draw(job, place)
+            progress(job.name)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, initializer=end_with_parent) as pool:
+        futures = {pool.submit(draw, job, place): job.name for job in jobs}
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+                progress(futures[future])
+        except BrokenProcessPool:
+            raise RuntimeError(
+                "a process ended before its work was done: is memory short?"
+            ) from None
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def draw(job: Job, place: Path) -> list[Drawing]:
+    """Draw and write all sheets of a job into a folder."""
+    sheets = job.draw(*job.arguments)
+    for sheet in sheets:
+        sheet.write(place)
+    return [
+        Drawing(
+            sheet.name,
+            sheet.title,
+            sheet.part,
+            paper_name(sheet.paper),
+            scale_text(sheet.scale) if sheet.to_scale else None,
+        )
+        for sheet in sheets
+    ]
+
+
+def record(out: Path, drawings: Sequence[Drawing]) -> dict[str, Any]:
+    """What was written, for JSON."""
+    sheets = [
+        {
+            "name": one.name,
+            "title": one.title,
+            "part": one.part,
+            "paper": one.paper,
+            "scale": one.scale,
+            "files": one.files,
+        }
+        for one in drawings
+    ]
+    return {"folder": str(out), "sheets": sheets}
