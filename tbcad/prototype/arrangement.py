@@ -16,15 +16,19 @@ from tbcad.prototype.balls.layout import (
     ball_counts,
     prototype_layout,
 )
+from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.mass import carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.drive.drive import Drive, load_drives
+from tbcad.prototype.drive.loads import base_torques, choose_drive
 from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
 from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
 from tbcad.spec.design import Spec
@@ -51,6 +55,7 @@ class Arrangement:
         stage: layout of the object stage.
         wiring: of lamp and LEDs.
         frame: layout of what holds stage, base and camera.
+        shroud: round the rig, None without.
         parts: lists of purchased parts.
     """
 
@@ -64,6 +69,7 @@ class Arrangement:
     stage: StageLayout
     wiring: Wiring
     frame: FrameLayout
+    shroud: ShroudLayout | None
     parts: Parts
 
 
@@ -101,12 +107,9 @@ def balance_and_drive(
     Raises:
         SpecError: no drive is strong enough.
     """
-    motion = spec.prototype.motion
     balance = sum_masses(base.frame, ball_masses(layout, spec.printer.density_g_cm3), carrier)
-    torque = balance.required_torque(
-        *layout.stops.range, float(np.radians(motion.acceleration_deg_s2)), motion.safety
-    )
-    return balance, choose_drive(spec.prototype.base.drive, torque, load_drives(parts))
+    torques = base_torques(balance, layout.stops.range, spec.prototype.motion)
+    return balance, choose_drive(spec.prototype.base.drive, torques, load_drives(parts))
 
 
 Outcome = tuple[Spec, Arrangement | SpecError]
@@ -134,7 +137,7 @@ def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterato
         for angle in section.pad_angles_deg:
             chosen = _with_base(spec, hold=hold, pad_angle_deg=angle)
             try:
-                base_layout(chosen.prototype.base, layout)
+                base_layout(chosen.prototype.base, layout, base_motion(chosen))
             except SpecError as error:
                 yield chosen, error
             else:
@@ -155,7 +158,7 @@ def _frame_attempts(
     """
     for boss in spec.prototype.base.hub_bosses_mm:
         chosen = _with_base(spec, hub_boss_mm=boss)
-        base = base_layout(chosen.prototype.base, layout)
+        base = base_layout(chosen.prototype.base, layout, base_motion(chosen))
         try:
             estimate = _estimated_drive(chosen, layout, base, parts)
             keep_out = _keep_out(chosen, layout, base)
@@ -236,8 +239,9 @@ def _arranged(
 ) -> Arrangement:
     (balance, drive), (stage, wiring) = estimate, staged
     frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
+    shroud = shroud_round(spec, stage, frame, keep_out, parts)
     return Arrangement(
-        spec=spec,
+        spec=_with_light(spec, frame.lamps, shroud),
         layout=layout,
         base=base,
         split=split_base(base, spec.printer),
@@ -247,8 +251,31 @@ def _arranged(
         stage=stage,
         wiring=wiring,
         frame=frame,
+        shroud=shroud,
         parts=parts,
     )
+
+
+def shroud_round(
+    spec: Spec, stage: StageLayout, frame: FrameLayout, keep_out: KeepOut, parts: Parts
+) -> ShroudLayout | None:
+    """The shroud round stage, frame and base.
+
+    Raises:
+        SpecError: when no sheet is large enough.
+    """
+    static = (*stage.components, *frame.printed, *frame.purchased)
+    floor = spec.prototype.frame.floor_mm - frame.plate["thickness_mm"]
+    return shroud_layout(spec.prototype.light, static, keep_out, floor, parts)
+
+
+def _with_light(spec: Spec, lamps: LampLayout | None, shroud: ShroudLayout | None) -> Spec:
+    """The spec with what was chosen for lamps and shroud."""
+    values = {
+        "lamp_z_mm": float(lamps.places[0, 2]) if lamps else 0.0,
+        "shroud": shroud is not None,
+    }
+    return _with(spec, light=spec.prototype.light.model_copy(update=values))
 
 
 def _remedy(design: MirrorDesign, tried: list[int]) -> str:

@@ -7,13 +7,16 @@ import numpy as np
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
+from tbcad.prototype.fasteners.bodies import fastener_component
 from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.component_solids import component_solid
 from tbcad.prototype.printing.parts import Role
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)
+FASTENER: Colour = (0.25, 0.26, 0.28, 1.0)
 STEEL: Colour = (0.78, 0.80, 0.83, 1.0)
 SEEN: Colour = (0.30, 0.60, 0.95, 0.35)
+CARD: Colour = (0.05, 0.05, 0.06, 0.12)
 LIGHT: Colour = (1.00, 0.85, 0.30, 0.15)
 COLOURS: dict[Role, Colour] = {
     "base": (0.36, 0.45, 0.58, 1.0),
@@ -33,12 +36,18 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
         ColouredSolid(component.name, component_solid(component), METAL)
         for component in prototype.frame.purchased
     )
+    fasteners = (
+        ColouredSolid(one.name, component_solid(fastener_component(one)), FASTENER)
+        for one in prototype.fasteners
+    )
     return (
         _printed("base", prototype, ("base", "cap")),
         SolidGroup("balls", tuple(_balls(prototype))),
         _printed("stage", prototype, ("stage",)),
         _printed("frame", prototype, ("frame",)),
         SolidGroup("bought", tuple(purchased)),
+        SolidGroup("shroud", tuple(_shroud(prototype))),
+        SolidGroup("fasteners", tuple(fasteners)),
         _views(prototype),
     )
 
@@ -56,6 +65,12 @@ def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
     balls, centre = prototype.layout.balls, prototype.layout.body_centres()
     for k in (~balls.cap).nonzero()[0].tolist():
         yield ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
+
+
+def _shroud(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
+    """The panels without flaps; transparent, so that the rig is seen."""
+    for panel in prototype.shroud.panels if prototype.shroud else ():
+        yield ColouredSolid(panel.name, component_solid(panel.component), CARD)
 
 
 def _views(prototype: PrototypeModel) -> SolidGroup:

@@ -25,6 +25,7 @@ EXACT_MM = 0.05
 EXACT = 0.1
 CIRCLE_SIDES = 48
 MAX_SPLITS = 60
+CHUNK = 1024
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class KeepOut:
         radius: of the balls, mm, (k,).
         swung: smallest and largest azimuth of each ball, (k, 2).
         sections: wall, ribs and bosses over the whole swing, and the hub all round.
+        at_stops: the same while the base is at its stops or between them; None: this is that.
     """
 
     frame: Floats
@@ -70,10 +72,17 @@ class KeepOut:
     radius: Floats
     swung: Floats
     sections: tuple[SweptSection, ...]
+    at_stops: "KeepOut | None" = None
 
     def to_light(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to the light in use, mm, (n,); negative in it."""
         local = _cylindrical(self.frame, points)
+        # Few points at a time: the arrays of all points and cones would not stay in the cache.
+        parts = [local[k : k + CHUNK] for k in range(0, max(len(local), 1), CHUNK)]
+        return np.concatenate([self._to_cones(part) for part in parts])
+
+    def _to_cones(self, local: Floats) -> Floats:
+        """Distance of points (n, 3) about the axis to the nearest cone in use, mm, (n,)."""
         return np.asarray(_to_cones(_from_range(local, self.used), self.cones).min(axis=1))
 
     def to_light_outside_sphere(self, points: Floats) -> Floats:
@@ -121,6 +130,7 @@ def keep_out_volume(
     to_object, to_camera = light_hulls(prototype.balls.outline, base.light.pinhole, capture)
     swing = np.array([min(float(angle.min()), 0.0) - approach, max(float(angle.max()), 0.0)])
     return KeepOut(
+        at_stops=keep_out_volume(prototype, base, capture, 0.0) if approach else None,
         frame=base.frame,
         capture=capture,
         cones=RoundCones(

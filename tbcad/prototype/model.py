@@ -1,8 +1,9 @@
 """The whole prototype: its layouts, its printed parts as solids, and the drive that turns them."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from OCP.Standard import Standard_Failure
@@ -10,25 +11,36 @@ from OCP.StdFail import StdFail_NotDone
 
 from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
+from tbcad.camera.requirements import camera_requirements
 from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.primitives import Component
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.arrangement import Arrangement, arrangements, balance_and_drive
+from tbcad.prototype.arrangement import (
+    Arrangement,
+    arrangements,
+    balance_and_drive,
+    shroud_round,
+)
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_pose import SeatPose, expected_downs, worst_pose
+from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.purchased import base_purchased_parts
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.balance import BaseBalance, PointMasses
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.electronics.wiring import Wiring
+from tbcad.prototype.fasteners.fastener import Fastener, numbered
+from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.light.shroud import ShroudLayout
 from tbcad.prototype.printing.component_solids import placed_component
 from tbcad.prototype.printing.parts import PrintedPart, Role
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.purchased.parts import Parts
+from tbcad.prototype.stage.fasteners import stage_fasteners
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
@@ -55,6 +67,8 @@ class PrototypeModel:
         stage: layout of the object stage.
         wiring: of lamp and LEDs.
         frame: layout of what holds stage, base and camera.
+        gauge: that shows where the camera's pinhole is; None without a camera.
+        shroud: round the rig, None without.
         printed: all printed parts.
         balance: of what turns with the base.
         drive: that turns it.
@@ -69,24 +83,43 @@ class PrototypeModel:
     stage: StageLayout
     wiring: Wiring
     frame: FrameLayout
+    gauge: CameraGauge | None
+    shroud: ShroudLayout | None
     printed: tuple[PrintedPart, ...]
     balance: BaseBalance
     drive: Drive
     parts: Parts
     capture_radius: float
 
+    @cached_property
+    def fasteners(self) -> tuple[Fastener, ...]:
+        """All fasteners in their places, named."""
+        base, parts = self.base, self.parts
+        return numbered(
+            (
+                *base_fasteners(base, self.split, self.drive, parts),
+                *cap_magnets(base, self.layout, parts),
+                *self.frame.fasteners,
+                *stage_fasteners(self.stage, parts),
+            )
+        )
+
     @property
     def purchased(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls and drive."""
-        counts = Counter(base_purchased_parts(self.base, self.split))
-        counts.update(cap_magnets(self.base, self.layout, self.parts))
+        counts = Counter(one.part.name for one in self.fasteners)
         counts.update(frame_purchased_parts(self.frame))
-        counts.update(self.wiring.purchased)
+        counts.update(self.wiring.purchased(self.frame.lamps))
+        if self.shroud:
+            counts[self.shroud.sheet.name] += self.shroud.sheets
         return counts
 
 
 def build_prototype_model(
-    design: MirrorDesign, progress: Progress = lambda _: None, submit: Submit = at_once
+    design: MirrorDesign,
+    progress: Progress = lambda _: None,
+    submit: Submit = at_once,
+    arranged: Callable[[Arrangement], None] = lambda _: None,
 ) -> PrototypeModel:
     """Arrange the prototype of a design and build its solids.
 
@@ -97,6 +130,7 @@ def build_prototype_model(
         design: the mirrors.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
+        arranged: called with the arrangement before its solids are made.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -108,6 +142,7 @@ def build_prototype_model(
         balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
         if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
+        arranged(arrangement)
         try:
             return _model(arrangement, progress, submit)
         except (SpecError, InvalidSolidError) as error:
@@ -121,29 +156,41 @@ def build_prototype_model(
 
 def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> PrototypeModel:
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
-    printer, parts = spec.printer, arrangement.parts
+    printer, parts, split = spec.printer, arrangement.parts, arrangement.split
     progress("prototype: base")
-    carrier = carrier_parts(base, arrangement.split, printer)
+    pose = worst_pose(base, split, expected_downs(base, split))
+    coupons = submit(coupons_or_error, base, printer, pose)
+    carrier = carrier_parts(base, split, printer)
+    printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
+    if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
+        coupons = submit(coupons_or_error, base, printer, printed_pose)
     disc = placed_component(arrangement.frame.homing.disc, printer)
     masses = _masses([*carrier, disc], printer.density_g_cm3)
     faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
     stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
+    shroud = arrangement.shroud
     if drive != arrangement.drive:  # the mass of the solids asks for another
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
         disc = placed_component(frame.homing.disc, printer)
+        shroud = shroud_round(spec, stage, frame, keep_out, parts)
     static = [
         *_components("stage", stage.components, printer),
         *_components("frame", frame.printed, printer),
     ]
+    gauge = _gauge(spec, layout, base, frame)
     progress("prototype: caps and coupon")
+    plates = coupons.result()
+    if isinstance(plates, Exception):
+        raise plates
     printed = (
-        *(PrintedPart(part, "base", CARRIER_PURPOSE) for part in carrier),
+        *_carrier(base, carrier),
         PrintedPart(disc, "base", frame.homing.disc.what),
         *_caps(base, layout),
         *static,
-        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in coupon_plates(base, printer)),
+        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in plates),
+        *(_components("tool", [gauge.component], printer) if gauge else ()),
     )
     for fault in faults:
         if fault.result():
@@ -152,16 +199,43 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         spec=spec,
         layout=layout,
         base=base,
-        split=arrangement.split,
+        split=split,
         stage=stage,
         wiring=arrangement.wiring,
         frame=frame,
+        gauge=gauge,
+        shroud=shroud,
         printed=printed,
         balance=balance,
         drive=drive,
         parts=parts | arrangement.wiring.parts,
         capture_radius=spec.optics.capture_diameter_mm / 2,
     )
+
+
+def coupons_or_error(
+    base: BaseLayout, printer: PrinterSpec, pose: SeatPose
+) -> list[PlacedSolid] | SpecError | InvalidSolidError:
+    """The coupons with their properties, or why there are none."""
+    try:
+        plates = coupon_plates(base, printer, pose)
+        for plate in plates:
+            _ = plate.properties  # kept with it
+    except (SpecError, InvalidSolidError) as error:
+        return error
+    except KERNEL_ERRORS as error:
+        return InvalidSolidError(KERNEL_FAILS.format(error))
+    return plates
+
+
+def _gauge(
+    spec: Spec, layout: PrototypeLayout, base: BaseLayout, frame: FrameLayout
+) -> CameraGauge | None:
+    if frame.mount is None:
+        return None
+    camera, diameter = layout.array.camera, spec.prototype.camera_diameter_mm
+    needed = camera_requirements(layout.array, spec.optics.capture_diameter_mm / 2)
+    return camera_gauge(base, camera, diameter, needed, layout.stops.range)
 
 
 def carrier_fault(part: PlacedSolid) -> str:
@@ -178,6 +252,14 @@ def carrier_fault(part: PlacedSolid) -> str:
 def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:
     mass = [part.mass_g(density) for part in parts]
     return PointMasses(np.array(mass), np.array([part.properties.centroid for part in parts]))
+
+
+def _carrier(base: BaseLayout, pieces: list[PlacedSolid]) -> Iterator[PrintedPart]:
+    """The carrier's pieces, that with the hub first; a printed bore is too narrow for a shaft."""
+    reamed = f"{CARRIER_PURPOSE}; ream its bore {base.spec.shaft_mm:g} H7"
+    first = reamed if base.hub.boss else CARRIER_PURPOSE
+    for number, piece in enumerate(pieces):
+        yield PrintedPart(piece, "base", CARRIER_PURPOSE if number else first)
 
 
 def _caps(base: BaseLayout, layout: PrototypeLayout) -> Iterator[PrintedPart]:

@@ -7,7 +7,7 @@ integer linear program.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
@@ -24,6 +24,9 @@ SLACK = 1e-5
 GREEDY_STEP = np.radians(0.25)  # by which the greedy layout's half swing grows
 # Azimuths are rounded to so many decimals: the solver's last digits differ between computers.
 DECIMALS = 9
+# Limits are rounded to so many, a tenth of SLACK: of equally good azimuths, the last digits of the
+# limits, which differ between computers too, would decide which ones the solver finds.
+LIMIT_DECIMALS = 6
 ROUNDING = 1e-12  # of a difference of two azimuths, radians
 
 
@@ -65,6 +68,11 @@ class PlacementProblem:
         """Azimuths (k,) between which each ball must be, for half a swing."""
         low = np.maximum(self.served_high - half_swing, self.min_azimuth + half_swing)
         return low, np.minimum(self.served_low + half_swing, self.max_azimuth - half_swing)
+
+    def rounded(self) -> "PlacementProblem":
+        """The same limits to LIMIT_DECIMALS."""
+        limits = {field.name: getattr(self, field.name) for field in fields(self)}
+        return PlacementProblem(**{k: np.round(v, LIMIT_DECIMALS) for k, v in limits.items()})
 
     def satisfied_by(self, azimuth: Floats) -> bool:
         """Whether azimuths (k,) keep all limits."""
@@ -147,7 +155,8 @@ def min_swing_placement(problem: PlacementProblem) -> Placement:
     Raises:
         SpecError: when there are none.
     """
-    solution = None if _is_crowded(problem) else _min_swing(problem, greedy_placement(problem))
+    limits = problem.rounded()
+    solution = None if _is_crowded(problem) else _min_swing(limits, greedy_placement(limits))
     if solution is None:
         raise SpecError(
             f"found no place for {len(problem)} balls on one base within a swing of "
@@ -156,9 +165,9 @@ def min_swing_placement(problem: PlacementProblem) -> Placement:
             "prototype.post_diameter_mm smaller, or prototype.max_swing_deg larger"
         )
     azimuth, bound = solution
-    closer = _solved(problem, problem.half_swing(azimuth) + SLACK, outermost=True)
+    closer = _solved(limits, limits.half_swing(azimuth) + SLACK, outermost=True)
     options = [azimuth] if closer is None else [azimuth, closer[0]]
-    return _placement(problem, min(options, key=problem.outermost), 2 * bound)
+    return _placement(problem, min(options, key=limits.outermost), 2 * bound)
 
 
 def _is_crowded(problem: PlacementProblem) -> bool:
@@ -222,7 +231,7 @@ def _solved(
     Variables: k azimuths, half the swing, the outermost azimuth, and for each pair with a minimum
     separation 1 where the first has the larger azimuth.
     """
-    k = len(problem)
+    k, max_half_swing = len(problem), round(max_half_swing, LIMIT_DECIMALS)
     first, second = np.nonzero(np.triu(problem.min_separation, 1))
     low, high = problem.served_high - max_half_swing, problem.served_low + max_half_swing
     if np.any(low > high):

@@ -6,6 +6,7 @@ mirror an interval of base angles. The fewest stops that hit all intervals are f
 going through their upper ends in order.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,15 +104,25 @@ def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     Returns:
         The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
     """
-    points: list[float] = []
+    order = np.argsort(high, kind="stable")
+    new = np.zeros(len(high), dtype=bool)
+    new[_new_points(low[order], high[order])] = True
     which = np.empty(len(high), dtype=np.int64)
-    last = -np.inf
-    for i in np.argsort(high, kind="stable").tolist():
-        if low[i] > last:
-            last = float(high[i])
-            points.append(last)
-        which[i] = len(points) - 1
-    return np.array(points), which
+    which[order] = np.cumsum(new) - 1
+    return high[order][new], which
+
+
+def _new_points(low: Floats, high: Floats) -> list[int]:
+    """Which intervals, by rising high, no earlier point hits, where each such one ends in a point.
+
+    A plain loop over plain numbers: it runs for thousands of places that balls are tried in.
+    """
+    last, new = -math.inf, []
+    for k, (start, end) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+        if start > last:
+            last = end
+            new.append(k)
+    return new
 
 
 def azimuths_for_fewer_stops(
@@ -161,7 +172,9 @@ def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) 
     """Number of stops with one ball moved to another azimuth."""
     moved = azimuth.copy()
     moved[ball] = moved_to
-    return len(min_stabbing_points(*requests.intervals(moved))[0])
+    low, high = requests.intervals(moved)
+    order = np.argsort(high, kind="stable")
+    return len(_new_points(low[order], high[order]))
 
 
 def plan_stops(

@@ -1,7 +1,9 @@
 """The coupon: seats for a few sizes of body at several offsets of the pads, to try the fit.
 
-A seat is on a bar that only joins it to the others, and is no thicker than on the carrier: a wall
-round cup and pocket, with a cone of 45 degrees between them that prints without support.
+A seat is no thicker than on the carrier: a wall round cup and pocket, with a cone between them. It
+lies on the bed as the carrier's worst seat does and is printed with the same supports, so that its
+pads come out as those of the carrier. It stands on a plate below it, its keel, and a bar on the bed
+joins it to the others.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,10 +14,11 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_mesh, check_pads
 from tbcad.cad.glyphs import ROWS, relief, text_width
-from tbcad.cad.solids import cut, fused, meshed, moved, one_solid, polygon, prism, revolved_polygon
+from tbcad.cad.solids import fused, meshed, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
+from tbcad.prototype.base.coupon_pose import SeatPose
+from tbcad.prototype.base.coupon_seat import height, outline, printed_seat
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.seat_solids import seat_hollow
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid
@@ -24,15 +27,14 @@ from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
-BAR_HEIGHT = 0.8  # of a pocket's floor: bars are lower, so that they reach into no pocket
-BESIDE_TEXT_MM = 1.5  # of a bar
+# Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.
+BAR_HEIGHT, BAR_MAX_MM = 0.8, 0.6
+BESIDE_TEXT_MM = 0.8  # of a bar
 GAP_MM = 3.0  # round texts and between seats
-SUNK_MM = 0.4  # of texts into their face
+SUNK_MM = 0.3  # of texts into their face
 # Tolerance (mm) and angle (radians) of a mesh that is only checked for gaps.
 COARSE_MESH = (0.2, 0.4)
-DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a seat whose axis points down
 DECIMALS = 6  # to which sizes are the same, mm
-ROUNDING_MM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class CouponRow:
         first: width of the size's place, mm.
         cell: width of the place of one seat with its offset, mm.
         size: width and depth of the whole, mm.
+        middle: y of the seats' balls from the shelf's middle line, mm.
     """
 
     seat: int
@@ -54,36 +57,56 @@ class CouponRow:
     first: float
     cell: float
     size: tuple[float, float]
+    middle: float
 
 
 Place = tuple[CouponRow, Floats]
 """A row, and its left end on its shelf's middle line, mm, (2,)."""
 
 
-def coupon_plates(base: BaseLayout, printer: PrinterSpec) -> list[PlacedSolid]:
+def coupon_plates(base: BaseLayout, printer: PrinterSpec, pose: SeatPose) -> list[PlacedSolid]:
     """Plates with a seat for each chosen size and each offset of the pads, few as the bed allows.
+
+    Args:
+        base: with the seats.
+        printer: with its bed.
+        pose: of the seats on the bed.
 
     Raises:
         SpecError: when a single seat is larger than the bed.
         InvalidSolidError: when the kernel fails.
     """
-    seats = replace(base.seats, back=base.seats.bottom + base.spec.floor_mm)
-    plates = _plates(coupon_rows(seats, base.spec, printer), printer)
+    seats = coupon_seats(base, pose)
+    plates = _plates(coupon_rows(seats, base.spec, printer, pose.lean), printer)
     return [
-        PlacedSolid(name, _plate(name, seats, base.spec, rows), np.eye(3), np.zeros(3))
+        PlacedSolid(name, _plate(name, seats, base.spec, rows, pose), np.eye(3), np.zeros(3))
         for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
     ]
 
 
-def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec) -> list[CouponRow]:
-    """A row for each chosen size, the largest first; several where the bed is too narrow."""
+def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:
+    """Seats as the coupon has them: short, with their pads about the axis as in the pose."""
+    seats = base.seats
+    azimuth = np.full(len(seats), pose.pad_azimuth)
+    return replace(seats, back=seats.bottom + base.spec.floor_mm, pad_azimuth=azimuth)
+
+
+def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec, lean: float) -> list[CouponRow]:
+    """A row for each chosen size, the largest first; several where the bed is too narrow.
+
+    Args:
+        seats: from `coupon_seats`.
+        spec: of the base.
+        printer: with its bed.
+        lean: of the seats' axes, radians.
+    """
     width = float(usable_size(printer)[0])
     rows = []
     for k in _seats_to_try(seats, spec):
-        row = _row(seats, spec, k, spec.coupon_offsets_mm)
+        row = _row(seats, spec, k, spec.coupon_offsets_mm, lean)
         count = max(int((width - row.first) / row.cell), 1)
         rows += [
-            _row(seats, spec, k, spec.coupon_offsets_mm[start : start + count])
+            _row(seats, spec, k, spec.coupon_offsets_mm[start : start + count], lean)
             for start in range(0, len(spec.coupon_offsets_mm), count)
         ]
     return rows
@@ -96,17 +119,25 @@ def _seats_to_try(seats: Seats, spec: BaseSpec) -> list[int]:
     return [int(seat) for seat in first[np.round(chosen).astype(int)]]
 
 
-def _row(seats: Seats, spec: BaseSpec, k: int, offsets: tuple[float, ...]) -> CouponRow:
+def _row(
+    seats: Seats, spec: BaseSpec, k: int, offsets: tuple[float, ...], lean: float
+) -> CouponRow:
     name = _short(f"{2 * seats.radius[k]:.2f}")
     boss = 2 * float(seats.boss[k])
     cell = _offsets_width(spec) + 2 * GAP_MM + boss
     first = _text_width(name, spec) + 2 * GAP_MM
-    size = (first + cell * len(offsets), max(boss, _bar_width(spec)) + GAP_MM)
-    return CouponRow(k, offsets, name, first, cell, size)
+    ends = outline(seats, spec, k, lean)[:, 0]
+    low, high = float(ends.min()), float(ends.max())
+    size = (first + cell * len(offsets), max(high - low, _bar_width(spec)) + GAP_MM)
+    return CouponRow(k, offsets, name, first, cell, size, -(low + high) / 2)
 
 
 def _bar_width(spec: BaseSpec) -> float:
     return spec.digit_mm + 2 * BESIDE_TEXT_MM
+
+
+def _bar_height(spec: BaseSpec) -> float:
+    return min(BAR_HEIGHT * spec.floor_mm, BAR_MAX_MM)
 
 
 def _text_width(text: str, spec: BaseSpec) -> float:
@@ -157,16 +188,18 @@ def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
         )
 
 
-def _plate(name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]]) -> TopoDS_Solid:
+def _plate(
+    name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]], pose: SeatPose
+) -> TopoDS_Solid:
     bodies, contacts, pads = _bars(spec, shelves), [], []
     for row, corner in (place for shelf in shelves for place in shelf):
         k = row.seat
         bodies += _texts(row, spec, corner)
         for n, offset in enumerate(row.offsets):
-            at = np.array([*_seat_middle(row, corner, n, seats), float(seats.back[k])])
-            wall = revolved_polygon(_wall_section(seats, spec, k), 0.0, 2 * np.pi)
-            bodies.append(moved(cut(wall, [seat_hollow(seats, k, offset)]), DOWN, at))
-            contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ DOWN)
+            at = np.array([*_ball_middle(row, corner, n, seats), height(seats, spec, k, pose)])
+            seat = printed_seat(seats, spec, k, offset, pose, -row.middle)
+            bodies.append(moved(seat, np.eye(3), at))
+            contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ pose.axes)
             pads.append(seats.pad[k])
     solid = one_solid(name, fused(bodies))
     check_mesh(name, meshed(solid, *COARSE_MESH))
@@ -189,28 +222,13 @@ def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
 def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) -> TopoDS_Shape:
     """A bar on the bed between two corners (x, y)."""
     corners = np.column_stack([rectangle(low, high), np.zeros(4)])
-    return prism(polygon(corners), np.array([0, 0, BAR_HEIGHT * spec.floor_mm]))
+    return prism(polygon(corners), np.array([0, 0, _bar_height(spec)]))
 
 
-def _seat_middle(row: CouponRow, corner: Floats, n: int, seats: Seats) -> Floats:
-    """Where the axis of a row's n-th seat meets the bed, (2,)."""
+def _ball_middle(row: CouponRow, corner: Floats, n: int, seats: Seats) -> Floats:
+    """Above which point of the bed the ball in a row's n-th seat is, (2,)."""
     right = row.first + (n + 1) * row.cell - GAP_MM
-    return np.asarray(corner + np.array([right - float(seats.boss[row.seat]), 0.0]))
-
-
-def _wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
-    """Half section (z, r) of what a hollow is cut out of, (n, 2)."""
-    front, back, boss = float(seats.front[k]), float(seats.back[k]), float(seats.boss[k])
-    # On the cone of 45 degrees, tangent to the sphere round the cup, z + r is this.
-    cone = np.sqrt(2) * float(seats.cup[k] + spec.cup_wall_mm)
-    foot = max(cone - back, float(seats.pocket[k]) + spec.cup_wall_mm)
-    if foot >= boss:
-        slope = [[back, boss]]
-    else:
-        slope = [[cone - boss, boss], [cone - foot, foot]]
-        if cone - foot < back - ROUNDING_MM:
-            slope.append([back, foot])
-    return np.array([[front, 0.0], [front, boss], *slope, [back, 0.0]])
+    return np.asarray(corner + np.array([right - float(seats.boss[row.seat]), row.middle]))
 
 
 def _texts(row: CouponRow, spec: BaseSpec, corner: Floats) -> list[TopoDS_Shape]:
@@ -224,5 +242,5 @@ def _texts(row: CouponRow, spec: BaseSpec, corner: Floats) -> list[TopoDS_Shape]
 
 def _text(text: str, spec: BaseSpec, corner: Floats, x: float) -> list[TopoDS_Shape]:
     """A text about a point at a distance x from a row's left end."""
-    place = np.array([*(corner + np.array([x, 0.0])), BAR_HEIGHT * spec.floor_mm])
+    place = np.array([*(corner + np.array([x, 0.0])), _bar_height(spec)])
     return relief(text, spec.digit_mm, spec.relief_mm, SUNK_MM, np.eye(3), place)

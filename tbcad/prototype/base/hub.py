@@ -1,6 +1,6 @@
 """The hub: a disc and a boss about the axis, and the holes of what drives it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,14 @@ SLIT_MM = 2.0  # width of the clamp's slit
 DISC_MM = 10.0  # thickness of the disc
 DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
 MIN_DISC_RADIUS_MM = 30.0  # with a boss
+SOCKET_MM = 9.0  # depth of the bore's free end, within the disc
 BELOW_HEAD_MM = 6.0  # material below a counterbore
 ZERO_DISC_MM = 5.0  # thickness of the disc between hub and drive
 # Dowel that gives the disc its place about the axis, on the drive's circle between two holes.
 KEY_MM, KEY_DEPTH_MM = 3.0, 6.0
 KEY_HOLE_MM = 3.1  # in hub and disc; printed holes come out smaller
+# On the side without ribs, at a right angle to each other.
+SET_SCREW_AZIMUTHS = np.radians([135.0, 225.0])
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,11 @@ class Hub:
     key_radius: float
 
     @property
+    def socket(self) -> float:
+        """Z of the shaft's front end: before it the bore is free for the camera's gauge."""
+        return self.front - SOCKET_MM
+
+    @property
     def mount(self) -> float:
         """Z of the zero disc's outer face, where wheel, coupling or stage is bolted on."""
         return self.face - ZERO_DISC_MM
@@ -126,6 +134,26 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         lock=spec.lock if pattern.boss else None,
         lock_z=(back + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
         key_radius=pattern.circle / 2,
+    )
+
+
+def deepened(hub: Hub, face: float) -> Hub:
+    """The hub with its outer face at z = face or behind it.
+
+    Its disc gets thicker, and what is below the counterbores stays. One with a boss is returned as
+    it is: its length is a key.
+    """
+    more = hub.face - face
+    if hub.boss or more <= 0:
+        return hub
+    diameter, depth = hub.head
+    return replace(
+        hub,
+        back=face,
+        face=face,
+        depth=hub.depth + more,
+        head=(diameter, depth + more),
+        lock_z=face,
     )
 
 

@@ -4,15 +4,20 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.solids import cylinder, polygon, prism
-from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, SCREW_MM, SLIT_MM, Hub
+from tbcad.prototype.base.hub import (
+    KEY_DEPTH_MM,
+    KEY_HOLE_MM,
+    SCREW_MM,
+    SET_SCREW_AZIMUTHS,
+    SLIT_MM,
+    Hub,
+)
 from tbcad.prototype.base.profile import meridian
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
 THROUGH_MM = 1.0  # tools stick out this far, so that no faces coincide
-# On the side without ribs, at a right angle to each other.
-SET_SCREW_AZIMUTHS = np.radians([135.0, 225.0])
 
 
 def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:

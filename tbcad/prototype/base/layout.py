@@ -13,7 +13,8 @@ from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.hub import Hub, hub_layout
+from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
+from tbcad.prototype.base.hub import Hub, deepened, hub_layout
 from tbcad.prototype.base.profile import (
     LightSpheroid,
     distance_outside,
@@ -45,6 +46,7 @@ RIB_END_MM = 1.0
 # Rings are lower than ribs by this, whose tops would touch their cones along a line.
 RING_LOWER_MM = 0.6
 RING_FOOT = 0.3  # of the wall's thickness, where a ring's section begins
+BEHIND_MM = 1.0  # of the hub's outer face from bosses and rings: the zero disc lies on it
 END_POINTS = 9  # across the end of a boss, where its height over the wall is measured
 MAX_ROUNDS = 60  # of lengthening bosses
 ROUNDING_MM = 1e-9
@@ -89,6 +91,11 @@ class BaseLayout:
         return shortened(offset(self.inner, self.spec.thickness_mm / 2), RIB_END_MM)
 
     @property
+    def rearmost(self) -> float:
+        """Z of the end of bosses and rings that is farthest behind, mm."""
+        return _rearmost(self.spec, self.seats, self.rings, self.frame)
+
+    @property
     def axes(self) -> Floats:
         """What x, y and z of the carrier's own frame are in the frame of the shell, as rows.
 
@@ -112,19 +119,28 @@ class BaseLayout:
         return float(np.abs(self.sector).max() + swing / 2)
 
 
-def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
+def base_layout(
+    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
+) -> BaseLayout:
     """The base for a prototype's balls.
+
+    Args:
+        spec: of the base.
+        prototype: with its balls.
+        motion: of the base, against which its balls are held.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
     """
-    frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype)
+    frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype, motion)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)
     behind_light = float(light.pinhole / 2 - light.level / 2)
     hub = hub_layout(spec, behind_light - spec.light_clearance_mm)
     inner = _inner(spec, seats, frame, light, hub)
-    sector = _sector(spec, seats, prototype)
+    sector, rings = _sector(spec, seats, prototype), _rings(spec, inner)
+    protruding = _protruding(spec, seats, frame, offset(inner, spec.thickness_mm))
+    hub = deepened(hub, _rearmost(spec, protruding, rings, frame) - BEHIND_MM)
     return BaseLayout(
         spec=spec,
         frame=frame,
@@ -133,9 +149,9 @@ def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
         sector=sector,
         ribs=_ribs(spec, seats, prototype, sector),
         outline=_outline(spec, inner, hub),
-        rings=_rings(spec, inner),
+        rings=rings,
         hub=hub,
-        seats=_protruding(spec, seats, frame, offset(inner, spec.thickness_mm)),
+        seats=protruding,
     )
 
 
@@ -201,6 +217,13 @@ def _end(seats: Seats, frame: Floats) -> float:
     ends, fronts = (seats.at_depth(depth) @ frame[0] for depth in (seats.back, seats.front))
     side = seats.boss * (seats.axes[:, 0] @ frame[0])
     return float((np.maximum(ends, fronts) + side).max() + EDGE_MM)
+
+
+def _rearmost(spec: BaseSpec, seats: Seats, rings: tuple[Floats, ...], frame: Floats) -> float:
+    """Z of the end of bosses, with their numbers, and rings that is farthest from the camera."""
+    ends = seats.at_depth(seats.back + spec.relief_mm) @ frame[0]
+    side = np.abs(seats.boss * (seats.axes[:, 0] @ frame[0]))
+    return float(min((ends - side).min(), *(ring[:, 0].min() for ring in rings)))
 
 
 def _sector(spec: BaseSpec, seats: Seats, prototype: PrototypeLayout) -> tuple[float, float]:

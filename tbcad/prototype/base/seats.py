@@ -11,17 +11,25 @@ from numpy.typing import NDArray
 from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
+from tbcad.prototype.base.pads import PAD_AZIMUTHS, pad_normals
+from tbcad.prototype.base.pockets import (
+    WEB_MM,
+    Pockets,
+    first_ball,
+    glue_wells,
+    magnet_pockets,
+    worst_force_needed,
+)
 from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec, Hold
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads
-WEB_MM = 0.8  # between pocket and pads
 OFF_PATH_MM = 0.6  # minimum between a pad and the insertion path of another ball
 ENOUGH_ROOM_MM = OFF_PATH_MM + 1  # beyond which more room makes no path or rotation better
 MAX_PAD = 2 / 3  # diameter of a pad in radii of its ball
 MIN_PAD_RELIEF = 0.8  # of the cup's clearance, by which pads stand out at their edges
-PAD_AZIMUTHS = np.radians(np.arange(0, 120, 5))  # tried for the first pad
 # A ball may be inserted at a slant, as long as it touches no pad of its own before its place.
 SLANTS = np.radians([0.0, 10.0, 20.0])
 SLANT_AZIMUTHS = np.radians(np.arange(0, 360, 30))
@@ -44,6 +52,7 @@ class Seats:
         back: length at which it ends, mm, (k,).
         boss: radius of the boss, mm, (k,).
         magnet: diameter of the magnet, zero: glue, mm, (k,).
+        magnet_height: of the magnet, zero: glue, mm, (k,).
         pocket: radius of its pocket, or of the well, mm, (k,).
         bottom: length at which the pocket ends, mm, (k,).
         insertion: from the centre to where the ball is free when it is taken out, mm, (k, 3).
@@ -61,6 +70,7 @@ class Seats:
     back: Floats
     boss: Floats
     magnet: Floats
+    magnet_height: Floats
     pocket: Floats
     bottom: Floats
     insertion: Floats
@@ -82,10 +92,7 @@ class Seats:
     @property
     def local_normals(self) -> Floats:
         """Unit normals of the pads toward the ball's centre, along the rows of axes, (k, 3, 3)."""
-        azimuth = self.pad_azimuth[:, None] + np.arange(3) * 2 * np.pi / 3
-        along = np.full(azimuth.shape, np.cos(self.tilt))
-        across = np.sin(self.tilt) * unit_circle(azimuth)
-        return -np.concatenate([across, along[..., None]], axis=-1)
+        return pad_normals(self.tilt, self.pad_azimuth)
 
     @property
     def pad_normals(self) -> Floats:
@@ -99,21 +106,28 @@ class Seats:
         return self.centre[:, None] - distance * self.pad_normals
 
 
-def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
+def seat_layout(
+    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
+) -> Seats:
     """One seat for each body of the prototype.
 
+    Args:
+        spec: of the base.
+        prototype: with its balls.
+        motion: of the base, against which its balls are held.
+
     Raises:
-        SpecError: when a pad, pocket or magnet does not fit; it says what to change.
+        SpecError: when a pad, pocket or magnet does not fit, or does not hold a ball; it says
+            what to change.
     """
-    hold, pad_angle = spec.holds[0], spec.pad_angles_deg[0]
+    pad_angle = spec.pad_angles_deg[0]
     radius, tilt = prototype.balls.body_radius, float(np.radians(pad_angle))
     pad = np.minimum(spec.pad_mm, MAX_PAD * radius) / 2
     cup = radius + spec.clearance_mm
     front = radius * np.cos(tilt) - pad * np.sin(tilt) - LIP_MM
     _check_cups(spec, radius, pad, front, pad_angle)
-    magnet, pocket = _pockets(spec, hold, radius, pad, tilt)
-    magnet_height = spec.magnet_height_mm if hold == "magnet" else 0.0
-    bottom = radius + spec.magnet_gap_mm + magnet_height
+    pockets = _pockets(spec, prototype, pad, tilt, motion)
+    bottom = radius + spec.magnet_gap_mm + pockets.height
     seats = Seats(
         centre=prototype.body_centres(),
         radius=radius,
@@ -125,8 +139,9 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
         front=front,
         back=bottom + spec.floor_mm,
         boss=np.sqrt(cup**2 - front**2) + spec.cup_wall_mm,
-        magnet=magnet,
-        pocket=pocket,
+        magnet=pockets.magnet,
+        magnet_height=pockets.height,
+        pocket=pockets.radius,
         bottom=bottom,
         insertion=(prototype.balls.body_depth + cup)[:, None] * prototype.normals(),
         pad_offset=spec.pad_offset_mm,
@@ -146,7 +161,7 @@ def _check_cups(
 ) -> None:
     if (closed := front < 0).any():
         raise SpecError(
-            f"the cup of ball {_first_ball(closed)} would close round it: make "
+            f"the cup of ball {first_ball(closed)} would close round it: make "
             f"prototype.base.pad_angle_deg less than {pad_angle:g} or "
             f"prototype.base.pad_mm less than {spec.pad_mm:g}"
         )
@@ -156,29 +171,24 @@ def _check_cups(
     if sunk.any():
         minimum = float(edge.max()) / MIN_PAD_RELIEF
         raise SpecError(
-            f"the pads of ball {_first_ball(sunk)} do not stand out of its cup: make "
+            f"the pads of ball {first_ball(sunk)} do not stand out of its cup: make "
             f"prototype.base.clearance_mm more than {minimum:.2f} or prototype.base.pad_mm smaller"
         )
 
 
 def _pockets(
-    spec: BaseSpec, hold: Hold, radius: Floats, pad: Floats, tilt: float
-) -> tuple[Floats, Floats]:
-    """Magnets and radii of pockets, both (k,)."""
-    room = radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
-    if hold == "glue":
-        return np.zeros_like(radius), room / 2
-    sizes = np.array(sorted(spec.magnets_mm))
-    fitting = (sizes + spec.magnet_play_mm) / 2 <= room[:, None]
-    if (none := ~fitting.any(axis=1)).any():
-        ball = _first_ball(none)
-        largest = float(2 * room[ball - 1] - spec.magnet_play_mm)
-        raise SpecError(
-            f"no magnet fits between the pads of ball {ball}: add one of {max(largest, 0):.1f} mm "
-            "or less to prototype.base.magnets_mm, or set prototype.base.hold to glue"
-        )
-    magnet = np.where(fitting, sizes, 0).max(axis=1)
-    return magnet, (magnet + spec.magnet_play_mm) / 2
+    spec: BaseSpec,
+    prototype: PrototypeLayout,
+    pad: Floats,
+    tilt: float,
+    motion: Motion,
+) -> Pockets:
+    """What holds each ball with the room between its pads."""
+    room = prototype.balls.body_radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
+    needed = worst_force_needed(prototype, _axes(prototype), tilt, motion)
+    if spec.holds[0] == "glue":
+        return glue_wells(prototype, needed, room)
+    return magnet_pockets(spec, prototype, needed, room)
 
 
 def _with_clear_paths(seats: Seats) -> Seats:
@@ -200,7 +210,7 @@ def _with_clear_pads(seats: Seats) -> Seats:
     room = np.stack([insertion_clearance(one).min(axis=1) for one in tries])
     if (blocked := room.max(axis=0) < OFF_PATH_MM).any():
         raise SpecError(
-            f"a pad of ball {_first_ball(blocked)} is where another ball is inserted: make "
+            f"a pad of ball {first_ball(blocked)} is where another ball is inserted: make "
             "prototype.ball_wall_mm larger or prototype.base.pad_mm smaller"
         )
     return replace(seats, pad_azimuth=PAD_AZIMUTHS[_first_with_enough(room)])
@@ -227,8 +237,3 @@ def _room_at_pads(seats: Seats) -> Floats:
     ball = np.arange(len(seats))
     room[ball, :, ball] = np.inf
     return room
-
-
-def _first_ball(flags: NDArray[np.bool_]) -> int:
-    """Number of the first ball whose flag is set, from 1."""
-    return int(flags.argmax()) + 1

@@ -52,7 +52,8 @@ def carrier_parts(base: BaseLayout, split: BaseSplit, printer: PrinterSpec) -> l
     if split.joints:
         return carrier_pieces(base, split, solid, printer)
     directions = downward_directions(base, split.pieces[0])
-    return [placed_on_bed("carrier", solid, directions, base.axes, printer)]
+    pads = base.local_seats.pad_normals.reshape(-1, 3)
+    return [placed_on_bed("carrier", solid, directions, base.axes, printer, pads)]
 
 
 def carrier_solid(base: BaseLayout, split: BaseSplit = UNCUT) -> TopoDS_Solid:

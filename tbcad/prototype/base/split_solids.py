@@ -30,7 +30,7 @@ from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
-from tbcad.types import Floats
+from tbcad.types import Bools, Floats
 
 FAR_MM = 2000.0  # larger than any base
 CHORD_MM = 0.02  # error of meshes that volumes are taken from
@@ -119,6 +119,7 @@ def carrier_pieces(
         SpecError: when a piece does not fit the bed.
         InvalidSolidError: when the kernel fails.
     """
+    seats = base.local_seats
     return [
         placed_on_bed(
             f"carrier_{n + 1}",
@@ -126,6 +127,7 @@ def carrier_pieces(
             downward_directions(base, piece),
             base.axes,
             printer,
+            seats.pad_normals[_seats_in(base, split, n)].reshape(-1, 3),
         )
         for n, piece in enumerate(split.pieces)
     ]
@@ -135,9 +137,15 @@ def _piece(base: BaseLayout, split: BaseSplit, n: int, whole: TopoDS_Solid) -> T
     piece, holes, seats = split.pieces[n], piece_holes(base, split, n), base.local_seats
     expected = volume_by_cut_mesh(whole, piece, holes, CHORD_MM)
     shape = cut(whole, [*(_beyond(row) for row in piece), *holes])
-    in_piece = np.array([split.piece_of(end) == n for end in seats.at_depth(seats.back)])
+    in_piece = _seats_in(base, split, n)
     contacts, pads = seats.contacts[in_piece].reshape(-1, 3), np.repeat(seats.pad[in_piece], 3)
     return checked(f"carrier_{n + 1}", shape, expected, contacts, pads)
+
+
+def _seats_in(base: BaseLayout, split: BaseSplit, n: int) -> Bools:
+    """Which seats are in a piece, (k,)."""
+    seats = base.local_seats
+    return np.array([split.piece_of(end) == n for end in seats.at_depth(seats.back)])
 
 
 def piece_holes(base: BaseLayout, split: BaseSplit, n: int) -> list[TopoDS_Shape]:

@@ -83,6 +83,15 @@ class BaseBalance:
         """
         return np.asarray(self.torque_amplitude * np.sin(self.azimuth + angle - self._up))
 
+    @property
+    def angle_of_top(self) -> float:
+        """Base angle with the centre of gravity straight above the axis, radians."""
+        return self._up - self.azimuth
+
+    def energy(self, angle: Floats) -> Floats:
+        """Energy of gravity with the base at angles (n,), N mm, (n,); zero beside the axis."""
+        return np.asarray(self.torque_amplitude * np.cos(angle - self.angle_of_top))
+
     def max_torque(self, low: float, high: float) -> float:
         """Largest magnitude of the torque between two base angles (radians), N mm."""
         # The torque has an extreme at this base angle and at each half turn from it.

@@ -1,15 +1,16 @@
 """The drives of the base: motor, gear and belt, and the torque that each holds."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 
+import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, package_lists
 from tbcad.spec.csv_rows import Row, positive_number, read_rows
 from tbcad.spec.errors import SpecError, short_text
+from tbcad.types import Floats
 
 DRIVE_COLUMNS = ("drive", "motor", "pinion", "wheel", "belt", "coupling", "efficiency", "source")
 KINDS = {  # of the parts that each of these columns may name
@@ -63,18 +64,34 @@ class Drive:
         """Torque on the base that the motor's holding torque makes, N mm."""
         return self.motor["holding_nmm"] * self.ratio * self.efficiency
 
+    @property
+    def rated_current(self) -> float:
+        """Of the motor's phases, A; zero of a stage."""
+        return self.motor["rated_a"] if self.motor.kind == "motors" else 0.0
+
+    @property
+    def resistance(self) -> float:
+        """Of a phase of the motor, ohm; zero of a stage."""
+        return self.motor["resistance_ohm"] if self.motor.kind == "motors" else 0.0
+
+    @property
+    def rated_radial(self) -> float:
+        """Radial load that the motor's shaft bears at its end, N; zero of a stage."""
+        return self.motor["radial_n"] if self.motor.kind == "motors" else 0.0
+
     def steps_per_deg(self, microsteps: int) -> float:
         """Microsteps for a degree of the base."""
         return self.motor["full_steps"] * microsteps * self.ratio / 360
 
-    def wind_up_angle(self, torque: float) -> float:
-        """Angle by which the base yields to a torque (N mm), radians.
+    def wind_up_angle(self, torque: Floats) -> Floats:
+        """Angles by which the base yields to torques (N mm), with their signs, radians.
 
         A stepper's torque is a sine of its rotor's deviation with a period of four full steps, so
         it holds a torque only at a deviation.
         """
-        share = min(abs(torque) / (self.motor["holding_nmm"] * self.ratio), 1.0)
-        return math.asin(share) * STEPS_PER_PERIOD / self.motor["full_steps"] / self.ratio
+        share = np.clip(torque / (self.motor["holding_nmm"] * self.ratio), -1.0, 1.0)
+        periods = self.motor["full_steps"] / STEPS_PER_PERIOD
+        return np.asarray(np.arcsin(share) / periods / self.ratio)
 
     def belt_pull(self, torque: float) -> float:
         """Pull in the belt under a torque on the base (N mm), N; zero without a belt."""
@@ -87,6 +104,14 @@ class Drive:
             return 0.0
         length = self.belt["teeth"] * self.belt["pitch_mm"]
         return centre_distance(length, pitch_diameter(self.pinion), pitch_diameter(self.wheel))
+
+    @property
+    def span_mm(self) -> float:
+        """Length of a straight side of the belt; zero without one."""
+        if not (self.pinion and self.wheel):
+            return 0.0
+        smaller = (pitch_diameter(self.wheel) - pitch_diameter(self.pinion)) / 2
+        return math.sqrt(self.centre_mm**2 - smaller**2)
 
 
 def pitch_diameter(wheel: PurchasedPart) -> float:
@@ -149,24 +174,3 @@ def _named_part(where: str, row: Row, column: str, parts: Parts) -> PurchasedPar
             f"{where}, column {column}: {short_text(row[column])} is not in {lists}: add it"
         )
     return part
-
-
-def choose_drive(name: str, required_torque: float, drives: Sequence[Drive]) -> Drive:
-    """The first drive of a name that holds a torque on the base (N mm).
-
-    Raises:
-        SpecError: when none does; it says what to change.
-    """
-    candidates = [drive for drive in drives if drive.name == name]
-    if not candidates:
-        known = ", ".join(dict.fromkeys(drive.name for drive in drives))
-        raise SpecError(f"no drive {short_text(name)} in drives.csv: use one of {known}")
-    for drive in candidates:
-        if drive.holds_nmm >= required_torque:
-            return drive
-    strongest = max(drive.holds_nmm for drive in candidates)
-    raise SpecError(
-        f"no drive {name} holds {required_torque:.0f} N mm on the base, at most {strongest:.0f}: "
-        "balance the base with a counterweight, make prototype.largest_ball_mm or "
-        "prototype.motion.safety smaller, or use another prototype.base.drive"
-    )

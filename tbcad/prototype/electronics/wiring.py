@@ -13,9 +13,11 @@ import numpy as np
 
 from tbcad.formats.csv_table import Row
 from tbcad.geometry.vectors import norm
+from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.electronics.outputs import LAMP, Light, lights
 from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
-from tbcad.prototype.frame.brackets import choose_part
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.purchased.choice import choose_part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.prototype.stage import arms, crown
 from tbcad.prototype.stage.layout import StageLayout
@@ -32,11 +34,14 @@ LEAD_MM = 1000.0  # from the foot of the stage to the controller
 CHANNEL_MM = 45.0  # from the post's axis out of the foot's channel, with room for the connector
 CUT_MM = 50.0  # wires are cut to multiples of this
 METRE_MM = 1000.0
+MA_PER_A = 1000.0
 WIRES = 2  # of an LED
 SWITCH_MODULE = "MOSFET"
 PATH = "grooves of arm and crown, bore of crown and post, channel of the stage's foot, controller"
 BOARD = "board"  # connector: terminals of the controller
-CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamp, camera's release and switch
+CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamps, camera's release and switch
+BETWEEN_LAMPS_MM = 500.0  # of cable from one lamp to the next
+LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
 RELEASE: Row = {
     "wire": CABLE,
     "length_mm": CABLE_MM,
@@ -55,6 +60,25 @@ HOME: Row = {
     "part": "SWITCH-SS-5GL2",
     "connector": BOARD,
     "path": "common and normally closed contact of the switch, input and ground",
+}
+MOTOR: Row = {
+    "signal": "motor",
+    "connector": BOARD,
+    "pins": "A+ A- B+ B-",
+    "path": "the motor's own wires; a few ohm are between the two of a coil",
+}
+FUSE, SUPPLY_V = "FUSE-2A", 24.0
+SUPPLY: Row = {
+    "wire": CABLE,
+    "length_mm": CABLE_MM,
+    "signal": "supply",
+    "part": "SUPPLY-24V",
+    "output": "supply",
+    "connector": FUSE,
+    "pins": "+ -",
+    "supply_v": SUPPLY_V,
+    "path": "plus by the fuse to controller, lamps and resistors; minus to controller and all "
+    "switch modules: one ground",
 }
 
 
@@ -91,16 +115,16 @@ class Wiring:
         """Parts that no list has by this name: the resistor of a value."""
         return {self.resistor.part.name: self.resistor.part} if self.resistor else {}
 
-    @property
-    def purchased(self) -> dict[str, int]:
-        """Quantity of purchased parts by name; of wire, in metres."""
-        counts = Counter({SWITCH_MODULE: len(self.lights), self.led.name: self.leds})
+    def purchased(self, lamps: LampLayout | None) -> dict[str, int]:
+        """Quantity of purchased parts by name; without LEDs; of wire, in metres."""
+        counts = Counter({SWITCH_MODULE: len(self.lights)})
         if self.resistor and self.connector and self.wire:
             counts[self.resistor.part.name] += self.leds
             counts[self.connector.name] += 1
             counts[self.wire.name] += math.ceil(WIRES * sum(self.lengths) / METRE_MM)
-        cables = 2 + self.trigger  # of lamp, switch and release
-        counts[CABLE] += math.ceil(cables * CABLE_MM / METRE_MM)
+        # Of supply, switch and release.
+        cable = (2 + self.trigger) * CABLE_MM + lamp_cable_mm(lamps)
+        counts[CABLE] += math.ceil(cable / METRE_MM)
         return dict(+counts)
 
 
@@ -132,19 +156,30 @@ def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiri
     )
 
 
-def wiring_rows(wiring: Wiring) -> list[Row]:
-    """One row for each line of the controller: lights by output, release, switch."""
+def lamp_cable_mm(lamps: LampLayout | None) -> float:
+    """Length of the cable to the lamps, mm."""
+    return CABLE_MM + (BETWEEN_LAMPS_MM * (len(lamps.places) - 1) if lamps else 0.0)
+
+
+def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[Row]:
+    """One row for each line of the controller: lights by output, release, switch, motor, supply."""
     outputs = {light.name: light.output for light in wiring.lights}
-    lamp: Row = {"signal": LAMP, "part": "lamp", "supply_v": wiring.supply_v}
-    rows = [_row(lamp | {"wire": CABLE, "length_mm": CABLE_MM}, outputs)]
+    rows = [_row(_lamp_cells(wiring, lamps), outputs)]
     for i in range(wiring.leds):
         name = f"led_{i + 1}"
         rows.append(_row({"signal": name, **_led_cells(wiring, i)}, outputs))
     if wiring.trigger:
         rows.append(RELEASE)
     rows.append(HOME | {"output": f"limit {wiring.axis}"})
+    rows += [_motor_row(drive, wiring.axis), SUPPLY]
     empty: Row = dict.fromkeys(COLUMNS)
     return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
+
+
+def _motor_row(drive: Drive, axis: str) -> Row:
+    """The motor's line; a rotary stage's current is its maker's."""
+    current = drive.rated_current * MA_PER_A or None
+    return MOTOR | {"part": drive.motor.name, "output": f"driver {axis}", "current_ma": current}
 
 
 def _row(cells: Row, outputs: dict[str, int]) -> Row:
@@ -154,6 +189,20 @@ def _row(cells: Row, outputs: dict[str, int]) -> Row:
         return {"connector": BOARD, "output": "by hand", **cells}
     on, off = f"M64 P{output}", f"M65 P{output}"
     return {"connector": BOARD, "output": f"digital {output}", "on": on, "off": off, **cells}
+
+
+def _lamp_cells(wiring: Wiring, lamps: LampLayout | None) -> Row:
+    """The lamps' line; without lamps it is that of a lamp of the user's own."""
+    cable: Row = {"signal": LAMP, "wire": CABLE, "length_mm": lamp_cable_mm(lamps)}
+    if lamps is None:
+        return {**cable, "part": "lamp", "supply_v": wiring.supply_v}
+    return {
+        **cable,
+        "part": lamps.strip.name,
+        "supply_v": lamps.strip["supply_v"],
+        "current_ma": lamps.current_ma,
+        "path": LAMP_PATH,
+    }
 
 
 def _led_cells(wiring: Wiring, index: int) -> Row:

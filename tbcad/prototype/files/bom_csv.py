@@ -1,25 +1,36 @@
-"""bom.csv: everything to buy and to print; and the drive's loads for prototype.json."""
+"""bom.csv: everything to buy and to print."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from tbcad.formats.csv_table import Cell, Row
+from tbcad.formats.csv_table import Row
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.balance import BaseBalance, cap_volume
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.purchased.prices import Price, Prices
+from tbcad.prototype.purchased.standards import standard_in
 from tbcad.spec.errors import SpecError, short_text
-from tbcad.spec.prototype import MotionSpec
 
+NAME = "bom.csv"
+PRICE_COLUMNS = ("unit_price", "total_price", "currency", "price_date", "price_source")
 COLUMNS = (
-    *("item", "quantity", "part", "what", "material", "mass_g", "total_mass_g"),
-    *("print_volume_mm3", "from"),
+    *("item", "quantity", "part", "what", "standard", "material", "mass_g", "total_mass_g"),
+    *("print_volume_mm3", "filament_g", "print_hours"),
+    *PRICE_COLUMNS,
+    "from",
 )
-ALWAYS = {"GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
-PRINT_MATERIAL = "PETG"
+WHOLE = ("item", "quantity", "print_volume_mm3")
+NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE_COLUMNS[:2])
+ALWAYS = {"FUSE-2A": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
+PRINT_MATERIAL, CAP_MATERIAL = "PETG", "resin"
+GRAM_DECIMALS, CENTS = 2, 2
+ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
+LIGHT_G = 0.1
+KINDS = BOUGHT, PRINTED = "bought", "printed"
+MM3_PER_CM3 = 1000.0
 
 
 @dataclass(frozen=True)
@@ -30,11 +41,15 @@ class PrintedItem:
         name: of the part and of its files.
         what: it is for.
         volume: mm^3.
+        estimate: of its print.
+        material: of it.
     """
 
     name: str
     what: str
     volume: float
+    estimate: PrintEstimate
+    material: str = PRINT_MATERIAL
 
 
 def bom_rows(
@@ -44,119 +59,139 @@ def bom_rows(
     printed: Iterable[PrintedItem],
     density: float,
     parts: Parts,
+    prices: Prices,
 ) -> list[Row]:
     """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
 
-    Balls and caps come first, by size, then the drive, other purchased parts, and last what is
-    printed.
+    Balls come first, by size, then the drive, other purchased parts, and last what is printed.
 
     Args:
         prototype: with its balls.
         drive: of the base.
         purchased: quantity of each other purchased part, by its name in the lists.
-        printed: parts to print, without caps.
+        printed: parts to print.
         density: of their material, g/cm^3.
         parts: the lists.
+        prices: of the parts.
 
     Raises:
         SpecError: when a part is in no list.
     """
     rows = [
-        *_balls(prototype),
-        *(_printed(cap, density) for cap in _caps(prototype)),
-        *(_purchased(part, 1) for part in drive.parts),
-        *_other_purchased(purchased, parts),
-        *(_printed(item, density) for item in printed),
+        *ball_rows(prototype, prices),
+        *(_purchased(part, 1, prices) for part in drive.parts),
+        *_other_purchased(purchased, parts, prices),
+        *(_printed(item, density, prices) for item in printed),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
-def drive_record(
-    balance: BaseBalance,
-    drive: Drive,
-    motion: MotionSpec,
-    swing: tuple[float, float],
-    radius: float,
-) -> dict[str, Cell | list[float]]:
-    """What the drive must bear and does, for prototype.json.
+def cap_item(
+    prototype: PrototypeLayout, j: int, volume: float, estimate: PrintEstimate
+) -> PrintedItem:
+    """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
+    balls = prototype.balls
+    front, body = balls.radius[j], 2 * balls.body_radius[j]
+    what = (
+        f"front of radius {front:.1f} mm on a ball of {body:.3f} mm, polished and coated as drawn"
+    )
+    return PrintedItem(f"cap {j + 1}", what, volume, estimate, CAP_MATERIAL)
 
-    Args:
-        balance: masses on the base.
-        drive: chosen for them.
-        motion: of the base.
-        swing: smallest and largest base angle, radians.
-        radius: at which a counterweight would be, mm.
-    """
-    torque = balance.max_torque(*swing)
-    acceleration = float(np.radians(motion.acceleration_deg_s2))
+
+def totals(rows: Iterable[Row]) -> dict[str, Any]:
+    """Sums of a list, for prototype.json; prices by currency, of parts that have one."""
+    rows = list(rows)
+    bought, printed = ([row for row in rows if row["from"] == kind] for kind in KINDS)
     return {
-        "mass_g": balance.mass_g,
-        "centre_mm": (balance.centre + 0.0).tolist(),
-        "moment_g_mm": balance.moment,
-        "azimuth_deg": float(np.degrees(balance.azimuth)),
-        "inertia_g_mm2": balance.inertia,
-        "worst_torque_nmm": torque,
-        "safety": motion.safety,
-        "required_torque_nmm": balance.required_torque(*swing, acceleration, motion.safety),
-        "holding_torque_nmm": drive.holds_nmm,
-        "drive": drive.name,
-        "motor": drive.motor.name,
-        "ratio": drive.ratio,
-        "steps_per_deg": drive.steps_per_deg(motion.microsteps),
-        "wind_up_deg": float(np.degrees(drive.wind_up_angle(torque))),
-        "belt_pull_n": drive.belt_pull(torque),
-        "belt_centre_mm": drive.centre_mm,
-        "counterweight_g": balance.moment / radius,
-        "counterweight_radius_mm": radius,
+        "mass_g": _sum(rows, "total_mass_g"),
+        "bought_price": by_currency(bought),
+        "without_price": sum(row["unit_price"] is None for row in bought),
+        "filament_g": _sum(printed, "filament_g"),
+        "filament_price": by_currency(printed),
+        "print_hours": _sum(printed, "print_hours"),
     }
 
 
-def _row(
-    quantity: int, part: str, what: str, material: str, mass: float, volume: float | None = None
-) -> Row:
-    """A row; with a volume (mm^3) the part is printed."""
+def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
+    """What all rows have; mass is that of one, grams."""
+    rounded = _grams(mass)
     return {
         "quantity": quantity,
         "part": part,
         "what": what,
+        "standard": standard_in(what),
         "material": material,
-        "mass_g": mass,
-        "total_mass_g": quantity * mass,
-        "print_volume_mm3": volume,
-        "from": "bought" if volume is None else "printed",
+        "mass_g": rounded,
+        "total_mass_g": round(quantity * rounded, GRAM_DECIMALS + ESTIMATE_DIGITS),
     }
 
 
-def _purchased(part: PurchasedPart, quantity: int) -> Row:
-    return _row(quantity, part.name, part.what, part.material, part.mass_g)
+def price_columns(quantity: int, price: Price | None) -> Row:
+    """The columns of a price; empty without one."""
+    if price is None:
+        return dict.fromkeys(PRICE_COLUMNS)
+    total = round(quantity * price.amount, CENTS)
+    values = (price.amount, total, price.currency, price.date, price.source)
+    return dict(zip(PRICE_COLUMNS, values, strict=True))
 
 
-def _printed(item: PrintedItem, density: float) -> Row:
-    mass = item.volume * 1e-3 * density
-    return _row(1, item.name, item.what, PRINT_MATERIAL, mass, item.volume)
+def _bought(part: str, what: str, quantity: int, material: str, mass: float, prices: Prices) -> Row:
+    row = _row(part, what, quantity, material, mass)
+    return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _balls(prototype: PrototypeLayout) -> Iterator[Row]:
+def _purchased(part: PurchasedPart, quantity: int, prices: Prices) -> Row:
+    return _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+
+
+def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
+    """Its mass is that of a solid print, and its price that of its filament."""
+    filament = item.estimate.filament_mm3 / MM3_PER_CM3 * density
+    mass = item.volume / MM3_PER_CM3 * density
+    return {
+        **_row(item.name, item.what, 1, item.material, mass),
+        "print_volume_mm3": round(item.volume),
+        "filament_g": _estimate(filament),
+        "print_hours": _estimate(item.estimate.hours),
+        **price_columns(1, prices.of(item.material, filament)),
+        "from": PRINTED,
+    }
+
+
+def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
     """Purchased balls by rising diameter."""
     balls, grade = prototype.balls, prototype.grade.grade
     for k, count in sorted(Counter(balls.stock[~balls.cap].tolist()).items()):
         ball = balls.catalogue.balls[k]
         what = f"steel ball {ball.size} {ball.standard} {grade}"
-        yield _row(count, f"ball {ball.size}", what, "steel", ball.mass_g)
+        yield _bought(f"ball {ball.size}", what, count, "steel", ball.mass_g, prices)
 
 
-def _caps(prototype: PrototypeLayout) -> Iterator[PrintedItem]:
-    """Caps by number of their ball: no two are alike."""
-    balls, volume = prototype.balls, cap_volume(prototype.balls)
-    for j in np.flatnonzero(balls.cap).tolist():
-        front, body = balls.radius[j], 2 * balls.body_radius[j]
-        what = f"front of radius {front:.1f} mm on a ball of {body:.3f} mm"
-        yield PrintedItem(f"cap {j + 1}", what, float(volume[j]))
-
-
-def _other_purchased(purchased: Mapping[str, int], parts: Parts) -> list[Row]:
+def _other_purchased(purchased: Mapping[str, int], parts: Parts, prices: Prices) -> list[Row]:
     """Parts by name, in the order of the lists; those of none are left out."""
     counts = Counter(ALWAYS) + Counter(purchased)
     if unknown := [name for name in counts if name not in parts]:
         raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
-    return [_purchased(part, counts[name]) for name, part in parts.items() if counts[name]]
+    return [_purchased(part, counts[name], prices) for name, part in parts.items() if counts[name]]
+
+
+def _grams(mass: float) -> float:
+    return round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
+
+
+def _estimate(value: float) -> float:
+    """A figure to as many digits as can be known."""
+    return float(f"{value:.{ESTIMATE_DIGITS}g}")
+
+
+def _sum(rows: Iterable[Row], column: str) -> float:
+    return round(sum(float(row[column] or 0) for row in rows), GRAM_DECIMALS)
+
+
+def by_currency(rows: Iterable[Row]) -> dict[str, float]:
+    """Sums of the prices that there are, by currency."""
+    sums = defaultdict[str, float](float)
+    for row in rows:
+        if row["currency"]:
+            sums[str(row["currency"])] += float(row["total_price"] or 0)
+    return {currency: round(amount, CENTS) for currency, amount in sorted(sums.items())}

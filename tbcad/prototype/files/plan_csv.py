@@ -8,13 +8,18 @@ import numpy as np
 
 from tbcad.formats.csv_table import Row
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.balance import BaseBalance
+from tbcad.prototype.drive.loads import DriveLoads
 from tbcad.prototype.frame.layout import FrameLayout
 
 PICTURE_COLUMNS = (
     *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),
     *("polar_error_deg", "azimuth_error_deg", "error_deg"),
 )
-STOP_COLUMNS = ("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg")
+STOP_COLUMNS = (
+    *("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg"),
+    *("torque_nmm", "wind_up_deg"),
+)
 HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 
@@ -42,12 +47,22 @@ def picture_rows(layout: PrototypeLayout) -> list[Row]:
     ]
 
 
-def stop_rows(layout: PrototypeLayout) -> list[Row]:
-    """One row for each stop: how many mirrors, which balls, and the worst errors, all >= 0.
+def stop_rows(layout: PrototypeLayout, balance: BaseBalance, loads: DriveLoads) -> list[Row]:
+    """One row for each stop: how many mirrors, which balls, the worst errors, gravity's effect.
 
-    They hold for both turns of the object.
+    Worst errors are >= 0. Gravity's torque about the axis has the sign of the base angle, as has
+    the wind-up: the angle by which the base is farther than the motor's steps say, because motor
+    and belt yield, less that at angle zero, where it is homed. All hold for both turns of the
+    object.
     """
-    return [_stop_row(layout, stop) for stop in range(len(layout.stops))]
+    torque = balance.torque(np.append(layout.stops.angle, 0.0))
+    wind_up = loads.wind_up_at(torque)
+    beyond = np.degrees(wind_up[:-1] - wind_up[-1]) + 0.0
+    gravity = zip(torque[:-1].tolist(), beyond.tolist(), strict=True)
+    return [
+        _stop_row(layout, stop) | dict(zip(STOP_COLUMNS[-2:], effect, strict=True))
+        for stop, effect in enumerate(gravity)
+    ]
 
 
 def hole_rows(frame: FrameLayout) -> list[Row]:
@@ -68,7 +83,7 @@ def _stop_row(layout: PrototypeLayout, stop: int) -> Row:
     balls = " ".join(str(ball + 1) for ball in np.unique(layout.fit.ball[mirrors]).tolist())
     worst = [float(np.abs(error[mirrors]).max()) for error in (stops.azimuth_error, stops.error)]
     values = (stop + 1, _degrees(float(stops.angle[stop])), len(mirrors), balls)
-    return dict(zip(STOP_COLUMNS, (*values, *map(_degrees, worst)), strict=True))
+    return dict(zip(STOP_COLUMNS[:-2], (*values, *map(_degrees, worst)), strict=True))
 
 
 def _degrees(angle: float) -> float:

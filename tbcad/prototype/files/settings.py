@@ -3,8 +3,8 @@
 A comment in round brackets is on a line of its own before each setting. After homing GRBL sets the
 machine's coordinate to minus the travel plus the pull-off, and soft limits keep it between minus
 the travel and zero; grblHAL keeps the pull-off from both ends.
-Sources: doc/markdown/settings.md and grbl/limits.c of GRBL 1.1h; settings.h and machine_limits.c of
-grblHAL core.
+Sources: doc/markdown/settings.md and grbl/limits.c of GRBL 1.1h; settings.h, config.h and
+machine_limits.c of grblHAL core.
 """
 
 import math
@@ -19,6 +19,9 @@ NAME = "grbl_settings.txt"
 AXES = "XYZA"  # a bit of a mask each, and the last digit of $100, $110, $120, $130
 SEEK_DEG_MIN, LOCATE_DEG_MIN = 360.0, 60.0
 DEBOUNCE_MS = 25
+# A pulled-up input is high, which means pressed, with an open switch and with none (grblHAL core,
+# config.h: the default 0 is for normally closed switches to ground): empty ones are inverted.
+OTHER_AXES = 0b111
 TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
 Setting = tuple[int, float, str]
 
@@ -41,7 +44,7 @@ def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setti
 def _homing(mask: int, motion: MotionSpec) -> list[Setting]:
     seek = min(SEEK_DEG_MIN, motion.feed_deg_min)
     return [
-        (5, mask, "the switch opens when it is pressed: a broken wire stops the base"),
+        (5, OTHER_AXES & ~mask, "the switch opens when it is pressed; other inputs are empty"),
         (22, 1, "homing"),
         (44, mask, "homing: this axis"),
         (45, 0, "homing: no other axis"),

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, Prism, cylinder_between
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.spec.errors import SpecError
+from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.types import Floats
 
 # Diameters of clearance holes by ISO 273, medium, by thread (1/4 inch: 6.35).
@@ -27,11 +26,13 @@ class Bracket:
         component: the part itself.
         holes: tapped holes that it needs in the base plate, (x, y) along the frame's axes, (h, 2).
         foot: corners of its foot on the plate, the same, (f, 2).
+        fasteners: of it, but for those in the base plate.
     """
 
     component: Component
     holes: Floats
     foot: Floats
+    fasteners: tuple[Fastener, ...] = ()
 
 
 def frame_axes(axis: Floats) -> Floats:
@@ -62,36 +63,3 @@ def drilled_holes(places: Sequence[Floats], depth: Floats, diameter: float) -> l
     return [
         cylinder_between(place - beyond, place + depth + beyond, diameter / 2) for place in places
     ]
-
-
-def choose_part(
-    parts: Parts, kind: str, key: str, hint: str, order: str = "length_mm", **sizes: float
-) -> PurchasedPart:
-    """The smallest purchased part of a kind that has all sizes, and at least the size in order.
-
-    Args:
-        parts: lists of purchased parts.
-        kind: a list.
-        key: of the spec that asks for it.
-        hint: what to change when there is none.
-        order: size that must only be large enough; the smallest is taken.
-        sizes: required.
-
-    Raises:
-        SpecError: when the list has none.
-    """
-    exact = {size: value for size, value in sizes.items() if size != order}
-    candidates = [
-        part for part in of_kind(parts, kind, **exact) if part[order] >= sizes.get(order, 0.0)
-    ]
-    if not candidates:
-        required = ", ".join(f"{size} {value:.4g}" for size, value in sizes.items())
-        raise SpecError(f"no part with {required} in {kind}.csv, which {key} needs: {hint}")
-    return min(candidates, key=lambda part: part[order])
-
-
-def choose_screw(parts: Parts, thread: float, length: float) -> str:
-    """Name of the shortest socket head screw of a thread that is at least so long."""
-    hint = "make prototype.frame.flange_mm smaller"
-    key = "prototype.frame.flange_mm"
-    return choose_part(parts, "screws", key, hint, thread_mm=thread, length_mm=length).name

@@ -1,4 +1,4 @@
-"""Parts on the base plate: feet of the uprights, clamp of the post, bracket of the camera."""
+"""Parts on the base plate: feet of the uprights, clamp of the post."""
 
 import numpy as np
 
@@ -9,10 +9,8 @@ from tbcad.geometry.primitives import (
     box,
     cylinder_between,
     rectangle,
-    slot,
 )
-from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import Camera
+from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
@@ -24,15 +22,15 @@ from tbcad.prototype.frame.brackets import (
     level_prism,
     webs,
 )
-from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.prototype.frame.fasteners import on_uprights
+from tbcad.prototype.purchased.choice import choose_screw
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]
 M5_HEAD_MM = 8.5
-TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
 
 # Feet of the uprights.
 FOOT_HEIGHT_MM, FOOT_DEPTH_MM = 50.0, 48.0
@@ -49,23 +47,14 @@ HEAD_TO_COLLAR_MM, HEAD_TO_EAR_MM = 2.0, 1.0  # between a screw's head and colla
 CLAMP_EDGE_MM = 9.0  # from a screw to the foot's edge
 BEYOND_EAR_MM = 1.0  # of foot and slit beyond the ears
 SLIT_FLOOR_MM = 1.0  # material below the slit
+CLAMP_INSERT, CLAMP_SCREW_MM = "INSERT-M4", (4.0, 20.0)  # thread, length
 INSERT_PLAY_MM = 0.4  # of the insert's hole beyond it
 WIRE_WALL_MM, MAX_WIRE_MM = 3.0, 4.0  # post beside the wires' hole, and its largest radius
 CHANNEL_WIDTH_MM, CHANNEL_HEIGHT_MM = 6.0, 4.5
 CHANNEL_ROOF_MM = 3.0  # material above the channel
 
-# Bracket of the camera.
-MOUNT_HALF_MM = 25.0  # half width of the plate that carries the camera
-MOUNT_START_MM = 15.0  # of plate beyond the slot
-MOUNT_WEB_MM = 10.0  # from the plate's upper end to the webs
-BRACKET_FOOT_MM = 70.0  # length of the foot beyond the plate
-FOOT_BORDER_MM = 18.0  # of the foot beside the plate
-FOOT_TRAVEL_MM = 10.0
-SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
-AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
-
-def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Bracket:
+def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int, parts: Parts) -> Bracket:
     """A foot on the front (side 1) or the back (side -1) of both uprights.
 
     Args:
@@ -73,6 +62,7 @@ def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Brack
         axes: of the frame, as rows, (3, 3).
         face: level coordinate of the uprights' front.
         side: on which the foot is.
+        parts: lists of purchased parts.
     """
     low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
     start = face if side > 0 else face - EXTRUSION_MM
@@ -97,9 +87,9 @@ def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Brack
     screw, _ = at(FOOT_DEPTH_MM - FOOT_SCREW_MM, 0.0)
     _, height = at(0.0, FOOT_HEIGHT_MM - FOOT_SCREW_MM)
     across = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
-    in_plate = [np.array([screw, y, low]) @ axes for y in across]
+    under = [np.array([screw, y, low]) @ axes for y in across]
     in_uprights = [np.array([start, y, height]) @ axes for y in across]
-    removed = drilled_holes(in_plate, thick * axes[2], M5_HOLE_MM)
+    removed = drilled_holes(under, thick * axes[2], M5_HOLE_MM)
     removed += drilled_holes(in_uprights, side * thick * axes[0], M5_HOLE_MM)
     component = Component(
         "upright_foot_front" if side > 0 else "upright_foot_back",
@@ -110,10 +100,13 @@ def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int) -> Brack
     )
     ends = (start, start + side * FOOT_DEPTH_MM)
     foot = np.array([[x, y] for x in ends for y in (-half, half)])
-    return Bracket(component, np.array([[screw, y] for y in across]), foot)
+    in_plate = np.array([[screw, y] for y in across])
+    inward = -side * axes[0]
+    fasteners = on_uprights(component.name, in_uprights, inward, thick, parts)
+    return Bracket(component, in_plate, foot, fasteners)
 
 
-def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: PurchasedPart) -> Bracket:
+def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) -> Bracket:
     """A clamp round the post, with a channel for the wires below."""
     low, radius, up = spec.floor_mm, stage.sizes.post + COLLAR_WALL_MM, axes[2]
     ear, top = radius + EAR_LENGTH_MM, low + COLLAR_HEIGHT_MM
@@ -141,7 +134,7 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
     removed = (
         Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
-        *_clamp(axes, stage, ear, top, insert),
+        *_clamp(axes, stage, ear, top, parts[CLAMP_INSERT]),
         *drilled_holes(places, spec.flange_mm * up, M5_HOLE_MM),
         box(channel, np.array([width, 0.0, low + height]), axes),
     )
@@ -152,7 +145,26 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, insert: Purcha
         removed,
         (-up, up),
     )
-    return Bracket(component, holes, np.array([[-half, -half], [end, half]]))
+    foot = np.array([[-half, -half], [end, half]])
+    return Bracket(component, holes, foot, _clamp_fasteners(axes, stage, ear, top, parts))
+
+
+def _clamp_fasteners(
+    axes: Floats, stage: StageLayout, ear: float, top: float, parts: Parts
+) -> tuple[Fastener, ...]:
+    """The clamp's screw from one ear, its insert in the other."""
+    middle, side, across = _clamp_screw(stage, ear, top), np.array([0.0, EAR_MM, 0.0]), axes[1]
+    screw, name = choose_screw(parts, *CLAMP_SCREW_MM), ("stage_foot",)
+    return (
+        Fastener(screw, (middle - side) @ axes, across, name),
+        Fastener(parts[CLAMP_INSERT], (middle + side) @ axes, -across, name),
+    )
+
+
+def _clamp_screw(stage: StageLayout, ear: float, top: float) -> Floats:
+    """Middle of the clamp's screw."""
+    height = (stage.foot + SLIT_FLOOR_MM + top) / 2 + SLIT_FLOOR_MM
+    return np.array([ear - EAR_LENGTH_MM / 2, 0.0, height])
 
 
 def _clamp(
@@ -162,7 +174,7 @@ def _clamp(
     low = stage.foot + SLIT_FLOOR_MM
     slit = np.array([0.0, -SLIT_MM / 2, low])
     end = np.array([ear + BEYOND_EAR_MM, SLIT_MM / 2, top + THROUGH_MM])
-    screw = np.array([ear - EAR_LENGTH_MM / 2, 0.0, (low + top) / 2 + SLIT_FLOOR_MM])
+    screw = _clamp_screw(stage, ear, top)
     outside = np.array([0.0, EAR_MM + THROUGH_MM, 0.0])
     inside = np.array([0.0, EAR_MM - insert["length_mm"] - INSERT_PLAY_MM, 0.0])
     hole = CLEARANCE_HOLE_MM[insert["thread_mm"]] / 2
@@ -171,97 +183,3 @@ def _clamp(
         cylinder_between((screw - outside) @ axes, (screw + outside) @ axes, hole),
         cylinder_between((screw + inside) @ axes, (screw + outside) @ axes, insert["hole_mm"] / 2),
     ]
-
-
-def camera_bracket(spec: PrototypeSpec, axes: Floats, camera: Camera) -> Bracket:
-    """A plate along the camera's axis, on its outer side, with a slot for its tripod thread.
-
-    Raises:
-        SpecError: when the camera does not look along the frame's plane, its thread lies beyond
-            its end, or it reaches the base plate.
-    """
-    _check_camera(spec, axes, camera)
-    frame, back, radius = spec.frame, -(axes @ camera.forward), spec.camera_diameter_mm / 2
-    out = unit(np.array([1.0, 0.0, 0.0]) - back[0] * back)
-    pinhole, low = axes @ camera.pinhole, frame.floor_mm
-
-    def at(along: float, away: float) -> Floats:
-        """Point (level, up) behind the pinhole, away from the camera's axis."""
-        return np.asarray((pinhole + along * back + away * out)[[0, 2]])
-
-    def at_height(height: float, away: float) -> Floats:
-        """Point (level, up) of a line along the camera's axis."""
-        start = at(0.0, away)
-        return np.asarray(start + (height - start[1]) / back[2] * back[[0, 2]])
-
-    first = frame.camera_screw_mm - frame.camera_travel_mm / 2 - MOUNT_START_MM
-    near, far = radius, radius + frame.flange_mm
-    mount = np.array([at(first, near), at_height(low, near), at_height(low, far), at(first, far)])
-    start, end = float(mount[1, 0]), float(mount[2, 0]) + BRACKET_FOOT_MM
-    inside, high = far - OVERLAP_MM, low + frame.flange_mm - OVERLAP_MM
-    web = np.array(
-        [at(first + MOUNT_WEB_MM, inside), at_height(high, inside), [end - WEB_SETBACK_MM, high]]
-    )
-    half = MOUNT_HALF_MM + FOOT_BORDER_MM
-    foot = rectangle((start, low), (end, low + frame.flange_mm))
-    added = [
-        level_prism(mount, -MOUNT_HALF_MM, MOUNT_HALF_MM, axes),
-        level_prism(foot, -half, half, axes),
-        *webs(web, MOUNT_HALF_MM - frame.web_mm, frame.web_mm, axes),
-    ]
-    beside = half - SLOT_SIDE_MM
-    ends = (start + SLOT_INNER_MM, end - SLOT_OUTER_MM)
-    holes = np.array([[x, y] for x in ends for y in (-beside, beside)])
-    component = Component(
-        "camera_bracket",
-        "bracket of the camera",
-        tuple(added),
-        (*_camera_slot(frame, axes, camera, out, radius), *_foot_slots(frame, axes, holes)),
-        (-out @ axes, -axes[2], out @ axes, axes[1]),
-    )
-    return Bracket(component, holes, np.array([[start, -half], [end, half]]))
-
-
-def _camera_slot(
-    spec: FrameSpec, axes: Floats, camera: Camera, out: Floats, radius: float
-) -> tuple[Primitive, ...]:
-    away = out @ axes
-    on_axis = camera.pinhole - spec.camera_screw_mm * camera.forward
-    start, depth = on_axis + (radius - THROUGH_MM) * away, (spec.flange_mm + 2 * THROUGH_MM) * away
-    return slot(start, camera.forward, spec.camera_travel_mm, TRIPOD_HOLE_MM / 2, depth)
-
-
-def _foot_slots(spec: FrameSpec, axes: Floats, holes: Floats) -> list[Primitive]:
-    low, depth = spec.floor_mm - THROUGH_MM, (spec.flange_mm + 2 * THROUGH_MM) * axes[2]
-    starts = [np.array([*hole, low]) @ axes for hole in holes]
-    return [
-        body
-        for start in starts
-        for body in slot(start, axes[0], FOOT_TRAVEL_MM, M5_HOLE_MM / 2, depth)
-    ]
-
-
-def _check_camera(spec: PrototypeSpec, axes: Floats, camera: Camera) -> None:
-    frame, travel = spec.frame, spec.frame.camera_travel_mm / 2
-    if abs(float(camera.forward @ axes[1])) > AXIAL:
-        raise SpecError(
-            "the camera does not look along the plane of the frame, so there is no bracket for it: "
-            "set the second number of optics.camera_mm to 0, or prototype.camera_diameter_mm to 0"
-        )
-    if frame.camera_screw_mm - travel < MOUNT_START_MM:
-        raise SpecError(
-            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} is too near to the "
-            f"pinhole: make it {MOUNT_START_MM + travel:g} or more, or camera_travel_mm smaller"
-        )
-    if frame.camera_screw_mm > spec.camera_length_mm:
-        raise SpecError(
-            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} lies beyond the camera's "
-            f"end: make it less than prototype.camera_length_mm {spec.camera_length_mm:g}"
-        )
-    end = camera.pinhole - spec.camera_length_mm * camera.forward
-    lowest = end[2] - spec.camera_diameter_mm / 2 * np.hypot(*camera.forward[:2]) - travel
-    if lowest < frame.floor_mm:
-        raise SpecError(
-            f"the camera reaches down to {lowest:.0f} mm, below the base plate: make "
-            f"prototype.frame.floor_mm less than {lowest:.0f}"
-        )

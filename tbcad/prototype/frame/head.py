@@ -9,22 +9,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, rectangle, slot
-from tbcad.geometry.rotations import bolt_circle
+from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     HALF_FLANGE_MM,
     OVERLAP_MM,
     THROUGH_MM,
-    choose_part,
     drilled_holes,
     level_prism,
     webs,
 )
+from tbcad.prototype.frame.fasteners import motor_fasteners, motor_screw_places, on_uprights
 from tbcad.prototype.frame.purchased import (
     COUPLING_MM,
     PLATE_MM,
+    STAGE_HEIGHT_MM,
     HeadPlate,
     ShaftParts,
     axial_cylinder,
@@ -33,29 +35,30 @@ from tbcad.prototype.frame.purchased import (
     wheel_radius,
 )
 from tbcad.prototype.homing.sizes import (
-    BRACKET_EDGE_MM,
-    BRACKET_HIGH_MM,
-    BRACKET_LOW_MM,
     MARK_DEPTH_MM,
     MARK_END_MM,
     MARK_MM,
     MIN_PLATE_MM,
     PIN_HOLE_MM,
     PIN_OUT_MM,
+    bracket_screws,
     tab_radius,
 )
+from tbcad.prototype.purchased.choice import choose_part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
+# Behind the head of a rotary stage's screw (M6, ISO 4762): room for it, and the length of its key.
+M6_HEAD_MM, HEAD_PLAY_MM, KEY_ROOM_MM = 10.0, 0.5, 95.0
 GAP_MM = 5.0  # between what turns and the plate: the heads of the wheel's screws are in it
+RELIEF_MM = 0.3  # round a bearing, where it passes
 SHOULDER_MM = 3.0  # width of the shoulder behind a bearing
 TUBE_WALL_MM = 6.0  # of the tube round the bearings
 MIN_TUBE_MM = 45.0  # length
 COLLAR_GAP_MM = 2.0  # between tube and collar
 BELOW_AXIS_MM = 20.0  # smallest reach of the plate with a belt below the axis
-STAGE_HEIGHT_MM = 40.0  # of a stage of the 60 mm class; assumed
 EDGE_MM = 3.0  # of the plate round the motor
 WEB_MM = 24.0  # from the middle to the webs: a NEMA 17 motor goes between
 WEB_EDGE_MM = 1.0  # of the plate beyond the webs
@@ -74,6 +77,7 @@ class BearingHead:
         component: the printed part.
         plate: across the axis.
         purchased: what is in it: bearings, shaft, collar, wheels, motor.
+        fasteners: that hold it and the motor, and the inserts in its side.
         rear: coordinate of the tube's end along w, from the origin, mm.
         shaft: in the bearings, if any.
         face: level coordinate of the flange's face on the uprights, mm.
@@ -83,6 +87,7 @@ class BearingHead:
     component: Component
     plate: HeadPlate
     purchased: tuple[Component, ...]
+    fasteners: tuple[Fastener, ...]
     rear: float
     shaft: PurchasedPart | None
     face: float
@@ -114,7 +119,8 @@ def bearing_head(
     added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
     removed = _motor_holes(spec, base, drive, plate)
     removed += _zero_holes(base, plate)
-    removed += _screws(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))
+    screws = _screw_places(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))
+    removed += drilled_holes(screws, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
     if shaft_parts:
         rear, radius = shaft_parts.rear, shaft_parts.tube
         added.append(axial_cylinder(base, plate.front - OVERLAP_MM, rear, radius))
@@ -131,6 +137,11 @@ def bearing_head(
         component=component,
         plate=plate,
         purchased=purchased_components(base, drive, plate, shaft_parts),
+        fasteners=(
+            *on_uprights(component.name, screws, -axes[0], spec.flange_mm, parts),
+            *motor_fasteners(base, drive, plate, parts),
+            *_side_inserts(base, plate, parts),
+        ),
         rear=shaft_parts.rear if shaft_parts else plate.back,
         shaft=shaft_parts.shaft if shaft_parts else None,
         face=face,
@@ -172,10 +183,10 @@ def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts
     hint = "set it to 8, 10 or 12, or add one to the list"
     bearing = choose_part(parts, "bearings", key, hint, "width_mm", bore_mm=bore)
     collar = choose_part(parts, "collars", key, hint, "width_mm", bore_mm=bore)
-    in_front = base.hub.front - plate.front
+    in_front = base.hub.socket - plate.front
     length = in_front + MIN_TUBE_MM + collar["width_mm"] + COLLAR_GAP_MM
     shaft = choose_part(parts, "shafts", key, hint, diameter_mm=bore, length_mm=length)
-    rear = base.hub.front - shaft["length_mm"] + collar["width_mm"] + COLLAR_GAP_MM
+    rear = base.hub.socket - shaft["length_mm"] + collar["width_mm"] + COLLAR_GAP_MM
     return ShaftParts(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
 
 
@@ -200,12 +211,12 @@ def _flange(
     return [flange, *webs(corners, WEB_MM, spec.web_mm, axes)]
 
 
-def _screws(
+def _screw_places(
     spec: FrameSpec, axes: Floats, face: float, heights: tuple[float, float]
-) -> list[Primitive]:
+) -> list[Floats]:
+    """Of the screws in the uprights, on the flange's face."""
     half = spec.uprights_mm / 2
-    places = [np.array([face, y, z]) @ axes for z in heights for y in (-half, half)]
-    return drilled_holes(places, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
+    return [np.array([face, y, z]) @ axes for z in heights for y in (-half, half)]
 
 
 def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
@@ -217,11 +228,25 @@ def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
     holes.append(box(mark, end, base.frame))
     middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
-    for out in (BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM):
+    for out in bracket_screws():
         inner = hub_point(base, middle, out, deep)
         outer = hub_point(base, middle, out, plate.half_width + THROUGH_MM)
         holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
     return holes
+
+
+def _side_inserts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> list[Fastener]:
+    """Inserts for the bracket of the switch."""
+    middle, insert = plate.front - PLATE_MM / 2, m3_insert(base.spec, parts)
+    return [
+        Fastener(
+            insert,
+            hub_point(base, middle, out, plate.half_width),
+            -base.frame[2],
+            ("bearing_head",),
+        )
+        for out in bracket_screws()
+    ]
 
 
 def _seats(
@@ -234,7 +259,9 @@ def _seats(
     return [
         axial_cylinder(base, plate.front + THROUGH_MM, plate.front - width, seat),
         axial_cylinder(base, plate.front, beyond, outer / 2 - SHOULDER_MM),
-        axial_cylinder(base, rear + width, beyond, seat),
+        axial_cylinder(base, rear + width, rear - THROUGH_MM, seat),
+        # The flange may reach beyond the tube: the bearing goes through it without being pressed.
+        axial_cylinder(base, rear, beyond, outer / 2 + RELIEF_MM),
     ]
 
 
@@ -244,17 +271,20 @@ def _motor_holes(
     """Pilot and screws: slots along the plate for a belt, a window for a motor on the axis."""
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plate.back - THROUGH_MM
+    places = [hub_point(base, start, out, side) for out, side in motor_screw_places(drive)]
     if motor.kind == "stages":
-        places = bolt_circle(motor["hole_circle_mm"] / 2).tolist()
-        at = [hub_point(base, start, out, side) for out, side in places]
-        return [cylinder_between(place, place + depth, motor["hole_mm"] / 2) for place in at]
+        # Screws go in from behind, where flange and webs are.
+        behind = (KEY_ROOM_MM + THROUGH_MM) * base.frame[0]
+        through = [cylinder_between(place, place + depth, motor["hole_mm"] / 2) for place in places]
+        access = M6_HEAD_MM / 2 + HEAD_PLAY_MM
+        to_heads = [at + THROUGH_MM * base.frame[0] for at in places]
+        return [*through, *(cylinder_between(at - behind, at, access) for at in to_heads)]
     travel = spec.belt_travel_mm if drive.belt else 0.0
-    centre, half = drive.centre_mm, motor["hole_square_mm"] / 2
     pilot, screw = motor["pilot_mm"] / 2 + PILOT_PLAY_MM, CLEARANCE_HOLE_MM[motor["thread_mm"]] / 2
-    holes = list(slot(hub_point(base, start, centre), base.frame[1], travel, pilot, depth))
-    for out in (centre - half, centre + half):
-        for side in (-half, half):
-            holes += slot(hub_point(base, start, out, side), base.frame[1], travel, screw, depth)
+    middle = hub_point(base, start, drive.centre_mm)
+    holes = list(slot(middle, base.frame[1], travel, pilot, depth))
+    for place in places:
+        holes += slot(place, base.frame[1], travel, screw, depth)
     if not drive.belt:
         size = motor["frame_mm"] / 2 + WINDOW_PLAY_MM
         low = np.array([plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size])

@@ -3,57 +3,44 @@
 Head, uprights and feet are behind the base, where neither its swing nor any light comes.
 """
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Cylinder, box
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, box
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.hub import BELOW_HEAD_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
+from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
+    THROUGH_MM,
     Bracket,
-    choose_part,
-    choose_screw,
     drilled_holes,
     frame_axes,
 )
-from tbcad.prototype.frame.feet import camera_bracket, stage_foot, upright_foot
+from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
+from tbcad.prototype.frame.fasteners import plate_fasteners
+from tbcad.prototype.frame.feet import stage_foot, upright_foot
 from tbcad.prototype.frame.head import BearingHead, bearing_head
-from tbcad.prototype.frame.purchased import PLATE_MM
-from tbcad.prototype.homing.layout import (
-    PILOT_DEPTH_MM,
-    SWITCH_MM,
-    HomingLayout,
-    homing_layout,
-)
-from tbcad.prototype.homing.sizes import BRACKET_MM
+from tbcad.prototype.homing.layout import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.light.lamps import lamp_layout
+from tbcad.prototype.purchased.choice import choose_part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
 
+SLOT_DEPTH_MM = 6.1  # of an extrusion of 20 mm; no list gives it
 PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
-ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
-MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
-UPRIGHT_SCREWS = 4 + 2 * 2  # of the head, and of two feet
-FOOT_INSERT, FOOT_SCREW_MM = "INSERT-M4", (4.0, 20.0)  # of the stage's clamp: thread, length
-CAMERA_SCREW = "UNC1/4-20x12.7"
-BRACKET_INSERT = "INSERT-M3"
-HUB_SCREWS = 4
-COUPLING_FLANGE_MM = 3.0  # thickness; no list gives it
-M6_ENGAGEMENT_MM = 6.0
-PLATE_WASHER = "WASHER-5"
-TNUT, POST_SCREW = "TNUT-M5-6", "SET-M3x6"
 MAY_BE_LIT = ("camera",)  # light goes into it
-MAY_BE_SWEPT = ("rotary_stage",)  # the hub is bolted on it
 HEAD_PARTS = ("bearing_front", "bearing_rear", "collar", "shaft")
 
 
@@ -65,6 +52,8 @@ class FrameLayout:
         axes: of the frame, as rows: level under the axis w, across it, up, (3, 3).
         head: bearings and motor.
         homing: zero disc, and switch with its bracket.
+        mount: of the camera; None without one.
+        lamps: that light the object, None without any.
         printed: brackets to print.
         purchased: simple bodies of purchased parts, for the assembly.
         holes: tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2).
@@ -73,7 +62,7 @@ class FrameLayout:
         plate: part of the base plate.
         upright: part that the uprights are cut from.
         length: of the uprights, mm.
-        screws: quantity of screws and nuts, by name.
+        fasteners: of the frame, without those that hold the drive to the hub.
         light: smallest distance of each to the light in use, mm.
         swept: smallest distance of each to what the base sweeps, mm.
     """
@@ -81,6 +70,8 @@ class FrameLayout:
     axes: Floats
     head: BearingHead
     homing: HomingLayout
+    mount: CameraMount | None
+    lamps: LampLayout | None
     printed: tuple[Component, ...]
     purchased: tuple[Component, ...]
     holes: Floats
@@ -89,9 +80,14 @@ class FrameLayout:
     plate: PurchasedPart
     upright: PurchasedPart
     length: float
-    screws: Counter[str]
+    fasteners: tuple[Fastener, ...]
     light: dict[str, float]
     swept: dict[str, float]
+
+    @property
+    def floor(self) -> float:
+        """Height (z) of the base plate's upper face, which the uprights stand on, mm."""
+        return self.head.top - self.length
 
 
 def frame_layout(
@@ -120,16 +116,33 @@ def frame_layout(
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
-    brackets = _brackets(spec, prototype, axes, stage, head, parts)
+    mount = _camera_mount(spec, prototype, axes, parts)
+    brackets = _brackets(spec, axes, stage, head, mount, parts)
+    beside = (
+        *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
+        *((mount.plate, mount.fence) if mount else ()),
+        *(*head.purchased, homing.switch, *_camera(spec, prototype)),
+    )
+    lamps = lamp_layout(spec, head.face, prototype.array.camera, keep_out, parts, beside)
+    brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
-    purchased = (plate_body, *bars, *head.purchased, homing.switch, *_camera(spec, prototype))
-    printed = (head.component, homing.bracket, *(bracket.component for bracket in brackets))
+    purchased = (
+        *(plate_body, *bars, *head.purchased, homing.switch, *_camera(spec, prototype)),
+        *(lamps.bodies if lamps else ()),
+    )
+    printed = (
+        *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
+        *((mount.plate, mount.fence) if mount else ()),
+        *(lamps.holders if lamps else ()),
+    )
     light, swept = _check_clearances((*printed, *purchased), keep_out, spec.frame.clearance_mm)
     return FrameLayout(
         axes=axes,
         head=head,
         homing=homing,
+        mount=mount,
+        lamps=lamps,
         printed=printed,
         purchased=purchased,
         holes=np.vstack([bracket.holes for bracket in brackets]),
@@ -138,33 +151,58 @@ def frame_layout(
         plate=plate,
         upright=upright,
         length=length,
-        screws=_screws(spec, drive, brackets, parts) + _homing_parts(drive, homing, parts),
+        fasteners=_fasteners(spec.frame, axes, head, homing, brackets, mount, lamps, parts),
         light=light,
         swept=swept,
     )
 
 
 def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
-    """Quantity of purchased parts of stage and frame by name, without the drive and the LEDs."""
+    """Quantity of purchased parts of the frame by name, without the drive and fasteners."""
     in_head = [item.part for item in frame.purchased if item.name in HEAD_PARTS and item.part]
-    counts = Counter(in_head) + Counter(frame.screws)
-    counts.update({frame.plate.name: 1, frame.upright.name: 2, POST_SCREW: 1})
+    counts = Counter(in_head)
+    counts.update({frame.plate.name: 1, frame.upright.name: 2})
+    if frame.lamps:
+        counts[frame.lamps.strip.name] = math.ceil(frame.lamps.metres)
+    counts.update([frame.homing.pin, str(frame.homing.switch.part)])
     return dict(sorted(counts.items()))
+
+
+def _camera_mount(
+    spec: PrototypeSpec, prototype: PrototypeLayout, axes: Floats, parts: Parts
+) -> CameraMount | None:
+    if spec.camera_diameter_mm == 0:
+        return None
+    return camera_mount(spec, axes, prototype.array.camera, parts)
+
+
+def _fasteners(
+    spec: FrameSpec,
+    axes: Floats,
+    head: BearingHead,
+    homing: HomingLayout,
+    brackets: list[Bracket],
+    mount: CameraMount | None,
+    lamps: LampLayout | None,
+    parts: Parts,
+) -> tuple[Fastener, ...]:
+    on_brackets = (one for bracket in brackets for one in bracket.fasteners)
+    in_plate = plate_fasteners(spec, brackets, axes, parts)
+    of_camera, of_lamps = mount.fasteners if mount else (), lamps.fasteners if lamps else ()
+    return (*head.fasteners, *on_brackets, *in_plate, *homing.fasteners, *of_camera, *of_lamps)
 
 
 def _brackets(
     spec: PrototypeSpec,
-    prototype: PrototypeLayout,
     axes: Floats,
     stage: StageLayout,
     head: BearingHead,
+    mount: CameraMount | None,
     parts: Parts,
 ) -> list[Bracket]:
-    brackets = [upright_foot(spec.frame, axes, head.face, side) for side in (1, -1)]
-    brackets.append(stage_foot(spec.frame, axes, stage, parts[FOOT_INSERT]))
-    if spec.camera_diameter_mm > 0:
-        brackets.append(camera_bracket(spec, axes, prototype.array.camera))
-    return brackets
+    brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
+    brackets.append(stage_foot(spec.frame, axes, stage, parts))
+    return [*brackets, mount.bracket] if mount else brackets
 
 
 def _uprights(
@@ -180,8 +218,27 @@ def _uprights(
         low = np.array([head.face - EXTRUSION_MM, y - half, spec.floor_mm])
         body = box(low, np.array([head.face, y + half, head.top]), axes)
         what = f"{part.what}, cut to {length:.1f} mm"
-        uprights.append(Component(name, what, (body,), part=part.name))
+        slots = _slots(part["slot_mm"], (head.face - half, y), (spec.floor_mm, head.top), axes)
+        uprights.append(Component(name, what, (body,), slots, part=part.name))
     return part, length, uprights
+
+
+def _slots(
+    width: float, middle: tuple[float, float], heights: tuple[float, float], axes: Floats
+) -> tuple[Primitive, ...]:
+    """The four slots of an extrusion, simplified: as wide inside as at its face."""
+    half, inner, outer = width / 2, EXTRUSION_MM / 2 - SLOT_DEPTH_MM, EXTRUSION_MM / 2 + THROUGH_MM
+    (x, y), (low, high) = middle, heights
+    sides = [((a, -half), (b, half)) for a, b in ((inner, outer), (-outer, -inner))]
+    sides += [((-half, a), (half, b)) for a, b in ((inner, outer), (-outer, -inner))]
+    return tuple(
+        box(
+            np.array([x + x0, y + y0, low - THROUGH_MM]),
+            np.array([x + x1, y + y1, high + THROUGH_MM]),
+            axes,
+        )
+        for (x0, y0), (x1, y1) in sides
+    )
 
 
 def _plate(
@@ -219,47 +276,17 @@ def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
     return [Component("camera", "camera behind its pinhole", (body,))]
 
 
-def _screws(
-    spec: PrototypeSpec, drive: Drive, brackets: list[Bracket], parts: Parts
-) -> Counter[str]:
-    """Screws and nuts: on the uprights with T-nuts, in the plate, of motor, clamp and camera."""
-    flange, in_plate = spec.frame.flange_mm, sum(len(bracket.holes) for bracket in brackets)
-    counts = Counter({TNUT: UPRIGHT_SCREWS, FOOT_INSERT: 1, choose_screw(parts, *FOOT_SCREW_MM): 1})
-    counts[choose_screw(parts, 5.0, flange + ENGAGEMENT_MM)] += UPRIGHT_SCREWS
-    counts[choose_screw(parts, 5.0, flange + 2 * ENGAGEMENT_MM)] += in_plate
-    counts[PLATE_WASHER] += in_plate  # some of their holes are slots
-    if drive.motor.kind == "motors":
-        counts[choose_screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)] += 4
-    else:
-        counts[choose_screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)] += 4
-    if spec.camera_diameter_mm > 0:
-        counts[CAMERA_SCREW] += 1
-    return counts
-
-
-def _homing_parts(drive: Drive, homing: HomingLayout, parts: Parts) -> Counter[str]:
-    """Pin, switch and its screws, and the screws that hold drive and zero disc to the hub."""
-    counts = Counter({homing.pin: 1, str(homing.switch.part): 1, BRACKET_INSERT: 2})
-    counts[choose_screw(parts, 2.0, SWITCH_MM + PILOT_DEPTH_MM / 2)] += 2
-    counts[choose_screw(parts, 3.0, BRACKET_MM + ENGAGEMENT_MM)] += 2
-    if drive.motor.kind == "motors":
-        on_hub = drive.wheel["width_mm"] if drive.wheel else COUPLING_FLANGE_MM
-        counts[choose_screw(parts, 3.0, on_hub + ZERO_DISC_MM + ENGAGEMENT_MM)] += HUB_SCREWS
-    else:
-        length = BELOW_HEAD_MM + ZERO_DISC_MM + M6_ENGAGEMENT_MM
-        counts[choose_screw(parts, 6.0, length)] += HUB_SCREWS
-    return counts
-
-
 def _check_clearances(
     components: tuple[Component, ...], keep_out: KeepOut, clearance: float
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Smallest distances of all static parts to light and to what the base sweeps."""
     static = {component.name: component.added for component in components if not component.rotates}
-    light, swept = (
-        {name: min_distance(to, bodies) for name, bodies in static.items() if name not in exempt}
-        for to, exempt in ((keep_out.to_light, MAY_BE_LIT), (keep_out.to_swept, MAY_BE_SWEPT))
-    )
+    light = {
+        name: min_distance(keep_out.to_light, bodies)
+        for name, bodies in static.items()
+        if name not in MAY_BE_LIT
+    }
+    swept = {name: min_distance(keep_out.to_swept, bodies) for name, bodies in static.items()}
     obstacles = ("light of the balls", "balls and base as they swing")
     for obstacle, distances in zip(obstacles, (light, swept), strict=True):
         name, distance = min(distances.items(), key=lambda item: item[1])

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Cylinder, box, cylinder_between
+from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
+from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM
@@ -13,10 +15,12 @@ from tbcad.types import Floats
 
 PLATE_MM = 9.0  # so that M3x12 screws go 3 mm into a motor
 COUPLING_MM = 14.0  # length of a flange coupling with its gap to the motor; no list gives it
+COUPLING_COLLAR_MM = 10.0  # diameter of its collar; see tbcad.prototype.base.hub
 COUPLING_GAP_MM = 2.0  # between coupling and motor
-SHAFT_GAP_MM = 4.0  # between hub and motor's shaft in a coupling
 PULLEY_RIM_MM = 1.5
 SHAFT_END_MM = 2.0  # of the collar's bore beyond the shaft
+# A stage of the 60 mm class; assumed: its height, its top's, and the gap below the top.
+STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -68,17 +72,27 @@ def purchased_components(
     base: BaseLayout, drive: Drive, plate: HeadPlate, shaft_parts: ShaftParts | None
 ) -> tuple[Component, ...]:
     """Simple bodies of all purchased parts of the head."""
-    face, components = base.hub.mount, [_motor(base, drive, plate)]
+    if drive.motor.kind == "stages":
+        return _rotary_stage(base, drive.motor, plate)
+    components = [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
+        holes = _drilled(base, drive.wheel)
         components += [
-            _wheel("wheel", base, drive.wheel, 0.0, rotates=True),
+            _wheel("wheel", base, drive.wheel, 0.0, *holes, rotates=True),
             _wheel("pinion", base, drive.pinion, drive.centre_mm),
         ]
     if drive.coupling:
-        radius, end = drive.coupling["flange_mm"] / 2, face - COUPLING_MM + COUPLING_GAP_MM
-        body = axial_cylinder(base, face, end, radius)
-        components.append(_component("coupling", drive.coupling, body, rotates=True))
+        components.append(_coupling(base, drive.coupling))
     return (*components, *(_on_shaft(base, plate, shaft_parts) if shaft_parts else ()))
+
+
+def _coupling(base: BaseLayout, part: PurchasedPart) -> Component:
+    """A flange on the hub's face, and its collar, which keys of the flange's screws pass."""
+    face = base.hub.mount
+    flange = axial_cylinder(base, face, face - COUPLING_FLANGE_MM, part["flange_mm"] / 2)
+    end = face - COUPLING_MM + COUPLING_GAP_MM
+    collar = axial_cylinder(base, face, end, COUPLING_COLLAR_MM / 2)
+    return Component("coupling", part.what, (flange, collar), part=part.name, rotates=True)
 
 
 def _component(
@@ -90,7 +104,7 @@ def _component(
 def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> list[Component]:
     """Shaft, bearings and the collar that bears what the base weighs along the axis."""
     bearing, shaft, collar = shaft_parts.bearing, shaft_parts.shaft, shaft_parts.collar
-    front, rear, width = base.hub.front, shaft_parts.rear, bearing["width_mm"]
+    front, rear, width = base.hub.socket, shaft_parts.rear, bearing["width_mm"]
     end = front - shaft["length_mm"]
     body = axial_cylinder(base, front, end, shaft["diameter_mm"] / 2)
     components = [_component("shaft", shaft, body, rotates=True)]
@@ -109,27 +123,55 @@ def wheel_radius(part: PurchasedPart) -> float:
     return pitch_diameter(part) / 2 + PULLEY_RIM_MM
 
 
+def _drilled(base: BaseLayout, wheel: PurchasedPart) -> list[Cylinder]:
+    """The holes that are drilled into the wheel for the screws into the hub."""
+    start, end = base.hub.mount, base.hub.mount - wheel["width_mm"]
+    return [
+        cylinder_between(
+            hub_point(base, start + THROUGH_MM, x, y),
+            hub_point(base, end - THROUGH_MM, x, y),
+            SCREW_MM / 2,
+        )
+        for x, y in base.hub.holes.tolist()
+    ]
+
+
 def _wheel(
-    name: str, base: BaseLayout, part: PurchasedPart, out: float, rotates: bool = False
+    name: str,
+    base: BaseLayout,
+    part: PurchasedPart,
+    out: float,
+    *holes: Cylinder,
+    rotates: bool = False,
 ) -> Component:
-    """A toothed wheel behind the hub's face, on the axis or out from it."""
+    """A toothed wheel behind the hub's face, on the axis or out from it, and its other holes."""
     start, end = base.hub.mount, base.hub.mount - part["width_mm"]
     bore = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2, out)
     body = axial_cylinder(base, start, end, wheel_radius(part), out)
-    return _component(name, part, body, bore, rotates=rotates)
+    return _component(name, part, body, bore, *holes, rotates=rotates)
+
+
+def _rotary_stage(
+    base: BaseLayout, stage: PurchasedPart, plate: HeadPlate
+) -> tuple[Component, Component]:
+    """A stage before the plate, and its top, which rotates with the hub."""
+    start, radius = base.hub.mount, stage["top_mm"] / 2
+    end = start - STAGE_TOP_MM
+    top = axial_cylinder(base, start, end, radius)
+    body = axial_cylinder(base, end - STAGE_GAP_MM, plate.front, radius)
+    return (
+        _component("rotary_stage", stage, body),
+        Component("rotary_stage_top", "top of the rotary stage", (top,), rotates=True),
+    )
 
 
 def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
-    """A motor behind the plate with its pilot and shaft, or a stage before it."""
+    """A motor behind the plate with its pilot and shaft."""
     motor = drive.motor
-    if motor.kind == "stages":
-        body = axial_cylinder(base, base.hub.mount, plate.front, motor["top_mm"] / 2)
-        return _component("rotary_stage", motor, body)
     half_width, out = motor["frame_mm"] / 2, drive.centre_mm
     low = np.array([plate.back - motor["length_mm"], out - half_width, -half_width])
     pilot = plate.back - OVERLAP_MM, plate.back + motor["pilot_height_mm"]
-    # Through the pinion, or into the coupling.
-    tip = base.hub.mount - (0.0 if drive.belt else SHAFT_GAP_MM)
+    tip = plate.back + motor["shaft_length_mm"]
     added = (
         box(low, np.array([plate.back, out + half_width, half_width]), base.frame),
         axial_cylinder(base, *pilot, motor["pilot_mm"] / 2, out),

@@ -22,10 +22,11 @@ from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.frame.brackets import THROUGH_MM, choose_part
+from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.frame.brackets import THROUGH_MM
+from tbcad.prototype.frame.fasteners import ENGAGEMENT_MM
 from tbcad.prototype.frame.purchased import HeadPlate, axial_cylinder, hub_point
 from tbcad.prototype.homing.sizes import (
-    BRACKET_EDGE_MM,
     BRACKET_HIGH_MM,
     BRACKET_LOW_MM,
     BRACKET_MM,
@@ -35,9 +36,11 @@ from tbcad.prototype.homing.sizes import (
     PIN_HOLE_MM,
     PIN_MM,
     PIN_OUT_MM,
+    bracket_screws,
     switch_place,
     tab_radius,
 )
+from tbcad.prototype.purchased.choice import choose_part, choose_screw
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
@@ -74,6 +77,7 @@ class HomingLayout:
         disc: the printed part that turns with the base.
         bracket: the printed part on the head's plate.
         switch: body of the switch, drawn pressed.
+        fasteners: of bracket and switch.
         pin: name of the rod that fixes angle zero.
         error_deg: largest error of angle zero from the play of rod and key.
     """
@@ -82,6 +86,7 @@ class HomingLayout:
     disc: Component
     bracket: Component
     switch: Component
+    fasteners: tuple[Fastener, ...]
     pin: str
     error_deg: float
 
@@ -105,6 +110,7 @@ def homing_layout(
         disc=_disc(base, place, angles),
         bracket=_bracket(base, plate, place),
         switch=_switch(base, place, parts),
+        fasteners=_fasteners(base, plate, place, parts),
         pin=pin.name,
         error_deg=math.degrees(error),
     )
@@ -150,6 +156,11 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
     holes += [(*hub.key.tolist(), KEY_HOLE_MM)]
     screw = SCREW_MM if hub.boss else hub.hole
     holes += [(out, side, screw) for out, side in hub.holes.tolist()]
+    if base.rearmost < hub.face:
+        raise SpecError(
+            f"the carrier reaches {hub.face - base.rearmost:.1f} mm behind its hub, where the zero "
+            "disc is: make prototype.base.hub_boss_mm larger"
+        )
     removed: list[Primitive] = [_hole(base, hub.face, back, *hole) for hole in holes]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
     removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))
@@ -200,7 +211,7 @@ def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Compone
     low = np.array([plate.back, BRACKET_LOW_MM, near])
     body = box(low, np.array([place.low, BRACKET_HIGH_MM, far]), base.frame)
     removed: list[Primitive] = []
-    for out in screw_places():
+    for out in bracket_screws():
         middle = plate.back + (plate.front - plate.back) / 2
         inner = hub_point(base, middle, out, near - THROUGH_MM)
         outer = hub_point(base, middle, out, far + THROUGH_MM)
@@ -214,9 +225,29 @@ def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Compone
     return Component("home_bracket", "bracket of the switch", (body,), tuple(removed), downs)
 
 
-def screw_places() -> tuple[float, float]:
-    """Out of the bracket's two screws."""
-    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
+def _fasteners(
+    base: BaseLayout, plate: HeadPlate, place: _SwitchPlace, parts: Parts
+) -> tuple[Fastener, ...]:
+    """Screws of the bracket in the head's side, and of the switch in the bracket."""
+    bracket = choose_screw(parts, 3.0, BRACKET_MM + ENGAGEMENT_MM)
+    switch = choose_screw(parts, 2.0, SWITCH_MM + PILOT_DEPTH_MM / 2)
+    middle, far = plate.back + (plate.front - plate.back) / 2, plate.half_width + BRACKET_MM
+    axes, through = place.axes(base), ("home_bracket", "bearing_head")
+    on_head = [
+        Fastener(bracket, hub_point(base, middle, out, far), -base.frame[2], through)
+        for out in bracket_screws()
+    ]
+    top = place.low + SWITCH_MM
+    on_bracket = [
+        Fastener(
+            switch,
+            np.array([place.radius, around, top]) @ axes,
+            -base.frame[0],
+            ("home_switch", "home_bracket"),
+        )
+        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
+    ]
+    return (*on_head, *on_bracket)
 
 
 def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:

@@ -21,6 +21,11 @@ def switch_place(half_width: float) -> tuple[float, float]:
     return (BRACKET_LOW_MM + BRACKET_HIGH_MM) / 2, half_width + BRACKET_MM / 2
 
 
+def bracket_screws() -> tuple[float, float]:
+    """Out of the bracket's two screws."""
+    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
+
+
 def tab_radius(half_width: float) -> float:
     """Radius of the tab, which presses the switch beside a plate of half a width."""
     return math.hypot(*switch_place(half_width)) - TRIP_MM + TAB_BEYOND_MM

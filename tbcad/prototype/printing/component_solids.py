@@ -8,6 +8,7 @@ from tbcad.cad.solids import (
     cut,
     cylinder,
     fused,
+    moved,
     one_solid,
     polygon,
     prism,
@@ -28,7 +29,7 @@ def primitive_solid(body: Primitive) -> TopoDS_Shape:
     if isinstance(body, Cylinder):
         return cylinder(body.start, body.axis, body.radius, body.length)
     if isinstance(body, Revolved):
-        return revolved_polygon(body.profile, 0.0, 2 * np.pi)
+        return moved(revolved_polygon(body.profile, 0.0, 2 * np.pi), body.axes, body.start)
     return prism(polygon(_outward(body)), body.along)
 
 
@@ -38,6 +39,8 @@ def component_solid(component: Component) -> TopoDS_Solid:
     Raises:
         InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
     """
+    if len(component.added) == 1 and not component.removed:  # no boolean that could go wrong
+        return one_solid(component.name, primitive_solid(component.added[0]))
     added = [primitive_solid(body) for body in component.added]
     removed = [primitive_solid(body) for body in component.removed]
     solid = one_solid(component.name, cut(fused(added), removed))

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Solid
 from scipy.spatial import ConvexHull
 
 from tbcad.cad.mesh import Mesh
@@ -15,13 +15,13 @@ from tbcad.cad.solids import (
     from_bytes,
     meshed,
     moved,
-    one_solid,
     properties,
     solids,
     to_bytes,
 )
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
+from tbcad.prototype.printing.pads_up import NO_PADS, downward_pads, opening_up
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
@@ -50,11 +50,12 @@ class PlacedSolid:
 
     def __getstate__(self) -> dict[str, Any]:
         """The kernel's shapes are no data to Python until they are written as bytes."""
-        return {**self.__dict__, "shape": to_bytes(self.shape)}
+        data = self.__dict__.get("_shape_bytes") or to_bytes(self.shape)
+        return {**self.__dict__, "_shape_bytes": data, "shape": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Read the shape again, exactly as it was."""
-        self.__dict__.update(state, shape=from_bytes(state["shape"]))
+        """Read the shape again, and keep its bytes: a shape read and written again has others."""
+        self.__dict__.update(state, shape=from_bytes(state["_shape_bytes"]))
 
     @property
     def on_bed(self) -> TopoDS_Solid:
@@ -77,24 +78,33 @@ class PlacedSolid:
 
 
 def placed_on_bed(
-    name: str, shape: TopoDS_Shape, downs: Sequence[Floats], axes: Floats, printer: PrinterSpec
+    name: str,
+    shape: TopoDS_Solid,
+    downs: Sequence[Floats],
+    axes: Floats,
+    printer: PrinterSpec,
+    pads: Floats = NO_PADS,
 ) -> PlacedSolid:
-    """A part on the bed, in the orientation that needs the least support of those that fit.
+    """A part on the bed: of the orientations that fit, one with the fewest pads that face down.
+
+    Among these, the one that needs the least support.
 
     Args:
         name: of the part.
-        shape: about z, in the carrier's own frame.
+        shape: one valid solid about z, in the carrier's own frame; a move keeps it valid.
         downs: directions of that frame that may point down, as (3,) unit vectors.
         axes: of that frame in the frame of the shell, as rows.
         printer: with its bed.
+        pads: unit normals of its pads in that frame, (n, 3).
 
     Raises:
         SpecError: when it fits in no orientation.
-        InvalidSolidError: when it is not one closed solid.
     """
     coarse = meshed(shape, COARSE_MM, COARSE_ANGLE)
     corners = coarse.vertices[ConvexHull(coarse.vertices).vertices]
-    orientations = [fitting_orientation(corners, down, printer) for down in downs]
+    opening = opening_up(pads)
+    directions = [*downs, *([] if opening is None else [opening])]
+    orientations = [fitting_orientation(corners, down, printer) for down in directions]
     fitting = [orientation for orientation in orientations if orientation is not None]
     if not fitting:
         bed = size_text(min_bed(corners, downs, printer))
@@ -102,11 +112,13 @@ def placed_on_bed(
             f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
             "prototype.largest_ball_mm or prototype.k smaller"
         )
-    best = min(fitting, key=lambda orientation: round(_overhang(coarse, orientation), 3))
+    best = min(
+        fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(coarse, way), 3))
+    )
     placed = coarse.vertices @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
-    solid = one_solid(name, moved(shape, axes, np.zeros(3)))
+    solid = solids(moved(shape, axes, np.zeros(3)))[0]
     return PlacedSolid(name, solid, axes.T @ best, origin)
 
 

@@ -9,12 +9,13 @@ from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, r
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 SIZES: dict[str, tuple[str, ...]] = {
     "motors": (
-        *("frame_mm", "length_mm", "shaft_mm", "pilot_mm", "pilot_height_mm"),
+        *("frame_mm", "length_mm", "shaft_mm", "shaft_length_mm", "pilot_mm", "pilot_height_mm"),
         *("hole_square_mm", "thread_mm", "holding_nmm", "full_steps"),
+        *("rated_a", "resistance_ohm", "radial_n"),
     ),
     "stages": ("top_mm", "hole_circle_mm", "hole_mm", "ratio", "holding_nmm", "full_steps"),
     "wheels": ("teeth", "pitch_mm", "width_mm", "bore_mm"),
-    "belts": ("teeth", "pitch_mm", "width_mm"),
+    "belts": ("teeth", "pitch_mm", "width_mm", "rating_n", "stiffness_n"),
     "couplings": ("bore_mm", "flange_mm", "hole_circle_mm", "hole_mm"),
     "shafts": ("diameter_mm", "length_mm"),
     "bearings": ("bore_mm", "outer_mm", "width_mm", "load_n"),
@@ -24,18 +25,23 @@ SIZES: dict[str, tuple[str, ...]] = {
     "dowels": ("diameter_mm", "length_mm"),
     "magnets": ("diameter_mm", "height_mm"),
     "leds": ("diameter_mm", "flange_mm", "height_mm", "forward_v", "max_ma"),
+    "strips": ("width_mm", "thickness_mm", "cut_mm", "supply_v", "watt_m", "lumen_m"),
+    "sheets": ("length_mm", "width_mm", "thickness_mm"),
     "resistors": ("power_w",),
     "wires": ("outer_mm", "max_ma"),
     "connectors": ("pins",),
     "electronics": (),
     "extrusions": ("side_mm", "slot_mm", "length_mm"),
     "tnuts": ("thread_mm", "slot_mm"),
+    "nuts": ("thread_mm", "width_mm", "height_mm"),
     "washers": ("thread_mm", "outer_mm", "thickness_mm"),
     "collars": ("bore_mm", "outer_mm", "width_mm"),
     "plates": ("length_mm", "width_mm", "thickness_mm"),
 }
 """Columns that describe each kind of part, all above zero.
 
+shaft_length_mm is the length of a motor's shaft from the face that its screws pull on the plate.
+radial_n is the load at the end of a motor's shaft that its bearings bear for 30,000 h.
 hole_square_mm is the side of a square of holes, hole_circle_mm the diameter of a circle of holes.
 """
 MAX_VALUE = 1e6  # of any size or mass

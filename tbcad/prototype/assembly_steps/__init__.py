@@ -1,0 +1,1 @@
+"""How a prototype is assembled: steps with their parts, worked out from an export's files."""

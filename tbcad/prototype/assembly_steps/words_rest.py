@@ -1,0 +1,351 @@
+"""Words of the steps of stage, light, camera and electronics, and of the first run."""
+
+from collections.abc import Sequence
+
+from tbcad.prototype.assembly_steps.machine import Machine, Record
+from tbcad.prototype.assembly_steps.text import Text, lines
+from tbcad.prototype.frame.camera_mount import GAP_MM
+
+DIGITAL = "digital"
+MA_PER_A = 1000.0
+OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
+
+
+def lamps(machine: Machine) -> Text:
+    """Stands, holders and strips."""
+    light: Record = machine.record["lamps"]
+    return Text(
+        lines(
+            _lamp_mounts(light),
+            f"Cut the strip {machine.ref(light['strip'])} at its marks: {light['strips']} pieces "
+            f"of "
+            f"{light['length_mm']:.0f} mm for each of the {len(light['places'])} lamps"
+            f"{_lamp_drawing(machine)}. Solder a cable to each piece, plus to plus.",
+            "Stick them on the lamps' faces, toward the object.",
+        ),
+        lines(
+            f"At 24 V all of them light up and draw {light['current_ma']:.0f} mA together.",
+            "All of them shine at the object, and stand alike on both sides of it.",
+        ),
+    )
+
+
+def _lamp_mounts(light: Record) -> str:
+    """How stands and holders are screwed on."""
+    if light["level"]:
+        return (
+            "Screw the bridge's feet on the plate with washers, on both sides of the camera's "
+            "place; the plate's drawing says which holes are theirs. Screw the bar on the fronts "
+            "of both uprights with its T-nuts, as high as the upright's drawing has it."
+        )
+    return (
+        "Screw the stands on the plate with washers; its drawing says which holes are theirs. "
+        "Screw the holders on the fronts of the uprights with their T-nuts, as high as the "
+        "upright's drawing has it."
+    )
+
+
+def _lamp_drawing(machine: Machine) -> str:
+    """Name of the strips' drawing, in brackets."""
+    strip = machine.record["lamps"]["strip"]
+    names = [one["pdf"] for one in machine.record.get("drawings", []) if one["part"] == strip]
+    return f" ({names[0]})" if names else ""
+
+
+def stage(machine: Machine) -> Text:
+    """The object's stage with its LEDs."""
+    leds = machine.record["leds"]
+    return Text(
+        lines(
+            f"Solder two wires to each of the {len(leds)} LEDs, long one to anode, and mark the "
+            f"anode. Push "
+            "the LEDs into the crown's pockets from below, wires through the grooves and the bore."
+            if leds
+            else "",
+            "Wires through the post. Crown into the post, set screw through the post's wall."
+            if leds
+            else "Crown into the post, set screw through the post's wall.",
+            "Press the insert into the foot's ear. Foot on the plate with washers; clamp the post "
+            "in it" + (", turned so that the LEDs stand as the checks say." if leds else "."),
+            "Lay the disc on the crown's studs.",
+        ),
+        lines(
+            "The disc lies flat, comes off by hand and fits turned by 180 degrees.",
+            *(_led_place(number, one["position_mm"]) for number, one in enumerate(leds, 1)),
+            "The post does not turn in its clamp." + _plug(machine),
+            "The base passes the stage without touching it, over its whole travel by hand; then "
+            "the zero pin is in again.",
+        ),
+    )
+
+
+def _led_place(number: int, position: Sequence[float]) -> str:
+    """Where an LED stands; x is toward the camera, and y to its right when it looks back."""
+    x, y, z = position
+    return (
+        f"LED {number}: {abs(x):.0f} mm {'toward' if x > 0 else 'away from'} the camera, "
+        f"{abs(y):.0f} mm to the {'right' if y > 0 else 'left'} as the camera sees it, "
+        f"{abs(z):.0f} mm {'above' if z > 0 else 'below'} the object's centre."
+    )
+
+
+def _plug(machine: Machine) -> str:
+    return " A plug on the wires lets it be taken out." if machine.record["leds"] else ""
+
+
+def camera(machine: Machine) -> Text:
+    """The camera's mount."""
+    return Text(
+        lines(
+            "Press the inserts into the camera plate from behind.",
+            "Bracket on the base plate with washers, in the middle of its slots.",
+            "Three long screws with washers from behind through the bracket's slots; on each "
+            "between bracket and plate a "
+            "washer and two nuts, then into the plate's inserts. "
+            f"{GAP_MM:g} mm between plate and bracket. "
+            "The nut "
+            "at the plate locks the screw, the other one clamps the bracket.",
+            "Camera and lens are not in the list: camera.json has what they must do, and "
+            "tbcad camera "
+            "shows which on sale do it.",
+            "Fence on the plate. Then your camera on the plate by its tripod thread, its back "
+            "against the "
+            "fence.",
+        ),
+        lines(
+            f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
+            "The camera looks at the object, and cannot be turned on its screw by hand.",
+        ),
+    )
+
+
+def wiring(machine: Machine) -> Text:
+    """Lines of the controller, one each."""
+    return Text(
+        lines(
+            "Controller, supply, relay and switch modules stand outside the shroud. Supply off.",
+            "Plus of the supply goes to each lamp, and through its resistor to each "
+            "LED's anode (odd "
+            "pin). Their other ends (an LED's cathode: even pin) go to the drain of "
+            "a switch module, "
+            "whose input is the controller's output.",
+            *(_line(machine, row) for row in machine.wiring),
+            _no_lamps(machine),
+            "Never plug or unplug the motor with the supply on: that destroys drivers. No "
+            "wire goes "
+            "to the base.",
+        ),
+        lines(
+            "Before the supply is on: between its plus and minus, behind the fuse, are more than "
+            "100 ohm, and a few ohm between the two wires of each of the motor's coils.",
+            "With the supply on, no part gets warm and no LED lights.",
+            *(
+                f"{row['on']} switches {row['signal'].replace('_', ' ')} on, {row['off']} off."
+                for row in machine.wiring
+                if row["on"]
+            ),
+        ),
+        lines("Solder or crimp all joints, and insulate each one."),
+    )
+
+
+def _no_lamps(machine: Machine) -> str:
+    """Where the light comes from in a design that has no place for lamps."""
+    if machine.record.get("lamps"):
+        return ""
+    return (
+        "This design has no place for lamps of its own, and none are in the list: buy two small "
+        "ones alike, for 24 V and 2 W each, and connect both to line 1. Fasten them lower than the "
+        "object and in the middle of the machine, one toward the camera and one toward the "
+        "uprights, as far from the object, out of the camera's picture of balls and out of the "
+        "base's way (turn it by hand). They light it alike before and after its half turn. Without "
+        "them no photograph shows the object."
+    )
+
+
+def _line(machine: Machine, row: dict[str, str]) -> str:
+    """A line of wiring.csv in words."""
+    through = f" through {machine.ref(row['resistor'])}" if row["resistor"] else ""
+    switched = " by a switch module" if row["output"].startswith(DIGITAL) else ""
+    pins = (
+        f", pins {row['pins'].replace(' ', ' and ')} of {row['connector']}" if row["pins"] else ""
+    )
+    name = row["signal"].replace("_", " ")
+    if name in OWN_WIRES:
+        rated = f", {float(row['current_ma']):.0f} mA RMS" if row["current_ma"] else ""
+        return f"Line {row['line']}, {name}: {machine.ref(row['part'])}{rated}; {row['path']}."
+    what = f"{machine.ref(row['part'])}{through}{pins}"
+    way = f"; {row['path']}" if row["path"] and not row["resistor"] else ""
+    return f"Line {row['line']}, {name}: {what}, at {row['output']}{switched}{way}."
+
+
+def zero(machine: Machine) -> Text:
+    """Settings, homing and the trim."""
+    drive, home = machine.record["drive"], machine.record["home"]
+    current = drive["hold_current_a"]
+    homes = machine.record["controller"]["firmware"] == "grblhal"
+    return Text(
+        lines(
+            f"Set the driver to the motor's rated current{_rated(machine)} while it turns, and "
+            f"{current:.2f} A (root mean square) at rest (IRUN and IHOLD of Trinamic drivers)."
+            if current
+            else "",
+            "Send grbl_settings.txt line by line from a G-code sender. With Klipper include "
+            "klipper.cfg instead, fill in the board's pins, and print rotation_plan_klipper.gcode.",
+            "grblHAL starts in alarm when its inputs for reset, emergency stop and door are empty: "
+            "send $14=73 then, which inverts them."
+            if homes
+            else "",
+            ("Unlock the controller by $X. " if homes else "")
+            + "Jog by 0.1 degrees, so that the motor holds the base, and pull the zero pin out. "
+            "Jog a little in the positive direction. If the base turns against the disc's arrow, "
+            "set $3 as "
+            "the file's comment says.",
+            "Home ($H), send the program's line G92, and jog until the zero pin goes in. The "
+            "angle that the "
+            "controller shows, with a changed sign, is prototype.motion.home_trim_deg: build "
+            "again with it."
+            if homes
+            else "Jog until the zero pin goes in, and switch the controller on there: that is its "
+            "zero.",
+            "Pull the zero pin out, and keep the motor powered. Before the supply is switched off, "
+            "send the base to zero and put the pin in.",
+            _without_power(machine),
+        ),
+        lines(
+            "Before $H: the controller's report (send ?) has Pn with the axis's letter while the "
+            "switch is pressed by hand, and only then."
+            if homes
+            else "",
+            f"Homed, the base stops at {home['homed_deg']:.1f} degrees, again and again."
+            if homes
+            else "",
+            "Sent to zero, the zero pin goes in: the error is at most "
+            f"{home['zero_error_deg']:.1f} "
+            f"degrees.",
+        ),
+    )
+
+
+def _without_power(machine: Machine) -> str:
+    """What happens when the supply fails with the pin out."""
+    off = machine.record.get("power_off")
+    if not off or not off["fall_energy_j"]:
+        return ""
+    return (
+        "Nothing but the motor's current holds the base while the pin is out. If the supply fails, "
+        f"the base falls and strikes the end of its travel with up to {off['fall_energy_j']:.1f} J "
+        f"at {off['fall_speed_deg_s']:.0f} degrees a second: keep hands out of its way, and use an "
+        "uninterruptible supply for controller and motor. The pin bears "
+        f"{off['pin_force_n']:.0f} N of gravity at most, {off['pin_pressure_mpa']:.1f} MPa in its "
+        f"printed hole ({off['pin_pressure_limit_mpa']:.0f} are allowed)."
+    )
+
+
+def _rated(machine: Machine) -> str:
+    """The motor's current as its line has it."""
+    found = [row["current_ma"] for row in machine.wiring if row["signal"] == "motor"]
+    return f", {float(found[0]) / MA_PER_A:.1f} A," if found and found[0] else ""
+
+
+def gauge(machine: Machine) -> Text:
+    """The camera's alignment by the gauge."""
+    place: Record = machine.record["camera_place"]
+    sizes, error, travel = place["lengths_mm"], place["error"], place["travel"]
+    return Text(
+        lines(
+            "Take the stage's post out of its clamp. Measure the gauge: both widths between the "
+            "edges that "
+            "face each other. Sand the near arm's ends, or tape them, until near_width is "
+            "far_width x "
+            "(H - hub_to_near) / (H - hub_to_far), H = hub_to_pinhole.",
+            "Gauge into the hub's bore, arms level and marked face up, flange flat "
+            "on the hub; hold "
+            "it with tape. Zero pin in at zero.",
+            "Focus and stop the lens as camera.json has it: both move the pinhole.",
+            "Base at zero: turn yaw, roll and pitch until the near marks are within 10 pixels of "
+            "the place "
+            "that the checks name.",
+            "Move the camera along its axis until the near arm's ends just touch the far arm's "
+            "edges in the picture. Gaps of one width: too far. Overlaps: too near. "
+            "If they differ, it "
+            "is the gauge or the place across, which the next pictures tell apart.",
+            "Zero pin out. Base at -90 and 90 degrees: marked faces in one line (across), "
+            "ends touching "
+            "(out). What is alike in both pictures with opposite signs is the gauge's error; their "
+            "mean is the camera's.",
+            "Repeat until every mean is below half a pixel (0.1 mm is about a pixel). Tighten all "
+            "screws, look once more. Take the gauge off, put the post back. The "
+            "camera may be taken "
+            "off later: the fence brings it back.",
+        ),
+        lines(
+            f"Before sanding: near_width {sizes['near_width']:.2f}, far_width "
+            f"{sizes['far_width']:.2f}, "
+            f"hub_to_near {sizes['hub_to_near']:.2f}, hub_to_far {sizes['hub_to_far']:.2f}, "
+            f"hub_to_pinhole "
+            f"{sizes['hub_to_pinhole']:.2f} mm.",
+            *(
+                f"Base at {one['base_angle_deg']:.0f} degrees: the {one['side']} mark appears at "
+                f"column "
+                f"{one['column_px']:.0f}, row {one['row_px']:.0f}."
+                for one in place["pictures"]
+            ),
+            f"The pinhole is then known to {error['along_mm']:.2f} mm along, "
+            f"{error['across_mm']:.2f} across "
+            f"and {error['out_mm']:.2f} out.",
+        ),
+        lines(
+            f"Travel: along {travel['along_axis_mm']:g} mm, across {travel['across_mm']:g}, out "
+            f"{travel['out_mm']:g}, yaw {travel['yaw_deg']:.0f} degrees, roll "
+            f"{travel['roll_deg']:.0f}, pitch "
+            f"{travel['pitch_deg']:.0f}"
+        ),
+    )
+
+
+def shroud(machine: Machine) -> Text:
+    """The box of card."""
+    panels = machine.record["shroud"]["panels"]
+    return Text(
+        lines(
+            *(
+                f"Cut {one['dxf']}: {one['what']}, {one['size_mm'][0]:.0f} x "
+                f"{one['size_mm'][1]:.0f} mm."
+                for one in panels
+            ),
+            "Lay the floor under the plate first; cables go out through the notch of the back.",
+            "Score the dashed lines. Fold the flaps of front, back and right side "
+            "inward by 90 degrees and glue them. The "
+            "left side "
+            "is held by tape, so that it comes off: the object is placed and turned through it.",
+        ),
+        lines(
+            "No part touches the card over the whole travel of the base.",
+            "With the room lit and the lamps off, a long exposure stays black.",
+        ),
+    )
+
+
+def first(machine: Machine) -> Text:
+    """The program's first run."""
+    phases = machine.record["controller"]["phases"]
+    low, high = machine.record["swing_deg"]
+    names = ", ".join(one["name"].replace("_", " ") for one in phases)
+    return Text(
+        lines(
+            "Object on the disc, shroud closed. tbcad run drives machine and camera and keeps the "
+            "photographs; any G-code sender runs rotation_plan.nc with the camera on the relay.",
+            f"At each stop it takes {len(phases)} photographs: {names}.",
+            "When the program waits, turn the disc with the object by 180 degrees and let it go "
+            "on.",
+        ),
+        lines(
+            f"The base swings from {low:.0f} to {high:.0f} degrees and touches nothing. Keep a "
+            f"hand at the "
+            "switch of the supply the first time.",
+            "The number of photographs is the same in both runs.",
+            "Afterwards the base is at zero and the zero pin in, before the supply is "
+            "switched off.",
+        ),
+    )

@@ -1,0 +1,275 @@
+"""The sheets: base plate, driven wheel, uprights."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.drafting.dimensions import (
+    across,
+    arrow,
+    centre_cross,
+    labels,
+    leader,
+    upward,
+)
+from tbcad.drafting.sheet import (
+    A3,
+    A4,
+    LEFT_MM,
+    TITLE_MM,
+    Sheet,
+    TitleBlock,
+    border,
+    choose_scale,
+    drawing_room,
+    notes,
+    placed,
+    rectangle,
+    title_block,
+)
+from tbcad.drafting.tables import TEXT_MM, table
+from tbcad.formats.csv_table import Row
+from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
+from tbcad.prototype.base.hub import PATTERNS, SCREW_MM
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.frame.brackets import TAPPED_M5_MM
+from tbcad.prototype.frame.head import GAP_MM
+from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.frame.purchased import wheel_radius
+from tbcad.prototype.purchased.parts import PurchasedPart
+
+PLATE, WHEEL, UPRIGHT = "drawing_plate", "drawing_wheel", "drawing_upright"
+TABLE_MM = (10.0, 18.0, 18.0, 14.0, 42.0)  # widths of the columns of the hole table
+TABLE_HEAD = ("hole", "x", "y", "thread", "holds")
+ASIDE_MM = 14.0  # of dimension lines from the part
+BEFORE_MM, BEHIND_MM = 22.0, 10.0  # room for dimensions left and below, and on the other sides
+NOTES_MM = 85.0  # width of the notes' column on A4
+DATUM_MM, OFF_MM = 8.0, 4.0  # length of the arrows at the origin, and their distance from it
+BESIDE_MM = 4.0  # from border or drawing to notes and tables
+LAMP_NOTES = {
+    0: (),
+    1: ("Left end on the plate. Marked: the screw of the lamps' holder, in the front slot.",),
+    2: ("Left end on the plate. Marked: both screws of a lamp's holder, in the front slot.",),
+}
+LEVEL_MM = 8.0  # from one dimension line to the next
+CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere along
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What all sheets take from the parts list.
+
+    Attributes:
+        design: name of it.
+        items: number of each part.
+        quantities: of each part.
+    """
+
+    design: str
+    items: Mapping[str, int]
+    quantities: Mapping[str, int]
+
+    def block(self, title: str, part: PurchasedPart, view: str) -> TitleBlock:
+        """The title block of a part's drawing."""
+        item = f"{self.items[part.name]}: {part.name}"
+        return TitleBlock(title, self.design, item, self.quantities[part.name], part.material, view)
+
+
+def listed(design: str, rows: Sequence[Row]) -> Listed:
+    """From the rows of the parts list."""
+    items = {str(row["part"]): int(row["item"] or 0) for row in rows}
+    return Listed(design, items, {str(row["part"]): int(row["quantity"] or 0) for row in rows})
+
+
+def sheets(frame: FrameLayout, base: BaseLayout, drive: Drive, bill: Listed) -> list[Sheet]:
+    """All sheets of a prototype."""
+    found = [plate_sheet(frame, bill), upright_sheet(frame, bill)]
+    if drive.wheel:
+        found.append(wheel_sheet(base, drive.wheel, bill))
+    return found
+
+
+def plate_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
+    """The plate from above with its tapped holes, and their table; the origin is its corner."""
+    part, paper = frame.plate, A3
+    size = part["length_mm"], part["width_mm"]
+    left, low, right, high = drawing_room(paper)
+    left_of_table = right - sum(TABLE_MM)
+    scale, origin = fitted(size, (left, low, left_of_table - BESIDE_MM, high))
+    holes = [
+        Circle(Layer.CUT, (x, y), TAPPED_M5_MM / 2)
+        for x, y in (frame.holes - frame.corner).tolist()
+    ]
+    part_drawn = placed([rectangle((0, 0, *size), Layer.CUT), *holes], origin, scale)
+    circles = [entity for entity in part_drawn if isinstance(entity, Circle)]
+    numbers = [str(number) for number in range(1, len(holes) + 1)]
+    title = "base plate"
+    text = (
+        f"Plate {size[0]:g} x {size[1]:g} x {part['thickness_mm']:g}, bought to this size.",
+        f"{len(holes)} x M5: drill {TAPPED_M5_MM:g} through, tap through.",
+        "x runs from the uprights to the camera, both axes from the corner at the arrows.",
+        "Seen from the side that carries the brackets. Deburr all edges.",
+    )
+    entities = [
+        *border(paper),
+        *title_block(paper, scale, bill.block(title, part, "from above")),
+        *part_drawn,
+        *(line for circle in circles for line in centre_cross(circle)),
+        *labels(circles, numbers),
+        *outer(origin, (size[0] * scale, size[1] * scale), size),
+        *_datum(origin),
+        *table((left_of_table, high), TABLE_MM, (TABLE_HEAD, *_hole_cells(frame))),
+        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, text),
+    ]
+    return Sheet(PLATE, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
+    """The driven wheel from behind the hub, x toward azimuth zero; the origin is its middle."""
+    paper, radius = A4, wheel_radius(part)
+    left, low, right, high = drawing_room(paper)
+    circle = PATTERNS[base.spec.drive].circle
+    corner = right - NOTES_MM, high
+    scale, origin = fitted(
+        (2 * radius, 2 * radius), (left, low, corner[0] - BESIDE_MM, high), (radius, radius)
+    )
+    places: list[Point] = [(float(x), float(y)) for x, y in base.hub.holes]
+    holes = [Circle(Layer.CUT, place, SCREW_MM / 2) for place in places]
+    outline = [Circle(Layer.CUT, (0, 0), radius), Circle(Layer.CUT, (0, 0), part["bore_mm"] / 2)]
+    on_circle = Circle(Layer.CENTRE, (0, 0), circle / 2)
+    drawn = placed([*outline, *holes, on_circle], origin, scale)
+    circles = [one for one in drawn if isinstance(one, Circle) and one.layer == Layer.CUT]
+    title = "driven wheel"
+    angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
+    text = (
+        f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, width of the belt's rim as bought.",
+        f"{len(holes)} x Ø{SCREW_MM:g} through on a circle of Ø{circle:g} ± 0.1,",
+        f"the first at {angle:.0f}°, the others {360 / len(holes):g}° apart.",
+        "Drill from the flat side that lies against the",
+        "zero disc; the bore stays as bought.",
+        "In brackets: over the rims, as bought.",
+        f"Turn off a hub: the head's plate is {GAP_MM:g} mm behind.",
+    )
+    ring, bore, first = circles[0], circles[1], circles[2]
+    top = ring.centre[1] + ring.radius
+    entities = [
+        *border(paper),
+        *title_block(paper, scale, bill.block(title, part, "on the face at the zero disc")),
+        *drawn,
+        *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
+        *across(
+            (origin[0] - ring.radius, origin[1]),
+            (origin[0] + ring.radius, origin[1]),
+            origin[1] - ring.radius - ASIDE_MM / 2,
+            f"(Ø{2 * radius:.1f})",
+        ),
+        *_called(
+            first, (origin[0] + ring.radius, top), f"{len(holes)} x Ø{SCREW_MM:g} on Ø{circle:g}"
+        ),
+        *_called(bore, (origin[0] + ring.radius, origin[1]), f"Ø{part['bore_mm']:g}"),
+        *notes(corner, NOTES_MM - BESIDE_MM, text),
+    ]
+    return Sheet(WHEEL, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
+    """An upright, lying: its length; the origin is its lower left corner."""
+    part, paper, length = frame.upright, A4, frame.length
+    left, low, right, high = drawing_room(paper)
+    side, slot = part["side_mm"], part["slot_mm"]
+    middle = low + (high - low) / 2
+    scale, origin = fitted((length, side), (left, middle, right, high))
+    lines = [
+        Line(Layer.CUT, (0.0, side / 2 + sign * slot / 2), (length, side / 2 + sign * slot / 2))
+        for sign in (-1, 1)
+    ]
+    drawn = placed([rectangle((0, 0, length, side), Layer.CUT), *lines], origin, scale)
+    centre = origin[1] + side * scale / 2
+    heights = _lamp_screws(frame)
+    title = "upright"
+    text = (
+        f"Saw from {part.what}.",
+        f"Length {length:.1f} ± {CUT_MM:g}, both of the same length to 0.2; ends square to 0.2.",
+        "No holes: head and feet are held by T-nuts in the slots. Deburr both ends.",
+        *LAMP_NOTES[len(heights)],
+    )
+    entities = [
+        *border(paper),
+        *title_block(paper, scale, bill.block(title, part, "from the side")),
+        *drawn,
+        Line(Layer.CENTRE, (origin[0] - 4, centre), (origin[0] + length * scale + 4, centre)),
+        *outer(origin, (length * scale, side * scale), (round(length, 1), side)),
+        *_heights(origin, side, heights, scale),
+        *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
+    ]
+    return Sheet(UPRIGHT, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def _lamp_screws(frame: FrameLayout) -> list[float]:
+    """Heights of a lamp holder's screws above the plate, mm; none without lamps."""
+    if frame.lamps is None:
+        return []
+    return sorted(z - frame.floor for z in frame.lamps.screws)
+
+
+def _heights(
+    origin: Point, side: float, heights: Sequence[float], scale: float
+) -> Iterator[Entity]:
+    """Screws on a lying upright, each with its distance from the left end."""
+    (x, low), high = origin, origin[1] + side * scale
+    for level, height in enumerate(heights, 1):
+        at = x + height * scale
+        yield Line(Layer.CENTRE, (at, low - OFF_MM), (at, high + OFF_MM))
+        yield from across((x, high), (at, high), high + level * LEVEL_MM, f"{height:.1f}")
+
+
+def fitted(
+    size: Point, room: tuple[float, float, float, float], datum: Point = (0.0, 0.0)
+) -> tuple[float, Point]:
+    """Scale of a part in the middle of a room with its dimensions, and where its datum is."""
+    left, low, right, high = room
+    left, low, right, high = left + BEFORE_MM, low + BEFORE_MM, right - BEHIND_MM, high - BEHIND_MM
+    scale = choose_scale(size, (right - left, high - low))
+    x = (left + right - size[0] * scale) / 2 + datum[0] * scale
+    y = (low + high - size[1] * scale) / 2 + datum[1] * scale
+    return scale, (x, y)
+
+
+def outer(origin: Point, on_paper: Point, size: Point) -> Iterator[Entity]:
+    """Length below, width on the left."""
+    (x, y), (length, width) = origin, on_paper
+    yield from across((x, y), (x + length, y), y - ASIDE_MM, f"{size[0]:g}")
+    yield from upward((x, y), (x, y + width), x - ASIDE_MM, f"{size[1]:g}")
+
+
+def _datum(origin: Point) -> Iterator[Entity]:
+    """Arrows along x and y at the origin, outside the part."""
+    x, y = origin
+    corner = x - OFF_MM, y - OFF_MM
+    right, up = (x + DATUM_MM, corner[1]), (corner[0], y + DATUM_MM)
+    for tip, place, name in (
+        (right, (right[0] + 1.0, right[1] - 1.0), "x"),
+        (up, (up[0] - 0.6, up[1] + 1.0), "y"),
+    ):
+        yield Line(Layer.DIMENSIONS, corner, tip)
+        yield arrow(tip, corner)
+        yield Text(Layer.DIMENSIONS, place, TEXT_MM, name)
+
+
+def _called(circle: Circle, corner: Point, text: str) -> Iterator[Entity]:
+    """A leader from a place to a circle."""
+    place = corner[0] + BESIDE_MM, corner[1] + BESIDE_MM
+    x, y = place[0] - circle.centre[0], place[1] - circle.centre[1]
+    share = circle.radius / float(np.hypot(x, y))
+    tip = circle.centre[0] + share * x, circle.centre[1] + share * y
+    yield from leader(tip, place, text)
+
+
+def _hole_cells(frame: FrameLayout) -> list[tuple[str, ...]]:
+    places = (frame.holes - frame.corner).tolist()
+    return [
+        (str(number), f"{x:.2f}", f"{y:.2f}", "M5", name.replace("_", " "))
+        for number, ((x, y), name) in enumerate(zip(places, frame.holds, strict=True), 1)
+    ]

@@ -1,0 +1,111 @@
+"""Bodies of small purchased parts, simplified as drawings do: no threads, no sockets.
+
+Threads are drawn at their core diameter in screws, and at their nominal one in inserts and nuts, so
+that a screw in its place shares no room with what it is screwed into.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tbcad.geometry.primitives import (
+    Component,
+    Primitive,
+    box,
+    cylinder_between,
+    rectangle,
+    revolved_along,
+)
+from tbcad.geometry.rotations import unit_circle
+from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.types import Floats
+
+# Pitch by nominal diameter: coarse threads of ISO 261; 1/4-20 UNC.
+PITCH_MM = {2.0: 0.4, 3.0: 0.5, 4.0: 0.7, 5.0: 0.8, 6.0: 1.0, 6.35: 1.27}
+CORE = 1.226869  # pitches by which the core of a screw is smaller than its thread (ISO 68-1)
+WASHER_PLAY_MM = 0.3  # of a washer's hole (ISO 7089, M3 to M5)
+# T-nuts; no list gives these.
+TNUT_LENGTH_MM, TNUT_HEIGHT_MM, TNUT_DEPTH_MM, TNUT_PLAY_MM = 10.0, 4.0, 0.5, 0.4
+THROUGH_MM = 1.0  # by which a hole extends beyond the part
+FLANGE_MM = 1.0  # height of an LED's flange; no list gives it
+DOME = np.radians([0.0, 30.0, 60.0, 90.0])  # corners of an LED's dome
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def core_radius(thread: float) -> float:
+    """Radius of a screw's core by its nominal diameter, mm."""
+    return (thread - CORE * PITCH_MM[thread]) / 2
+
+
+def fastener_component(fastener: Fastener) -> Component:
+    """The body of a fastener in its place."""
+    part, place, along = fastener.part, fastener.place, fastener.along
+    removed: tuple[Primitive, ...] = ()
+    if part.kind == "tnuts":
+        added, removed = _tnut(part, place, along)
+    else:
+        added = (revolved_along(PROFILES[part.kind](part), place, along),)
+    return Component(
+        fastener.name, part.what, added, removed, part=part.name, rotates=fastener.rotates
+    )
+
+
+def _rod(radius: float, length: float) -> Floats:
+    return rectangle((0.0, 0.0), (length, radius))
+
+
+def _screw(part: PurchasedPart) -> Floats:
+    core, head, height = core_radius(part["thread_mm"]), part["head_mm"] / 2, part["head_height_mm"]
+    end = part["length_mm"]
+    return np.array(
+        [[-height, 0.0], [end, 0.0], [end, core], [0.0, core], [0.0, head], [-height, head]]
+    )
+
+
+def _washer(part: PurchasedPart) -> Floats:
+    hole = (part["thread_mm"] + WASHER_PLAY_MM) / 2
+    return rectangle((-part["thickness_mm"], hole), (0.0, part["outer_mm"] / 2))
+
+
+def _insert(part: PurchasedPart) -> Floats:
+    return rectangle((0.0, part["thread_mm"] / 2), (part["length_mm"], part["hole_mm"] / 2))
+
+
+def _nut(part: PurchasedPart) -> Floats:
+    """Round, as wide as across its flats."""
+    return rectangle((0.0, part["thread_mm"] / 2), (part["height_mm"], part["width_mm"] / 2))
+
+
+def _led(part: PurchasedPart) -> Floats:
+    """Flange, body and dome; wires are not drawn."""
+    flange, radius, height = part["flange_mm"] / 2, part["diameter_mm"] / 2, part["height_mm"]
+    across, up = unit_circle(DOME).T
+    dome = np.column_stack([height - radius + radius * up, radius * across])
+    sides = [[0.0, 0.0], [height, 0.0], *dome[::-1].tolist()[1:], [FLANGE_MM, radius]]
+    return np.array([*sides, [FLANGE_MM, flange], [0.0, flange]])
+
+
+PROFILES: dict[str, Callable[[PurchasedPart], Floats]] = {
+    "screws": _screw,
+    "setscrews": lambda part: _rod(core_radius(part["thread_mm"]), part["length_mm"]),
+    "washers": _washer,
+    "nuts": _nut,
+    "inserts": _insert,
+    "dowels": lambda part: _rod(part["diameter_mm"] / 2, part["length_mm"]),
+    "magnets": lambda part: _rod(part["diameter_mm"] / 2, part["height_mm"]),
+    "leds": _led,
+}
+"""Sections (n, 2) by kind: (z along, r) from the fastener's place."""
+
+
+def _tnut(
+    part: PurchasedPart, place: Floats, along: Floats
+) -> tuple[tuple[Primitive, ...], tuple[Primitive, ...]]:
+    """A block in an upright slot, and its thread."""
+    axes = np.stack([np.cross(UP, along), UP, along])
+    half = np.array([(part["slot_mm"] - TNUT_PLAY_MM) / 2, TNUT_LENGTH_MM / 2, 0.0])
+    start = axes @ place + [0.0, 0.0, TNUT_DEPTH_MM]
+    block = box(start - half, start + half + [0.0, 0.0, TNUT_HEIGHT_MM], axes)
+    end = place + (TNUT_DEPTH_MM + TNUT_HEIGHT_MM + THROUGH_MM) * along
+    return (block,), (cylinder_between(place - THROUGH_MM * along, end, part["thread_mm"] / 2),)

@@ -1,0 +1,408 @@
+"""What holds the camera: a bracket on the base plate, a plate on three screws, a fence.
+
+Six ways to move, each with screws of its own. The bracket's foot slides along the plate; three
+screws between bracket and camera plate set the distance, roll and pitch; their slots in the bracket
+let it slide across. On the camera plate the camera slides along its optical axis, and turns (yaw)
+about the tripod screw. The fence below the camera, with two slots of its own, holds both, and keeps
+the camera from turning on a screw that does not.
+
+Lengths are behind the pinhole along the optical axis, across, and out from the axis.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tbcad.geometry.primitives import (
+    Component,
+    Primitive,
+    Prism,
+    box,
+    cylinder_between,
+    rectangle,
+    slot,
+)
+from tbcad.geometry.vectors import unit
+from tbcad.optics.camera import Camera
+from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.frame.brackets import (
+    CLEARANCE_HOLE_MM,
+    OVERLAP_MM,
+    THROUGH_MM,
+    Bracket,
+    level_prism,
+    webs,
+)
+from tbcad.prototype.purchased.choice import choose_screw
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.types import Floats
+
+M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]
+TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
+CAMERA_SCREW, NUT, WASHER, INSERT = "UNC1/4-20x12.7", "NUT-M5", "WASHER-5", "INSERT-M5"
+NUT_MM, WASHER_MM, WASHER_OUTER_MM = 4.7, 1.0, 10.0
+
+# Travel to either side. Printed brackets are off by 0.5 mm and a degree; the rest is for cameras.
+ALONG_PLATE_MM, ACROSS_MM, OUT_MM = 5.0, 5.0, 3.0
+YAW_DEG, ROLL_DEG, PITCH_DEG = 3.0, 3.0, 2.0  # as far as the screws' play in the bracket lets it
+
+# The camera plate.
+TOP_MM = 12.0  # of plate and bracket behind the pinhole
+PLATE_MM, TRIPOD_MM = 12.0, 8.0  # thickness, and below the tripod screw's head
+HALF_PLATE_MM = 30.0
+GAP_MM = 14.0  # between plate and bracket: two nuts and a washer at the nearest
+UPPER_MM, LOWER_MM, PAIR_MM = 12.0, 72.0, 13.0  # of the three screws: from the top, half distance
+MIN_ENGAGEMENT_MM = 4.0  # of a screw in its insert at the farthest
+RECESS_MM = 9.0  # half width of the recess and the window for the tripod screw's head and its key
+RECESS_BEYOND_MM = 5.0  # of the recess beyond the head
+WINDOW_WALL_MM = 2.0  # between window and the upper screws' slots
+PLATE_END_MM = 5.0  # of the plate beyond the fence's slots
+# The fence.
+FENCE_MM, FENCE_HEIGHT_MM, FENCE_HALF_MM = 12.0, 14.0, 28.0
+FENCE_SCREW_MM = 20.0  # from the middle to its screws
+HEAD_HOLE_MM, HEAD_DEPTH_MM = 9.0, 8.0  # counterbore
+
+# The bracket's foot.
+MOUNT_WEB_MM = 10.0  # from the bracket's upper end to the webs
+BRACKET_FOOT_MM = 70.0  # length of the foot beyond the bracket
+FOOT_BORDER_MM = 13.0  # of the foot beside the bracket
+WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
+SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
+AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
+
+
+@dataclass(frozen=True)
+class CameraMount:
+    """The parts that hold the camera.
+
+    Attributes:
+        bracket: on the base plate.
+        plate: for the camera, on three screws.
+        fence: on the plate, below the camera.
+        fasteners: of them, without the screws in the base plate.
+        travel: how far the camera moves to either side, by name with unit.
+    """
+
+    bracket: Bracket
+    plate: Component
+    fence: Component
+    fasteners: tuple[Fastener, ...]
+    travel: dict[str, float]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where the camera is, the frame's axes as rows (3, 3), and the insert of the three screws."""
+
+    spec: PrototypeSpec
+    axes: Floats
+    camera: Camera
+    insert: PurchasedPart
+
+    @cached_property
+    def own(self) -> Floats:
+        """Rows: behind the pinhole along the optical axis, across, out from it, (3, 3)."""
+        back = -self.camera.forward
+        level = self.axes[0]
+        return np.stack([back, self.axes[1], unit(level - (level @ back) * back)])
+
+    @property
+    def frame(self) -> FrameSpec:
+        """The section of the frame."""
+        return self.spec.frame
+
+    @property
+    def radius(self) -> float:
+        """Of the camera's body: its optical axis over the camera plate."""
+        return self.spec.camera_diameter_mm / 2
+
+    @property
+    def bracket_at(self) -> float:
+        """Out to the bracket's face."""
+        return self.radius + PLATE_MM + GAP_MM
+
+    @property
+    def along(self) -> float:
+        """Travel of the camera along its axis to either side."""
+        return self.frame.camera_travel_mm / 2
+
+    @property
+    def fence_screws(self) -> float:
+        """Behind the pinhole to the fence's screws."""
+        return self.spec.camera_length_mm + FENCE_MM / 2
+
+    @property
+    def fence_travel(self) -> float:
+        """Of the fence's slots to either side: that of the camera, and what yaw needs."""
+        return self.along + FENCE_SCREW_MM * float(np.tan(np.radians(YAW_DEG)))
+
+    @property
+    def plate_end(self) -> float:
+        """Behind the pinhole to the camera plate's end."""
+        fence = self.fence_screws + self.fence_travel + M5_HOLE_MM / 2
+        lowest = float(self.screws[-1, 0]) + self.insert["outer_mm"] / 2
+        return max(fence, lowest) + PLATE_END_MM
+
+    @property
+    def recess(self) -> float:
+        """Half length of the recess for the tripod screw's head."""
+        return self.along + TRIPOD_HOLE_MM + RECESS_BEYOND_MM
+
+    @property
+    def window(self) -> float:
+        """Half length of the window for its key."""
+        return self.along + TRIPOD_HOLE_MM / 2
+
+    @property
+    def screws(self) -> Floats:
+        """Places (3, 2) of the three screws: behind the pinhole, and across."""
+        upper = TOP_MM + UPPER_MM
+        beyond = self.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
+        lower = max(TOP_MM + LOWER_MM, beyond)
+        return np.array([[upper, -PAIR_MM], [upper, PAIR_MM], [lower, 0.0]])
+
+    def point(self, back: float, across: float, out: float) -> Floats:
+        """A point (3,) of the camera's own axes, in the frame of the shell."""
+        return np.asarray(self.camera.pinhole + np.array([back, across, out]) @ self.own)
+
+    def block(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
+        """A box between two points of the camera's own axes."""
+        local = box(np.array(low), np.array(high), self.own)
+        return Prism(local.corners + self.camera.pinhole, local.along)
+
+    def hole(self, back: float, across: float, out: tuple[float, float], size: float) -> Primitive:
+        """A hole of a diameter out from the axis, between two distances."""
+        start, end = (self.point(back, across, one) for one in out)
+        return cylinder_between(start, end, size / 2)
+
+    def slot(
+        self, place: tuple[float, float], along: int, travel: float, out: tuple[float, float]
+    ) -> tuple[Primitive, ...]:
+        """A slot of M5 about a place, along one of the own axes, with a travel to either side."""
+        start = self.point(*place, out[0])
+        depth = (out[1] - out[0]) * self.own[2]
+        return slot(start, self.own[along], 2 * travel, M5_HOLE_MM / 2, depth)
+
+
+def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts) -> CameraMount:
+    """Bracket, plate and fence for a camera.
+
+    Args:
+        spec: of the prototype.
+        axes: of the frame, as rows, (3, 3).
+        camera: in its place.
+        parts: purchased parts.
+
+    Raises:
+        SpecError: when the camera does not look along the frame's plane, its thread lies beyond
+            its end, or camera or mount reach the base plate.
+    """
+    place = _Place(spec, axes, camera, parts[INSERT])
+    _check_camera(place)
+    play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
+    return CameraMount(
+        bracket=_bracket(place),
+        plate=_plate(place),
+        fence=_fence(place),
+        fasteners=_fasteners(place, parts),
+        travel={
+            "along_axis_mm": place.along,
+            "across_mm": ACROSS_MM,
+            "out_mm": OUT_MM,
+            "along_plate_mm": ALONG_PLATE_MM,
+            "yaw_deg": YAW_DEG,
+            "roll_deg": min(ROLL_DEG, play),
+            "pitch_deg": min(PITCH_DEG, play),
+        },
+    )
+
+
+def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
+    """Three screws with two nuts and two washers each, two of the fence, the tripod screw."""
+    return (
+        *(
+            one
+            for back, across in place.screws.tolist()
+            for one in _tilting_screw(place, back, across, parts)
+        ),
+        *(one for side in (-1, 1) for one in _fence_screw(place, side * FENCE_SCREW_MM, parts)),
+        Fastener(
+            parts[CAMERA_SCREW],
+            place.point(place.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM),
+            -place.own[2],
+            ("camera_plate", "camera"),
+        ),
+    )
+
+
+def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
+    """A screw through the bracket into the plate's insert, with a nut against either."""
+    flange, out = place.frame.flange_mm, place.own[2]
+    length = WASHER_MM + flange + GAP_MM + OUT_MM + MIN_ENGAGEMENT_MM
+    screw, washer, nut = choose_screw(parts, M5_MM, length), parts[WASHER], parts[NUT]
+    bracket, plate = ("camera_bracket",), ("camera_plate",)
+    face, inner = place.bracket_at + flange, place.bracket_at
+
+    def at(away: float) -> Floats:
+        return place.point(back, across, away)
+
+    return (
+        Fastener(washer, at(face), -out, bracket),
+        Fastener(screw, at(face + WASHER_MM), -out, bracket + plate),
+        Fastener(washer, at(inner), out, bracket),
+        Fastener(nut, at(inner - WASHER_MM), -out, bracket),
+        Fastener(nut, at(place.radius + PLATE_MM), out, plate),
+        Fastener(place.insert, at(place.radius + PLATE_MM), -out, plate),
+    )
+
+
+def _fence_screw(place: _Place, across: float, parts: Parts) -> tuple[Fastener, ...]:
+    """A screw from the fence through the plate into a nut on a washer."""
+    out, plate = place.own[2], ("camera_plate",)
+    length = FENCE_HEIGHT_MM - HEAD_DEPTH_MM + PLATE_MM + WASHER_MM + NUT_MM
+    head, face = place.radius - FENCE_HEIGHT_MM + HEAD_DEPTH_MM, place.radius + PLATE_MM
+
+    def at(away: float) -> Floats:
+        return place.point(place.fence_screws, across, away)
+
+    return (
+        Fastener(choose_screw(parts, M5_MM, length), at(head), out, ("camera_fence", *plate)),
+        Fastener(parts[WASHER], at(face), -out, plate),
+        Fastener(parts[NUT], at(face + WASHER_MM), out, plate),
+    )
+
+
+def _plate(place: _Place) -> Component:
+    """The plate that carries the camera: inserts for three screws, slots for tripod and fence."""
+    near, far = place.radius, place.radius + PLATE_MM
+    through = (near - THROUGH_MM, far + THROUGH_MM)
+    screw, recess = place.frame.camera_screw_mm, place.recess
+    tripod = place.point(screw, 0.0, through[0])
+    depth = (through[1] - through[0]) * place.own[2]
+    removed: list[Primitive] = [
+        place.hole(back, across, through, place.insert["hole_mm"])
+        for back, across in place.screws.tolist()
+    ]
+    removed += slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth)
+    removed.append(
+        place.block(
+            (screw - recess, -RECESS_MM, near + TRIPOD_MM),
+            (screw + recess, RECESS_MM, through[1]),
+        )
+    )
+    for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
+        at = (place.fence_screws, across)
+        removed += place.slot(at, 0, place.fence_travel, through)
+    body = place.block((TOP_MM, -HALF_PLATE_MM, near), (place.plate_end, HALF_PLATE_MM, far))
+    out = place.own[2]
+    what = "plate of the camera, on three screws"
+    return Component("camera_plate", what, (body,), tuple(removed), (-out, out))
+
+
+def _fence(place: _Place) -> Component:
+    """The bar below the camera that its back lies against."""
+    near, far = place.radius - FENCE_HEIGHT_MM, place.radius
+    start = place.spec.camera_length_mm
+    body = place.block((start, -FENCE_HALF_MM, near), (start + FENCE_MM, FENCE_HALF_MM, far))
+    removed = []
+    for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
+        at, head = (place.fence_screws, across), near + HEAD_DEPTH_MM
+        removed.append(place.hole(*at, (near, far + THROUGH_MM), M5_HOLE_MM))
+        removed.append(place.hole(*at, (near - THROUGH_MM, head), HEAD_HOLE_MM))
+    what = "fence that keeps the camera from turning"
+    out = place.own[2]
+    return Component("camera_fence", what, (body,), tuple(removed), (out, -out))
+
+
+def _bracket(place: _Place) -> Bracket:
+    """The bracket on the base plate: slots across for three screws, a window for the key."""
+    frame, axes, low = place.frame, place.axes, place.frame.floor_mm
+    near, far = place.bracket_at, place.bracket_at + frame.flange_mm
+
+    def at(back: float, out: float) -> Floats:
+        """Point (level, up) of the camera's own axes."""
+        return (axes @ place.point(back, 0.0, out))[[0, 2]]
+
+    def at_height(height: float, out: float) -> Floats:
+        """Point (level, up) of a line along the camera's axis."""
+        start, back = at(0.0, out), (axes @ place.own[0])[[0, 2]]
+        return np.asarray(start + (height - start[1]) / back[1] * back)
+
+    mount = np.array([at(TOP_MM, near), at_height(low, near), at_height(low, far), at(TOP_MM, far)])
+    start, end = float(mount[1, 0]), float(mount[2, 0]) + BRACKET_FOOT_MM
+    inside, high = far - OVERLAP_MM, low + frame.flange_mm - OVERLAP_MM
+    web = np.array(
+        [at(TOP_MM + MOUNT_WEB_MM, inside), at_height(high, inside), [end - WEB_SETBACK_MM, high]]
+    )
+    half = HALF_PLATE_MM + FOOT_BORDER_MM
+    foot = rectangle((start, low), (end, low + frame.flange_mm))
+    added = [
+        level_prism(mount, -HALF_PLATE_MM, HALF_PLATE_MM, axes),
+        level_prism(foot, -half, half, axes),
+        *webs(web, HALF_PLATE_MM - frame.web_mm, frame.web_mm, axes),
+    ]
+    beside, ends = half - SLOT_SIDE_MM, (start + SLOT_INNER_MM, end - SLOT_OUTER_MM)
+    holes = np.array([[x, y] for x in ends for y in (-beside, beside)])
+    removed = (*_bracket_holes(place, near, far), *_foot_slots(frame, axes, holes))
+    out = place.own[2]
+    component = Component(
+        "camera_bracket",
+        "bracket of the camera",
+        tuple(added),
+        removed,
+        (-out, -axes[2], out, axes[1]),
+    )
+    return Bracket(component, holes, np.array([[start, -half], [end, half]]))
+
+
+def _bracket_holes(place: _Place, near: float, far: float) -> list[Primitive]:
+    """Slots across for the three screws, and a window through which the tripod screw is turned."""
+    through = (near - THROUGH_MM, far + THROUGH_MM)
+    removed: list[Primitive] = []
+    for back, across in place.screws.tolist():
+        removed += place.slot((back, across), 1, ACROSS_MM, through)
+    screw, window = place.frame.camera_screw_mm, place.window
+    low, high = (screw - window, -RECESS_MM, through[0]), (screw + window, RECESS_MM, through[1])
+    return [*removed, place.block(low, high)]
+
+
+def _foot_slots(spec: FrameSpec, axes: Floats, holes: Floats) -> list[Primitive]:
+    low, depth = spec.floor_mm - THROUGH_MM, (spec.flange_mm + 2 * THROUGH_MM) * axes[2]
+    starts = [np.array([*hole, low]) @ axes for hole in holes]
+    return [
+        body
+        for start in starts
+        for body in slot(start, axes[0], 2 * ALONG_PLATE_MM, M5_HOLE_MM / 2, depth)
+    ]
+
+
+def _check_camera(place: _Place) -> None:
+    frame, along = place.frame, place.along
+    length = place.spec.camera_length_mm
+    if abs(float(place.camera.forward @ place.axes[1])) > AXIAL:
+        raise SpecError(
+            "the camera does not look along the plane of the frame, so there is no bracket for it: "
+            "set the second number of optics.camera_mm to 0, or prototype.camera_diameter_mm to 0"
+        )
+    nearest = place.screws[0, 0] + M5_HOLE_MM / 2 + WINDOW_WALL_MM + place.window
+    if frame.camera_screw_mm < nearest:
+        raise SpecError(
+            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} is too near to the "
+            f"pinhole: make it {np.ceil(nearest):g} or more, or camera_travel_mm smaller"
+        )
+    if frame.camera_screw_mm > length:
+        raise SpecError(
+            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} lies beyond the camera's "
+            f"end: make it less than prototype.camera_length_mm {length:g}"
+        )
+    ends = [place.point(length + along, 0.0, -place.radius)]
+    ends += [place.point(place.plate_end, 0.0, out) for out in (place.radius, place.bracket_at)]
+    lowest = float(min(end[2] for end in ends))
+    if lowest < frame.floor_mm:
+        raise SpecError(
+            f"the camera reaches down to {lowest:.0f} mm, below the base plate: make "
+            f"prototype.frame.floor_mm less than {lowest:.0f}"
+        )
