@@ -1,0 +1,1 @@
+"""A machine as it was built: what its calibration changes in coverage, models and tolerances."""

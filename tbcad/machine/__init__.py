@@ -1,0 +1,1 @@
+"""A machine as it is: camera, axis, spheres and LEDs, designed, simulated or calibrated."""

@@ -1,0 +1,132 @@
+"""A prototype as one simulated build comes out: the designed machine with a process's errors."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tbcad.machine.machine import Machine
+from tbcad.machine.other_errors import DISTORTION, LED_MM, PRINCIPAL_PX
+from tbcad.optics.lens_camera import LensCamera
+from tbcad.simulate.prototype.plan import Plan
+from tbcad.tolerance.montecarlo.draws import ShellDraws
+from tbcad.tolerance.montecarlo.error_kinds import Errors
+from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
+from tbcad.tolerance.prototype.windows import tilted_centres
+from tbcad.types import Bools, Floats
+
+# Random stream of a build's other errors, beyond those of its shells and its prototype.
+OTHER_STREAM = 2000
+
+
+@dataclass(frozen=True)
+class BuiltPrototype:
+    """A prototype with its k bodies, which caps have beside their reflecting spheres.
+
+    Attributes:
+        machine: camera, axis, reflecting spheres and LEDs.
+        body_centre: of the spheres in the seats at base angle zero, mm, (k, 3).
+        body_radius: mm, (k,).
+    """
+
+    machine: Machine
+    body_centre: Floats
+    body_radius: Floats
+
+
+@dataclass(frozen=True)
+class OtherErrors:
+    """Errors that are no process's; see tbcad.machine.other_errors.
+
+    Attributes:
+        leds: mm, (l, 3).
+        distortion: k1, k2, p1, p2, k3, (5,).
+        principal: pixels, (2,).
+    """
+
+    leds: Floats
+    distortion: Floats
+    principal: Floats
+
+
+def designed_build(designed: Machine, plan: Plan) -> BuiltPrototype:
+    """The build without errors."""
+    return BuiltPrototype(designed, plan.body_centre, plan.body_radius)
+
+
+def random_build(
+    designed: Machine,
+    plan: Plan,
+    errors: Errors,
+    seed: int,
+    build: int = 0,
+    *,
+    wind_up: Floats,
+) -> BuiltPrototype:
+    """One simulated build; the same that `tbcad tolerance` simulates, with a real lens and LEDs.
+
+    Args:
+        designed: from tbcad.machine.designed.
+        plan: of the same export.
+        errors: of the process.
+        seed: of all builds.
+        build: number of the build.
+        wind_up: turn of the base under gravity at the plan's stops, radians, (t,): see
+            tbcad.tolerance.prototype.wind_up.
+    """
+    draws = draw_prototypes(errors, seed, [build], is_cap(plan), wind_up)
+    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed, build))
+
+
+def draw_other_errors(leds: int, seed: int, build: int = 0, camera: int = 0) -> OtherErrors:
+    """Errors of the lens, the sensor and so many LEDs, for a camera by its number from 0."""
+    key = np.random.SeedSequence(seed, spawn_key=(build, OTHER_STREAM + camera))
+    random = np.random.Generator(np.random.Philox(key))
+    return OtherErrors(
+        leds=LED_MM * random.standard_normal((leds, 3)),
+        distortion=np.array(DISTORTION) * random.standard_normal(len(DISTORTION)),
+        principal=PRINCIPAL_PX * random.standard_normal(2),
+    )
+
+
+def _built(
+    designed: Machine, plan: Plan, draws: PrototypeDraws, other: OtherErrors
+) -> BuiltPrototype:
+    tilt = Rotation.from_rotvec(draws.tilt[0] @ plan.frame[1:])
+    seats = draws.seat[0]
+    machine = Machine(
+        camera=built_camera(designed.camera, draws, other),
+        axis=tilt.apply(designed.axis),
+        axis_point=designed.axis_point,
+        angle=designed.angle + draws.angle[0].ravel(),
+        centre=tilt.apply(tilted_centres(plan, draws.cap_tilt[0]) + seats),
+        radius=plan.radius + draws.radius[0],
+        leds=designed.leds + other.leds,
+        shift=(draws.runout[0] @ plan.frame[1:]).reshape(-1, 3),
+    )
+    # A ball is its own body, too large or too small as it is.
+    body_radius = np.where(is_cap(plan), plan.body_radius, machine.radius)
+    return BuiltPrototype(machine, tilt.apply(plan.body_centre + seats), body_radius)
+
+
+def is_cap(plan: Plan) -> Bools:
+    """Which spheres are made instead of purchased, (k,)."""
+    return np.asarray(plan.body_radius < plan.radius)
+
+
+def built_camera(
+    designed: LensCamera, draws: PrototypeDraws | ShellDraws, other: OtherErrors
+) -> LensCamera:
+    """The camera of the first of some builds."""
+    right, down, _ = designed.axes
+    aside = other.principal / designed.focal
+    back = Rotation.from_rotvec(aside[0] * down - aside[1] * right)
+    tilt = Rotation.from_rotvec(draws.camera_tilt[0])
+    return replace(
+        designed,
+        pinhole=designed.pinhole + draws.camera_shift[0],
+        axes=(tilt * back).apply(designed.axes),
+        focal=designed.focal * draws.focal[0],
+        principal=designed.principal + other.principal,
+        distortion=designed.distortion + other.distortion,
+    )

@@ -1,0 +1,26 @@
+"""The export of the machine that was calibrated."""
+
+import json
+from pathlib import Path
+
+from tbcad.errors import InputError
+from tbcad.machine.shells import CAMERAS
+
+CALIBRATION = "calibration.json"
+
+
+def export_of(calibration: Path) -> Path:
+    """The export that a calibration's record names.
+
+    Raises:
+        InputError: it names none.
+    """
+    folders = [calibration, *(calibration / name for name in CAMERAS)]
+    path = next((one / CALIBRATION for one in folders if (one / CALIBRATION).is_file()), None)
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))["exports"] if path else None
+    except (OSError, ValueError, KeyError, TypeError):
+        found = None
+    if not isinstance(found, str):
+        raise InputError(f"{calibration} does not name its export: name it with --exports")
+    return Path(found)

@@ -1,0 +1,84 @@
+"""The machine that an export describes, before anything is measured."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import Record, Vector, read_json
+from tbcad.machine.machine import Machine
+from tbcad.optics.lens_camera import without_distortion
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.simulate.prototype.plan import MISSING, RECORD, SCHEMA, Plan
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.types import Floats
+
+RUNS = 2  # of the base through its stops, the object turned by 180 degrees between both
+
+
+class _Led(Record):
+    position_mm: Vector
+
+
+class _Document(Record):
+    leds: list[_Led]
+
+
+def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
+    """The prototype of an export; its frames are the stops of the first run, then of the second.
+
+    Raises:
+        InputError: the record of the prototype cannot be read, or has no LEDs.
+    """
+    camera = export.reflectors[0].camera
+    return Machine(
+        camera=without_distortion(camera),
+        axis=plan.frame[0],
+        axis_point=np.zeros(3),
+        angle=np.tile(plan.angle, RUNS),
+        centre=plan.centre,
+        radius=plan.radius,
+        leds=read_leds(export.folder),
+    )
+
+
+def designed_shell(reflector: Reflector, leds: Floats) -> Machine:
+    """One camera of the shell with its mirrors as spheres that do not move.
+
+    Args:
+        reflector: camera and mirrors, all of them curved.
+        leds: that are held at the object's place to calibrate it, mm, (l, 3).
+    """
+    mirrors = reflector.mirrors
+    radius = 1 / mirrors.curvature
+    return Machine(
+        camera=without_distortion(reflector.camera),
+        axis=np.array([0.0, 0.0, 1.0]),
+        axis_point=np.zeros(3),
+        angle=np.zeros(1),
+        centre=mirrors.apex - radius[:, None] * mirrors.normal,
+        radius=radius,
+        leds=leds,
+    )
+
+
+def read_leds(folder: Path) -> Floats:
+    """Where the LEDs of an export's prototype shine from, mm, (l, 3).
+
+    Raises:
+        InputError: the record cannot be read, or names none.
+    """
+    path = folder / RECORD
+    leds = read_json(path, _Document, SCHEMA, MISSING).leds
+    if not leds:
+        raise InputError(
+            f"{path} names no LEDs, which calibrate the machine: build it with the default of "
+            "prototype.stage.leds_mm"
+        )
+    return np.array([led.position_mm for led in leds])
+
+
+def dome_radius(export: ExportedDesign) -> float:
+    """Radius of the domes of an export's LEDs, mm."""
+    return float(load_parts()[export.spec.prototype.stage.led]["diameter_mm"]) / 2
