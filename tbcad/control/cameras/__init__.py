@@ -1,0 +1,1 @@
+"""Cameras that a run photographs with, one module for each kind."""

@@ -1,0 +1,125 @@
+"""A camera on USB, by libgphoto2: released and read by its own protocol.
+
+Sources: python-gphoto2 2.6 (examples/capture-image.py, camera-config-values.py); libgphoto2
+camlibs/ptp2/config.c for the names of the settings.
+"""
+
+from types import ModuleType
+from typing import Any
+
+from tbcad.control.cameras.camera import Shot
+from tbcad.control.cameras.image_facts import suffix_of
+from tbcad.control.faults import CameraFault
+from tbcad.control.port import INSTALL
+from tbcad.errors import InputError
+from tbcad.runs.exposure import Setting
+
+# What must not change in a run; a camera has some of them.
+LOCKED = (
+    *("shutterspeed", "shutterspeed2", "aperture", "f-number", "iso", "autoiso"),
+    *("whitebalance", "colortemperature", "exposurecompensation", "expprogram"),
+    *("autoexposuremode", "focusmode", "focusmode2"),
+    *("imagesize", "imageformat", "imagequality"),
+)
+FOCUS, MANUAL = ("focusmode", "focusmode2"), "manual"
+AUTOFOCUS, OFF = "autofocus", "Off"  # of the driver, before each release
+
+
+class GphotoCamera:
+    """The one camera that is plugged in."""
+
+    released = False
+
+    def __init__(self) -> None:
+        """Connect to the camera.
+
+        Raises:
+            InputError: the library is missing, or there is no camera, or its lens focuses itself.
+        """
+        self._gp = _library()
+        try:
+            self._connect()
+        except CameraFault as error:
+            raise InputError(f"--camera gphoto2: {error}") from None
+        self.model = str(self._camera.get_abilities().model)
+        self._names = [name for name in LOCKED if self._setting(name) is not None]
+        self._check_focus()
+
+    def _connect(self) -> None:
+        self._camera = self._gp.Camera()
+        try:
+            self._camera.init()
+        except self._gp.GPhoto2Error as error:
+            raise CameraFault(
+                f"no camera answers ({error}): switch it on, plug it in, and close what else uses "
+                "it, for example gvfs-gphoto2-volume-monitor"
+            ) from None
+        if self._setting(AUTOFOCUS) not in (None, OFF):
+            self._set(AUTOFOCUS, OFF)
+
+    def _check_focus(self) -> None:
+        for name in FOCUS:
+            value = self._setting(name)
+            if value is not None and MANUAL not in str(value).lower() and value != "MF":
+                self.close()
+                raise InputError(
+                    f"--camera gphoto2: {name} is {value}: set the lens to manual focus, for the "
+                    "focus must not change"
+                )
+
+    def expect(self) -> None:
+        """Get ready: nothing to do."""
+
+    def photograph(self) -> Shot:
+        """Release the camera, and read the photograph and its settings."""
+        gp = self._gp
+        try:
+            path = self._camera.capture(gp.GP_CAPTURE_IMAGE)
+            file = self._camera.file_get(path.folder, path.name, gp.GP_FILE_TYPE_NORMAL)
+            data = bytes(file.get_data_and_size())
+        except gp.GPhoto2Error as error:
+            raise CameraFault(f"the camera gives no photograph: {error}") from None
+        return Shot(data, suffix_of(path.name), self._settings())
+
+    def _settings(self) -> dict[str, Setting]:
+        found = {name: self._setting(name) for name in self._names}
+        told = {name: value for name, value in found.items() if value is not None}
+        return {"model": self.model, **told}
+
+    def _setting(self, name: str) -> Setting | None:
+        """A setting of the camera; None if it has none of this name."""
+        try:
+            value: Any = self._camera.get_single_config(name).get_value()
+        except self._gp.GPhoto2Error:
+            return None
+        return value if isinstance(value, str | int | float) else None
+
+    def _set(self, name: str, value: str) -> None:
+        try:
+            widget = self._camera.get_single_config(name)
+            widget.set_value(value)
+            self._camera.set_single_config(name, widget)
+        except self._gp.GPhoto2Error as error:
+            raise CameraFault(f"{name} cannot be set to {value}: {error}") from None
+
+    def again(self) -> None:
+        """Close the camera's session and open another."""
+        self.close()
+        self._connect()
+        if (model := str(self._camera.get_abilities().model)) != self.model:
+            raise CameraFault(f"another camera answers, {model} and not {self.model}")
+
+    def close(self) -> None:
+        """Close the camera's session."""
+        try:
+            self._camera.exit()
+        except self._gp.GPhoto2Error:
+            return
+
+
+def _library() -> ModuleType:
+    try:
+        import gphoto2
+    except ImportError:
+        raise InputError(f"--camera gphoto2: its library is not installed: {INSTALL}") from None
+    return gphoto2  # type: ignore[no-any-return]

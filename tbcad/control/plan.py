@@ -1,0 +1,179 @@
+"""What an export says of a run: stops, lights, times, the controller's settings.
+
+Names and schemas of files are written out here: the modules that write them load numerical
+libraries for a second, and a run needs none.
+"""
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tbcad.control.program import PROGRAM, Program, read_program
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import REBUILD, Finite, Record, read_csv, read_json
+from tbcad.runs.exposure import Frame, PhaseName
+from tbcad.spec.prototype import MotionSpec
+
+DESIGN_FILE, DESIGN_SCHEMA = "design.json", "tbcad-design/2"
+RECORD, SCHEMA = "prototype.json", "tbcad-prototype/2"
+MIRRORS_FILE, BALLS, PICTURES = "mirrors.csv", "balls.csv", "rotation_plan.csv"
+MISSING = "build the prototype too, tbcad build"
+STOPS, SETTINGS = "stops.csv", "grbl_settings.txt"
+FILES = (DESIGN_FILE, MIRRORS_FILE, RECORD, BALLS, PICTURES, STOPS, PROGRAM, SETTINGS)
+"""What a run depends on."""
+TURNS: tuple[Literal[0, 180], ...] = (0, 180)
+ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
+DIRECTION = 3  # the setting that is changed where the base turns against its arrow
+_SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
+
+
+class _Camera(Record):
+    width_px: int = Field(ge=16, le=65_536)
+    height_px: int = Field(ge=16, le=65_536)
+
+
+class _PrototypeSpec(Record):
+    motion: MotionSpec
+
+
+class _Spec(Record):
+    prototype: _PrototypeSpec
+
+
+class _Design(Record):
+    spec: _Spec
+    cameras: tuple[_Camera, _Camera]
+
+
+class Phase(Record):
+    """A light, and the digital output that switches it; None: no output is on."""
+
+    name: PhaseName
+    output: Annotated[int, Field(ge=0, le=99)] | None
+
+
+class _Controller(Record):
+    firmware: Literal["grblhal", "grbl"]
+    axis: Literal["X", "A"]
+    phases: tuple[Phase, ...] = Field(min_length=1)
+
+
+class _Prototype(Record):
+    controller: _Controller
+
+
+class _Stop(Record):
+    stop: int = Field(ge=1)
+    base_angle_deg: Finite
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a run needs of an export.
+
+    Attributes:
+        sha256: of each file that it depends on, by name.
+        size_px: columns and rows of the design's camera.
+        firmware: of the controller, "grblhal" or "grbl".
+        axis: letter of the base's axis.
+        phases: of a stop, in order.
+        motion: times and speeds.
+        settings: of the controller, by number.
+        program: the motions.
+        frames: of both runs, in order.
+    """
+
+    sha256: dict[str, str]
+    size_px: tuple[int, int]
+    firmware: Literal["grblhal", "grbl"]
+    axis: str
+    phases: tuple[Phase, ...]
+    motion: MotionSpec
+    settings: dict[int, float]
+    program: Program
+    frames: tuple[Frame, ...]
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """Digital outputs of all lights."""
+        return tuple(phase.output for phase in self.phases if phase.output is not None)
+
+
+def read_control_plan(folder: Path) -> Plan:
+    """Read what a run needs of a folder that `tbcad build` wrote with a prototype.
+
+    Raises:
+        InputError: something is missing or does not fit; it says what.
+    """
+    design = read_json(
+        folder / DESIGN_FILE, _Design, DESIGN_SCHEMA, "name a folder that tbcad build wrote"
+    )
+    controller = read_json(folder / RECORD, _Prototype, SCHEMA, MISSING).controller
+    program = read_program(folder)
+    angles = _angles(folder / STOPS, program)
+    return Plan(
+        sha256={name: _sha256(folder / name) for name in FILES},
+        size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
+        firmware=controller.firmware,
+        axis=controller.axis,
+        phases=controller.phases,
+        motion=design.spec.prototype.motion,
+        settings=read_settings(folder / SETTINGS),
+        program=program,
+        frames=tuple(
+            Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
+            for turn in TURNS
+            for stop, angle in angles.items()
+        ),
+    )
+
+
+def read_settings(path: Path) -> dict[int, float]:
+    """Settings of the controller by number, without the direction, which is found by trying.
+
+    Raises:
+        InputError: there is no such file, or a line is neither comment nor setting.
+    """
+    settings: dict[int, float] = {}
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        if line.startswith("("):
+            continue
+        match = _SETTING.match(line)
+        if match is None:
+            raise InputError(f"{path}: line {number} is no setting such as $1=255: {REBUILD}")
+        settings[int(match[1])] = float(match[2])
+    settings.pop(DIRECTION, None)
+    return settings
+
+
+def _angles(path: Path, program: Program) -> dict[int, float]:
+    """Base angle of each stop, which the program must drive to."""
+    angles = {row.stop: row.base_angle_deg for row in read_csv(path, _Stop, MISSING)}
+    for stop, angle in angles.items():
+        move = program.stops.get(stop)
+        if move is None or abs(move.angle_deg - angle) > ANGLE_DEG:
+            raise InputError(f"{path}: {PROGRAM} does not drive to stop {stop}: {REBUILD}")
+    if len(angles) != len(program.stops):
+        raise InputError(f"{path} has another number of stops than {PROGRAM}: {REBUILD}")
+    return angles
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError:
+        raise InputError(f"{path} is not there: {MISSING}") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None

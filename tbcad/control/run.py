@@ -1,0 +1,213 @@
+"""A whole run: export, port, camera and folder in, photographs out."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+
+from tbcad.control.base import Base
+from tbcad.control.cameras.choice import check_camera_name, connected_camera
+from tbcad.control.estimate import (
+    BYTES_PER_PX,
+    CAPTURE_S,
+    Shots,
+    count,
+    disk_bytes,
+    expected_seconds,
+)
+from tbcad.control.faults import MachineFault
+from tbcad.control.grbl import Grbl
+from tbcad.control.outcome import Outcome
+from tbcad.control.plan import Plan, read_control_plan
+from tbcad.control.port import SerialPort
+from tbcad.control.selection import chosen_frames, chosen_phases
+from tbcad.control.session import Ask, RunOptions, Session, Show
+from tbcad.errors import InputError
+from tbcad.runs.exposure import exposure_name
+from tbcad.runs.photographs import read_run
+from tbcad.runs.record import RunRecord, read_record
+from tbcad.runs.writing import DiskFault, check_new
+from tbcad.types import Progress
+
+STOPPED = "stopped by the operator"
+TIMEOUT_S = 30.0
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What is asked for.
+
+    Attributes:
+        exports: folder that tbcad build wrote.
+        out: folder of the run.
+        phases: names with commas between; None: all, or those of the run that is resumed.
+        stops: numbers and ranges with commas between; None likewise.
+        runs: "a", "b" or "ab"; None: both, or as in the run that is resumed.
+        size_px: columns and rows of the photographs; None: those of the design's camera.
+        resume: go on with the run in the folder.
+    """
+
+    exports: Path
+    out: Path
+    phases: str | None = None
+    stops: str | None = None
+    runs: str | None = None
+    size_px: tuple[int, int] | None = None
+    resume: bool = False
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What a run would do.
+
+    Attributes:
+        plan: of the export.
+        remaining: photographs to be taken.
+        seconds: that it would take, about.
+        disk_bytes: that it would need, about.
+    """
+
+    plan: Plan
+    remaining: list[Shots]
+    seconds: float
+    disk_bytes: int
+
+    @property
+    def photographs(self) -> int:
+        """Number of photographs."""
+        return count(self.remaining)
+
+
+def dry_run(request: RunRequest) -> DryRun:
+    """What a run would do, without port and camera; nothing is written.
+
+    Raises:
+        InputError: export, folder or choice will not do.
+    """
+    plan, options = _prepared(request, send_settings=False)
+    taken = set(read_run(request.out).exposures) if request.resume else set[str]()
+    names = [phase.name for phase in options.phases]
+    remaining = [
+        Shots(frame, left)
+        for frame in options.frames
+        if (left := tuple(name for name in names if exposure_name(frame, name) not in taken))
+    ]
+    seconds = expected_seconds(plan, remaining, CAPTURE_S)
+    each = BYTES_PER_PX * options.size_px[0] * options.size_px[1]
+    return DryRun(plan, remaining, sum(seconds.values()), disk_bytes(count(remaining), each))
+
+
+def run_machine(
+    request: RunRequest,
+    port: str,
+    camera: str,
+    ask: Ask,
+    show: Show,
+    note: Progress,
+    *,
+    send_settings: bool = False,
+    timeout_s: float = TIMEOUT_S,
+) -> Outcome:
+    """Photograph what is asked for, and leave base held and lights off, whatever happens.
+
+    Args:
+        request: what is asked for.
+        port: of the controller.
+        camera: gphoto2, command:... or folder:...
+        ask: asks the operator to do something.
+        show: shows progress.
+        note: called with what the operator should know before the first position.
+        send_settings: send the controller the settings that differ from the export's.
+        timeout_s: how long a photograph may take.
+
+    Raises:
+        InputError: something was wrong before the first motion; nothing was photographed.
+    """
+    plan, options = _prepared(request, send_settings)
+    check_camera_name(camera)
+    with ExitStack() as stack:
+        line = SerialPort(port)
+        stack.callback(line.close)
+        base = Base(Grbl(line, note), plan)
+        with _faults_as_input_errors(port):
+            base.connect()
+            base.check_settings(send=send_settings)
+        with _secured(base):
+            chosen = connected_camera(camera, timeout_s)
+            stack.callback(chosen.close)
+            session = Session(plan, options, base, chosen)
+            with _faults_as_input_errors(port):
+                session.begin(request.out, ask, note, resume=request.resume)
+            return _photographed(session, ask, show)
+
+
+def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
+    begun, before, stopped = monotonic(), session.taken, ""
+    try:
+        session.photograph(ask, show)
+    except (MachineFault, DiskFault) as fault:
+        stopped = str(fault)
+    except KeyboardInterrupt:
+        stopped = STOPPED
+    return session.finish(stopped, monotonic() - begun, before)
+
+
+@contextmanager
+def _secured(base: Base) -> Iterator[None]:
+    """Hold the base and switch lights off if an error comes through."""
+    try:
+        yield
+    except BaseException:
+        base.secure()
+        raise
+
+
+@contextmanager
+def _faults_as_input_errors(port: str) -> Iterator[None]:
+    """Before the first photograph a fault is one of the input: there is nothing to lose."""
+    try:
+        yield
+    except MachineFault as fault:
+        raise InputError(f"{port}: {fault}") from None
+    except DiskFault as fault:
+        raise InputError(f"{fault}: make room, or name another folder") from None
+
+
+def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOptions]:
+    """Plan and choice, or those of the run that is resumed."""
+    plan = read_control_plan(request.exports)
+    phases = chosen_phases(plan, request.phases)
+    frames = chosen_frames(plan, request.stops, request.runs or "ab")
+    size = request.size_px or plan.size_px
+    if not request.resume:
+        check_new(request.out)
+        return plan, RunOptions(frames, phases, size, send_settings)
+    record = read_record(request.out)
+    _check_same_export(request, plan, record)
+    recorded = chosen_phases(plan, ",".join(record.phases))
+    given = (
+        ("--phases", request.phases, phases == recorded),
+        ("--stops", request.stops or request.runs, frames == record.frames),
+        ("--size", request.size_px, size == (record.width_px, record.height_px)),
+    )
+    for name, value, same in given:
+        if value is not None and not same:
+            raise InputError(
+                f"{request.out} was begun with another {name}: leave it out with --resume"
+            )
+    size = record.width_px, record.height_px
+    return plan, RunOptions(record.frames, recorded, size, send_settings)
+
+
+def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> None:
+    if record.source != "camera":
+        raise InputError(f"{request.out} is a simulated run: name another folder")
+    other = [
+        name for name, digest in plan.sha256.items() if record.export_sha256.get(name) != digest
+    ]
+    if other:
+        raise InputError(
+            f"{request.out} is a run of another export: {other[0]} of {request.exports} differs; "
+            "name the export that it was begun with"
+        )

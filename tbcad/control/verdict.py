@@ -1,0 +1,65 @@
+"""What a run prints: its plan before, its result after."""
+
+from collections.abc import Iterator
+
+from tbcad.control.estimate import duration_text, size_text
+from tbcad.control.outcome import Outcome
+from tbcad.control.run import DryRun
+
+NAMED = 5  # of the photographs that are missing
+SHOWN_STOPS = 3
+
+
+def outcome_lines(outcome: Outcome, resume: str) -> Iterator[str]:
+    """A dozen lines at most.
+
+    Args:
+        outcome: of the run.
+        resume: the command that goes on with it.
+    """
+    verdict = "COMPLETE" if outcome.complete else "NOT COMPLETE"
+    yield (
+        f"{verdict}: {outcome.taken} of {outcome.wanted} photographs in {outcome.folder}, "
+        f"{outcome.new} of them now, in {duration_text(outcome.seconds)}"
+    )
+    if outcome.stopped:
+        yield f"stopped: {outcome.stopped}"
+    if outcome.unsafe:
+        yield f"LOOK AT THE MACHINE: {outcome.unsafe}"
+    for name, reason in [*outcome.missed.items()][:NAMED]:
+        yield f"missing: {name}: {reason}"
+    if (more := len(outcome.missed) - NAMED) > 0:
+        yield f"missing: {more} more, in journal.jsonl"
+    if outcome.taken < outcome.wanted:
+        yield f"go on with: {resume}"
+
+
+def dry_run_record(found: DryRun) -> dict[str, object]:
+    """What a run would do, for other programs."""
+    positions = [{"title": shots.title, "phases": list(shots.phases)} for shots in found.remaining]
+    return {
+        "schema": "tbcad-run-plan/1",
+        "photographs": found.photographs,
+        "seconds": found.seconds,
+        "disk_bytes": found.disk_bytes,
+        "positions": positions,
+    }
+
+
+def dry_run_lines(found: DryRun) -> Iterator[str]:
+    """What a run would do."""
+    first = found.remaining[0] if found.remaining else None
+    positions = len(found.remaining)
+    yield f"{found.photographs} photographs at {positions} positions would be taken"
+    if first is None:
+        return
+    yield f"phases at the first: {', '.join(first.phases)}"
+    for shots in found.remaining[:SHOWN_STOPS]:
+        yield f"  {shots.title}: {len(shots.phases)} photographs"
+    if positions > SHOWN_STOPS:
+        yield f"  ... to {found.remaining[-1].title}"
+    yield (
+        f"about {duration_text(found.seconds)} with 2 s for each photograph, and "
+        f"{size_text(found.disk_bytes)} of disk with 1 byte for each pixel"
+    )
+    yield "both are measured on the camera's first photograph before a run starts"

@@ -1,0 +1,1 @@
+"""The folder of a run: photographs of all stops and what is known of each, real or simulated."""
