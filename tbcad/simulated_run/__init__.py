@@ -1,0 +1,1 @@
+"""All photographs of a run, simulated for a machine with random errors."""

@@ -1,0 +1,26 @@
+"""How a run is simulated."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is simulated.
+
+    Attributes:
+        seed: of the build and of all noise.
+        stops: numbers of the stops, from 1; None for all.
+        phases: that are photographed at each; None for all.
+        perfect: a build without errors before a lens without distortion.
+        noise: factor of all noise.
+        bits: of a pixel's number, 8 or 16.
+        shell: both cameras of the shell in place of the prototype.
+    """
+
+    seed: int = 0
+    stops: tuple[int, ...] | None = None
+    phases: tuple[str, ...] | None = None
+    perfect: bool = False
+    noise: float = 1.0
+    bits: int = 8
+    shell: bool = False

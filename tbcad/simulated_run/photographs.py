@@ -1,0 +1,138 @@
+"""The photographs of a simulated run, each by itself: the same whatever else is photographed."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from tbcad.machine.built import BuiltPrototype
+from tbcad.runs.exposure import DARK, LIT, Frame
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulated_run.led_light import DOME_MM, balls_of_frame, led_light
+from tbcad.simulated_run.object_light import object_light, pixel_directions
+from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.sensor import (
+    Image16,
+    PixelMaps,
+    Sensor,
+    Signal,
+    generator,
+    pixel_maps,
+    recorded,
+)
+from tbcad.simulated_run.spread import PointSpread, add_points, blurred
+from tbcad.types import Floats
+
+LED_LIGHT = 0.9  # of a full pixel: brightness of an LED's image on the optical axis
+OBJECT_LIGHT = 0.9  # likewise: of white, where the object is lit best
+NOISE_STREAM = 4000
+WHITE = 255.0
+
+
+@dataclass(frozen=True)
+class Chain:
+    """From light to numbers.
+
+    Attributes:
+        sensor: of the camera.
+        spread: of a point's light.
+        dome: radius of the LEDs' domes, mm.
+        led_light: of each LED, on the optical axis, 1 fills a pixel; one for all, or (l,).
+        object_light: of the lit object where it is white, likewise.
+    """
+
+    sensor: Sensor = field(default_factory=Sensor)
+    spread: PointSpread = field(default_factory=PointSpread)
+    dome: float = DOME_MM
+    led_light: float | tuple[float, ...] = LED_LIGHT
+    object_light: float = OBJECT_LIGHT
+
+
+@dataclass(frozen=True)
+class SimulatedRun:
+    """A prototype that is photographed.
+
+    Attributes:
+        built: the prototype.
+        frames: in the order of the machine's.
+        scene: the lit object.
+        occluders: what may hide LEDs.
+        chain: from light to numbers.
+        seed: of noise, dust and hot pixels.
+    """
+
+    built: BuiltPrototype
+    frames: tuple[Frame, ...]
+    scene: Scene
+    occluders: Occluders
+    chain: Chain
+    seed: int
+
+    @cached_property
+    def maps(self) -> PixelMaps:
+        """What is fixed to the pixels."""
+        return pixel_maps(self.built.machine.camera, self.directions, self.chain.sensor, self.seed)
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Unit directions through the pixels, (h, w, 3)."""
+        return pixel_directions(self.built.machine.camera)
+
+    def frame_photographs(self, number: int, phases: tuple[str, ...]) -> dict[str, Image16]:
+        """The photographs of a frame, from 0, in some phases."""
+        frame = self.frames[number]
+        light: dict[str, Signal | None] = {DARK: None}
+        if LIT in phases:
+            light[LIT] = self._object(number)
+        if set(phases) - {LIT, DARK}:
+            light.update(self._leds(number))
+        return {phase: self._recorded(frame, phase, light[phase]) for phase in phases}
+
+    def _recorded(self, frame: Frame, phase: str, light: Signal | None) -> Image16:
+        kind = {DARK: 0, LIT: 1}
+        number = kind[phase] if phase in kind else len(kind) + led_number(phase)
+        stream = (NOISE_STREAM, frame.object_turn_deg, frame.stop, number)
+        return recorded(self.chain.sensor, self.maps, light, generator(self.seed, *stream))
+
+    def _object(self, number: int) -> Signal:
+        pinhole = self.built.machine.camera.pinhole
+        balls, turned = balls_of_frame(self.built, number), self._turned(number)
+        colour = object_light(pinhole, self.directions, balls, self.scene, turned)
+        share = colour.astype(np.float32) * np.float32(self.chain.object_light / WHITE)
+        return blurred(share, self.chain.spread)
+
+    def _leds(self, number: int) -> dict[str, Signal]:
+        camera = self.built.machine.camera
+        points = led_light(
+            self.built, number, self._turned(number), self.occluders, self.chain.dome
+        )
+        light = np.broadcast_to(self.chain.led_light, len(self.built.machine.leds))
+        images: dict[str, Signal] = {}
+        for led, brightness in enumerate(light.tolist()):
+            image = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
+            pixel, area = points.of(led)
+            add_points(image, pixel, brightness * area, self.chain.spread)
+            images[f"led_{led + 1}"] = image
+        return images
+
+    def _turned(self, number: int) -> bool:
+        return self.frames[number].object_turn_deg != 0
+
+
+def led_number(phase: str) -> int:
+    """Number of an LED, from 1, by its phase."""
+    return int(phase.removeprefix("led_"))
+
+
+def phases_of(leds: int) -> tuple[str, ...]:
+    """All phases at a stop, in the order of photographing."""
+    return (DARK, *(f"led_{led}" for led in range(1, leds + 1)), LIT)
+
+
+def frames_of(angles: Floats) -> tuple[Frame, ...]:
+    """The frames of both runs through stops at base angles (s,), degrees."""
+    return tuple(
+        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
+        for turn in (0, 180)
+        for stop, angle in enumerate(angles.tolist(), 1)
+    )
