@@ -1,0 +1,177 @@
+"""Bright spots of a photograph: where each is, how bright, and how well that is known.
+
+Coordinates are columns and rows; whole numbers are pixel centres. Brightness is in the numbers of
+the file, summed over the three colours.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tbcad.runs.images import Image16
+from tbcad.types import Bools, Floats, Ints
+
+THRESHOLD = 0.02  # of the largest number: less is no spot
+NEIGHBOURS_PX = 1.5  # pixels that touch, also at a corner
+MAX_BRIGHT = 200_000  # pixels: of more the light is not that of LEDs in balls
+# Radius of the disc whose light is summed: of a spot's own area, and of what spreads it.
+OF_SPOT, OF_SPREAD_PX = 1.4, 2.5
+MAX_RADIUS_PX = 25
+RING_PX = 2  # about the disc, for the light behind
+ROUNDING = 1 / 12  # variance of a number that is rounded
+COLUMNS = 8  # of a table of spots: place, sums and largest number
+ROUNDS = 4  # of finding the centroid in the disc about the last one
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Bright spots, over n of them.
+
+    Attributes:
+        frame: from 0, (n,).
+        led: that shone, from 0, (n,).
+        pixel: column and row of the centroid, (n, 2).
+        light: sum over the disc, (n,).
+        radius: of the disc, pixels, (n,).
+        shot: sum of light times the squared distance from the centroid, of one way, (n,).
+        spread: the same of ones where there is light: what other noise counts by, (n,).
+        colours: sum of squared differences of colours, scaled to the same sum, less what rounding
+            adds, (n,).
+        full: largest number of a pixel as a share of the largest possible, (n,).
+    """
+
+    frame: Ints
+    led: Ints
+    pixel: Floats
+    light: Floats
+    radius: Floats
+    shot: Floats
+    spread: Floats
+    colours: Floats
+    full: Floats
+
+    def __len__(self) -> int:
+        """Number of spots."""
+        return len(self.frame)
+
+    def only(self, which: Bools | Ints) -> "Spots":
+        """Some of them."""
+        return Spots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
+
+
+def joined_spots(parts: list[Spots]) -> Spots:
+    """All spots of several photographs."""
+    if not parts:
+        empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+        return Spots(none, none, np.zeros((0, 2)), *[empty] * 6)
+    return Spots(
+        **{one.name: np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(Spots)}
+    )
+
+
+def find_spots(image: Image16, dark: Image16 | None, frame: int, led: int) -> Spots:
+    """The spots of a photograph by one LED.
+
+    Args:
+        image: (h, w, 3).
+        dark: the same without light, which is subtracted; None for none.
+        frame: number of the frame.
+        led: number of the LED.
+    """
+    largest = np.iinfo(image.dtype).max
+    threshold = max(round(THRESHOLD * largest), 1)
+    row, column = _bright(image, dark, threshold)
+    if not 0 < len(row) <= MAX_BRIGHT:
+        return joined_spots([])
+    label = _clusters(row, column)
+    sums = [
+        _measured(image, dark, row[label == k], column[label == k])
+        for k in range(int(label.max()) + 1)
+    ]
+    table = np.array([one for one in sums if one is not None]).reshape(-1, COLUMNS)
+    light, radius, shot, spread, colours, full = table[:, 2:].T
+    return Spots(
+        frame=np.full(len(table), frame),
+        led=np.full(len(table), led),
+        pixel=table[:, :2],
+        light=light,
+        radius=radius,
+        shot=shot,
+        spread=spread,
+        colours=colours,
+        full=full / largest,
+    )
+
+
+def _bright(image: Image16, dark: Image16 | None, threshold: int) -> tuple[Ints, Ints]:
+    """Rows and columns of pixels that are brighter than in the dark by a threshold."""
+    pixel = np.unique(np.flatnonzero(image.reshape(-1) > threshold) // 3)
+    above = image.reshape(-1, 3)[pixel].astype(np.int64)
+    if dark is not None:
+        above -= dark.reshape(-1, 3)[pixel]
+    row, column = np.divmod(pixel[above.max(axis=1) > threshold], image.shape[1])
+    return row, column
+
+
+def _clusters(row: Ints, column: Ints) -> Ints:
+    """Number of the cluster of each pixel."""
+    pairs = cKDTree(np.column_stack([row, column])).query_pairs(
+        NEIGHBOURS_PX, output_type="ndarray"
+    )
+    ones = np.ones(len(pairs), dtype=np.int8)
+    graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(row), len(row)))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _measured(
+    image: Image16, dark: Image16 | None, row: Ints, column: Ints
+) -> tuple[float, ...] | None:
+    """Centroid, sums and largest number of a spot; None where there is nothing to measure."""
+    radius = OF_SPOT * np.sqrt(len(row) / np.pi) + OF_SPREAD_PX
+    if radius > MAX_RADIUS_PX:
+        return None
+    half = int(np.ceil(radius)) + RING_PX + 1
+    at = np.rint([column.mean(), row.mean()]).astype(int)
+    first = np.maximum(at - half, 0)
+    box = np.s_[first[1] : at[1] + half + 1, first[0] : at[0] + half + 1]
+    numbers = image[box].astype(np.float64)
+    light = numbers - (0 if dark is None else dark[box])
+    y, x = np.mgrid[0 : light.shape[0], 0 : light.shape[1]]
+    places = np.stack([x, y], axis=-1) + first
+    centre = np.array([column.mean(), row.mean()])
+    inside, above = np.zeros(x.shape, dtype=bool), np.zeros(x.shape)
+    for _ in range(ROUNDS):
+        away = ((places - centre) ** 2).sum(axis=-1)
+        inside = away <= radius**2
+        ring = ~inside & (away <= (radius + RING_PX) ** 2)
+        above = (light - np.median(light[ring], axis=0) if ring.any() else light).sum(axis=-1)
+        total = float(above[inside].sum())
+        if total <= 0:
+            return None
+        centre = (above[inside, None] * places[inside]).sum(axis=0) / total
+    offset = ((places - centre) ** 2).sum(axis=-1)[inside] / 2
+    return (
+        *centre,
+        total,
+        radius,
+        float((np.maximum(above[inside], 0) * offset).sum()),
+        float(offset[above[inside] != 0].sum()),
+        _colour_noise(light[inside]),
+        float(numbers[inside].max()),
+    )
+
+
+def _colour_noise(light: NDArray[np.float64]) -> float:
+    """Sum of squared differences of the colours (m, 3), each scaled to the mean of all."""
+    sums = light.sum(axis=0)
+    if (sums <= 0).any():
+        return 0.0
+    even = light * (sums.mean() / sums)
+    apart = float(((even - even.mean(axis=1, keepdims=True)) ** 2).sum())
+    # Of three colours two are free, when their mean is taken off; empty pixels are not rounded.
+    rounded = int(np.count_nonzero(light.any(axis=1)))
+    return float(apart - (light.shape[1] - 1) * ROUNDING * rounded)

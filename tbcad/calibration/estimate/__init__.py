@@ -1,0 +1,1 @@
+"""The machine that explains measured highlights best: maximum a posteriori."""

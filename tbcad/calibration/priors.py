@@ -1,0 +1,173 @@
+"""What is known of a machine before it is photographed: the errors of the process that made it.
+
+Figures of a process come from tbcad/tolerance/process/*.toml, each with its source there. What no
+process says is a judgement, below.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.calibration.estimate.parameters import (
+    ANGLES,
+    AXIS_POINT,
+    CAMERA_TURN,
+    CARRIER,
+    CENTRES,
+    DISTORTION,
+    FOCAL,
+    LEDS,
+    OFFSET,
+    PINHOLE,
+    PRINCIPAL,
+    RADII,
+    RUNOUT,
+    TILT,
+    Prior,
+)
+from tbcad.geometry.vectors import norm
+from tbcad.machine.machine import Machine
+from tbcad.machine.other_errors import LED_MM
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.types import Bools, Floats, Ints
+
+PRINCIPAL_SHARE = 0.01
+"""Of the width, by which the principal point is off: a sensor placed to 0.25 mm is 72 px of 3.45 um
+off at 2,080 px (Allied Vision Prosilica GT), lenses are centred better; judgement between both."""
+OBLONG = 1e-3
+"""By which pixels are not square: mask-made sensors are square to better; judgement."""
+DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
+"""k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
+15); judgement, wider than tbcad.machine.other_errors, because highlights tell it well. k3 is fixed:
+those of a few balls do not tell it from k2."""
+UNIFORM = math.sqrt(3)  # half width of a uniform distribution over its standard deviation
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What is special about the machine to be calibrated.
+
+    Attributes:
+        body_centre: of the bodies in the seats, mm, (k, 3); the spheres' own for balls.
+        is_cap: which spheres are made instead of purchased, (k,).
+        series: number of the series that each frame belongs to, (f,).
+        zero_error: half width of the base's angle zero, radians.
+        lens_known: whether focal lengths, principal point and distortion are given.
+        measured: radii that are measured, mm, with their standard deviations, by number of sphere.
+    """
+
+    body_centre: Floats
+    is_cap: Bools
+    series: Ints
+    zero_error: float = 0.0
+    lens_known: bool = False
+    measured: tuple[tuple[int, float, float], ...] = ()
+
+
+def prototype_prior(machine: Machine, errors: Errors, fitted: Fitted) -> Prior:
+    """Prior of a prototype whose balls are on a base that rotates.
+
+    Args:
+        machine: as designed.
+        errors: of its process.
+        fitted: what else is known.
+    """
+    radius, radii = _radii(machine, errors, fitted)
+    arm = norm(machine.centre - fitted.body_centre)
+    tilted = np.where(fitted.is_cap, arm * deviation(errors.cap_tilt), 0.0)
+    centres = np.hypot(deviation(errors.seat), tilted)
+    growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
+    frames, offset = len(machine.angle), fitted.zero_error / UNIFORM
+    sigma = _camera(machine, errors, fitted.lens_known) | {
+        TILT: np.full(2, deviation(errors.axis_tilt)),
+        AXIS_POINT: np.full(2, deviation(errors.shell_shift)),
+        OFFSET: np.full(
+            int(fitted.series.max()) + 1, math.hypot(offset, deviation(errors.rotation_angle))
+        ),
+        CARRIER: np.array([growth, deviation(errors.shell_shift)]),
+        LEDS: np.full(machine.leds.shape, _led(errors)),
+        CENTRES: np.repeat(centres[:, None], 3, axis=1),
+        RADII: radii,
+        ANGLES: np.full(frames, deviation(errors.rotation_angle)),
+        RUNOUT: np.full((frames, 2), deviation(errors.axis_runout)),
+    }
+    return Prior(_with_radii(machine, radius), fitted.series, sigma)
+
+
+def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:
+    """Prior of one shell with its camera; LEDs are held at the object's place, all at once.
+
+    In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
+
+    Args:
+        machine: as designed, with one frame.
+        errors: of its process.
+        lens_known: whether focal lengths, principal point and distortion are given.
+    """
+    spheres, shift = len(machine.radius), deviation(errors.shell_shift)
+    camera = _camera(machine, errors, lens_known)
+    camera[CAMERA_TURN] = np.hypot(camera[CAMERA_TURN], deviation(errors.shell_tilt))
+    camera[PINHOLE] = np.hypot(camera[PINHOLE], shift)
+    growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
+    sigma = camera | {
+        TILT: np.zeros(2),
+        AXIS_POINT: np.zeros(2),
+        OFFSET: np.zeros(1),
+        CARRIER: np.array([growth, 0.0]),
+        LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
+        CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
+        RADII: np.full(spheres, deviation(errors.whole_radius)),
+        ANGLES: np.zeros(1),
+        RUNOUT: np.zeros((1, 2)),
+    }
+    return Prior(machine, np.zeros(1, dtype=np.int64), sigma)
+
+
+def _centres(machine: Machine, errors: Errors) -> Floats:
+    """Of each centre along each axis, mm: its own error, and the warp that moves and turns it."""
+    warp, own = errors.warp, deviation(errors.sphere_centre)
+    turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
+    return np.asarray(np.hypot(own, warp.spread * np.hypot(1, turned)))
+
+
+def deviation(error: Error) -> float:
+    """Standard deviation of a kind of error."""
+    return error.spread if error.distribution == "normal" else error.spread / UNIFORM
+
+
+def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Floats]:
+    """Standard deviations of pose and lens.
+
+    A camera whose principal point is off is turned until its picture is in place again.
+    """
+    principal = 0.0 if lens_known else PRINCIPAL_SHARE * machine.camera.width_px
+    tilt = deviation(errors.camera_tilt)
+    aimed = math.hypot(tilt, principal / float(machine.camera.focal.mean()))
+    known = 0.0 if lens_known else 1.0
+    return {
+        CAMERA_TURN: np.array([aimed, aimed, tilt]),
+        PINHOLE: np.full(3, deviation(errors.camera_shift)),
+        FOCAL: known * np.array([deviation(errors.camera_focal), OBLONG]),
+        PRINCIPAL: np.full(2, principal),
+        DISTORTION: known * np.array(DISTORTIONS),
+    }
+
+
+def _led(errors: Errors) -> float:
+    """Of an LED's light along each axis: the whole stage's, and its own."""
+    return math.hypot(deviation(errors.shell_shift), LED_MM)
+
+
+def _radii(machine: Machine, errors: Errors, fitted: Fitted) -> tuple[Floats, Floats]:
+    """Means and standard deviations."""
+    made, bought = errors.whole_radius, errors.ball_radius
+    radius = machine.radius + np.where(fitted.is_cap, made.mean, bought.mean)
+    sigma = np.where(fitted.is_cap, deviation(made), deviation(bought))
+    for number, value, uncertainty in fitted.measured:
+        radius[number], sigma[number] = value, uncertainty
+    return radius, sigma
+
+
+def _with_radii(machine: Machine, radius: Floats) -> Machine:
+    return replace(machine, radius=radius)

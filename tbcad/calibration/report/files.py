@@ -1,0 +1,122 @@
+"""The folder of a calibration."""
+
+import json
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.estimate.covariance import covariance
+from tbcad.calibration.report.plots import INCHES, plots
+from tbcad.calibration.report.record import RECORD, calibration_record, covariance_bytes
+from tbcad.calibration.report.recovered import (
+    BESIDES,
+    Kind,
+    recovered_errors,
+    recovered_table,
+)
+from tbcad.calibration.report.recovered_plot import draw_recovered
+from tbcad.calibration.report.tables import (
+    angles_table,
+    rays_table,
+    residuals_table,
+    sphere_covariances,
+    spheres_table,
+)
+from tbcad.calibration.report.verdict import Verdict
+from tbcad.calibration.true_rays import place_mm, ray_errors, turn_mrad
+from tbcad.figure_files import PlotFormat, figure_file
+from tbcad.geometry.vectors import norm
+from tbcad.machine.machine import Machine
+from tbcad.machine.record import RECORD as MACHINE
+from tbcad.machine.record import write_machine
+from tbcad.output.manifest import write_manifest
+from tbcad.screen import WIDTH
+from tbcad.simulate.study.tables import csv_text
+
+COVARIANCE = "covariance.npz"
+
+
+def write_calibration(
+    folder: Path,
+    result: Calibration,
+    judged: Verdict,
+    basis: dict[str, Any],
+    plot: PlotFormat = "png",
+) -> dict[str, Any]:
+    """Write all files of a calibration, and return its record.
+
+    Args:
+        folder: exists, and is the caller's to replace.
+        result: the calibration.
+        judged: its verdict.
+        basis: names of run, export, process and lens.
+        plot: kind of the plots' files.
+    """
+    known = covariance(result.found.prior, result.found.information)
+    record = calibration_record(result, judged, known, basis)
+    write_machine(folder / MACHINE, result.found.machine, result.setup.frames)
+    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    tables = (
+        spheres_table(result, known),
+        angles_table(result, known),
+        rays_table(result),
+        residuals_table(result),
+    )
+    for table in tables:
+        (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
+    (folder / COVARIANCE).write_bytes(covariance_bytes(result, known))
+    for name, data in plots(result, sphere_covariances(result, known), plot).items():
+        (folder / name).write_bytes(data)
+    write_manifest(folder)
+    return record
+
+
+def write_recovered(
+    folder: Path, result: Calibration, truth: Machine, plot: PlotFormat = "png"
+) -> str:
+    """Write recovered.csv and its plot of a simulated run, and return what they say.
+
+    Args:
+        folder: of the calibration.
+        result: the calibration.
+        truth: the machine that was photographed.
+        plot: kind of the plot's file.
+    """
+    kinds = recovered_errors(
+        result, covariance(result.found.prior, result.found.information), truth
+    )
+    table = recovered_table(kinds)
+    (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
+    drawn = figure_file(lambda figure: draw_recovered(figure, kinds), INCHES, plot)
+    (folder / f"recovered.{plot}").write_bytes(drawn)
+    write_manifest(folder)
+    return _recovered_text(result, truth, kinds, plot)
+
+
+def _recovered_text(
+    result: Calibration, truth: Machine, kinds: tuple[Kind, ...], plot: PlotFormat
+) -> str:
+    figures = sum(len(kind.sigma) for kind in kinds)
+    within = sum(kind.within * len(kind.sigma) for kind in kinds) / figures
+    known = result.rays.known
+    errors = ray_errors(result.found, truth, known.frame, known.sphere)
+    found = [
+        f"{np.median(place_mm(one)):.3f} mm, {np.median(turn_mrad(one)):.2f} mrad"
+        for one in (errors.relative, errors.in_run)
+    ]
+    lines = [
+        f"of {figures} errors that were simulated, {within:.0%} are recovered to two standard "
+        f"deviations or better: recovered.csv, recovered.{plot}",
+        f"true errors of the rays: {found[0]} (median); among those of one run {found[1]}",
+    ]
+    for kind in kinds:
+        if kind.name == BESIDES:
+            off = norm((kind.recovered - kind.injected).reshape(-1, 3))
+            lines.append(
+                f"true errors of the centres, besides a motion and growth of all: "
+                f"{np.median(off):.1f} um (median), {off.max():.1f} um (largest)"
+            )
+    return "\n".join(textwrap.fill(line, WIDTH, subsequent_indent="  ") for line in lines)

@@ -1,0 +1,216 @@
+"""Recovered errors of a simulated build next to those that were injected."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.estimate.covariance import Covariance
+from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
+from tbcad.calibration.estimate.parameters import (
+    AXIS_POINT,
+    CAMERA_TURN,
+    DISTORTION,
+    FOCAL,
+    LEDS,
+    PINHOLE,
+    PRINCIPAL,
+    RUNOUT,
+    TILT,
+)
+from tbcad.calibration.report.tables import angle_deviations
+from tbcad.geometry.rotations import rotated
+from tbcad.machine.machine import Machine
+from tbcad.simulate.study.tables import Table
+from tbcad.types import Bools, Floats
+
+MICROMETRES, MILLI = 1000.0, 1000.0
+SIGMAS = 2.0
+BESIDES = "centres besides a motion and growth of all"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Errors of one kind, over n figures.
+
+    Attributes:
+        name: what they are of.
+        unit: of all three.
+        injected: by which the build differs from the design, (n,).
+        recovered: by which the calibrated machine does, (n,).
+        sigma: standard deviation that the calibration gives, (n,).
+    """
+
+    name: str
+    unit: str
+    injected: Floats
+    recovered: Floats
+    sigma: Floats
+
+    @property
+    def sigmas_off(self) -> Floats:
+        """Errors of the calibration in its standard deviations, (n,)."""
+        return (self.recovered - self.injected) / self.sigma
+
+    @property
+    def within(self) -> float:
+        """Share within two standard deviations."""
+        return float((np.abs(self.sigmas_off) <= SIGMAS).mean())
+
+
+def recovered_errors(result: Calibration, known: Covariance, truth: Machine) -> tuple[Kind, ...]:
+    """Errors by kind; what is fixed, or is not there, is left out.
+
+    Args:
+        result: the calibration.
+        known: covariance of its parameters.
+        truth: the machine that was photographed, with the same frames.
+    """
+    kinds = (*_of_spheres(result, known, truth), *_of_base(result, known, truth))
+    return tuple(
+        _free(kind) for kind in (*kinds, *_of_camera(result, known, truth)) if kind.sigma.any()
+    )
+
+
+def recovered_table(kinds: tuple[Kind, ...]) -> Table:
+    """All errors, one a row."""
+    columns: dict[str, ArrayLike] = {
+        "kind": [kind.name for kind in kinds for _ in kind.sigma],
+        "unit": [kind.unit for kind in kinds for _ in kind.sigma],
+    }
+    for name in ("injected", "recovered", "sigma", "sigmas_off"):
+        columns[name] = np.concatenate([getattr(kind, name) for kind in kinds])
+    return Table.of_columns("recovered", columns)
+
+
+def _free(kind: Kind) -> Kind:
+    free = kind.sigma > 0
+    return Kind(kind.name, kind.unit, kind.injected[free], kind.recovered[free], kind.sigma[free])
+
+
+def _kind(name: str, unit: str, factor: float, *values: Floats) -> Kind:
+    """Of values designed, true, estimated, and their deviations, in a unit by its factor."""
+    designed, true, found, sigma = (factor * np.asarray(one).ravel() for one in values)
+    return Kind(name, unit, true - designed, found - designed, sigma)
+
+
+def _of_spheres(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """Centres, also besides a motion and growth of all of them, and radii of balls and of caps."""
+    designed, found = result.setup.designed, result.found.machine
+    slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
+    covariance = np.asarray(slopes @ known.times(slopes.T.toarray()))
+    sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
+    of_centres = np.arange(sigma.size).reshape(-1, 4)[:, :3].ravel()
+    rest = _besides_motion(designed.centre)
+    besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
+    moved = [rest @ one.centre.ravel() for one in (designed, truth, found)]
+    caps = result.setup.plan.body_radius < result.setup.plan.radius
+    centres = [one.centre for one in (designed, truth, found)]
+    return [
+        _kind("centres", "um", MICROMETRES, *centres, sigma[:, :3]),
+        _kind(BESIDES, "um", MICROMETRES, *moved, np.sqrt(np.maximum(np.diag(besides), 0))),
+        *(
+            _radii(name, which, sigma, designed, truth, found)
+            for name, which in (("radii of balls", ~caps), ("radii of caps", caps))
+        ),
+    ]
+
+
+def _radii(name: str, which: Bools, sigma: Floats, *machines: Machine) -> Kind:
+    return _kind(name, "um", MICROMETRES, *(one.radius[which] for one in machines), sigma[which, 3])
+
+
+def _besides_motion(centre: Floats) -> Floats:
+    """Takes a shift, rotation and growth of all centres (k, 3) off their errors, (3 k, 3 k)."""
+    place = centre - centre.mean(axis=0)
+    turns = [np.cross(one, place).ravel() for one in np.eye(3)]
+    shifts = [np.broadcast_to(one, place.shape).ravel() for one in np.eye(3)]
+    basis, _ = np.linalg.qr(np.stack([*shifts, *turns, place.ravel()], axis=1))
+    return np.asarray(np.eye(place.size) - basis @ basis.T)
+
+
+def _of_base(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """Angles, the axis's direction, and where the base is in each frame beside its rotation."""
+    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
+    machines = designed, truth, found
+    angles = [np.degrees(one.angle) for one in machines]
+    tilts = [one.axis @ prior.across.T for one in machines]
+    places = [_base_places(one, prior.across) for one in machines]
+    return [
+        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_deviations(prior, known))),
+        _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, TILT)),
+        _kind("base in each frame", "um", MICROMETRES, *places, _place_deviations(result, known)),
+    ]
+
+
+def _base_places(machine: Machine, across: Floats) -> Floats:
+    """Where the base's origin goes in each frame, across the axis, mm, (f, 2)."""
+    point = np.broadcast_to(machine.axis_point, (len(machine.angle), 3))
+    turned = rotated(point, machine.axis, machine.angle)
+    shift = 0.0 if machine.shift is None else machine.shift
+    return np.asarray((point - turned + shift) @ across.T)
+
+
+def _place_deviations(result: Calibration, known: Covariance) -> Floats:
+    """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
+    prior, angle = result.found.prior, result.found.machine.angle
+    frames = np.arange(len(angle))
+    turned = np.stack(
+        [
+            rotated(np.broadcast_to(one, (len(angle), 3)), prior.mean.axis, angle)
+            for one in prior.across
+        ],
+        axis=2,
+    )
+    by_point = np.eye(2) - prior.across @ turned
+    columns = (
+        prior.first[AXIS_POINT] + np.arange(2),
+        prior.first[RUNOUT] + 2 * frames[:, None] + np.arange(2),
+    )
+    values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
+    covariance = known.of(Slopes(columns, values).matrix(prior), 2)
+    return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+
+
+def _of_camera(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """The camera's place and direction, its lens in deviations of the process, and LEDs."""
+    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
+    machines = designed, truth, found
+    turns = [_turn(designed, one) for one in machines]
+    lens = FOCAL, PRINCIPAL, DISTORTION
+    width = np.concatenate([prior.sigma[block] for block in lens])
+    unit = np.where(width > 0, width, 1.0)
+    lenses = [_lens(one) / unit for one in machines]
+    sigma = np.concatenate([_sigma(result, known, block) for block in lens]) / unit
+    places = [one.camera.pinhole for one in machines]
+    return [
+        _kind("camera's place", "um", MICROMETRES, *places, _sigma(result, known, PINHOLE)),
+        _kind("camera's direction", "mrad", MILLI, *turns, _sigma(result, known, CAMERA_TURN)),
+        _kind("lens", "deviations of the prior", 1.0, *lenses, sigma),
+        _kind("LEDs", "um", MICROMETRES, *(m.leds for m in machines), _sigma(result, known, LEDS)),
+    ]
+
+
+def _turn(designed: Machine, machine: Machine) -> Floats:
+    """By which a camera is rotated about its own axes, radians, (3,)."""
+    turn = machine.camera.axes @ designed.camera.axes.T
+    return np.asarray(Rotation.from_matrix(turn).as_rotvec())
+
+
+def _lens(machine: Machine) -> Floats:
+    """As the parameters of a lens are: see Prior."""
+    camera = machine.camera
+    logarithm = np.log(camera.focal)
+    focal = [logarithm.mean(), logarithm[0] - logarithm[1]]
+    return np.concatenate([focal, camera.principal, camera.distortion])
+
+
+def _sigma(result: Calibration, known: Covariance, block: str) -> Floats:
+    """Of a block's parameters, zero where they are fixed."""
+    prior = result.found.prior
+    every = np.zeros(len(prior.flat_sigma))
+    every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
+    first = prior.first[block]
+    return every[first : first + prior.sigma[block].size]

@@ -1,0 +1,186 @@
+"""`tbcad calibrate`: from a run's folder to the folder of its calibration."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
+from tbcad.calibration.detection.detect import detect
+from tbcad.calibration.detection.expected import Room
+from tbcad.calibration.intrinsics.files import read_lens
+from tbcad.calibration.options import DEFAULT_PROCESS, CalibrationOptions
+from tbcad.calibration.report.files import write_calibration, write_recovered
+from tbcad.calibration.report.verdict import Verdict, verdict, verdict_text
+from tbcad.calibration.setup_files import parse_measured
+from tbcad.errors import InputError
+from tbcad.figure_files import PlotFormat
+from tbcad.machine.designed import dome_radius
+from tbcad.machine.machine import Machine
+from tbcad.machine.record import TRUTH, read_machine
+from tbcad.output.folder import check_replaceable, replacing
+from tbcad.runs.photographs import Run, read_run
+from tbcad.runs.same_export import check_same_export
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.tolerance.process.process import Process, load_process, process_errors
+from tbcad.types import Progress
+
+SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
+READING, DETECTING, ESTIMATING, WRITING = (
+    "run and export",
+    "highlights in photographs",
+    "machine and its uncertainty",
+    "files",
+)
+
+
+@dataclass(frozen=True)
+class WrittenCalibration:
+    """A calibration whose files are written.
+
+    Attributes:
+        folder: that holds them.
+        result: the calibration.
+        verdict: what to think of it.
+        text: the verdict in words.
+        record: the object of calibration.json.
+        others: of a shell's other camera.
+    """
+
+    folder: Path
+    result: Calibration
+    verdict: Verdict
+    text: str
+    record: dict[str, Any]
+    others: tuple["WrittenCalibration", ...] = ()
+
+    @property
+    def every(self) -> tuple["WrittenCalibration", ...]:
+        """This one and the others."""
+        return (self, *self.others)
+
+
+def calibrate_run(
+    folder: Path,
+    exports: Path,
+    out: Path,
+    options: CalibrationOptions,
+    force: bool,
+    progress: Progress,
+    detail: Progress,
+) -> WrittenCalibration:
+    """Calibrate the machines that took a run's photographs, and write all that is found.
+
+    A prototype's files are in `out`, those of a shell's cameras in its folders a and b.
+
+    Raises:
+        InputError: one cannot be read, they do not belong together, there is nothing to calibrate
+            from, or out cannot be replaced.
+    """
+    progress(READING)
+    process = load_process(options.process or DEFAULT_PROCESS, options.settings)
+    run = read_run(folder)
+    check_same_export(run, exports)
+    machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}
+    for name in machines:
+        check_replaceable(out / name, force)
+    export = read_export(exports)
+    setups = [_setup(one, export, options) for one in machines.values()]
+    truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
+    found = []
+    for one, setup in zip(machines.values(), setups, strict=True):
+        progress(DETECTING)
+        measured = parse_measured(options.measured, len(setup.plan))
+        prior = setup.prior(process_errors(process), measured)
+        detection = detect(one, prior, _room(setup), dome_radius(export), detail)
+        progress(ESTIMATING)
+        found.append(calibrate(setup, detection, prior, detail))
+    progress(WRITING)
+    first, *others = (
+        _written(
+            result,
+            truth,
+            out / name,
+            _basis(one, result.setup, options, process),
+            force,
+            options.plot,
+        )
+        for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
+    )
+    return replace(first, others=tuple(others))
+
+
+def _setup(run: Run, export: ExportedDesign, options: CalibrationOptions) -> Setup:
+    record = run.record
+    lens = None if options.intrinsics is None else read_lens(options.intrinsics)
+    size = record.width_px, record.height_px
+    return prepared_setup(export, record.frames, size, lens, record.geometry)
+
+
+def _written(
+    result: Calibration,
+    truth: Machine | None,
+    out: Path,
+    basis: dict[str, Any],
+    force: bool,
+    plot: PlotFormat,
+) -> WrittenCalibration:
+    judged = verdict(result)
+    with replacing(out, force) as new:
+        record = write_calibration(new, result, judged, basis, plot)
+        texts = [] if truth is None else [write_recovered(new, result, truth, plot)]
+    text = "\n".join([verdict_text(result, judged), *texts])
+    return WrittenCalibration(out, result, judged, text, record)
+
+
+def _truth(run: Run, setup: Setup) -> Machine | None:
+    """The machine of a simulated run; None of a real one, and where its file was taken away.
+
+    Raises:
+        InputError: the file cannot be read, or is of another run.
+    """
+    if run.record.geometry == "shell":
+        return None  # its calibration is in the frame of the shell, its truth in the design's
+    path = run.folder / TRUTH
+    if run.record.source != SIMULATED or not path.is_file():
+        return None
+    truth, frames = read_machine(path)
+    shapes = [(len(one.radius), len(one.leds)) for one in (truth, setup.designed)]
+    if frames != run.record.frames or shapes[0] != shapes[1]:
+        raise InputError(
+            f"{path} is of another run: simulate the run again, or remove the file, which only "
+            "serves to compare"
+        )
+    return truth
+
+
+def _room(setup: Setup) -> Room:
+    """What the design lets an object fill: a cylinder on the disc within the capture sphere."""
+    stage = setup.export.spec.prototype.stage
+    radius = stage.object_diameter_mm / 2
+    return Room(radius, stage.top_mm, math.sqrt((setup.export.capture_mm / 2) ** 2 - radius**2))
+
+
+def _basis(run: Run, setup: Setup, options: CalibrationOptions, process: Process) -> dict[str, Any]:
+    """What the calibration is based on, for its record."""
+    lens = "estimated" if options.intrinsics is None else str(options.intrinsics)
+    return {
+        "run": str(run.folder.resolve()),
+        "exports": str(setup.export.folder.resolve()),
+        "export_sha256": run.record.export_sha256,
+        "source": run.record.source,
+        "geometry": run.record.geometry,
+        "camera": run.record.camera,
+        "photographs": {
+            "expected": len(run.record.frames) * len(run.record.phases),
+            "usable": len(run.exposures),
+        },
+        "process": {
+            "name": process.name,
+            "title": process.title,
+            "given": options.process is not None,
+            "settings": list(options.settings),
+        },
+        "lens": lens,
+        "measured_radii": list(options.measured),
+    }

@@ -1,0 +1,67 @@
+"""What else is known of a prototype: its angle zero, and radii that were measured."""
+
+import math
+import re
+from pathlib import Path
+
+from pydantic import Field
+
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import Record, read_json
+from tbcad.simulate.prototype.plan import MISSING, SCHEMA
+
+MEASURED_MM = 0.01
+"""Standard deviation of a radius that is measured without saying how well: by a micrometer screw
+over the body, or a spherometer."""
+PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
+
+Measured = tuple[tuple[int, float, float], ...]
+
+
+class _Home(Record):
+    zero_error_deg: float = Field(ge=0, le=180)
+
+
+class _Document(Record):
+    home: _Home | None = None
+
+
+def read_zero_error(path: Path) -> float:
+    """Half width of the base's angle zero by the record of a prototype, radians; 0 if not said.
+
+    Raises:
+        InputError: the record cannot be read.
+    """
+    home = read_json(path, _Document, SCHEMA, MISSING).home
+    return 0.0 if home is None else math.radians(home.zero_error_deg)
+
+
+def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
+    """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm.
+
+    Args:
+        texts: of the options.
+        balls: number of balls of the prototype.
+
+    Raises:
+        InputError: a text is neither, or names another ball.
+    """
+    return tuple(_measured(text, balls) for text in texts)
+
+
+def _measured(text: str, balls: int) -> tuple[int, float, float]:
+    found = PATTERN.fullmatch(text.replace(" ", ""))
+    try:
+        ball, radius, sigma = found.groups() if found else ("", "", "")
+        values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
+    except ValueError:
+        raise InputError(
+            f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write for "
+            "instance 1=43.21:0.01"
+        ) from None
+    if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
+        raise InputError(
+            f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation above "
+            "0 mm: change it"
+        )
+    return values
