@@ -48,7 +48,7 @@ def write_images(images: Mapping[Path, Bytes]) -> None:
         InputError: the folder cannot be written.
     """
     folder = next(iter(images)).parent
-    replace_files(folder, {path.name: _png(image) for path, image in images.items()})
+    replace_files(folder, {path.name: png_bytes(image) for path, image in images.items()})
 
 
 def write_animation(path: Path, frames: Sequence[Bytes]) -> None:
@@ -85,7 +85,8 @@ def difference(truth: Bytes, picture: Bytes) -> Bytes:
     return np.abs(truth.astype(np.int16) - picture.astype(np.int16)).astype(np.uint8)
 
 
-def _png(image: Bytes) -> bytes:
+def png_bytes(image: Bytes) -> bytes:
+    """A picture (h, w, 3), or grey (h, w), as a PNG file."""
     data = BytesIO()
     Image.fromarray(image).save(data, "png", compress_level=PNG_COMPRESSION)
     return data.getvalue()

@@ -36,17 +36,34 @@ def write_capture(
         capture_mm: diameter of the capture sphere.
         facts: how the capture is made.
     """
-    record: dict[str, Any] = {"schema": SCHEMA, "object": subject.name, **facts, "cameras": {}}
+    record = capture_record({"object": subject.name, **facts})
+    write_cameras(folder, photographs, capture_mm, record)
+    write_object(folder / OBJECT, subject)
+    write_record(folder, record)
+    return record
+
+
+def capture_record(facts: dict[str, Any]) -> dict[str, Any]:
+    """The record of a capture, to which `write_cameras` adds the cameras."""
+    return {"schema": SCHEMA, **facts, "cameras": {}}
+
+
+def write_cameras(
+    folder: Path, photographs: CameraPhotographs, capture_mm: float, record: dict[str, Any]
+) -> None:
+    """Write pictures and light field, and add what is in them to a record."""
     with create_light_field(folder / NAME, capture_mm, record) as store:
         for reflector, bands in photographs:
             picture, counts = write_camera(store, reflector, bands())
             file = folder / f"camera_{reflector.camera_id}.png"
             write_images({file: picture})
             record["cameras"][reflector.camera_id] = {"picture": file.name, **counts}
-    write_object(folder / OBJECT, subject)
+
+
+def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write capture.json."""
     text = json.dumps(record, indent=1) + "\n"
     (folder / RECORD).write_text(text, encoding="utf-8")
-    return record
 
 
 def write_object(path: Path, subject: SceneObject) -> None:
@@ -87,7 +104,10 @@ def _subject(arrays: dict[str, Any]) -> SceneObject:
         raise ValueError("arrays do not belong together")
     if faces.min() < 0 or faces.max() >= v or not np.isfinite(points).all():
         raise ValueError("facets have corners that do not exist")
+    light = arrays.get("light")
+    if light is not None and (light.shape != (v,) or not np.isfinite(light).all()):
+        raise ValueError("light and corners do not belong together")
     if (uv is None) != (texture is None) or (uv is not None and uv.shape != (f, 3, 2)):
         raise ValueError("a texture without its coordinates")
     name, patterned = str(arrays["name"]), bool(arrays["patterned"])
-    return SceneObject(name, points, faces, normals, albedo, uv, texture, patterned)
+    return SceneObject(name, points, faces, normals, albedo, uv, texture, patterned, light)

@@ -28,18 +28,22 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
+from tbcad.picture_bytes import png_bytes
 from tbcad.simulate.capture.photograph import RowBand
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
+SHOWN_PX = 1200  # width of what notebooks show
 PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "colour": ((3,), "u1"),
     "mirror": ((), "u2"),
     "origin": ((3,), "f4"),
     "direction": ((3,), "f4"),
 }
+# Bytes an array keeps unpacked: mirrors side by side share chunks, two rows of which fit in.
+CHUNK_CACHE = 32 << 20
 MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
 
 
@@ -94,9 +98,12 @@ class LightField:
         """
         file = path / NAME if path.is_dir() else path
         if not file.is_file():
-            raise InputError(f"{file} is no file: name a folder that tbcad capture wrote")
+            raise InputError(
+                f"{file}: no such file; give a light field: the folder that `tbcad capture` or "
+                "`tbcad merge` wrote, or its lightfield.h5"
+            )
         try:
-            store = h5py.File(file, "r")
+            store = h5py.File(file, "r", rdcc_nbytes=CHUNK_CACHE)
         except OSError as error:
             raise InputError(f"{file} is no light field: {error}: capture again") from error
         with store:
@@ -128,6 +135,12 @@ class LightField:
             for camera in [frame.camera]
         )
         return f"<LightField of {self.facts.get('object', 'an object')}: {sizes}>"
+
+    def _repr_png_(self) -> bytes:
+        """What notebooks show: the photographs side by side."""
+        images = [frame.image() for frame in self.frames.values()]
+        rows = min(len(image) for image in images)
+        return png_bytes(np.concatenate([image[:rows] for image in images], axis=1), SHOWN_PX)
 
 
 def band_arrays(band: RowBand) -> dict[str, NDArray[Any]]:

@@ -8,17 +8,18 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import Camera
+from tbcad.optics.lens_camera import LensCamera
 from tbcad.optics.reflection import reflect
 from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
 from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
-from tbcad.types import Bytes, Colours, Floats, Ints
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
 # Where a ball's front ends its body begins; for a bought ball both are the same sphere.
 SAME_MM = 1e-9
+# Points on balls are on them but for rounding.
+ON_BALL_MM = 1e-6
 # What lies beyond the outermost pixels' centres by no more than rounding is on them.
 EDGE_PX = 1e-6
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
@@ -43,12 +44,23 @@ class BallHits:
 
 def trace_balls(run: PrototypeRun, direction: Floats, stop: Ints) -> BallHits:
     """What unit directions (n, 3) from the pinhole meet at stops (n,)."""
-    pinhole = run.camera.pinhole
-    ball, distance = _first_ball(pinhole, direction, stop, run.balls)
+    return ball_hits(run.camera.pinhole, run.balls, direction, stop)
+
+
+def ball_hits(pinhole: Floats, balls: Floats, direction: Floats, stop: Ints) -> BallHits:
+    """What unit directions (n, 3) from a pinhole (3,) meet.
+
+    Args:
+        pinhole: mm, (3,).
+        balls: at each stop, (s, k, 8): see PrototypeRun.
+        direction: (n, 3).
+        stop: from 0, (n,).
+    """
+    ball, distance = _first_ball(pinhole, direction, stop, balls)
     on = ball > 0
     origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
     origin[on] = pinhole + distance[on, None] * direction[on]
-    sphere = run.balls[stop[on], ball[on] - 1]
+    sphere = balls[stop[on], ball[on] - 1]
     reflected[on] = reflect(direction[on], (origin[on] - sphere[:, :3]) / sphere[:, 3:4])
     return BallHits(ball, origin, reflected, distance)
 
@@ -68,18 +80,12 @@ def camera_colours(run: PrototypeRun, scene: Scene, direction: Floats, stop: Int
     return np.where(front[:, None], direct, reflected_colours(scene, hits))
 
 
-def pixel_rays(camera: Camera, pixels: Floats) -> Floats:
-    """Unit directions (n, 3) through columns and rows (n, 2); whole numbers are pixel centres."""
-    size = np.array([camera.width_px, camera.height_px])
-    return unit(camera.forward + (pixels - (size - 1) / 2) * camera.pixel_pitch @ camera.axes[:2])
-
-
-def image_points(camera: Camera, direction: Floats) -> Floats:
+def image_points(camera: LensCamera, direction: Floats) -> Floats:
     """Column and row (n, 2) where directions (n, 3) appear; NaN outside of the pixels' centres."""
     last = np.array([camera.width_px - 1.0, camera.height_px - 1.0])
-    ahead = direction @ camera.forward > 0
+    shown = camera.shows(direction)
     pixels = np.full((len(direction), 2), np.nan)
-    pixels[ahead] = camera.project(camera.pinhole + direction[ahead])
+    pixels[shown] = camera.project(camera.pinhole + direction[shown])
     outside = (pixels < -EDGE_PX) | (pixels > last + EDGE_PX)
     pixels[outside.any(axis=1)] = np.nan
     return np.asarray(np.clip(pixels, 0, last))
@@ -107,15 +113,22 @@ def resampled_photograph(
 
     Bilinear between the four nearest pixels, which are whole numbers as in a file.
     """
-    corner = np.floor(places).astype(np.int64)
-    x, y = (places - corner).T
-    weight = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
-    # Beyond the last column and row a corner has no weight.
-    near = corner[:, None] + CORNERS
+    near, weight = between_pixels(places)
     pixel = near[..., 0] + near[..., 1] * run.camera.width_px
     traced, which = np.unique(pixel, return_inverse=True)
     corners = _pixels(run, scene, stop, samples, traced)[which.reshape(len(places), 4)]
     return to_bytes(np.einsum("nk,nkc->nc", weight, corners))
+
+
+def between_pixels(places: Floats) -> tuple[Ints, Floats]:
+    """The four pixels about columns and rows (n, 2), (n, 4, 2), and their bilinear weights (n, 4).
+
+    Beyond the last column and row a pixel has no weight, and does not exist.
+    """
+    corner = np.floor(places).astype(np.int64)
+    x, y = (places - corner).T
+    weight = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
+    return corner[:, None] + CORNERS, weight
 
 
 def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels: Ints) -> Bytes:
@@ -126,8 +139,25 @@ def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels
     total = np.zeros((len(pixels), 3), dtype=np.float32)
     shifts = sample_shifts(samples)
     for shift in shifts:
-        total += camera_colours(run, scene, pixel_rays(run.camera, centres + shift), stops)
+        total += camera_colours(run, scene, run.camera.directions(centres + shift), stops)
     return to_bytes(total / np.float32(len(shifts)))
+
+
+@compiled
+def balls_between(start: Floats, end: Floats, balls: Floats) -> Bools:
+    """Whether a ball (k, 8) is between points (n, 3), which may be on balls."""
+    hidden = np.zeros(len(start), dtype=np.bool_)
+    for i in range(len(start)):
+        way = end[i] - start[i]
+        length = np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+        way /= length
+        for k in range(len(balls)):
+            enters, leaves = _span(start[i], way, balls[k, :3], balls[k, 3])
+            body_enters, body_leaves = _span(start[i], way, balls[k, 4:7], balls[k, 7])
+            first = max(enters, body_enters)
+            if first <= min(leaves, body_leaves) and ON_BALL_MM < first < length - ON_BALL_MM:
+                hidden[i] = True
+    return hidden
 
 
 @compiled

@@ -5,13 +5,16 @@ object the prototype is turned instead: its camera is then where the shell's cam
 ball in the place of one of camera b's mirrors. Both runs differ only in where the prototype is.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from tbcad.geometry.rotations import rotated
-from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.camera import Camera
+from tbcad.geometry.vectors import dot, unit
+from tbcad.optics.highlights import reflection_points
+from tbcad.optics.lens_camera import LensCamera, without_distortion
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
@@ -37,7 +40,7 @@ class PrototypeRun:
     """
 
     reflector: Reflector
-    camera: Camera
+    camera: LensCamera
     balls: Floats
     stop: Ints
     ball: Ints
@@ -52,9 +55,64 @@ class PrototypeRun:
 def prototype_runs(
     reflectors: tuple[Reflector, Reflector], plan: Plan
 ) -> tuple[PrototypeRun, PrototypeRun]:
-    """Both runs: that for camera a's mirrors, and that for camera b's, the object turned."""
-    a, b = reflectors
-    return _run(a, a.camera, plan, 0, np.ones(3)), _run(b, a.camera, plan, 1, HALF_TURN)
+    """Both runs as designed: for camera a's mirrors, and for camera b's, the object turned."""
+    camera = without_distortion(reflectors[0].camera)
+    a, b = (
+        prototype_run(reflector, plan, half, camera, _designed_balls(plan))
+        for half, reflector in enumerate(reflectors)
+    )
+    return a, b
+
+
+def prototype_run(
+    reflector: Reflector, plan: Plan, half: int, camera: LensCamera, balls: Floats
+) -> PrototypeRun:
+    """One run of a prototype whose camera and balls are where they are.
+
+    Args:
+        reflector: the shell's camera and mirrors.
+        plan: which ball stands in for which mirror.
+        half: 0 for camera a's mirrors, 1 for camera b's, the object turned.
+        camera: that takes the photographs, in the frame of the prototype.
+        balls: at each stop, in the frame of the prototype, as of `PrototypeRun`, (s, k, 8).
+    """
+    flip = HALF_TURN if half else np.ones(3)
+    balls, camera = balls * np.concatenate([flip, [1.0], flip, [1.0]]), _turned(camera, flip)
+    ball, stop = plan.ball[half], plan.stop[half]
+    centre, radius = balls[stop, ball, :3], balls[stop, ball, 3]
+    apex = reflection_points(centre, radius, np.zeros(3), camera.pinhole)
+    normal = (apex - centre) / radius[:, None]
+    window = reflector.mirrors.apex if plan.moved else _designed_apex(plan, half) * flip
+    return PrototypeRun(
+        reflector=reflector,
+        camera=camera,
+        balls=balls,
+        stop=stop,
+        ball=ball,
+        ball_surfaces=Surfaces(apex, normal, 1 / radius),
+        window_rotation=_window_rotations(window, reflector.camera.pinhole, apex, camera.pinhole),
+    )
+
+
+def balls_at_stops(
+    plan: Plan, centre: Floats, radius: Floats, place: Callable[[Floats], Floats]
+) -> Floats:
+    """Balls as of `PrototypeRun`, (s, k, 8).
+
+    Args:
+        plan: says where the sphere in the seat is, from the reflecting one, and how much larger.
+        centre: of the reflecting spheres at base angle zero, mm, (k, 3).
+        radius: of the reflecting spheres, mm, (k,).
+        place: moves points of the base (s, k, 3) from angle zero to the stops.
+    """
+    shape = (len(plan.angle), len(plan))
+    front, body = (
+        place(np.broadcast_to(points, (*shape, 3)))
+        for points in (centre, centre + plan.body_centre - plan.centre)
+    )
+    body_radius = radius + (plan.body_radius - plan.radius)
+    radii = [np.broadcast_to(one, shape)[..., None] for one in (radius, body_radius)]
+    return np.concatenate([front, radii[0], body, radii[1]], axis=2)
 
 
 def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
@@ -66,67 +124,41 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _run(reflector: Reflector, camera: Camera, plan: Plan, of: int, flip: Floats) -> PrototypeRun:
-    ball, stop, frame = plan.ball[of], plan.stop[of], plan.frame * flip
-    angle = plan.angle[stop]
-    apex, normal = (
-        rotated(vectors[ball] * flip, frame[0], angle) for vectors in (plan.apex, plan.normal)
-    )
-    turned = replace(
-        camera,
-        pinhole=camera.pinhole * flip,
-        forward=camera.forward * flip,
-        right=camera.right * flip,
-    )
-    rotations = _window_rotations(reflector.mirrors.apex, apex, frame, turned.pinhole)
-    if not plan.moved:
-        rotations = np.broadcast_to(np.eye(3), rotations.shape)
-    return PrototypeRun(
-        reflector=reflector,
-        camera=turned,
-        balls=_balls_at_stops(plan, frame[0], flip),
-        stop=stop,
-        ball=ball,
-        ball_surfaces=Surfaces(apex, normal, 1 / plan.radius[ball]),
-        window_rotation=rotations,
-    )
+def _designed_balls(plan: Plan) -> Floats:
+    place = partial(rotated, axis=plan.frame[0], angle=plan.angle[:, None])
+    return balls_at_stops(plan, plan.centre, plan.radius, place)
 
 
-def _balls_at_stops(plan: Plan, axis: Floats, flip: Floats) -> Floats:
-    """All balls at all stops, (s, k, 8)."""
-    shape = (len(plan.angle), len(plan))
-    centre, body_centre = (
-        rotated(np.broadcast_to(points * flip, (*shape, 3)), axis, plan.angle[:, None])
-        for points in (plan.centre, plan.body_centre)
-    )
-    radius, body_radius = (
-        np.broadcast_to(values, shape)[..., None] for values in (plan.radius, plan.body_radius)
-    )
-    return np.concatenate([centre, radius, body_centre, body_radius], axis=2)
+def _designed_apex(plan: Plan, half: int) -> Floats:
+    """Apices of the balls in place of a half's mirrors, where they are designed to be, (m, 3)."""
+    return rotated(plan.apex[plan.ball[half]], plan.frame[0], plan.angle[plan.stop[half]])
 
 
-def _window_rotations(mirror: Floats, ball: Floats, frame: Floats, pinhole: Floats) -> Floats:
-    """Rotation of each mirror's window along with its ball, (m, 3, 3).
+def _turned(camera: LensCamera, flip: Floats) -> LensCamera:
+    return replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
 
-    About the axis by the known difference of both azimuths, then in the plane of the axis by the
-    known angle between both apices as the pinhole sees them (tbcad.optics.windows).
+
+def _window_rotations(
+    window: Floats, window_pinhole: Floats, apex: Floats, pinhole: Floats
+) -> Floats:
+    """Rotation of each window along with its ball, (m, 3, 3).
+
+    The direction to one apex becomes that to the other, and the plane of incidence of the light
+    from the origin stays one (tbcad.optics.windows).
 
     Args:
-        mirror: apices of the mirrors, mm, (m, 3).
-        ball: apices of the balls in their places, mm, (m, 3).
-        frame: rows: axis, azimuth zero and third, (3, 3).
-        pinhole: mm, (3,).
+        window: apices that the windows are about, mm, (m, 3).
+        window_pinhole: that sees them, mm, (3,).
+        apex: of the balls in their places, mm, (m, 3).
+        pinhole: that sees the balls, mm, (3,).
     """
-    (phi, low), (psi, high) = (_angles(apex, frame, pinhole) for apex in (mirror, ball))
-    normal = np.cos(psi)[:, None] * frame[2] - np.sin(psi)[:, None] * frame[1]
-    still = np.broadcast_to(np.eye(3), (len(mirror), 3, 3))
-    about_axis = rotated(still, frame[0], (psi - phi)[:, None])
-    return rotated(about_axis, normal[:, None], (low - high)[:, None])
+    before, after = _sight(window, window_pinhole), _sight(apex, pinhole)
+    return np.asarray(np.swapaxes(before, 1, 2) @ after)
 
 
-def _angles(apex: Floats, frame: Floats, pinhole: Floats) -> tuple[Floats, Floats]:
-    """Azimuth of apices (m, 3), and the angle at the pinhole between them and the origin."""
-    ray = apex - pinhole
-    along = ray @ frame[0]
-    across = norm(ray - along[:, None] * frame[0])
-    return np.arctan2(apex @ frame[2], apex @ frame[1]), np.arctan2(across, -along)
+def _sight(apex: Floats, pinhole: Floats) -> Floats:
+    """Rows: direction to each apex, across the plane of incidence, and in it, (m, 3, 3)."""
+    ahead, home = unit(apex - pinhole), unit(-pinhole)
+    along = dot(ahead, np.broadcast_to(home, ahead.shape))
+    inward = unit(home - along[:, None] * ahead)
+    return np.stack([ahead, np.cross(inward, ahead), inward], axis=1)

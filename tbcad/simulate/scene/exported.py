@@ -12,7 +12,8 @@ from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import numbered_directions
 from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE, SCHEMA
 from tbcad.optics.camera import Camera
-from tbcad.optics.cells import cells_of
+from tbcad.optics.cells import Cells, cells_of
+from tbcad.optics.pedestals import flattened, pedestal_cells
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.simulate.scene.reflector import Reflector
@@ -120,7 +121,13 @@ def _reflector(
         np.array([[-1.0 if mirrored else 1.0, 0, 0], [0, 0, 1]]),
     )
     try:
-        cells = cells_of(surfaces.joined(walls), triangles[:, ::-1] if mirrored else triangles)
+        start = triangles[:, ::-1] if mirrored else triangles
+        if document.spec.shell.edges == "pedestal":
+            pinhole, groove = np.array(camera.pinhole_mm), document.spec.shell.groove_mm
+            flat = flattened(surfaces.joined(walls), start, pinhole)
+            cells: Cells = pedestal_cells(flat, surfaces, pinhole, groove)
+        else:
+            cells = cells_of(surfaces.joined(walls), start)
     except NotRegularError as error:
         raise InputError(
             f"{path}: the mirrors of camera {camera.id} bound no cells: {error}: {REBUILD}"

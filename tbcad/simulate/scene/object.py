@@ -36,6 +36,7 @@ class SceneObject:
         uv: where each facet's corners lie on `texture`, 0 to 1 from its lower left, (f, 3, 2).
         texture: the picture, (h, w, 3); None where `albedo` says it all.
         patterned: whether the built-in pattern is painted over it.
+        light: on each corner, 0 to 1, (v,); None for the built-in light.
     """
 
     name: str
@@ -46,6 +47,7 @@ class SceneObject:
     uv: Floats | None = None
     texture: Bytes | None = None
     patterned: bool = False
+    light: Floats | None = None
 
     @property
     def radius(self) -> float:
@@ -152,7 +154,7 @@ def _read(path: Path) -> Any:
     import trimesh
 
     if not path.is_file():
-        raise InputError(f"{path} is no file: name a triangle mesh (PLY, STL, OBJ, GLB ...)")
+        raise InputError(f"{path}: no such file; give a triangle mesh (PLY, STL, OBJ, GLB ...)")
     if path.stat().st_size > MAX_FILE_BYTES:
         raise InputError(f"{path} is over 1 GiB: reduce the mesh first")
     try:

@@ -71,8 +71,10 @@ def embree_scene(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any
 
 
 def prepared_scene(subject: SceneObject) -> Scene:
-    """Put an object into Embree and light it."""
+    """Put an object into Embree and light it, unless it brings its own light."""
     embree = embree_scene(subject.points, subject.faces)
+    if subject.light is not None:
+        return Scene(subject, embree, subject.light, subject.radius)
     lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
     sky = SKY_LIGHT * (0.75 + 0.25 * subject.normals[:, 2])
     return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)

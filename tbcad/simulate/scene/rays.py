@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.parallel import compiled
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.reflector import Reflector, check_joined
 from tbcad.types import Bools, Floats, Ints
 
 MirrorNumbers = NDArray[np.int32]
@@ -111,7 +111,11 @@ def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
+
+    Raises:
+        InputError: the mirrors stand on pedestals.
     """
+    check_joined(reflector, "views")
     boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
     camera, edges = reflector.camera, (reflector.side, reflector.foot)
     table = _table(reflector.mirrors, camera.pinhole)

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
@@ -99,6 +101,19 @@ class SubstitutedReflector(Reflector):
     def mirrors(self) -> Surfaces:
         """The reflecting surfaces."""
         return self.surfaces
+
+
+def check_joined(reflector: Reflector, what: str) -> None:
+    """Refuse mirrors on pedestals, where only edges between neighbouring spheres are known.
+
+    Raises:
+        InputError: as said; `what` is not simulated.
+    """
+    if isinstance(reflector.cells, PedestalCells):
+        raise InputError(
+            f'shell.edges is "pedestal": {what} of mirrors on pedestals are not simulated so far: '
+            "build the design with --set shell.edges=valley for them"
+        )
 
 
 def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:

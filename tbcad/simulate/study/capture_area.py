@@ -23,8 +23,8 @@ CURVES = {
     "flat_median_mm": ("flat, median", "C0.--"),
     "flat_minimum_mm": ("flat, minimum", "C0.-"),
     "flat_closed_form_mm": ("flat, 2 d sin(min theta_0)", "k:"),
-    "paper_claim_flat_mm": ("the paper: flat", "r+"),
-    "paper_claim_convex_mm": ("the paper: convex", "rx"),
+    "paper_claim_flat_mm": ("the paper: flat", "k+"),
+    "paper_claim_convex_mm": ("the paper: convex", "kx"),
 }
 NOTES = (
     "flat_closed_form_mm: 2 d sin(min theta_0), the largest sphere that every flat mirror sees "

@@ -240,7 +240,7 @@ def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
     ]
     polar = np.concatenate([one.array.polar for one in by_rule.values()] or [np.zeros(1)])
     ends = np.degrees([polar.min(), polar.max()])
-    for key, style in (("depth_near", "r--"), ("depth_far", "r-.")):
+    for key, style in (("depth_near", "k--"), ("depth_far", "k-.")):
         paper = claimed(key)
         series.append(Series(f"the paper: {paper:g} mm", ends, np.full(2, paper), style))
     title = "Virtual images of the capture sphere"

@@ -83,9 +83,10 @@ def balanced_sensors() -> tuple[BalancedSensor, ...]:
 def with_lens_of_table_i(spec: Spec) -> Spec:
     """The design, with the view angle of Table I where it leaves the angle open.
 
-    The angle that fits the mirrors changes with n, and with it the pixels of every mirror.
+    The angle that fits the mirrors changes with n, and with it the pixels of every mirror. A design
+    whose cameras or mirrors are elsewhere than those of Table I needs a lens of its own.
     """
-    if spec.camera.hfov_deg != FIT:
+    if spec.camera.hfov_deg != FIT or not has_optics_of_table_i(spec):
         return spec
     camera = spec.camera.model_copy(update={"hfov_deg": claimed("hfov")})
     return spec.model_copy(update={"camera": camera})
@@ -93,13 +94,17 @@ def with_lens_of_table_i(spec: Spec) -> Spec:
 
 def is_table_i(spec: Spec) -> bool:
     """Whether optics and lens of a design are those of Table I, whatever n, sensor and radii."""
-    optics, lens = spec.optics, with_lens_of_table_i(spec).camera
-    camera = [claimed("camera_x"), 0.0, claimed("camera_z")]
+    lens = with_lens_of_table_i(spec).camera
+    return has_optics_of_table_i(spec) and lens.hfov_deg == claimed("hfov")
+
+
+def has_optics_of_table_i(spec: Spec) -> bool:
+    """Whether cameras, ellipsoids and capture sphere of a design are those of Table I."""
+    optics = spec.optics
     return (
-        list(optics.camera_mm) == camera
+        list(optics.camera_mm) == [claimed("camera_x"), 0.0, claimed("camera_z")]
         and optics.semi_minor_mm == claimed("short_axis")
         and optics.capture_diameter_mm == claimed("capture_diameter")
-        and lens.hfov_deg == claimed("hfov")
     )
 
 

@@ -1,20 +1,18 @@
-"""Plots as data, and as PNG files whose bytes repeat."""
+"""Plots as data, and as PNG, SVG or PDF files whose bytes repeat."""
 
 from dataclasses import dataclass
-from io import BytesIO
 from typing import TYPE_CHECKING
 
+from tbcad.figure_files import PlotFormat, figure_file, legend_below
 from tbcad.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 PANEL_INCHES = (6.4, 5.2)
-DPI = 120
 MARKER_POINTS, CROSS_POINTS = 4, 7
-LEGEND_BELOW = -0.14  # of the axes' height, below the axis label
-LEGEND_COLUMNS = 2
 
 
 @dataclass(frozen=True)
@@ -59,22 +57,15 @@ class Panel:
     names: tuple[str, ...] = ()
 
 
-def plot_png(panels: tuple[Panel, ...]) -> bytes:
-    """Panels side by side as a PNG file; the same panels give the same bytes."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def plot_file(panels: tuple[Panel, ...], kind: PlotFormat = "png") -> bytes:
+    """Panels side by side as a file; the same panels give the same bytes."""
+    width, height = PANEL_INCHES
 
-    # A user's own settings must not change the picture.
-    with matplotlib.rc_context(matplotlib.rcParamsDefault):
-        width, height = PANEL_INCHES
-        figure = Figure(figsize=(width * len(panels), height), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+    def draw(figure: "Figure") -> None:
         for place, panel in enumerate(panels, 1):
             _draw(figure.add_subplot(1, len(panels), place), panel)
-        file = BytesIO()
-        figure.savefig(file, format="png", metadata={"Software": None})
-    return file.getvalue()
+
+    return figure_file(draw, (width * len(panels), height), kind)
 
 
 def _draw(axes: "Axes", panel: Panel) -> None:
@@ -90,20 +81,13 @@ def _draw(axes: "Axes", panel: Panel) -> None:
     axes.set_ylabel(panel.y_label)
     axes.grid(True, which="both", alpha=0.25)
     if any(series.label for series in panel.series):
-        # Below the axes, where it hides no data.
-        axes.legend(
-            fontsize=8,
-            loc="upper center",
-            bbox_to_anchor=(0.5, LEGEND_BELOW),
-            ncols=LEGEND_COLUMNS,
-            frameon=False,
-        )
+        legend_below(axes)
 
 
 def _draw_series(axes: "Axes", series: Series) -> None:
     label = series.label or None
     if series.shade is not None:
-        points = axes.scatter(series.x, series.y, c=series.shade, s=9, cmap="viridis", label=label)
+        points = axes.scatter(series.x, series.y, c=series.shade, s=9, label=label)
         axes.figure.colorbar(points, ax=axes, label=series.shade_label)
         axes.set_aspect("equal")
     elif series.style == "bars":

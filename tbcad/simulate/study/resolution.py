@@ -224,7 +224,7 @@ def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
         series.append(Series(label, counted.numbers("n"), pixels, f"C{k}.-"))
     rows = balanced_sensors()
     n = np.array([row.n for row in rows], dtype=np.float64)
-    for k, (heading, style) in enumerate(zip(HEADINGS.values(), ("rx", "r+"), strict=True)):
+    for k, (heading, style) in enumerate(zip(HEADINGS.values(), ("kx", "k+"), strict=True)):
         values = np.array([row.printed[k] for row in rows], dtype=np.float64)
         series.append(Series(f"{TABLE_II}: '{heading}'", n, values, style))
     title = "Virtual cameras, and pixels of one, over n"
@@ -239,7 +239,7 @@ def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
             label, n = f"{ratio}, pixels {kind}", rows.numbers("balanced_n")
             series.append(Series(label, megapixels(rows), n, f"C{k}{style}"))
     series.append(
-        Series(f"{TABLE_II}, 1:1", megapixels(balanced), balanced.numbers("paper_n"), "r+")
+        Series(f"{TABLE_II}, 1:1", megapixels(balanced), balanced.numbers("paper_n"), "k+")
     )
     title = "n that balances virtual cameras and pixels"
     return Panel(title, "sensor, megapixels", "subdivision n", tuple(series), logarithmic="x")

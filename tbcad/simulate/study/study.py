@@ -6,7 +6,8 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
-from tbcad.simulate.study.plots import Panel, plot_png
+from tbcad.figure_files import PlotFormat
+from tbcad.simulate.study.plots import Panel, plot_file
 from tbcad.simulate.study.tables import Cell, Table, csv_text
 
 SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
@@ -71,7 +72,9 @@ def check_study_folder(out: Path) -> None:
             raise PermissionError(errno.EACCES, "no right to write there")
 
 
-def write_study(study: Study, out: Path, more: dict[str, bytes] | None = None) -> list[Path]:
+def write_study(
+    study: Study, out: Path, more: dict[str, bytes] | None = None, plot: PlotFormat = "png"
+) -> list[Path]:
     """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
 
     Raises:
@@ -79,14 +82,14 @@ def write_study(study: Study, out: Path, more: dict[str, bytes] | None = None) -
     """
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-    return replace_files(out, study_files(study) | (more or {}))
+    return replace_files(out, study_files(study, plot) | (more or {}))
 
 
-def study_files(study: Study) -> dict[str, bytes]:
+def study_files(study: Study, plot: PlotFormat = "png") -> dict[str, bytes]:
     """The files of a study by name: the same study gives the same bytes."""
     tables = (study.summary, *study.tables)
     files = {f"{table.name}.csv": csv_text(table).encode() for table in tables}
     notes = [note for table in tables for note in table.notes]
     files[f"{study.name}-notes.txt"] = "".join(f"{note}\n" for note in notes).encode()
-    files[f"{study.name}.png"] = plot_png(study.panels)
+    files[f"{study.name}.{plot}"] = plot_file(study.panels, plot)
     return files

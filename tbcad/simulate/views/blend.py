@@ -12,10 +12,11 @@ import numpy as np
 from tbcad.simulate.parallel import chunks, compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
     RAYS_PER_CHUNK,
-    SAMPLED_RAY_STEP,
+    RAYS_PER_RUN,
     RayBundle,
-    candidate_mirrors,
+    boxes_around,
     greedy_descent,
+    mirrors_near_boxes,
     squared_distance,
 )
 from tbcad.types import Bools, Bytes, Floats, Ints
@@ -57,7 +58,7 @@ def _blend(
     depth: Floats,
     limit: float,
 ) -> Floats:
-    near = candidate_mirrors(pinholes, targets, limit, SAMPLED_RAY_STEP)
+    near = mirrors_near_boxes(pinholes, boxes_around(targets, RAYS_PER_RUN), limit)
     last = tiles[:, 3].copy()
     result = np.zeros((len(targets), 4))
     chosen, angle = np.empty(CAMERAS + 1, dtype=np.int64), np.empty(CAMERAS + 1)

@@ -11,11 +11,14 @@ from tbcad.simulate.capture.light_field import Frame, LightField
 from tbcad.types import Bools, Bytes, Floats, Ints
 
 NEIGHBOURS = 6
+BORDER = ((1, 1), (1, 1), (0, 0))  # a pixel on all sides, of rows, columns and components
 
 
 @dataclass(frozen=True)
 class MirrorTile:
-    """The rectangle of h x w pixels that holds a mirror's, row by row; n = h w.
+    """A rectangle of h x w pixels that holds a mirror's, row by row; n = h w.
+
+    The pixels on its border are not of the mirror, so that each of the mirror's has 8 neighbours.
 
     Attributes:
         shape: h and w.
@@ -108,10 +111,12 @@ def _tile(frame: Frame, index: int) -> MirrorTile | None:
         return None
     rows, columns = (np.flatnonzero(valid.any(axis=axis)) for axis in (1, 0))
     cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    height, width = valid[cut].shape
-    valid = valid[cut].ravel()
+    valid = np.pad(valid[cut], 1)
+    height, width = valid.shape
+    valid = valid.ravel()
     colour, origin, direction = (
-        pixels[name][cut].reshape(-1, 3) for name in ("colour", "origin", "direction")
+        np.pad(pixels[name][cut], BORDER).reshape(-1, 3)
+        for name in ("colour", "origin", "direction")
     )
     pinhole, spread = convergence_point(origin[valid], direction[valid])
     middle = _middle(valid, height, width)

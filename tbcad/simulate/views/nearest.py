@@ -8,24 +8,24 @@ import numpy as np
 from tbcad.simulate.parallel import chunks, compiled, in_threads
 from tbcad.simulate.views.ray_bundle import (
     RAYS_PER_CHUNK,
-    SAMPLED_RAY_STEP,
+    RAYS_PER_RUN,
     RayBundle,
-    candidate_mirrors,
-    greedy_descent,
-    squared_distance,
+    boxes_around,
+    mirrors_near_boxes,
 )
 from tbcad.types import Floats, Ints
 
-# Target rays in a row that are so near to each other that a few mirrors do for all of them.
-RAYS_PER_RUN = 64
-SAMPLED_IN_RUN = 4
-
 
 def nearest_rays(bundle: RayBundle, targets: Floats) -> Ints:
-    """Pixel (n,) of the bundle nearest to each target (n, 4); -1 beyond the bundle's limit."""
+    """Pixel (n,) of the bundle nearest to each target (n, 4); -1 beyond the bundle's limit.
+
+    Any order of the targets gives the same pixels; neighbours one after the other take less time.
+    """
+    # That far a ray may pass the virtual pinhole, for each mm of its distance from the target.
+    reach = np.sqrt(1 + bundle.pinholes[:, 2] ** 2)
 
     def pixels(part: slice) -> Ints:
-        arrays = bundle.points, bundle.tiles, bundle.pinholes
+        arrays = bundle.points, bundle.tiles, bundle.pinholes, reach
         return _nearest(*arrays, targets[part], bundle.limit)
 
     parts = in_threads(pixels, chunks(len(targets), RAYS_PER_CHUNK))
@@ -33,48 +33,65 @@ def nearest_rays(bundle: RayBundle, targets: Floats) -> Ints:
 
 
 @compiled
-def _nearest(points: Floats, tiles: Ints, pinholes: Floats, targets: Floats, limit: float) -> Ints:
-    near_chunk = candidate_mirrors(pinholes, targets, limit, SAMPLED_RAY_STEP)
+def _nearest(
+    points: Floats, tiles: Ints, pinholes: Floats, reach: Floats, targets: Floats, limit: float
+) -> Ints:
+    boxes = boxes_around(targets, RAYS_PER_RUN)
+    near_chunk = mirrors_near_boxes(pinholes, boxes, limit)
     near, previous = near_chunk, -1
     last = tiles[:, 3].copy()
-    # How near each mirror came, or may have come, when last asked, and how far the targets have
-    # moved since: they cannot have come nearer by more than that.
-    came, moved = np.full(len(tiles), -np.inf), 0.0
     result = np.full(len(targets), -1, dtype=np.int64)
     for i in range(len(targets)):
-        ray = targets[i]
+        x, y, a, b = targets[i, 0], targets[i, 1], targets[i, 2], targets[i, 3]
         if i % RAYS_PER_RUN == 0:
-            run = targets[i : i + RAYS_PER_RUN]
-            near = near_chunk[candidate_mirrors(pinholes[near_chunk], run, limit, SAMPLED_IN_RUN)]
-        if i > 0:
-            step = 0.0
-            for j in range(4):
-                step += (ray[j] - targets[i - 1, j]) ** 2
-            moved += np.sqrt(step)
+            run = boxes[i // RAYS_PER_RUN : i // RAYS_PER_RUN + 1]
+            near = near_chunk[mirrors_near_boxes(pinholes[near_chunk], run, limit)]
         best, owner = limit, -1
         for rank in range(-1, len(near)):  # first the mirror of the previous target
             k = previous if rank < 0 else near[rank]
-            if k < 0 or last[k] < 0 or came[k] - moved >= best or (rank >= 0 and k == previous):
+            if k < 0 or (rank >= 0 and k == previous):
                 continue
-            bound = _lower_bound(pinholes[k], ray) if rank >= 0 else 0.0
-            if bound >= best:
-                came[k] = bound + moved
+            depth = pinholes[k, 2]
+            across, down = x + depth * a - pinholes[k, 0], y + depth * b - pinholes[k, 1]
+            beyond = best * reach[k] + pinholes[k, 3]
+            if across * across + down * down > beyond * beyond or last[k] < 0:
                 continue
-            last[k] = greedy_descent(points, tiles[k], last[k], ray, 0.0, 1.0)
-            distance = np.sqrt(squared_distance(points, last[k], ray, 0.0, 1.0))
-            came[k] = distance + moved
-            if distance < best:
-                best, result[i] = distance, last[k]
-                owner = k
+            # What is found is no bound for later targets: where the descent ends at the edge of a
+            # mirror's pixels, the nearest may be much nearer.
+            pixel, squared = _descend(points, tiles[k, 2], last[k], x, y, a, b)
+            last[k] = pixel
+            if squared < best * best:
+                best, result[i], owner = np.sqrt(squared), pixel, k
         previous = owner
     return result
 
 
 @compiled
-def _lower_bound(pinhole: Floats, ray: Floats) -> float:
-    """Minimum distance that a mirror's rays can have from a target ray, mm."""
-    x = ray[0] + pinhole[2] * ray[2] - pinhole[0]
-    y = ray[1] + pinhole[2] * ray[3] - pinhole[1]
-    past = max(np.sqrt(x * x + y * y) - pinhole[3], 0.0)
-    result: float = past / np.sqrt(1 + pinhole[2] ** 2)
+def _descend(
+    points: Floats, width: int, start: int, x: float, y: float, a: float, b: float
+) -> tuple[int, float]:
+    """As `greedy_descent`, to the target (x, y, a, b), with the squared distance that it ends at.
+
+    Numbers instead of parts of arrays: numba counts who uses an array, which takes longer than
+    the distances.
+    """
+    pixel = start
+    best = _squared_distance(points, pixel, x, y, a, b)
+    while True:
+        nearer = pixel
+        for row in (pixel - width, pixel, pixel + width):
+            for other in (row - 1, row, row + 1):
+                squared = _squared_distance(points, other, x, y, a, b)
+                if squared < best:  # never so for NaN
+                    best, nearer = squared, other
+        if nearer == pixel:
+            return pixel, best
+        pixel = nearer
+
+
+@compiled
+def _squared_distance(points: Floats, pixel: int, x: float, y: float, a: float, b: float) -> float:
+    across, down = points[pixel, 0] - x, points[pixel, 1] - y
+    slope, steepness = points[pixel, 2] - a, points[pixel, 3] - b
+    result: float = across * across + down * down + slope * slope + steepness * steepness
     return result

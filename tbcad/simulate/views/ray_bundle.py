@@ -11,15 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled
+from tbcad.simulate.parallel import chunks, compiled, in_threads
 from tbcad.simulate.views.mirror_tiles import MirrorTile
 from tbcad.simulate.views.two_plane import TwoPlane
 from tbcad.types import Bytes, Floats, Ints
 
 # Target rays that go through the loops together: neighbours, so that few mirrors are near.
-RAYS_PER_CHUNK = 1 << 11
-# Every 31st target ray is looked at to find the mirrors near a chunk of them.
-SAMPLED_RAY_STEP = 31
+RAYS_PER_CHUNK = 1 << 12
+# Target rays in a row that are so near to each other that a few mirrors do for all of them.
+RAYS_PER_RUN = 64
+TILES_PER_CHUNK = 16
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class RayBundle:
         limit: how far a ray may be from a target ray that it is used for, mm.
         points: two-plane coordinates, (n, 4); NaN at pixels of another mirror or too oblique.
         tiles: first pixel, height and width of each tile, and a pixel in its middle that has a
-            ray, -1 if none has, (k, 4).
+            ray, -1 if none has, (k, 4). Pixels on the border of a tile have no ray.
         pinholes: of the virtual cameras: across, across, depth over s, and how far from there
-            the rays pass, mm, (k, 4).
+            the rays pass at that depth, mm, (k, 4).
         colour: (n, 3).
     """
 
@@ -47,50 +48,84 @@ class RayBundle:
 
 def ray_bundle(two_plane: TwoPlane, tiles: list[MirrorTile], limit: float) -> RayBundle:
     """The rays of at least one tile."""
-    origin, direction, valid, colour = (
-        np.concatenate([getattr(tile, name) for tile in tiles])
-        for name in ("origin", "direction", "valid", "colour")
-    )
-    points = two_plane.coordinates(origin, direction, valid)
     shape = np.array([tile.shape for tile in tiles])
-    first = np.cumsum(shape.prod(axis=1)) - shape.prod(axis=1)
+    ends = np.cumsum(shape.prod(axis=1))
+    first = ends - shape.prod(axis=1)
+    place = two_plane.place(np.stack([tile.pinhole for tile in tiles]))
+    points, spread = np.empty((ends[-1], 4)), np.empty(len(tiles))
+
+    def fill(part: slice) -> None:
+        for k, tile in enumerate(tiles[part], part.start):
+            rays = points[first[k] : ends[k]]
+            two_plane.fill(rays, tile.origin, tile.direction, tile.valid)
+            spread[k] = _spread(rays, place[k])
+
+    in_threads(fill, chunks(len(tiles), TILES_PER_CHUNK))
     middle = first + np.array([tile.middle for tile in tiles])
     start = np.where(np.isnan(points[middle, 0]), -1, middle)
-    pinhole = two_plane.place(np.stack([tile.pinhole for tile in tiles]))
-    spread = np.array([tile.spread for tile in tiles])
     return RayBundle(
         two_plane=two_plane,
         limit=limit,
         points=points,
         tiles=np.column_stack([first, shape, start]),
-        pinholes=np.column_stack([pinhole, spread]),
-        colour=colour,
+        pinholes=np.column_stack([place, spread]),
+        colour=np.concatenate([tile.colour for tile in tiles]),
     )
 
 
 @compiled
-def candidate_mirrors(pinholes: Floats, targets: Floats, limit: float, step: int) -> Ints:
-    """Mirrors (c,) whose rays may be within a limit of target rays that are neighbours.
+def _spread(points: Floats, pinhole: Floats) -> float:
+    """Largest distance of rays (n, 4) from a point (3,) at its depth, mm; 0 without rays."""
+    largest = 0.0
+    for i in range(len(points)):
+        x = points[i, 0] + pinhole[2] * points[i, 2] - pinhole[0]
+        y = points[i, 1] + pinhole[2] * points[i, 3] - pinhole[1]
+        largest = max(largest, x * x + y * y)  # never NaN
+    return float(np.sqrt(largest))
+
+
+@compiled
+def boxes_around(targets: Floats, count: int) -> Floats:
+    """Middles and half sides (r, 2, 4) of boxes that hold `count` targets (n, 4) in a row each.
+
+    Targets without coordinates count for nothing; a box without any is NaN.
+    """
+    boxes = np.empty(((len(targets) + count - 1) // count, 2, 4))
+    for run in range(len(boxes)):
+        last = min((run + 1) * count, len(targets))
+        for j in range(4):
+            low, high = np.inf, -np.inf
+            for i in range(run * count, last):
+                low, high = min(low, targets[i, j]), max(high, targets[i, j])  # never NaN
+            boxes[run, 0, j], boxes[run, 1, j] = (low + high) / 2, (high - low) / 2
+    return boxes
+
+
+@compiled
+def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
+    """Mirrors (c,) whose rays may be within a limit of a target ray in any of some boxes.
 
     Args:
         pinholes: as in `RayBundle`, (k, 4).
-        targets: two-plane coordinates, (n, 4).
+        boxes: middles and half sides, (r, 2, 4).
         limit: mm.
-        step: between the targets that are looked at; the last one always is.
     """
     kept = np.empty(len(pinholes), dtype=np.int64)
     count = 0
     for k in range(len(pinholes)):
-        low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for i in range(0, len(targets) + step - 1, step):
-            ray = targets[min(i, len(targets) - 1)]
-            for j in range(2):
-                across = ray[j] + pinholes[k, 2] * ray[2 + j] - pinholes[k, j]
-                low[j], high[j] = min(low[j], across), max(high[j], across)
-        margin = pinholes[k, 3] + limit * np.sqrt(1 + pinholes[k, 2] ** 2)
-        if low[0] <= margin and high[0] >= -margin and low[1] <= margin and high[1] >= -margin:
-            kept[count] = k
-            count += 1
+        depth = pinholes[k, 2]
+        margin = pinholes[k, 3] + limit * np.sqrt(1 + depth * depth)
+        for run in range(len(boxes)):
+            middle, half = boxes[run, 0], boxes[run, 1]
+            x = abs(middle[0] + depth * middle[2] - pinholes[k, 0])
+            y = abs(middle[1] + depth * middle[3] - pinholes[k, 1])
+            if (
+                x <= margin + half[0] + abs(depth) * half[2]
+                and y <= margin + half[1] + abs(depth) * half[3]
+            ):
+                kept[count] = k
+                count += 1
+                break
     return kept[:count]
 
 
@@ -114,15 +149,13 @@ def greedy_descent(
     points: Floats, tile: Ints, start: int, target: Floats, depth: float, slopes: float
 ) -> int:
     """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""
-    first, height, width = tile[0], tile[1], tile[2]
+    width = tile[2]
     best = squared_distance(points, start, target, depth, slopes)
     pixel = start
     while True:
-        y, x = divmod(pixel - first, width)
         nearer = pixel
-        for row in range(max(y - 1, 0), min(y + 2, height)):
-            for column in range(max(x - 1, 0), min(x + 2, width)):
-                other = first + row * width + column
+        for row in (pixel - width, pixel, pixel + width):
+            for other in (row - 1, row, row + 1):
                 distance = squared_distance(points, other, target, depth, slopes)
                 if distance < best:  # never so for NaN
                     best, nearer = distance, other

@@ -1,5 +1,6 @@
 """A large lens made of many pinholes (section 4.3 of the paper): the mean of their pictures."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from tbcad.simulate.views.synthesis import (
     search_radius,
 )
 from tbcad.simulate.views.two_plane import two_plane_along
-from tbcad.types import Bools, Colours, Floats, Progress
+from tbcad.types import Bools, Colours, Floats, Ints, Progress
 
 # 69 points of a square lattice, the paper's number of pinholes, are within this squared radius
 # in steps of the lattice.
@@ -57,12 +58,16 @@ class ThinLens:
         warn_of_wide_lens(self.aperture_mm, distance)
 
 
-def lens_pinholes() -> Floats:
-    """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them."""
-    reach = int(np.sqrt(LATTICE_RADIUS2))
+def lens_pinholes(radius2: int = LATTICE_RADIUS2) -> Floats:
+    """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them.
+
+    Args:
+        radius2: squared radius of the disc in steps of the lattice.
+    """
+    reach = int(np.sqrt(radius2))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
-    inside = x**2 + y**2 <= LATTICE_RADIUS2
-    return np.asarray(np.stack([x[inside], y[inside]], axis=1) / np.sqrt(LATTICE_RADIUS2))
+    inside = x**2 + y**2 <= radius2
+    return np.asarray(np.stack([x[inside], y[inside]], axis=1) / np.sqrt(radius2))
 
 
 def lens_rays(
@@ -85,18 +90,26 @@ def lens_rays(
     return np.broadcast_to(view.pinhole + offset, direction.shape), direction
 
 
-def refocus(tiles: MirrorTiles, view: Camera, focus: ThinLens) -> SynthesisedView:
+def refocus(
+    tiles: MirrorTiles,
+    view: Camera,
+    focus: ThinLens,
+    pinholes: Floats | None = None,
+    proceed: Callable[[], None] = lambda: None,
+) -> SynthesisedView:
     """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
     Args:
         tiles: the light field.
         view: the middle of the lens, and the picture.
         focus: the lens.
+        pinholes: their places on the unit disc, (n, 2), if not those 69.
+        proceed: called before every few pinholes; may raise to give up.
 
     Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
     the mean is of the others.
     """
-    places = lens_pinholes() * focus.aperture_mm / 2
+    places = (lens_pinholes() if pinholes is None else pinholes) * focus.aperture_mm / 2
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     square = np.abs(places).max() * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
     corners = [
@@ -104,19 +117,19 @@ def refocus(tiles: MirrorTiles, view: Camera, focus: ThinLens) -> SynthesisedVie
     ]
     origin, direction = (np.concatenate(part) for part in zip(*corners, strict=True))
     bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
-    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
-    count = np.zeros((view.height_px, view.width_px), dtype=np.float32)
+    total = np.zeros((view.height_px * view.width_px, 3), dtype=np.float32)
+    count = np.full(len(total), len(places), dtype=np.float32)
 
-    def one(place: Floats) -> tuple[Bools, Colours, Bools]:
-        meets, rays = rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
-        return meets, *ray_colours(bundle, rays)
+    def one(place: Floats) -> tuple[Ints, Colours, Bools]:
+        pixels, rays = rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
+        return pixels, *ray_colours(bundle, rays)
 
-    for meets, colours, seen in in_batches(one, list(places)):
-        total[meets] += colours
-        count += ~meets
-        count[meets] += seen
-    mean = total / np.maximum(count, 1)[..., None]
-    return SynthesisedView(mean.astype(np.float32), count > 0)
+    for pixels, colours, seen in in_batches(one, list(places), lambda _: proceed()):
+        total[pixels] += colours
+        count[pixels] -= ~seen
+    mean = total / np.maximum(count, 1)[:, None]
+    shape = view.height_px, view.width_px
+    return SynthesisedView(mean.astype(np.float32).reshape(*shape, 3), count.reshape(shape) > 0)
 
 
 def refocus_sweep(

@@ -2,29 +2,39 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.optics.camera import Camera
+from tbcad.picture_bytes import png_bytes
+from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.blend import blend_cameras
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
-from tbcad.simulate.views.ray_bundle import RayBundle, candidate_mirrors, ray_bundle
+from tbcad.simulate.views.ray_bundle import (
+    RayBundle,
+    boxes_around,
+    mirrors_near_boxes,
+    ray_bundle,
+)
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
-from tbcad.types import Bools, Colours, Floats, Ints
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints
+
+# The pixels of a block are a run of target rays.
+BLOCK_PX = 8
+# So many target rays, in a row, are looked at together to find the mirrors near a view.
+RAYS_PER_BOX = 1024
 
 Method = Literal["nearest", "blend"]
 Rays = tuple[Floats, Floats]
 """Origins and unit directions, (n, 3) each."""
 DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
-
-# Every 601st target ray is looked at to find the mirrors near a view.
-VIEW_RAY_STEP = 601
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,15 @@ class SynthesisedView:
         """The picture in whole numbers, (h, w, 3)."""
         return np.rint(self.colour).astype(np.uint8)
 
+    def __repr__(self) -> str:
+        """Return size and the share that was seen."""
+        rows, columns = self.seen.shape
+        return f"<SynthesisedView: {columns} x {rows}, {self.seen.mean():.1%} seen>"
+
+    def _repr_png_(self) -> bytes:
+        """What notebooks show: the picture."""
+        return png_bytes(self.image)
+
 
 def synthesise(
     tiles: MirrorTiles,
@@ -62,7 +81,7 @@ def synthesise(
     """
     direction = view_directions(view)
     origin = np.broadcast_to(view.pinhole, direction.shape)
-    meets, rays = rays_to_capture_sphere(tiles, (origin, direction))
+    pixels, rays = rays_to_capture_sphere(tiles, (origin, direction))
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
     colours, seen = ray_colours(bundle, rays, method, depth)
@@ -71,17 +90,48 @@ def synthesise(
         bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
         colours[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
     colour = np.zeros(direction.shape, dtype=np.float32)
-    colour[meets] = colours
-    complete = ~meets
-    complete[meets] = seen
+    complete = np.ones(direction.shape[:2], dtype=bool)
+    colour.reshape(-1, 3)[pixels] = colours
+    complete.reshape(-1)[pixels] = seen
     return SynthesisedView(colour, complete)
 
 
-def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Bools, Rays]:
-    """Which rays (h, w, 3) meet the capture sphere, (h, w), and those rays, (n, 3)."""
+def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Ints, Rays]:
+    """Which rays (h, w, 3) meet the capture sphere, and those rays, (n, 3).
+
+    Which: numbers of pixels, row by row, (n,). They come block by block, so that rays that follow
+    each other are neighbours.
+    """
     flat = [part.reshape(-1, 3) for part in rays]
     meets = meets_sphere(flat[0], flat[1], tiles.source.capture_mm / 2)
-    return meets.reshape(rays[0].shape[:2]), (flat[0][meets], flat[1][meets])
+    pixels, *chosen = _chosen(pixels_in_blocks(*rays[0].shape[:2]), meets, *flat)
+    return pixels, (chosen[0], chosen[1])
+
+
+@compiled
+def _chosen(
+    order: Ints, meets: Bools, origin: Floats, direction: Floats
+) -> tuple[Ints, Floats, Floats]:
+    """Those numbers of an order that are chosen, and their rays."""
+    pixels = np.empty(meets.sum(), dtype=np.int64)
+    origins, directions = np.empty((len(pixels), 3)), np.empty((len(pixels), 3))
+    count = 0
+    for pixel in order:
+        if meets[pixel]:
+            pixels[count] = pixel
+            for j in range(3):
+                origins[count, j] = origin[pixel, j]
+                directions[count, j] = direction[pixel, j]
+            count += 1
+    return pixels, origins, directions
+
+
+@lru_cache(maxsize=4)
+def pixels_in_blocks(height: int, width: int) -> Ints:
+    """Numbers of all pixels (n,), as counted row by row, in the order of blocks of BLOCK_PX."""
+    row, column = np.divmod(np.arange(height * width), width)
+    in_block = row % BLOCK_PX * BLOCK_PX + column % BLOCK_PX
+    return np.lexsort((in_block, column // BLOCK_PX, row // BLOCK_PX))
 
 
 def nearby_rays(
@@ -106,10 +156,20 @@ def ray_colours(
     targets = bundle.two_plane.coordinates(*rays)
     if method == "nearest":
         pixels = nearest_rays(bundle, targets)
-        seen = pixels >= 0
-        return np.where(seen[:, None], bundle.colour[pixels], np.float32(0)), seen
+        return _colours_of(bundle.colour, pixels), pixels >= 0
     colour, seen = blend_cameras(bundle, targets, _depths(bundle.two_plane, rays, depth))
     return colour.astype(np.float32), seen
+
+
+@compiled
+def _colours_of(colour: Bytes, pixels: Ints) -> Colours:
+    """Colours (n, 3) of pixels; black for -1."""
+    result = np.zeros((len(pixels), 3), dtype=np.float32)
+    for i in range(len(pixels)):
+        if pixels[i] >= 0:
+            for j in range(3):
+                result[i, j] = colour[pixels[i], j]
+    return result
 
 
 def search_radius(tiles: MirrorTiles) -> float:
@@ -137,11 +197,8 @@ def _near_mirrors(tiles: MirrorTiles, two_plane: TwoPlane, targets: Floats, limi
     """Mirrors (k,) whose rays may be within the limit of targets (n, 4), by their apices."""
     place = two_plane.place(tiles.apex)
     behind = np.flatnonzero(place[:, 2] < 0)
-    targets = targets[~np.isnan(targets[:, 0])]
-    if len(targets) == 0:
-        return behind[:0]
     pinholes = np.column_stack([place[behind], tiles.width[behind]])
-    return behind[candidate_mirrors(pinholes, targets, limit, VIEW_RAY_STEP)]
+    return behind[mirrors_near_boxes(pinholes, boxes_around(targets, RAYS_PER_BOX), limit)]
 
 
 def _depths(two_plane: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:

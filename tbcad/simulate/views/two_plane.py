@@ -45,17 +45,25 @@ class TwoPlane:
             direction: unit vectors, (n, 3).
             valid: which rays there are, (n,); all of them if None.
         """
-        axes = np.ascontiguousarray(self.axes)
         origin, direction = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
         valid = np.ones(len(direction), dtype=np.bool_) if valid is None else valid
         result = np.empty((len(direction), 4))
 
         def fill(part: slice) -> None:
-            arrays = (origin[part], direction[part], valid[part], result[part])
-            _coordinates(axes, self.scale, *arrays)
+            self.fill(result[part], origin[part], direction[part], valid[part])
 
         in_threads(fill, chunks(len(direction), RAYS_PER_CHUNK))
         return result
+
+    def fill(
+        self,
+        result: Floats,
+        origin: NDArray[np.floating],
+        direction: NDArray[np.floating],
+        valid: Bools,
+    ) -> None:
+        """Write the `coordinates` of rays in contiguous arrays into an array (n, 4)."""
+        _coordinates(np.ascontiguousarray(self.axes), self.scale, origin, direction, valid, result)
 
     def place(self, points: Floats) -> Floats:
         """Points (n, 3), mm, along the axes, the third over s, (n, 3)."""
