@@ -25,7 +25,7 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import draw, shell_error_shapes
+from tbcad.tolerance.montecarlo.draws import shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.sensitivity import (
@@ -37,6 +37,7 @@ from tbcad.tolerance.montecarlo.sensitivity import (
 from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
 from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
+from tbcad.tolerance.prototype.wind_up import read_wind_up
 from tbcad.tolerance.prototype.windows import PrototypeCase, prototype_model
 from tbcad.tolerance.stages import (
     EVERY_PROCESS,
@@ -283,7 +284,8 @@ def _sharpness(
     scene = prepared_scene(scene_object)
     views = viewpoints_around(*VIEWPOINTS).cameras(export.capture_mm)
     reference = ReferenceViews(export.capture_mm, views, ground_truths(scene, views, detail))
-    builds = draw(errors, options.seed, range(PHOTOGRAPHED_BUILDS), len(export.reflectors[0]))
+    case = MonteCarloCase(simulator.edge_models, errors, options.seed)
+    builds = case.draws(range(PHOTOGRAPHED_BUILDS))
     residual = options.calibration_residual
     return sharpness(
         export.reflectors, builds, scene, reference, residual, options.seed, progress=detail
@@ -292,6 +294,7 @@ def _sharpness(
 
 def _prototype_yield(simulator: _Simulator, errors: Errors) -> PrototypeYield:
     export = simulator.export
-    model = prototype_model(export.reflectors, read_plan(export))
+    plan = read_plan(export)
+    model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
     result = simulator.all_builds(PrototypeCase(model, errors, simulator.options.seed))
     return PrototypeYield(result.uncalibrated, result.calibrated)

@@ -4,18 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 
-from tbcad import schedule
-from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import Spec
+from tbcad.spec.design import MAX_MARGIN, Spec
 from tbcad.spec.errors import SpecError
-from tbcad.tolerance.montecarlo.builds import WorstCase, coverage_at_yield, simulate
+from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.process.process import Process, process_errors
-from tbcad.tolerance.wanted_yield import check_yield
 from tbcad.types import Floats, Progress
 
 WorstCoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
@@ -23,10 +19,6 @@ WorstCoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
 
 MAX_TRIES = 6
 STEP_MM = 0.01  # margins are rounded up to a multiple of it
-# Simulated builds that the margin of a design is computed from, and their seed.
-BUILDS = 400
-SEED = 1
-LARGEST_MARGIN_MM = 20.0  # as in the design's keys
 
 
 @dataclass(frozen=True)
@@ -102,48 +94,13 @@ def margin(
         if share >= wanted_yield and (shortfall > -STEP_MM or tried == 0):
             return Margin(tried, share)
         tried = max(0.0, round(ceil((tried + shortfall) / STEP_MM - 1e-9) * STEP_MM, 6))
-        if tried > LARGEST_MARGIN_MM:
-            return Margin(None, share, f"it would need more than {LARGEST_MARGIN_MM:g} mm")
+        if tried > MAX_MARGIN:
+            return Margin(None, share, f"it would need more than {MAX_MARGIN:g} mm")
     if share >= wanted_yield:
         return Margin(tried, share)
     return Margin(None, share, f"not found in {MAX_TRIES} tries")
 
 
-def spec_for_process(
-    spec: Spec, process: Process, wanted_yield: float, progress: Progress = lambda _: None
-) -> Spec:
-    """The same design but for the minimum margin with which a process reaches a yield.
-
-    Args:
-        spec: the design.
-        process: how it is made.
-        wanted_yield: share of the builds that are to be good.
-        progress: called with each margin that is tried.
-
-    Raises:
-        InputError: no margin is enough, or the radii do not follow a target.
-    """
-    check_yield(wanted_yield)
-    if spec.mirrors.radius_rule != "traced":
-        raise InputError(
-            f"--for-process sets mirrors.margin_mm, which radii of rule "
-            f"{spec.mirrors.radius_rule} do not follow: use --radius-rule traced"
-        )
-    errors = process_errors(process, spec.mirrors.coating_um)
-    needed = margin(spec, errors, wanted_yield, _worst_coverage, progress)
-    if needed.mm is None:
-        raise InputError(
-            f"process {process.name} does not make {wanted_yield:.1%} of the builds good with any "
-            f"margin ({needed.reason}): choose a more exact one, or see tbcad tolerance"
-        )
-    return with_margin(spec, needed.mm)
-
-
-def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:
-    case = WorstCase(models, errors, SEED)
-    return simulate(case, BUILDS, schedule.run_units).worst
-
-
 def with_margin(spec: Spec, mm: float) -> Spec:
-    """The spec with another margin."""
+    """The spec with another margin, the same for all mirrors."""
     return spec_with(spec, mirrors={"margin_mm": round(mm, 6), "radius_rule": "traced"})

@@ -24,14 +24,16 @@ def _yield_curve(analysis: Analysis) -> Panel:
         Series(analysis.process.name, worst, 100 * share, "C0-"),
         Series(f"{analysis.target:g} mm", target, np.array([0.0, 100.0]), "k--"),
     )
-    return Panel("Builds whose worst camera covers ...", "... mm or more", "% of builds", series)
+    return Panel("Yield", "minimum coverage of a build, mm", "builds that reach it, %", series)
 
 
 def _loss_bars(analysis: Analysis) -> Panel:
     loss = np.array([effect.loss for effect in analysis.single_errors])
     names = tuple(in_words(effect.kind) for effect in analysis.single_errors)
     bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
-    return Panel("Loss by each kind of error alone", "mm of coverage", "", (bars,), names=names)
+    return Panel(
+        "Loss by each kind of error alone", "loss of coverage, mm", "", (bars,), names=names
+    )
 
 
 def _coverage_map(analysis: Analysis) -> Panel:
@@ -41,7 +43,12 @@ def _coverage_map(analysis: Analysis) -> Panel:
     horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
     x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
     dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
-    return Panel("Virtual cameras, the zenith in the middle", "degrees", "degrees", (dots,))
+    return Panel(
+        "Virtual cameras, the zenith in the middle",
+        "angle from the zenith along x, degrees",
+        "angle from the zenith along y, degrees",
+        (dots,),
+    )
 
 
 def directions(analysis: Analysis) -> Floats:

@@ -15,6 +15,7 @@ from tbcad.tolerance.montecarlo.builds import CoverageResult, estimate_yield
 from tbcad.tolerance.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
 from tbcad.tolerance.plots import directions, in_words, panels
 from tbcad.tolerance.process.process import ErrorSpec, Process
+from tbcad.tolerance.ray_spread import spread_dict, spread_sentence
 from tbcad.tolerance.yield_text import percent, yield_sentence
 from tbcad.types import Floats
 
@@ -35,6 +36,7 @@ UNITS = {
     "um": "micrometres",
     "mm": "mm",
     "permille": "per mille",
+    "percent": "%",
     "mrad": "mrad",
     "deg": "degrees",
 }
@@ -52,6 +54,7 @@ def summary_text(analysis: Analysis) -> str:
         _margin_sentence(analysis),
         _processes_sentence(analysis),
         _sharpness_sentence(analysis),
+        spread_sentence(analysis),
         _prototype_sentence(analysis),
     )
     return " ".join(filter(None, sentences))
@@ -172,6 +175,7 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
             "calibrated": float(sharp.calibrated.mean()),
             "calibration_residual_mrad": 1000 * analysis.options.calibration_residual,
         },
+        "ray_spread_mm": spread_dict(analysis),
         "prototype": prototype
         and {
             "uncalibrated": _result_dict(prototype.uncalibrated, analysis.target),

@@ -1,7 +1,7 @@
 """Thousands of simulated builds: what the cameras of each one cover, and how many cover enough."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import sqrt
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -10,10 +10,11 @@ import numpy as np
 
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.tolerance.montecarlo.coverage import coverage
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModels
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import EdgeModels, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.pointing import pointing
+from tbcad.tolerance.montecarlo.warp import WarpMaps
 from tbcad.types import Floats, Ints
 
 if TYPE_CHECKING:
@@ -87,22 +88,37 @@ class YieldEstimate:
 
 
 @dataclass(frozen=True)
-class MonteCarloCase:
-    """Simulates builds of the shell; it can be sent to another process.
+class ShellCase:
+    """Builds of the shell to be simulated; it can be sent to another process.
 
     Attributes:
         edge_models: both halves as designed.
         errors: of the process.
         seed: of all builds.
+        warp: what the process's warp does to both halves.
     """
 
     edge_models: EdgeModels
     errors: Errors
     seed: int
+    warp: WarpMaps | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find the maps once for all batches."""
+        object.__setattr__(self, "warp", warp_maps_of(self.edge_models, self.errors))
+
+    def draws(self, builds: range) -> tuple[ShellDraws, ShellDraws]:
+        """Errors of both halves of the builds of these numbers."""
+        return draw(self.errors, self.seed, builds, len(self.edge_models[0]), self.warp)
+
+
+@dataclass(frozen=True)
+class MonteCarloCase(ShellCase):
+    """Simulates builds of the shell."""
 
     def __call__(self, builds: range) -> ShellResult:
         """Result of the builds of these numbers."""
-        draws = draw(self.errors, self.seed, builds, len(self.edge_models[0]))
+        draws = self.draws(builds)
         diameter, pixels = coverage(self.edge_models, draws)
         rays = [
             pointing(edge_model, drawn)
@@ -120,17 +136,29 @@ class WorstResult:
 
 
 @dataclass(frozen=True)
-class WorstCase:
+class WorstCase(ShellCase):
     """The same builds as MonteCarloCase's, but only their minimum coverage, in less time."""
-
-    edge_models: EdgeModels
-    errors: Errors
-    seed: int
 
     def __call__(self, builds: range) -> WorstResult:
         """Result of the builds of these numbers."""
-        draws = draw(self.errors, self.seed, builds, len(self.edge_models[0]))
-        return WorstResult(coverage(self.edge_models, draws, worst_only=True)[0].min(axis=1))
+        diameter, _ = coverage(self.edge_models, self.draws(builds), worst_only=True)
+        return WorstResult(diameter.min(axis=1))
+
+
+@dataclass(frozen=True)
+class CameraCoverage:
+    """Exact coverage diameters of v virtual cameras in s builds, mm, (s, v)."""
+
+    coverage: Floats
+
+
+@dataclass(frozen=True)
+class CoverageCase(ShellCase):
+    """The same builds, but only what each virtual camera of them covers."""
+
+    def __call__(self, builds: range) -> CameraCoverage:
+        """Result of the builds of these numbers."""
+        return CameraCoverage(coverage(self.edge_models, self.draws(builds))[0])
 
 
 AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
@@ -158,7 +186,7 @@ def simulate(
 def joined_results(results: Sequence[AnyResult]) -> AnyResult:
     """Results of consecutive builds as one; at least one is needed."""
     kind = type(results[0])
-    names = [field.name for field in fields(kind)]
+    names = [one.name for one in fields(kind)]
     return kind(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
 
 

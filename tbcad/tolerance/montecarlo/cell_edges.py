@@ -21,6 +21,7 @@ from tbcad.tolerance.montecarlo.edge_samples import (
     sample_points,
     screen_crossings,
 )
+from tbcad.tolerance.montecarlo.form_samples import displace_samples, reflect_formed_samples
 from tbcad.tolerance.montecarlo.neighbour_pairs import PairArrays
 from tbcad.tolerance.montecarlo.visible_edges import (
     CURVATURE,
@@ -37,14 +38,15 @@ ROUNDS = 4
 
 # Columns of the result.
 MISS_SQUARED, CROSSINGS, AREA = 0, 1, 2
-# Columns of a part of an edge: the edge, its mirror, the parameters between which the minimum is,
-# the minimum sample, and what the minimum is not below.
-EDGE, MIRROR, LOW, HIGH, LEAST, BOUND, COLUMNS = 0, 10, 11, 12, 13, 14, 15
+# Columns of a part of an edge: the edge, its mirror, the other face, the parameters between which
+# the minimum is, the minimum sample, and what the minimum is not below.
+EDGE, MIRROR, OTHER, LOW, HIGH, LEAST, BOUND, COLUMNS = 0, 10, 11, 12, 13, 14, 15, 16
 
 
 @compiled_loop
 def trace_cell_edges(
     surfaces: Floats,
+    forms: Floats,
     pairs: PairArrays,
     halved: Bools,
     view: Floats,
@@ -54,7 +56,10 @@ def trace_cell_edges(
     """Coverage of every mirror of one half, from the edges of its cell.
 
     Args:
-        surfaces: apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7).
+        surfaces: apex, normal, curvature of the m mirrors, the seam, the foot, and the foot at
+            the mirrors near it, (f, 7).
+        forms: waviness of the surfaces, see tbcad.tolerance.montecarlo.form_samples, (f, ...);
+            of none where no mirror has any.
         pairs: see tbcad.tolerance.montecarlo.neighbour_pairs.
         halved: mirrors whose seam edge does not limit their coverage, (m,).
         view: pinhole, object's centre, scale, and the camera's axes right, down, forward, in the
@@ -69,7 +74,8 @@ def trace_cell_edges(
         and the area of the cell's picture at unit distance.
     """
     pair, offset, face, reach = pairs
-    result = np.zeros((len(surfaces) - 2, 3))
+    formed = len(forms) > 0
+    result = np.zeros((len(halved), 3))
     parts, count, samples = np.empty((len(pair), COLUMNS)), 0, np.empty(PLACES)
     edge, spans, spare = np.empty(EDGE_COLUMNS), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
@@ -83,29 +89,81 @@ def trace_cell_edges(
             low, high = spans[s]
             sample_points(edge, low, high, view, samples)
             area = 0.0 if worst_only else picture_area(view, samples)
+            if formed:
+                _count_crossings(surfaces, halved, view, screen, p, q, samples, result)
+                displace_samples(view, surfaces, forms, (p, q), samples)
             for i, other, sign in ((p, q, 1), (q, p, -1)):
                 if i >= len(result):
                     continue
                 result[i, AREA] += sign * area
                 if halved[i] and other == len(result):
                     continue
-                reflect_samples(surfaces[i], view, samples)
-                result[i, CROSSINGS] += screen_crossings(screen[i], samples)
+                _reflect(surfaces, forms, i, view, samples)
+                if not formed:
+                    result[i, CROSSINGS] += screen_crossings(screen[i], samples)
                 if count == len(parts):
                     parts = np.concatenate((parts, np.empty_like(parts)))
-                _put_part(parts[count], i, edge, low, high, samples)
+                _put_part(parts[count], i, other, edge, low, high, samples)
                 count += 1
-    result[:, MISS_SQUARED] = _minima(surfaces, view, parts[:count], worst_only, samples)
+    result[:, MISS_SQUARED] = _minima(
+        surfaces, forms, view, parts[:count], len(result), worst_only, samples
+    )
     return result
 
 
 @compiled_loop
+def _count_crossings(
+    surfaces: Floats,
+    halved: Bools,
+    view: Floats,
+    screen: Floats,
+    p: int,
+    q: int,
+    samples: Floats,
+    result: Floats,
+) -> None:
+    """Add the crossings of an edge's images off the spheres of both its faces.
+
+    Edges that waviness displaces end beside each other, so that a line may slip through.
+    """
+    for i, other in ((p, q), (q, p)):
+        if i < len(result) and not (halved[i] and other == len(result)):
+            reflect_samples(surfaces[i], view, samples)
+            result[i, CROSSINGS] += screen_crossings(screen[i], samples)
+
+
+@compiled_loop
+def _sample(
+    edge: Floats,
+    span: tuple[float, float],
+    view: Floats,
+    surfaces: Floats,
+    forms: Floats,
+    faces: tuple[int, int],
+    samples: Floats,
+) -> None:
+    """Fill in points of the edge of two faces, and rays to them."""
+    sample_points(edge, span[0], span[1], view, samples)
+    if len(forms) > 0:
+        displace_samples(view, surfaces, forms, faces, samples)
+
+
+@compiled_loop
+def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples: Floats) -> None:
+    """Fill in the rays that a mirror reflects at the points."""
+    if len(forms) == 0:
+        reflect_samples(surfaces[mirror], view, samples)
+    else:
+        reflect_formed_samples(surfaces[mirror], forms[mirror], view, samples)
+
+
+@compiled_loop
 def _put_part(
-    part: Floats, mirror: int, edge: Floats, low: float, high: float, samples: Floats
+    part: Floats, mirror: int, other: int, edge: Floats, low: float, high: float, samples: Floats
 ) -> None:
     """Fill in a part of an edge that has been sampled."""
     least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
-    part[MIRROR] = mirror
+    part[MIRROR], part[OTHER] = mirror, other
     for k in range(EDGE_COLUMNS):
         part[EDGE + k] = edge[k]
     part[LOW], part[HIGH] = max(low, low + (least - 1) * step), min(high, low + (least + 1) * step)
@@ -114,10 +172,15 @@ def _put_part(
 
 @compiled_loop
 def _minima(
-    surfaces: Floats, view: Floats, parts: Floats, worst_only: bool, samples: Floats
+    surfaces: Floats,
+    forms: Floats,
+    view: Floats,
+    parts: Floats,
+    m: int,
+    worst_only: bool,
+    samples: Floats,
 ) -> Floats:
     """Minimum distance squared of each mirror's rays, (m,); see `trace_cell_edges`."""
-    m = len(surfaces) - 2
     sampled, refined = np.full(m, inf), np.full(m, inf)
     for part in parts:
         i = int(part[MIRROR])
@@ -126,18 +189,19 @@ def _minima(
     for part in parts:
         i = int(part[MIRROR])
         if not part[BOUND] > limit[i]:  # NaN too
-            refined[i] = min(refined[i], _refined(surfaces[i], view, part, samples))
+            refined[i] = min(refined[i], _refined(surfaces, forms, view, part, samples))
     return np.where(np.isinf(refined), sampled, refined)
 
 
 @compiled_loop
-def _refined(surface: Floats, view: Floats, part: Floats, samples: Floats) -> float:
+def _refined(surfaces: Floats, forms: Floats, view: Floats, part: Floats, samples: Floats) -> float:
     """Minimum distance squared of the rays at a part of an edge."""
     edge, low, high = part[EDGE:], part[LOW], part[HIGH]
+    mirror, other = int(part[MIRROR]), int(part[OTHER])
     for r in range(ROUNDS - 1):
         if r > 0:
             least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
             low, high = max(low, low + (least - 1) * step), min(high, low + (least + 1) * step)
-        sample_points(edge, low, high, view, samples)
-        reflect_samples(surface, view, samples)
+        _sample(edge, (low, high), view, surfaces, forms, (mirror, other), samples)
+        _reflect(surfaces, forms, mirror, view, samples)
     return parabola_minimum(samples)

@@ -6,7 +6,13 @@ import numpy as np
 
 from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, surface_tables, view_tables
+from tbcad.tolerance.montecarlo.edge_model import (
+    EdgeModel,
+    EdgeModels,
+    form_tables,
+    surface_tables,
+    view_tables,
+)
 from tbcad.tolerance.montecarlo.edge_samples import RIGHT
 from tbcad.types import Bools, Floats, Ints
 
@@ -40,15 +46,17 @@ def _outlines(half: EdgeModel, draws: ShellDraws, worst_only: bool) -> Floats:
     """What `trace_cell_edges` finds in s builds, (s, m, 3)."""
     outlines = np.empty((len(draws), len(half), 3))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
+    forms, pairs = form_tables(half, draws), half.pairs.arrays
     if worst_only:  # pictures do not count: cameras that only turn see the same
         views[:, RIGHT:] = views[:1, RIGHT:]
     for build in range(len(draws)):
-        if build > 0 and _same(build, surfaces, views):
+        if build > 0 and _same(build, surfaces, forms, views):
             outlines[build] = outlines[build - 1]
             continue
         outlines[build] = trace_cell_edges(
-            surfaces[build], half.pairs.arrays, half.halved, views[build], half.screen, worst_only
-        )
+            surfaces[build], forms[build], pairs, half.halved, views[build], half.screen,
+            worst_only,
+        )  # fmt: skip
     return outlines
 
 

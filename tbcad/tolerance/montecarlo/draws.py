@@ -1,11 +1,13 @@
 """Random errors of simulated builds: how far each of many builds is off, as arrays over builds."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerance.montecarlo.form import ASTIGMATISM, TERMS, term_shares
+from tbcad.tolerance.montecarlo.warp import WarpMap, WarpMaps
 from tbcad.types import Floats
 
 Shape = tuple[int, ...]
@@ -27,6 +29,8 @@ class ShellDraws:
         camera_tilt: rotation vectors about the pinhole, radians, (s, 3).
         focal: focal length over the designed one, (s,).
         facets: coverage lost on facets, mm, (s,).
+        foot: of the foot plane at each mirror, along its normal, mm, (s, m).
+        form: factors of the mirrors' form errors (tbcad.tolerance.montecarlo.form), mm, (s, m, t).
     """
 
     centre: Floats
@@ -38,6 +42,8 @@ class ShellDraws:
     camera_tilt: Floats
     focal: Floats
     facets: Floats
+    foot: Floats
+    form: Floats
 
     def __len__(self) -> int:
         """Number of builds."""
@@ -45,7 +51,11 @@ class ShellDraws:
 
 
 def draw(
-    errors: Errors, seed: int, builds: Sequence[int], mirrors: int
+    errors: Errors,
+    seed: int,
+    builds: Sequence[int],
+    mirrors: int,
+    warp: WarpMaps | None = None,
 ) -> tuple[ShellDraws, ShellDraws]:
     """Errors of both halves of some builds.
 
@@ -54,13 +64,27 @@ def draw(
         seed: of all builds.
         builds: numbers of the builds.
         mirrors: m of each half.
+        warp: what the process's warp does to them (`warp_maps_of`); needed where neighbours share
+            it.
+
+    Raises:
+        ValueError: it is missing.
     """
-    drawn = draw_kinds(errors, seed, builds, shell_error_shapes(mirrors))
-    return _half(drawn, 0), _half(drawn, 1)
+    if warp is None and errors.warp.spread != 0 and errors.warp.length != 0:
+        raise ValueError("the warp of these errors needs its maps")
+    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors)
+    drawn = draw_kinds(errors, seed, builds, shapes)
+    maps = warp or (None, None)
+    return _half(drawn, 0, maps[0]), _half(drawn, 1, maps[1])
 
 
-def shell_error_shapes(m: int) -> dict[str, Shape]:
-    """Shape of each kind of error of a shell, in the order of the streams; only append to it."""
+def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
+    """Shape of each kind of error of a shell, in the order of the streams; only append to it.
+
+    Args:
+        m: number of mirrors of a half.
+        modes: number of vectors that the warp of a half follows from.
+    """
     return {
         "sphere_centre": (2, m, 3),
         "sphere_radius": (2, m),
@@ -73,14 +97,16 @@ def shell_error_shapes(m: int) -> dict[str, Shape]:
         "camera_focal": (2,),
         "coating": (2,),
         "facets": (2,),
+        "warp": (2, modes, 3),
+        "waviness": (2, m, len(TERMS)),
     }
 
 
-def _half(drawn: Mapping[str, Floats], side: int) -> ShellDraws:
+def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> ShellDraws:
     def of(kind: str) -> Floats:
         return drawn[kind][:, side]
 
-    return ShellDraws(
+    draws = ShellDraws(
         centre=of("sphere_centre"),
         radius=of("sphere_radius") + of("coating")[:, None],
         scale=1 + of("scale_isotropic")[:, None] + drawn["scale_axis"],
@@ -90,7 +116,23 @@ def _half(drawn: Mapping[str, Floats], side: int) -> ShellDraws:
         camera_tilt=of("camera_tilt"),
         focal=1 + of("camera_focal"),
         facets=of("facets"),
+        foot=np.zeros(of("sphere_radius").shape),
+        form=of("waviness") * np.sqrt(term_shares()),
     )
+    if warp is None:  # each mirror is displaced by its own
+        return replace(draws, centre=draws.centre + of("warp"))
+    for build, numbers in enumerate(of("warp")):
+        _add_warp(draws, build, warp, numbers)
+    return draws
+
+
+def _add_warp(draws: ShellDraws, build: int, warp: WarpMap, numbers: Floats) -> None:
+    """Displace the mirrors of a build, in place."""
+    centre, radius, foot, astigmatism = warp.moved(numbers)
+    draws.centre[build] += centre
+    draws.radius[build] += radius
+    draws.foot[build] += foot
+    draws.form[build][:, ASTIGMATISM] += astigmatism
 
 
 def draw_kinds(

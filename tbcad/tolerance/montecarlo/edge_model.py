@@ -7,11 +7,21 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
-from tbcad.geometry.vectors import dot, unit
+from tbcad.geometry.vectors import dot, perpendicular_axes, unit
 from tbcad.optics.camera import Camera
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.simulate.scene.reflector import Reflector, check_joined
 from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.neighbour_pairs import NeighbourPairs, neighbour_pairs
+from tbcad.tolerance.montecarlo.error_kinds import Errors
+from tbcad.tolerance.montecarlo.form import MONOMIALS, term_polynomials
+from tbcad.tolerance.montecarlo.form_samples import (
+    FIRST,
+    FORM_COLUMNS,
+    HEIGHT,
+    PER_MM,
+    SECOND,
+)
+from tbcad.tolerance.montecarlo.neighbour_pairs import NeighbourPairs, cell_radii, neighbour_pairs
+from tbcad.tolerance.montecarlo.warp import WarpMaps, warp_maps
 from tbcad.types import Bools, Floats
 
 # No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
@@ -33,6 +43,7 @@ class EdgeModel:
         halved: mirrors that the seam halves, (m,).
         screen: two axes and the normal of a plane through the object for each mirror, (m, 3, 3);
             the normal is the direction u.
+        cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
     """
 
     view: Camera
@@ -40,6 +51,7 @@ class EdgeModel:
     pairs: NeighbourPairs
     halved: Bools
     screen: Floats
+    cell_radius: Floats
 
     def __len__(self) -> int:
         """Number of mirrors."""
@@ -66,17 +78,34 @@ def edge_models(cameras: tuple[Reflector, Reflector]) -> EdgeModels:
 
 
 def edge_model(at: Reflector) -> EdgeModel:
-    """The fast model of one camera with its mirrors."""
+    """The fast model of one camera with its mirrors.
+
+    Raises:
+        InputError: the mirrors stand on pedestals.
+    """
+    check_joined(at, "builds")
     surfaces = at.cells.surfaces
     table = np.column_stack([surfaces.apex, surfaces.normal, surfaces.curvature])
     first = unit(ASYMMETRIC - dot(at.u, ASYMMETRIC)[:, None] * at.u)
     screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
     halved = surfaces.apex[: len(at), 0] == 0
-    return EdgeModel(at.camera, table, neighbour_pairs(at.cells), halved, screen)
+    pairs, radius = neighbour_pairs(at.cells), cell_radii(at.cells)
+    return EdgeModel(at.camera, table, pairs, halved, screen, radius)
+
+
+def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
+    """What the warp of a process does to both halves; None where it is none of neighbours."""
+    length = errors.warp.length
+    if errors.warp.spread == 0 or length == 0:
+        return None
+    a, b = models
+    return warp_maps((a.table, b.table), (a.cell_radius, b.cell_radius), length)
 
 
 def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
-    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2, 7).
+    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r, 7).
+
+    They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed).
 
     A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
     thicker coating moves too. Their tilt is not an error of its own kind.
@@ -84,7 +113,9 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     Raises:
         InputError: an error is larger than a mirror's radius.
     """
-    table, m = np.repeat(edge_model.table[None], len(draws), axis=0), len(edge_model)
+    m, footed = len(edge_model), edge_model.pairs.footed
+    rows = np.append(np.arange(m + 2), np.full(len(footed), m + 1))
+    table = np.repeat(edge_model.table[None, rows], len(draws), axis=0)
     curvature = edge_model.table[:m, CURVATURE]
     if np.any(draws.radius * curvature <= -1):
         raise InputError(
@@ -93,7 +124,28 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
         )
     table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * edge_model.normal
     table[:, :m, CURVATURE] = curvature / (1 + draws.radius * curvature)
+    foot = edge_model.table[m + 1, NORMAL]
+    table[:, m + 2 :, APEX] += draws.foot[:, footed, None] * foot
     return table
+
+
+def form_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """Waviness of the surfaces of s builds, (s, m + 2 + r, FORM_COLUMNS), of planes 0.
+
+    They are in the order of `surface_tables`; (s, 0, ...) where no mirror has any.
+    """
+    if not draws.form.any():
+        return np.empty((len(draws), 0, FORM_COLUMNS))
+    planes = 2 + len(edge_model.pairs.footed)
+    forms = np.zeros((len(draws), len(edge_model) + planes, FORM_COLUMNS))
+    of_mirrors, axes = forms[:, : len(edge_model)], perpendicular_axes(edge_model.normal)
+    # Not by BLAS, whose threads would get into the way of those that simulate builds.
+    polynomials = np.einsum("smt,tk->smk", draws.form, term_polynomials())
+    of_mirrors[..., HEIGHT : HEIGHT + len(MONOMIALS)] = polynomials
+    of_mirrors[..., FIRST : FIRST + 3] = axes[:, 0]
+    of_mirrors[..., SECOND : SECOND + 3] = axes[:, 1]
+    of_mirrors[..., PER_MM] = 1 / edge_model.cell_radius
+    return forms
 
 
 def view_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:

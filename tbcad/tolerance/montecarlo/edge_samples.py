@@ -28,7 +28,10 @@ POINT, SCALED, RAY, REFLECTED, MOMENT = (3 * k * STRIDE for k in range(5))
 # Quantities of one number: the reflected ray's distance squared from the object's centre, its
 # place on the screen, the point's place in the picture.
 DISTANCE, SCREEN_X, SCREEN_Y, PICTURE_X, PICTURE_Y = (k * STRIDE for k in range(15, 20))
-PLACES = 20 * STRIDE
+# Of each of an edge's faces: its normal at the point, of three numbers, and its waviness there.
+FIRST_NORMAL, SECOND_NORMAL = 20 * STRIDE, 23 * STRIDE
+FIRST_HEIGHT, SECOND_HEIGHT = 26 * STRIDE, 27 * STRIDE
+PLACES = 28 * STRIDE
 # Rows of a view; axes of a screen.
 PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
 FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
@@ -38,13 +41,15 @@ MAX_FALL = 0.5
 
 
 @compiled_loop
-def _get(samples: Floats, quantity: int, s: int) -> Vector:
+def get_sample(samples: Floats, quantity: int, s: int) -> Vector:
+    """A quantity of three numbers at a sample."""
     first = quantity + s
     return samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE]
 
 
 @compiled_loop
-def _put(samples: Floats, quantity: int, s: int, value: Vector) -> None:
+def put_sample(samples: Floats, quantity: int, s: int, value: Vector) -> None:
+    """Fill in a quantity of three numbers at a sample."""
     first = quantity + s
     samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE] = value
 
@@ -67,27 +72,40 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
         w = 1 + bend * bend * t * t / 4
         chord = plus_scaled(start, t / w, tangent)
         point = plus_scaled(chord, -bend * t * t / 2 / w, outward)
-        _put(samples, POINT, s, point)
+        put_sample(samples, POINT, s, point)
         point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
-        _put(samples, SCALED, s, point)
-        _put(samples, RAY, s, minus(point, pinhole))
+        put_sample(samples, SCALED, s, point)
+        put_sample(samples, RAY, s, minus(point, pinhole))
 
 
 @compiled_loop
 def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
     """Fill in the rays that a surface (7,) reflects at the points, their moments and distances."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
-    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     for s in range(SAMPLES):
-        gradient = plus_scaled(normal, curvature, minus(_get(samples, POINT, s), apex))
-        across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
-        ray = _get(samples, RAY, s)
-        # Neither the normal nor the ray has to be of unit length.
-        out = plus_scaled(ray, -(2 * dot(ray, across) / dot(across, across)), across)
-        moment = cross(minus(_get(samples, SCALED, s), middle), out)
-        _put(samples, REFLECTED, s, out)
-        _put(samples, MOMENT, s, moment)
-        samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
+        gradient = plus_scaled(normal, curvature, minus(get_sample(samples, POINT, s), apex))
+        reflect_sample(gradient, view, samples, s)
+
+
+@compiled_loop
+def reflect_sample(gradient: Vector, view: Floats, samples: Floats, s: int) -> None:
+    """Fill in the ray that is reflected at a sample, its moment and distance.
+
+    Args:
+        gradient: of the surface there, before its shell is scaled; of any length.
+        view: see tbcad.tolerance.montecarlo.cell_edges.trace_cell_edges.
+        samples: with the points and rays.
+        s: number of the sample.
+    """
+    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
+    across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
+    ray = get_sample(samples, RAY, s)
+    # Neither the normal nor the ray has to be of unit length.
+    out = plus_scaled(ray, -(2 * dot(ray, across) / dot(across, across)), across)
+    moment = cross(minus(get_sample(samples, SCALED, s), middle), out)
+    put_sample(samples, REFLECTED, s, out)
+    put_sample(samples, MOMENT, s, moment)
+    samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
 
 
 @compiled_loop
@@ -102,7 +120,7 @@ def screen_crossings(screen: Floats, samples: Floats) -> int:
     facing = vector(screen[FACING])
     first, second = vector(screen[FIRST_AXIS]), vector(screen[SECOND_AXIS])
     for s in range(SAMPLES):
-        out, moment = _get(samples, REFLECTED, s), _get(samples, MOMENT, s)
+        out, moment = get_sample(samples, REFLECTED, s), get_sample(samples, MOMENT, s)
         against, along = sqrt(dot(out, out)) - dot(out, facing), dot(moment, facing)
         samples[SCREEN_X + s] = against * dot(moment, second) + along * dot(out, second)
         samples[SCREEN_Y + s] = -against * dot(moment, first) - along * dot(out, first)
@@ -126,7 +144,7 @@ def picture_area(view: Floats, samples: Floats) -> float:
     """Area between the picture's centre and the points' line in it, by Richardson's rule."""
     right, down, forward = vector(view[RIGHT]), vector(view[DOWN]), vector(view[FORWARD])
     for s in range(SAMPLES):
-        ray = _get(samples, RAY, s)
+        ray = get_sample(samples, RAY, s)
         depth = dot(ray, forward)
         samples[PICTURE_X + s] = dot(ray, right) / depth
         samples[PICTURE_Y + s] = dot(ray, down) / depth

@@ -1,6 +1,7 @@
 """The kinds of error of a process, with their spread and mean: read before numpy is loaded."""
 
 from dataclasses import dataclass
+from math import hypot, sqrt
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -19,11 +20,18 @@ class Error:
         spread: standard deviation if normal, half width if uniform; in mm, radians or as a share.
         mean: error common to all builds, in the same unit.
         distribution: of the error about its mean.
+        length: over which places of one part share the error, mm; 0: each has its own.
     """
 
     spread: float = 0.0
     mean: float = 0.0
     distribution: Distribution = "normal"
+    length: float = 0.0
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return self.spread if self.distribution == "normal" else self.spread / sqrt(3)
 
     def sample(self, generator: "np.random.Generator", *shape: int) -> "Floats":
         """Random errors of a shape."""
@@ -57,6 +65,11 @@ class Errors:
         axis_tilt: of its axis, radians.
         ball_radius: of each ball's radius, mm.
         seat: of each ball's centre along each axis, mm.
+        cap_tilt: of each cap about each axis across its own, through its body's centre, radians.
+        wind_up: share of the base's turn under gravity, worked out for each stop, that is there.
+        warp: smooth displacement of the points of a shell along each axis, mm; of length 0 an
+            error of each mirror's centre.
+        waviness: root mean square of the form error within a mirror, mm.
     """
 
     sphere_centre: Error = NO_ERROR
@@ -75,3 +88,19 @@ class Errors:
     axis_tilt: Error = NO_ERROR
     ball_radius: Error = NO_ERROR
     seat: Error = NO_ERROR
+    cap_tilt: Error = NO_ERROR
+    wind_up: Error = NO_ERROR
+    warp: Error = NO_ERROR
+    waviness: Error = NO_ERROR
+
+    @property
+    def whole_radius(self) -> Error:
+        """Error of the radius of a mirror that is a part of its own, such as a cap.
+
+        Where a part's limit gives its points a warp, half of it along the normal is its size
+        (docs/decisions/0007); the other half is its place.
+        """
+        if self.warp.spread == 0:
+            return self.sphere_radius
+        spread = hypot(self.sphere_radius.deviation, self.warp.spread / sqrt(2))
+        return Error(spread, self.sphere_radius.mean)

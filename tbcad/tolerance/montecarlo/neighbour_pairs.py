@@ -1,6 +1,6 @@
 """Pairs of mirrors that may share an edge, and the faces that may cover it, for any errors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -28,12 +28,14 @@ class NeighbourPairs:
         offset: where the faces of each pair begin in `face`, (e + 1,).
         face: mirrors and planes, in the order of their distance from both of the pair.
         reach: maximum distance of the edge's points from its middle, mm, (e,).
+        footed: mirrors whose pairs have a foot plane of their own, (r,): faces m + 2 onwards.
     """
 
     pair: Ints
     offset: Ints
     face: Ints
     reach: Floats
+    footed: Ints
 
     @property
     def arrays(self) -> PairArrays:
@@ -53,11 +55,23 @@ def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     first, second = coo_array(nearby).coords
     pair = np.column_stack([first, second])[(first < second) & (first < m)].astype(np.int64)
     offset, face = _cutting_faces(nearby, cells.surfaces, m, pair)
-    reach_mm = REACH * np.append(_cell_radii(cells), [0, 0])[pair].max(axis=1)
-    return NeighbourPairs(pair, offset, face, reach_mm)
+    reach_mm = REACH * np.append(cell_radii(cells), [0, 0])[pair].max(axis=1)
+    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
 
 
-def _cell_radii(cells: Cells) -> Floats:
+def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
+    """The same with a foot plane for each mirror: a shell that warps takes its foot with it."""
+    first, second = pairs.pair.T
+    footed = np.unique(first[second == m + 1])
+    number = np.full(m, m + 1)
+    number[footed] = m + 2 + np.arange(len(footed))
+    of_face = np.repeat(first, np.diff(pairs.offset))
+    pair = np.column_stack([first, np.where(second == m + 1, number[first], second)])
+    face = np.where(pairs.face == m + 1, number[of_face], pairs.face)
+    return replace(pairs, pair=pair, face=face, footed=footed)
+
+
+def cell_radii(cells: Cells) -> Floats:
     """Distance of each mirror's farthest corner from its apex, mm, (m,)."""
     mirror, corner = cells.triangles.ravel(), np.repeat(np.arange(len(cells.corners)), 3)
     mirror, corner = mirror[mirror < cells.mirrors], corner[mirror < cells.mirrors]

@@ -20,21 +20,25 @@ from tbcad.types import Floats
 def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
     """Errors of the ray of each mirror's centre pixel, for s builds of one edge_model.
 
-    The centre pixel shows the apex, and its designed ray goes through the object's centre. A pixel
-    is a fixed place on the sensor: moved and tilted cameras and wrong focal lengths count.
+    The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
+    mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
+    wrong focal lengths count.
 
     Returns:
         Angle between the designed and the built ray after the mirror, radians, and distance of the
-        built ray from the object's centre, mm, (s, m) each; NaN where it misses the sphere.
+        built ray from the point where the designed one is nearest to the object's centre, mm,
+        (s, m) each; NaN where it misses the sphere.
     """
     pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
     ray = _pixel_rays(edge_model, draws, axes)
     mirrors = surface_tables(edge_model, draws)[:, : len(edge_model)]
     point, normal = _entry(mirrors, pinhole / scale, ray / scale)
     out = reflect(unit(ray), unit(normal / scale))
-    offset = norm(np.cross(point * scale - middle, out))
     designed = reflected_rays(edge_model.view.pinhole, edge_model.apex, unit(edge_model.normal))
-    shells = map(Rotation.from_rotvec, draws.shell_tilt)
+    nearest = edge_model.apex - dot(edge_model.apex, designed)[:, None] * designed
+    shells = [Rotation.from_rotvec(turn) for turn in draws.shell_tilt]
+    aim = middle + np.stack([shell.apply(nearest, inverse=True) for shell in shells])
+    offset = norm(np.cross(point * scale - aim, out))
     built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
     return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
-from tbcad.tolerance.montecarlo.error_kinds import NO_ERROR, Errors
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Floats
 
 WorstCoverage = Callable[[Errors], Floats]
@@ -41,7 +41,8 @@ class SingleErrorEffect:
 
 def present_kinds(errors: Errors) -> list[str]:
     """The kinds of error that are not zero."""
-    return [field.name for field in fields(errors) if getattr(errors, field.name) != NO_ERROR]
+    kinds = {field.name: getattr(errors, field.name) for field in fields(errors)}
+    return [kind for kind, error in kinds.items() if error.spread != 0 or error.mean != 0]
 
 
 def only_kind(errors: Errors, kind: str) -> Errors:

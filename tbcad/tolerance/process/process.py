@@ -6,6 +6,7 @@ from a maker's tolerance.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
@@ -70,6 +71,31 @@ class Micrometres(ErrorSpec):
     mean: float = Field(0.0, ge=-10_000, le=10_000)
 
 
+class SmoothMicrometres(Micrometres):
+    """An error in micrometres that neighbouring places of a part share."""
+
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: it would move the whole part."""
+    distribution: Literal["normal"] = "normal"
+    """Always normal."""
+    length_mm: float = Field(ge=20, le=10_000)
+    """Correlation length: at this distance 61 % of the error is shared, at twice of it 14 %."""
+
+    @property
+    def error(self) -> Error:
+        """The same in mm."""
+        return replace(super().error, length=self.length_mm)
+
+
+class RootMeanSquare(Micrometres):
+    """A form error within each mirror, in micrometres."""
+
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: it differs from mirror to mirror."""
+    distribution: Literal["normal"] = "normal"
+    """Always normal."""
+
+
 class Millimetres(ErrorSpec):
     """An error in millimetres."""
 
@@ -83,6 +109,14 @@ class Permille(ErrorSpec):
     unit: ClassVar[float] = 1e-3
     magnitude: float = Field(ge=0, le=200)
     mean: float = Field(0.0, ge=-200, le=200)
+
+
+class Percent(ErrorSpec):
+    """A share in hundredths."""
+
+    unit: ClassVar[float] = 1e-2
+    magnitude: float = Field(ge=0, le=200)
+    mean: float = Field(0.0, ge=0, le=200)
 
 
 class Milliradians(ErrorSpec):
@@ -111,9 +145,13 @@ class Process(Section):
     schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(1, alias="schema")
     """Version of this table's keys."""
     sphere_centre_um: Micrometres
-    """Each mirror's centre along each axis, without the growth of the shell."""
+    """Each mirror's centre along each axis, by itself, without growth and warp of the shell."""
     sphere_radius_um: Micrometres
     """Each mirror's radius, with its centre fixed."""
+    warp_um: SmoothMicrometres
+    """Each shell: smooth displacement of its points along each axis."""
+    waviness_um: RootMeanSquare
+    """Root mean square of the height of the form error within each mirror."""
     scale_isotropic_permille: Permille
     """Growth of each shell."""
     scale_axis_permille: Permille
@@ -140,6 +178,10 @@ class Process(Section):
     """Prototype: direction of the base's axis."""
     seat_um: Micrometres
     """Prototype: each ball's centre along each axis."""
+    cap_tilt_mrad: Milliradians
+    """Prototype: each cap about each axis across its own."""
+    wind_up_percent: Percent
+    """Prototype: turn of the base because motor and belt yield to gravity, of that worked out."""
     ball_grade: GradeName
     """Prototype: grade of the balls by ISO 3290-1."""
 

@@ -1,7 +1,7 @@
 """Random errors of simulated prototypes: how far base, balls and camera of each are off."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,9 @@ class PrototypeDraws:
     Attributes:
         radius: by which balls are too large, mm, (s, k).
         seat: of the balls' centres on the base, mm, (s, k, 3).
-        angle: of the base at each stop of each run, radians, (s, 2, t).
+        cap_tilt: of caps about two axes across their own, radians, (s, k, 2).
+        angle: of the base at each stop of each run, with its turn under gravity, radians,
+            (s, 2, t).
         runout: of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2).
         tilt: of the axis about azimuth zero and across it, both through the object's centre,
             radians, (s, 2).
@@ -34,6 +36,7 @@ class PrototypeDraws:
 
     radius: Floats
     seat: Floats
+    cap_tilt: Floats
     angle: Floats
     runout: Floats
     tilt: Floats
@@ -47,25 +50,28 @@ class PrototypeDraws:
 
 
 def draw_prototypes(
-    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, stops: int
+    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, wind_up: Floats
 ) -> PrototypeDraws:
     """Errors of some prototypes; see tbcad.tolerance.montecarlo.draws.draw_kinds.
 
-    Purchased balls have the errors of their grade, caps those of the process's spheres, each with
-    its centre unchanged.
+    Purchased balls have the errors of their grade, caps those of a mirror that is a part of its own
+    (`Errors.whole_radius`), each with its centre unchanged.
 
     Args:
         errors: of the process.
         seed: of all builds.
         builds: numbers of the builds.
         is_cap: which of the balls are made instead of purchased, (k,).
-        stops: t of one run.
+        wind_up: turn of the base under gravity at the t stops of one run, radians, (t,).
     """
-    drawn = draw_kinds(errors, seed, builds, _shapes(len(is_cap), stops), FIRST_STREAM)
+    shapes = _shapes(len(is_cap), len(wind_up))
+    errors = replace(errors, sphere_radius=errors.whole_radius)
+    drawn = draw_kinds(errors, seed, builds, shapes, FIRST_STREAM)
     return PrototypeDraws(
         radius=np.where(is_cap, drawn["sphere_radius"], drawn["ball_radius"]),
         seat=drawn["seat"],
-        angle=drawn["rotation_angle"],
+        cap_tilt=np.where(is_cap[:, None], drawn["cap_tilt"], 0.0),
+        angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * wind_up,
         runout=drawn["axis_runout"],
         tilt=drawn["axis_tilt"],
         camera_shift=drawn["camera_shift"],
@@ -86,4 +92,6 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
         "camera_shift": (3,),
         "camera_tilt": (3,),
         "camera_focal": (),
+        "cap_tilt": (k, 2),
+        "wind_up": (),
     }

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.rotations import rotated
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.optics.reflection import reflected_rays
 from tbcad.optics.windows import cell_windows
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
@@ -73,6 +73,7 @@ class PrototypeModel:
         plan: balls on the base, and its stops.
         runs: for camera a's mirrors and for camera b's.
         virtual: number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
+        wind_up: turn of the base under gravity at each of t stops, radians, (t,).
     """
 
     pinhole: Floats
@@ -80,6 +81,7 @@ class PrototypeModel:
     plan: Plan
     runs: tuple[RunWindows, RunWindows]
     virtual: Ints
+    wind_up: Floats
 
     @property
     def is_cap(self) -> Bools:
@@ -89,17 +91,20 @@ class PrototypeModel:
     @cached_property
     def designed_rays(self) -> list[tuple[Floats, Floats]]:
         """Of each run without errors: see `_middle_rays`."""
-        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, len(self.plan.angle))
+        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.wind_up)
         return [_middle_rays(run, run_pose(self, exact, 0, k)) for k, run in enumerate(self.runs)]
 
 
-def prototype_model(reflectors: tuple[Reflector, Reflector], plan: Plan) -> PrototypeModel:
-    """The fast model of both cameras and the plan."""
+def prototype_model(
+    reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
+) -> PrototypeModel:
+    """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
     a, b = prototype_runs(reflectors, plan)
     view = reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
-    return PrototypeModel(view.pinhole, axes, plan, both, virtual_camera_numbers(both[1].halved))
+    virtual = virtual_camera_numbers(both[1].halved)
+    return PrototypeModel(view.pinhole, axes, plan, both, virtual, wind_up)
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
@@ -163,9 +168,9 @@ class PrototypeCase:
 
     def __call__(self, builds: range) -> PrototypeResult:
         """Result of the builds of these numbers."""
-        stops = len(self.model.plan.angle)
-        draws = draw_prototypes(self.errors, self.seed, builds, self.model.is_cap, stops)
-        uncalibrated, calibrated = coverage_and_offsets(self.model, draws)
+        model = self.model
+        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.wind_up)
+        uncalibrated, calibrated = coverage_and_offsets(model, draws)
         return PrototypeResult(*uncalibrated, *calibrated)
 
 
@@ -192,7 +197,7 @@ class RunPose:
 def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int) -> RunPose:
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
-    on_base = plan.centre[run.ball] + draws.seat[build, run.ball]
+    on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
     angle = plan.angle[run.stop] + draws.angle[build, half, run.stop]
     tilt = Rotation.from_rotvec(draws.tilt[build] @ plan.frame[1:])
     runout = draws.runout[build, half, run.stop] @ plan.frame[1:]
@@ -202,6 +207,19 @@ def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int
     lens = _lens(model, draws.camera_tilt[build], float(draws.focal[build]))
     lenses = np.repeat(lens[None], len(radius), axis=0)
     return RunPose(pinhole, lenses, centre, radius, highlights(pinhole, centre, radius))
+
+
+def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
+    """Centres of the reflecting spheres with their bodies tilted in their seats, mm, (k, 3).
+
+    A ball's own is its body's, and stays.
+
+    Args:
+        plan: with the balls.
+        tilt: of each body about two axes across its normal, radians, (k, 2).
+    """
+    about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
+    return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
 
 
 def _lens(model: PrototypeModel, tilt: Floats, focal: float) -> Floats:

@@ -1,0 +1,143 @@
+"""Warp of a one-piece shell: a smooth random displacement, and what it does to each mirror.
+
+Every point x of the shell is displaced by d(x), each component of which is a Gaussian random field
+(tbcad.tolerance.montecarlo.smooth_field). Neighbouring mirrors move, turn and bend together. A
+mirror becomes the sphere with astigmatism h that fits its displaced points best: with their normals
+n, n . d = n . e + r' + h, where the displacement e of the centre, the growth r' of the radius and h
+are sought. Shells that are moved, turned or scaled as a whole are followed exactly.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from tbcad.geometry.vectors import dot, perpendicular_axes
+from tbcad.simulate.parallel import compiled_loop
+from tbcad.tolerance.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
+from tbcad.tolerance.montecarlo.smooth_field import SmoothField, pivots, smooth_field
+from tbcad.types import Floats
+
+# Points of a mirror that are followed, besides its apex: on a circle at a share of its radius.
+RING_POINTS = 6
+RING_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class WarpMap:
+    """What K random numbers for each axis do to the m mirrors of one half.
+
+    Attributes:
+        basis: of the field at q points of each mirror, the apex first, (K, m q).
+        fit: centre and radius of the sphere, and astigmatism, from the points' displacements along
+            their normals, (m, 6, q).
+        normal: there, (m, q, 3).
+        foot_basis: of the field where each mirror is nearest to the foot plane, (m, K).
+        foot_normal: unit normal of the foot plane, (3,).
+    """
+
+    basis: Floats
+    fit: Floats
+    normal: Floats
+    foot_basis: Floats
+    foot_normal: Floats
+
+    @property
+    def modes(self) -> int:
+        """Number of random numbers K for each axis."""
+        return len(self.basis)
+
+    def moved(self, numbers: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Displacements of the mirrors of one build.
+
+        Args:
+            numbers: random numbers, mm, (K, 3).
+
+        Returns:
+            Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along
+            its normal (m,), and factors of the two terms of astigmatism (m, 2), mm.
+        """
+        points = field_values(self.basis, numbers).reshape(3, *self.normal.shape[:2])
+        along = np.einsum("xmq,mqx->mq", points, self.normal)
+        spheres = np.einsum("mkq,mq->mk", self.fit, along)
+        foot = np.einsum("mk,k->m", self.foot_basis, dot(numbers, self.foot_normal))
+        return spheres[:, :3], spheres[:, 3], foot, spheres[:, 4:]
+
+
+WarpMaps: TypeAlias = tuple[WarpMap, WarpMap]
+
+
+@compiled_loop
+def field_values(basis: Floats, numbers: Floats) -> Floats:
+    """Displacements (3, p) by random numbers (K, 3) and the field's basis (K, p).
+
+    Not by BLAS, whose threads would get into the way of those that simulate builds, and not by
+    einsum, which takes three times as long.
+    """
+    result = np.zeros((3, basis.shape[1]))
+    for k in range(len(basis)):
+        x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
+        for p in range(basis.shape[1]):
+            result[0, p] += basis[k, p] * x
+            result[1, p] += basis[k, p] * y
+            result[2, p] += basis[k, p] * z
+    return result
+
+
+def warp_maps(
+    tables: tuple[Floats, Floats], radii: tuple[Floats, Floats], length: float
+) -> WarpMaps:
+    """The maps of both halves, whose fields follow from the same mirrors of each.
+
+    Args:
+        tables: of each half apex, normal, curvature of the m mirrors, seam and foot, (m + 2, 7).
+        radii: of each half the distance of each mirror's farthest corner from its apex, mm, (m,).
+        length: correlation length, mm.
+    """
+    chosen = pivots(tables[0][:-2, :3], length)
+    first, second = (
+        _warp_map(table, radius, smooth_field(table[:-2, :3], length, chosen))
+        for table, radius in zip(tables, radii, strict=True)
+    )
+    return first, second
+
+
+def _warp_map(table: Floats, radius: Floats, field: SmoothField) -> WarpMap:
+    apex, foot = table[:-2, :3], table[-1]
+    points, normal = mirror_points(table[:-2], RING_SHARE * radius)
+    height = np.broadcast_to(_astigmatism(), (len(apex), RING_POINTS + 1, 2))
+    unknowns = np.concatenate([normal, np.ones((*normal.shape[:2], 1)), height], axis=2)
+    above = dot(apex - foot[:3], foot[3:6])
+    return WarpMap(
+        basis=np.ascontiguousarray(field.basis(points.reshape(-1, 3)).T),
+        fit=np.linalg.pinv(unknowns),
+        normal=normal,
+        foot_basis=field.basis(apex - above[:, None] * foot[3:6]),
+        foot_normal=foot[3:6],
+    )
+
+
+def _astigmatism() -> Floats:
+    """Height of both terms at the points, (q, 2)."""
+    x, y = RING_SHARE * np.vstack([np.zeros(2), _circle()]).T
+    return monomials(x, y) @ term_polynomials()[list(ASTIGMATISM)].T
+
+
+def _circle() -> Floats:
+    angle = 2 * np.pi * np.arange(RING_POINTS) / RING_POINTS
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def mirror_points(table: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """Points of mirrors, apex and ring, and unit normals there, (m, q, 3) each.
+
+    Args:
+        table: apex, normal, curvature of the mirrors, (m, 7).
+        radius: of the rings in the tangent planes, mm, (m,).
+    """
+    apex, normal, curvature = table[:, :3], table[:, 3:6], table[:, 6]
+    across = radius[:, None, None] * (_circle() @ perpendicular_axes(normal))
+    depth = curvature * radius**2 / (1 + np.sqrt(1 - (curvature * radius) ** 2))
+    ring = across - (depth[:, None] * normal)[:, None]
+    offset = np.concatenate([np.zeros((len(table), 1, 3)), ring], axis=1)
+    return apex[:, None] + offset, normal[:, None] + curvature[:, None, None] * offset
