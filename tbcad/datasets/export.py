@@ -1,0 +1,141 @@
+"""A capture as a folder for another program, with the figures of how well it fits."""
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.datasets.colmap import write_colmap
+from tbcad.datasets.crops import chosen_mirrors
+from tbcad.datasets.nerfstudio import write_nerfstudio
+from tbcad.datasets.ngp_rays import write_ngp_rays
+from tbcad.datasets.options import ExportOptions
+from tbcad.datasets.pictures import Pictures, default_size, taken_pictures
+from tbcad.datasets.ray_table import write_ray_table
+from tbcad.datasets.seed_points import SeedPoints, seed_points
+from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
+from tbcad.errors import InputError
+from tbcad.formats.csv_table import Row, write_table
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.types import Floats, Progress
+
+SCHEMA = "tbcad-dataset/1"
+RECORD, TABLE = "dataset.json", "cameras.csv"
+DIGITS = 6
+COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "central_error_mm")
+
+
+def write_dataset(
+    folder: Path,
+    source: LightField,
+    scene: Scene | None,
+    options: ExportOptions,
+    progress: Progress,
+    detail: Progress,
+) -> dict[str, Any]:
+    """Write all files of an export into a folder, and return its record.
+
+    Args:
+        folder: exists, is empty, and is the caller's to replace.
+        source: the light field.
+        scene: the object of a simulated capture; None where it is not known.
+        options: what is wanted.
+        progress: called with each stage.
+        detail: called with each step of a stage.
+
+    Raises:
+        InputError: a mirror is not in the capture, or none gives a camera.
+    """
+    progress("virtual cameras")
+    mirrors = chosen_mirrors(source, options.cameras, options.every)
+    virtual = virtual_cameras(source, mirrors, detail)
+    if not len(virtual):
+        raise InputError("no mirror of the capture gives a virtual camera: choose other --cameras")
+    record = {
+        "schema": SCHEMA,
+        "target": options.target,
+        "capture": source.facts,
+        "capture_mm": source.capture_mm,
+        "virtual_cameras": len(virtual),
+        "left_out": virtual.left_out,
+        **_written(folder, source, virtual, scene, options, progress, detail),
+        "fit": _fit(virtual),
+    }
+    write_table(folder / TABLE, COLUMNS, _rows(virtual))
+    text = json.dumps(record, indent=1, sort_keys=False, allow_nan=False) + "\n"
+    (folder / RECORD).write_text(text, encoding="utf-8")
+    return record
+
+
+def _written(
+    folder: Path,
+    source: LightField,
+    virtual: VirtualCameras,
+    scene: Scene | None,
+    options: ExportOptions,
+    progress: Progress,
+    detail: Progress,
+) -> dict[str, Any]:
+    """Write what the target reads, and return what is in it."""
+    if options.target == "ngp-rays":
+        progress("crops and rays")
+        write_ngp_rays(folder, source, virtual, detail)
+        return {"rays": int(virtual.rays.sum())}
+    if options.target == "rays":
+        progress("rays")
+        return {"rays": write_ray_table(folder, source, virtual, detail)}
+    progress("pictures")
+    size = options.size_px or default_size(virtual, source.capture_mm)
+    pictures = taken_pictures(source, virtual, size, scene, detail)
+    progress("seed points")
+    seeds = seed_points(pictures.cameras, pictures.picture, pictures.mask, source.capture_mm)
+    progress("files")
+    write = write_nerfstudio if options.target == "nerfstudio" else write_colmap
+    write(folder, [one.name for one in virtual.mirrors], pictures, seeds)
+    return _of_pictures(size, pictures, seeds)
+
+
+def _of_pictures(size: int, pictures: Pictures, seeds: SeedPoints) -> dict[str, Any]:
+    errors = pictures.reprojection_px
+    found = {
+        "size_px": size,
+        "seed_points": len(seeds.points),
+        "known_pixels": round(float(pictures.mask.mean()), DIGITS),
+    }
+    if errors is None or not len(errors):
+        return found
+    figures = {"rays": len(errors), "median": _rounded(np.median(errors))}
+    figures["percentile_95"] = _rounded(np.percentile(errors, 95))
+    return {**found, "reprojection_error_px": figures}
+
+
+def _fit(virtual: VirtualCameras) -> dict[str, dict[str, float]]:
+    """Median and maximum over the virtual cameras, mm."""
+    columns = {
+        "rms_distance_from_common_point_mm": virtual.rms_mm,
+        "worst_distance_from_common_point_mm": virtual.worst_mm,
+        "central_error_at_capture_radius_mm": virtual.central_error_mm,
+        "pixel_pitch_mm": virtual.pitch_mm,
+    }
+    return {
+        name: {"median": _rounded(np.median(values)), "max": _rounded(values.max())}
+        for name, values in columns.items()
+    }
+
+
+def _rounded(value: np.floating[Any]) -> float:
+    return round(float(value), DIGITS)
+
+
+def _rows(virtual: VirtualCameras) -> Iterator[Row]:
+    figures: Iterable[Floats] = np.column_stack(
+        [virtual.pitch_mm, virtual.rms_mm, virtual.worst_mm, virtual.central_error_mm]
+    )
+    for mirror, centre, rays, row in zip(
+        virtual.mirrors, virtual.centre.tolist(), virtual.rays, figures, strict=True
+    ):
+        cells = [mirror.name, *centre, int(rays), *np.round(row, DIGITS).tolist()]
+        yield dict(zip(COLUMNS, cells, strict=True))
