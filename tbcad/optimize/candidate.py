@@ -1,0 +1,143 @@
+"""What is varied, and what a candidate is judged by."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import ValidationError
+
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.simulate.study.pixels import Sensor, count_pixels
+from tbcad.simulate.study.sweep import spec_with
+from tbcad.spec.design import FIT, Spec
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats, Ints
+
+STEP_MM = 0.5  # of all variables: finer changes no figure that counts
+LEAST = 0.4  # of what the first design has, of all variables
+# At most, of the largest machine's longest side; a pinhole is on either side.
+CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
+
+Place = tuple[float, float, float]
+"""Camera's x and z, and the semi-minor axis, mm."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a design gives.
+
+    Attributes:
+        minimum_px: pixels that show the capture sphere, of the virtual camera with fewest.
+        median_px: of all virtual cameras.
+        mean_log_px: mean of the natural logarithm of the pixels of all virtual cameras.
+        variation: standard deviation of the pixels over their mean.
+        size_mm: longest side of the box round all mirrors' apices and both pinholes.
+        view_angle_deg: that the lenses need, across the columns.
+    """
+
+    minimum_px: float
+    median_px: float
+    mean_log_px: float
+    variation: float
+    size_mm: float
+    view_angle_deg: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A place and what it gives.
+
+    Attributes:
+        place: what was varied.
+        figures: None where it cannot be made.
+        reason: why it cannot, in one line.
+    """
+
+    place: Place
+    figures: Figures | None
+    reason: str = ""
+
+
+def place_of(spec: Spec) -> Place:
+    """What is varied, as a design has it."""
+    x, _, z = spec.optics.camera_mm
+    return x, z, spec.optics.semi_minor_mm
+
+
+def bounds(spec: Spec, size_mm: float) -> list[tuple[float, float]]:
+    """Least and largest of each variable, mm; the place that a search begins from is within.
+
+    Args:
+        spec: the first design.
+        size_mm: longest side of the largest machine.
+    """
+    x, z, semi_minor = place_of(spec)
+    depth = max(CAMERA_Z * size_mm, -z)
+    return [
+        (LEAST * x, max(CAMERA_X * size_mm, x)),
+        (-depth, LEAST * z),
+        (LEAST * semi_minor, max(SEMI_MINOR * size_mm, semi_minor)),
+    ]
+
+
+def rounded(place: Floats) -> Place:
+    """The nearest place on the grid."""
+    x, z, semi_minor = (np.round(place / STEP_MM) * STEP_MM).tolist()
+    return x, z, semi_minor
+
+
+def placed(spec: Spec, place: Place) -> Spec:
+    """A design with its camera and ellipsoid elsewhere, and a lens that fits."""
+    x, z, semi_minor = place
+    camera = (x, spec.optics.camera_mm[1], z)
+    moved = spec_with(
+        spec,
+        optics={"camera_mm": camera, "semi_minor_mm": semi_minor},
+        camera={"hfov_deg": FIT},
+    )
+    return Spec.model_validate(moved.model_dump(by_alias=True))
+
+
+def evaluate(spec: Spec, place: Place) -> Candidate:
+    """Design the mirrors of a place, and count pixels."""
+    try:
+        return Candidate(place, figures_of(design(placed(spec, place))))
+    except ValidationError as error:
+        return Candidate(place, None, error.errors()[0]["msg"])
+    except SpecError as error:
+        return Candidate(place, None, str(error))
+
+
+def figures_of(designed: MirrorDesign) -> Figures:
+    """Figures of a design, of both halves together."""
+    array, camera = designed.arrays[0], designed.spec.camera
+    pixels, weight = virtual_camera_pixels(array, designed.spec)
+    mean = float(np.average(pixels, weights=weight))
+    variance = float(np.average((pixels - mean) ** 2, weights=weight))
+    return Figures(
+        minimum_px=float(pixels.min()),
+        median_px=float(np.median(np.repeat(pixels, weight))),
+        mean_log_px=float(np.average(np.log(np.maximum(pixels, 1)), weights=weight)),
+        variation=math.sqrt(variance) / mean,
+        size_mm=size_of(array),
+        view_angle_deg=float(camera.hfov_deg),
+    )
+
+
+def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]:
+    """Pixels that show the capture sphere, (m,), and how many virtual cameras have as many, (m,).
+
+    The two halves of a mirror on the seam make one virtual camera, with the pixels of both.
+    """
+    sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
+    counts = count_pixels(array, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    halved = array.u[:, 0] == 0
+    return np.where(halved, 2, 1) * counts.seen, np.where(halved, 1, 2)
+
+
+def size_of(array: MirrorArray) -> float:
+    """Longest side of the box round all mirrors' apices and both pinholes, mm."""
+    apex = array.apex_distance[:, None] * array.u
+    points = np.abs(np.vstack([apex, array.camera.pinhole])[:, 0]).max()
+    rest = np.vstack([apex, array.camera.pinhole])[:, 1:]
+    return float(max(2 * points, *np.ptp(rest, axis=0)))
