@@ -12,7 +12,7 @@ from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 
 SHELL = "shell"
-PROTOTYPE = ("rig", "base", "seat", "exploded")
+PROTOTYPE = ("rig", "sides", "base", "seat", "exploded")
 SUBJECTS = (SHELL, *PROTOTYPE)
 SHELL_FILES = ("design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
@@ -40,13 +40,37 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
     refuse_existing(file, force)
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".tbcad-picture-") as place:
         drawn = Path(place) / "picture.png"
-        done = subprocess.run(
-            child_command(folder, drawn, subject), capture_output=True, text=True, check=False
-        )
-        if done.returncode != 0 or not drawn.is_file():
-            last = (done.stderr.strip() or "the process crashed").splitlines()[-1]
-            raise InputError(f"drawing failed ({last[:200]}): see tbcad doctor")
+        _run(child_command(folder, drawn, subject))
+        if not drawn.is_file():
+            raise InputError("drawing failed (no picture): see tbcad doctor")
         drawn.replace(file)
+
+
+def draw_apart(module: str, *arguments: str) -> None:
+    """Run a module of tbcad.report as a program in a process of its own.
+
+    Raises:
+        InputError: when there is no screen, or drawing fails.
+    """
+    _run(_on_screen([sys.executable, "-m", f"tbcad.report.{module}", *arguments]))
+
+
+def check_prototype_files(folder: Path) -> None:
+    """Refuse an export whose prototype is missing or not as it was written.
+
+    Raises:
+        InputError: it names the file.
+    """
+    _check_files(folder, PROTOTYPE[0])
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(
+        command, capture_output=True, encoding="utf-8", errors="replace", check=False
+    )
+    if done.returncode != 0:
+        last = (done.stderr.strip() or "the process crashed").splitlines()[-1]
+        raise InputError(f"drawing failed ({last[:200]}): see tbcad doctor")
 
 
 def _check_files(folder: Path, subject: str) -> None:
@@ -81,7 +105,17 @@ def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str
         InputError: when there is neither a screen nor a virtual one.
     """
     module, what = ("shell_pictures", []) if subject == SHELL else ("prototype_pictures", [subject])
-    command = [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
+    return _on_screen(
+        [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
+    )
+
+
+def _on_screen(command: list[str]) -> list[str]:
+    """A command, under a virtual screen where needed.
+
+    Raises:
+        InputError: when there is neither a screen nor a virtual one.
+    """
     if os.environ.get("DISPLAY") or sys.platform != "linux":
         return command
     virtual = shutil.which("xvfb-run")

@@ -19,7 +19,7 @@ from tbcad.types import Floats
 Record = dict[str, Any]
 
 
-class _Drawn(NamedTuple):
+class Drawn(NamedTuple):
     """A body of the assembly: its name, its group, its surface, its colour and opacity."""
 
     name: str
@@ -47,6 +47,15 @@ COLOURS = {
     "cap": "#d9b366",
     "ball": "#c7ccd4",
 }
+# Where it is seen from, and what points up in the picture. Camera a is toward +x.
+SIDES = (
+    ("from the camera's side (+x)", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ("from the right (+y)", (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    ("from the left (-y)", (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    ("from above (+z)", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+)
+SIDES_BORDER = 1.15  # height and width of a picture, in the longest side of all that is drawn
+ROWS = {"sides": 2}  # of pictures; one where nothing is said
 # In the exploded view: static parts are moved away from the object by this share of their
 # distance, balls and caps are lifted out of their seats by so many radii of the capture sphere.
 APART = 0.7
@@ -62,7 +71,9 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
         picture: file to write.
     """
     record = json.loads((folder / "prototype.json").read_text(encoding="utf-8"))
-    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
+    rows = ROWS.get(subject, 1)
+    size = (SIZE[0], rows * SIZE[1])
+    plotter = pyvista.Plotter(off_screen=True, shape=(rows, 2), window_size=size, border=False)
     SUBJECTS[subject](plotter, folder, record)
     plotter.screenshot(picture)
     plotter.close()
@@ -70,13 +81,36 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
 
 def _whole(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     """The whole prototype with purchased parts, from two sides."""
-    bodies = _assembly(folder, record)
+    bodies = assembly_bodies(folder, record)
     for column, eye in enumerate(((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0))):
         plotter.subplot(0, column)
         for body in bodies:
             if body.name != "camera_view":
                 _add(plotter, body, np.zeros(3))
         _show_all(plotter, eye)
+
+
+def _sides(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+    """The prototype without its shroud from four sides, all to one scale."""
+    bodies = [
+        body
+        for body in assembly_bodies(folder, record)
+        if body.group not in ("views", "shroud") and body.name != "camera_view"
+    ]
+    for number, (title, eye, up) in enumerate(SIDES):
+        plotter.subplot(*divmod(number, 2))
+        for body in bodies:
+            _add(plotter, body, np.zeros(3))
+        plotter.set_background("white")
+        plotter.add_text(title, position="upper_edge", color="black", font_size=12)
+        plotter.enable_parallel_projection()
+        plotter.view_vector(eye, viewup=up)
+        plotter.reset_camera()
+    longest = max(
+        np.ptp(np.reshape(view.bounds, (3, 2)), axis=1).max() for view in plotter.renderers
+    )
+    for view in plotter.renderers:
+        view.camera.parallel_scale = SIDES_BORDER * longest / 2  # half the height of a picture
 
 
 def _base(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
@@ -113,7 +147,7 @@ def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
     unit = record["target_mm"] / 2
     seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
     seats |= {part["name"]: seats[f"ball_{part['ball']}"] for part in _with(record, ("cap",))}
-    bodies = [body for body in _assembly(folder, record) if body.group != "views"]
+    bodies = [body for body in assembly_bodies(folder, record) if body.group != "views"]
     for column, eye in enumerate(((-0.5, -2.6, 0.8), (2.3, -1.5, 1.1))):
         plotter.subplot(0, column)
         for body in bodies:
@@ -125,6 +159,7 @@ def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
 
 SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Record], None]] = {
     "rig": _whole,
+    "sides": _sides,
     "base": _base,
     "seat": _seat,
     "exploded": _exploded,
@@ -137,10 +172,10 @@ def _with(record: Record, roles: tuple[str, ...]) -> list[Record]:
 
 def _parts(plotter: pyvista.Plotter, folder: Path, record: Record, roles: tuple[str, ...]) -> None:
     for part in _with(record, roles):
-        plotter.add_mesh(_mesh(folder, part), color=COLOURS[part["role"]], specular=0.2)
+        plotter.add_mesh(placed_mesh(folder, part), color=COLOURS[part["role"]], specular=0.2)
 
 
-def _mesh(folder: Path, part: Record) -> pyvista.PolyData:
+def placed_mesh(folder: Path, part: Record) -> pyvista.PolyData:
     """A part moved from the printer's bed back to its place in the prototype."""
     mesh = pyvista.read(folder / part["stl"])
     axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
@@ -171,7 +206,7 @@ def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
             plotter.add_mesh(sphere, color=COLOURS["ball"], smooth_shading=True, specular=0.9)
 
 
-def _assembly(folder: Path, record: Record) -> list[_Drawn]:
+def assembly_bodies(folder: Path, record: Record) -> list[Drawn]:
     """All bodies of prototype.glb, in millimetres and z up."""
     scene = trimesh.load_scene(folder / record["assembly"]["glb"])
     drawn = []
@@ -183,11 +218,11 @@ def _assembly(folder: Path, record: Record) -> list[_Drawn]:
         surface = pyvista.PolyData(points, faces.ravel()).clean()
         surface = surface.compute_normals(split_vertices=True, feature_angle=30.0)
         colour = mesh.visual.material.baseColorFactor / 255
-        drawn.append(_Drawn(name, scene.graph.transforms.parents[name], surface, colour))
+        drawn.append(Drawn(name, scene.graph.transforms.parents[name], surface, colour))
     return drawn
 
 
-def _add(plotter: pyvista.Plotter, body: _Drawn, moved: Floats) -> None:
+def _add(plotter: pyvista.Plotter, body: Drawn, moved: Floats) -> None:
     plotter.add_mesh(
         body.mesh.translate(moved, inplace=False),
         color=body.colour[:3],

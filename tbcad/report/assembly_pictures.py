@@ -1,0 +1,206 @@
+"""Pictures of the steps of assembly: new parts apart from their places, with call-outs.
+
+Run as a program, as `shell_pictures`: `python -m tbcad.report.assembly_pictures DIR PICTURES`.
+"""
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pyvista
+from PIL import Image
+from scipy.ndimage import distance_transform_edt
+
+from tbcad.geometry.vectors import unit
+from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
+from tbcad.report.apart import offsets
+from tbcad.report.callouts import Callout, draw_callouts, place_callouts
+from tbcad.report.prototype_pictures import Drawn, assembly_bodies, placed_mesh
+from tbcad.types import Bytes, Floats, Ints
+
+SIZE, SMALL = (1500, 950), (375, 238)
+ANGLE_DEG, AMBIENT = 25.0, 0.2
+FILLED = (0.66, 0.84)  # largest shares of the picture's width and height that new parts take
+CONTEXT = 0.45  # share of all that is shown, at least, that a picture has room for
+NEW, FASTENER, THERE = "#7fb0ea", "#ee7f2d", "#c4c4c4"
+# Directions to look from, degrees; their worth, since people look from above and from a corner.
+AZIMUTHS, ELEVATIONS = range(-135, 181, 45), {20: 1.0, 50: 0.95, -25: 0.8, -55: 0.7}
+SQUARE_DEG, SQUARE_WORTH = 90, 0.9
+ANCHOR_PX = 12  # visible pixels that a call-out needs
+DIGIT, SHADES = 8, 32  # of colours that number bodies
+
+
+class _Scene:
+    """The bodies of a step, to be drawn shaded or in colours that number them."""
+
+    def __init__(self, meshes: Mapping[str, pyvista.PolyData], new: frozenset[str]) -> None:
+        self.names, self.new = sorted(meshes), new
+        self.meshes = meshes
+
+    def plotter(self, size: tuple[int, int]) -> pyvista.Plotter:
+        plotter = pyvista.Plotter(off_screen=True, window_size=size)
+        plotter.set_background("white")
+        return plotter
+
+    def numbered(self, size: tuple[int, int]) -> pyvista.Plotter:
+        """Each body in the colour of its number from 1, without light."""
+        plotter = self.plotter(size)
+        plotter.set_background("black")
+        plotter.disable_anti_aliasing()  # blended colours would be other numbers
+        plotter.render_window.SetMultiSamples(0)
+        for number, name in enumerate(self.names, 1):
+            digits = (number // DIGIT**2, number // DIGIT % DIGIT, number % DIGIT)
+            colour = [SHADES * digit / 255 for digit in digits]
+            plotter.add_mesh(self.meshes[name], color=colour, lighting=False)
+        return plotter
+
+    def shaded(self, fasteners: frozenset[str]) -> pyvista.Plotter:
+        plotter = self.plotter(SIZE)
+        for name in self.names:
+            new = FASTENER if name in fasteners else NEW
+            colour = new if name in self.new else THERE
+            plotter.add_mesh(self.meshes[name], color=colour, ambient=AMBIENT, specular=0.1)
+        plotter.enable_anti_aliasing("ssaa")
+        return plotter
+
+    def _reach(self, names: Iterable[str], axes: Floats) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates of bodies along axes."""
+        points = np.vstack([self.meshes[name].points for name in sorted(names)]) @ axes.T
+        return points.min(axis=0), points.max(axis=0)
+
+    def look(self, plotter: pyvista.Plotter, eye: Floats) -> None:
+        """Look from a direction at the new bodies."""
+        right = unit(np.cross([0.0, 0.0, 1.0], eye))
+        axes = np.stack([right, np.cross(eye, right), eye])
+        low, high = self._reach(self.new, axes)
+        least, most = self._reach(self.meshes.keys(), axes)
+        half = np.maximum(high - low, CONTEXT * (most - least)) / 2
+        focus, half, away = (low + high) / 2 @ axes, half[:2], half[2]
+        ratio = np.array([SIZE[0] / SIZE[1] * FILLED[0], FILLED[1]])
+        distance = (half / ratio).max() / np.tan(np.radians(ANGLE_DEG) / 2) + away
+        plotter.camera_position = [tuple(focus + distance * eye), tuple(focus), (0.0, 0.0, 1.0)]
+        plotter.camera.view_angle = ANGLE_DEG
+        plotter.reset_camera_clipping_range()
+
+
+def draw(folder: Path, pictures: Path) -> None:
+    """Draw a PNG file for each step that has bodies, named by its key.
+
+    Args:
+        folder: an export with a prototype.
+        pictures: folder to write into.
+    """
+    machine = read_machine(folder)
+    bodies = _meshes(folder, machine)
+    for step in assembly_steps(machine):
+        if new := {name for use in step.parts for name in use.bodies} & bodies.keys():
+            _picture(machine, step, bodies, frozenset(new)).save(pictures / f"{step.key}.png")
+
+
+def _meshes(folder: Path, machine: Machine) -> dict[str, pyvista.PolyData]:
+    """Bodies of the assembly, and the tools that are not in it."""
+    drawn: list[Drawn] = assembly_bodies(folder, machine.record)
+    meshes = {body.name: body.mesh for body in drawn}
+    tools = [part for part in machine.record["parts"] if part["role"] == "tool"]
+    return meshes | {part["name"]: placed_mesh(folder, part) for part in tools}
+
+
+def _picture(
+    machine: Machine, step: Step, bodies: Mapping[str, pyvista.PolyData], new: frozenset[str]
+) -> Image.Image:
+    moved = offsets(machine, new)
+    shown = [name for name in (*new, *step.near) if name in bodies]
+    scene = _Scene(
+        {
+            name: bodies[name].translate(moved.get(name, np.zeros(3)), inplace=False)
+            for name in shown
+        },
+        new,
+    )
+    eye = _best_eye(scene, step)
+    fasteners = frozenset(one["name"] for one in machine.fasteners)
+    picture = Image.fromarray(_screenshot(scene, scene.shaded(fasteners), eye))
+    numbers = _numbers(_screenshot(scene, scene.numbered(SIZE), eye))
+    callouts = list(_callouts(step, scene, numbers))
+    draw_callouts(picture, place_callouts(callouts, SIZE))
+    return picture.quantize(255, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+
+
+def _screenshot(scene: _Scene, plotter: pyvista.Plotter, eye: Floats) -> Bytes:
+    scene.look(plotter, eye)
+    pixels = np.array(plotter.screenshot(None, return_img=True))
+    plotter.close()
+    return pixels
+
+
+def _numbers(pixels: Bytes) -> Ints:
+    """Numbers of the bodies from their colours, (height, width); 0 where there is none."""
+    shades = pixels[..., :3].astype(np.int64)
+    digits = (shades + SHADES // 2) // SHADES
+    exact = (np.abs(shades - SHADES * digits) <= 1).all(axis=-1)
+    return np.asarray(np.where(exact, digits @ np.array([DIGIT**2, DIGIT, 1]), 0))
+
+
+def _best_eye(scene: _Scene, step: Step) -> Floats:
+    """The direction from which most kinds of new parts are seen."""
+    plotter = scene.numbered(SMALL)
+    eyes = [_direction(azimuth, up) for up in ELEVATIONS for azimuth in AZIMUTHS]
+    seen = []
+    for eye in eyes:
+        scene.look(plotter, eye)
+        plotter.render()  # what was drawn before is shown otherwise
+        numbers = _numbers(np.array(plotter.screenshot(None, return_img=True)))
+        seen.append(_seen(scene, step, numbers))
+    plotter.close()
+    area = np.array(seen)
+    scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
+    return eyes[int(np.argmax(scores * _worth()))]
+
+
+def _worth() -> Floats:
+    """Of each direction, in their order."""
+    return np.array(
+        [
+            worth * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0)
+            for worth in ELEVATIONS.values()
+            for azimuth in AZIMUTHS
+        ]
+    )
+
+
+def _direction(azimuth: float, elevation: float) -> Floats:
+    turn, up = np.radians(azimuth), np.radians(elevation)
+    return np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+
+
+def _seen(scene: _Scene, step: Step, numbers: Ints) -> list[int]:
+    """Visible pixels of the best seen body of each kind of part."""
+    counts = np.bincount(numbers.ravel(), minlength=len(scene.names) + 1)
+    return [
+        max((_count(scene, counts, name) for name in use.bodies), default=0) for use in step.parts
+    ]
+
+
+def _count(scene: _Scene, counts: Ints, name: str) -> int:
+    return int(counts[scene.names.index(name) + 1]) if name in scene.meshes else 0
+
+
+def _callouts(step: Step, scene: _Scene, numbers: Ints) -> Iterable[Callout]:
+    """A call-out for each kind of part that is seen, at the middle of its best seen body."""
+    counts = np.bincount(numbers.ravel(), minlength=len(scene.names) + 1)
+    for use in step.parts:
+        best = max(use.bodies, key=lambda name: _count(scene, counts, name), default="")
+        if best and _count(scene, counts, best) >= ANCHOR_PX:
+            yield Callout(use.item, use.quantity, _inside(numbers == scene.names.index(best) + 1))
+
+
+def _inside(mask: Sequence[bool] | Floats) -> tuple[float, float]:
+    """The pixel (x, y) of a region that is farthest from its edge."""
+    y, x = np.unravel_index(int(np.argmax(distance_transform_edt(mask))), np.shape(mask))
+    return float(x), float(y)
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), Path(sys.argv[2]))

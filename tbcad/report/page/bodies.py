@@ -1,0 +1,222 @@
+"""What the 3D view shows: the shells, drawn from the record, and the bodies of prototype.glb."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tbcad.cad.mesh import Mesh
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.vectors import norm
+from tbcad.optics.surfaces import Surfaces
+from tbcad.report.page.packing import PackedArrays
+from tbcad.shell.cell_middles import means, middles
+from tbcad.shell.envelope import closing_envelope
+from tbcad.shell.facets import Facets, mirror_facets
+from tbcad.shell.mesh import shell_mesh
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.spec.design import MeshSpec, Spec
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats, Ints
+
+Record = dict[str, Any]
+
+# Display only, for the outlines of mirrors and the casing.
+COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.2)
+STEPS = 65_535  # of positions along a body's longest side
+# In the exploded view: static parts are moved away from the object by this share of their
+# distance, balls and caps out of their seats by so many radii of the capture sphere, fasteners
+# against their direction, shells apart by this share of their width.
+APART, LIFTED, FASTENER_MM, SHELLS_APART = 0.7, 1.5, 30.0, 0.6
+STATIC = ("stage", "frame", "bought", "shroud")
+# From glTF's metres and y up to millimetres and z up.
+SHELL_FRAME = 1e3 * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+SHELL_COLOUR = (0.80, 0.80, 0.80, 1.0)
+
+
+class Body(NamedTuple):
+    """A body of the 3D view.
+
+    Attributes:
+        name: as in the files.
+        group: key of the group that is switched on and off.
+        vertices: mm, (v, 3).
+        triangles: counter-clockwise from outside, (t, 3).
+        colour: red, green, blue and opacity, 0 to 1.
+        apart: by how much it is moved when everything is taken apart, mm, (3,).
+        turns: whether it turns with the base.
+    """
+
+    name: str
+    group: str
+    vertices: Floats
+    triangles: Ints
+    colour: tuple[float, ...]
+    apart: Floats
+    turns: bool = False
+
+
+def packed_body(body: Body, arrays: PackedArrays) -> Record:
+    """A body for the page; its positions are rounded to STEPS along its longest side."""
+    low = body.vertices.min(axis=0)
+    step = float(np.ptp(body.vertices, axis=0).max()) / STEPS or 1.0
+    places = np.round((body.vertices - low) / step).astype(np.uint16)
+    # One number for a place, which is sorted far faster than three.
+    number = places.astype(np.int64) @ [1 << 32, 1 << 16, 1]
+    _, first, index = np.unique(number, return_index=True, return_inverse=True)
+    triangles = index[body.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return {
+        "name": body.name,
+        "group": body.group,
+        "low": _short(low),
+        "step": step,
+        "vertices": arrays.add(places[first].T, "Uint16Array"),
+        "triangles": arrays.add(triangles[whole], "Uint32Array"),
+        "colour": [round(float(value), 3) for value in body.colour],
+        "apart": _short(body.apart),
+        "turns": body.turns,
+    }
+
+
+def coarse_facets(export: ExportedDesign) -> Facets:
+    """Camera a's mirrors, for display only."""
+    camera_a = export.reflectors[0]
+    return mirror_facets(_coarse(export.spec), camera_a.cells, norm(camera_a.mirrors.apex))
+
+
+def packed_shells(export: ExportedDesign, facets: Facets, arrays: PackedArrays) -> list[Record]:
+    """Camera a's shell from its record, and b's as its mirror image; none if it cannot be drawn."""
+    camera_a = export.reflectors[0]
+    spec = _coarse(export.spec)
+    distance = norm(camera_a.mirrors.apex)
+    ellipsoid = Ellipsoid(camera_a.camera.pinhole, spec.optics.semi_minor_mm)
+    try:
+        envelope = closing_envelope(spec.shell, camera_a.cells, ellipsoid)
+    except SpecError:  # a coat that leaves no room; the files are there all the same
+        return []
+    mesh = shell_mesh(spec, camera_a.cells, envelope, distance)
+    vertices, triangles = _with_fans(mesh, facets, camera_a.mirrors)
+    width = np.array([SHELLS_APART * float(np.ptp(vertices[:, 0])), 0.0, 0.0])
+    shell = Body("shell_a", "shell_a", vertices, triangles, SHELL_COLOUR, width)
+    owner = np.zeros(len(triangles), dtype=np.int64)
+    owner[: len(facets.outlines.cell)] = facets.outlines.cell + 1
+    record = _exact(shell, arrays) | {"owner": arrays.add(owner, "Uint16Array")}
+    image = {"name": "shell_b", "group": "shell_b", "mirrored": "shell_a", "apart": _short(-width)}
+    return [record, image]
+
+
+def _with_fans(mesh: Mesh, facets: Facets, mirrors: Surfaces) -> tuple[Floats, Ints]:
+    """A shell's mesh with a fan about the middle of each mirror in place of its facets.
+
+    The fans come first, in the order of the outlines; the other faces need no inner vertices.
+    """
+    outlines, inner = facets.outlines, len(facets.vertices)
+    rim, m = len(outlines.vertices), len(mirrors)
+    planar = not mirrors.curvature.any()
+    hubs = means(outlines.points, outlines.cell) if planar else middles(outlines, mirrors)
+    fans = [outlines.vertex[outlines.following], outlines.vertex, rim + outlines.cell]
+    others = mesh.triangles[len(facets.triangles) :]
+    others = np.where(others < rim, others, others - inner + rim + m)
+    vertices = np.concatenate([mesh.vertices[:rim], hubs, mesh.vertices[inner:]])
+    return vertices, np.concatenate([np.column_stack(fans), others])
+
+
+def packed_outlines(facets: Facets, arrays: PackedArrays) -> Record:
+    """Points along the outline of each of camera a's cells, mm; offsets of the cells, (m + 1,)."""
+    count = np.bincount(facets.outlines.cell)
+    offsets = np.concatenate([[0], np.cumsum(count)])
+    return {
+        "points": arrays.add(facets.outlines.points, "Float32Array"),
+        "offsets": arrays.add(offsets, "Uint32Array"),
+    }
+
+
+def axis(pinhole: Floats) -> list[float]:
+    """Unit vector of the axis that the base turns about."""
+    return [float(value) for value in pinhole / np.linalg.norm(pinhole)]
+
+
+def camera_distance(export: ExportedDesign) -> float:
+    """Distance of every virtual camera from the object, mm."""
+    pinhole = export.reflectors[0].camera.pinhole
+    return Ellipsoid(pinhole, export.spec.optics.semi_minor_mm).camera_distance
+
+
+def prototype_bodies(folder: Path) -> Iterator[Body]:
+    """All bodies of prototype.glb, in millimetres and z up."""
+    record = json.loads((folder / "prototype.json").read_text(encoding="utf-8"))
+    drawn = list(_drawn(folder / record["assembly"]["glb"]))
+    turning = _turning(record)
+    apart = _apart(record, drawn)
+    for name, group, points, faces, colour in drawn:
+        yield Body(name, group, points, faces, colour, apart[name], name in turning)
+
+
+def _coarse(spec: Spec) -> Spec:
+    return spec.model_copy(update={"mesh": COARSE})
+
+
+def _exact(body: Body, arrays: PackedArrays) -> Record:
+    """A body whose triangles all stay, since what they are of is told in their order."""
+    low = body.vertices.min(axis=0)
+    step = float(np.ptp(body.vertices, axis=0).max()) / STEPS
+    places = np.round((body.vertices - low) / step)
+    return {
+        "name": body.name,
+        "group": body.group,
+        "low": _short(low),
+        "step": step,
+        "vertices": arrays.add(places.T, "Uint16Array"),
+        "triangles": arrays.add(body.triangles, "Uint32Array"),
+        "colour": list(body.colour),
+        "apart": _short(body.apart),
+    }
+
+
+def _short(vector: Floats) -> list[float]:
+    return [round(float(value), 4) + 0.0 for value in vector]
+
+
+def _drawn(
+    file: Path,
+) -> Iterator[tuple[str, str, Floats, Ints, tuple[float, ...]]]:
+    """Name, group, vertices, triangles and colour of each body of an assembly."""
+    import trimesh
+
+    scene = trimesh.load_scene(file)
+    for name in sorted(scene.graph.nodes_geometry):
+        place, geometry = scene.graph[name]
+        mesh = scene.geometry[geometry]
+        points = trimesh.transform_points(mesh.vertices, place) @ SHELL_FRAME
+        colour = tuple(float(part) / 255 for part in mesh.visual.material.baseColorFactor)
+        group = str(scene.graph.transforms.parents[name])
+        yield name, group, np.asarray(points), np.asarray(mesh.faces), colour
+
+
+def _turning(record: Record) -> set[str]:
+    """Names of the bodies that turn with the base."""
+    parts = {part["name"] for part in record["parts"] if part["role"] in ("base", "cap")}
+    balls = {f"ball_{seat['ball']}" for seat in record["seats"]}
+    others = [*record.get("bought", ()), *record.get("fasteners", ())]
+    return parts | balls | {one["name"] for one in others if one.get("turns")}
+
+
+def _apart(record: Record, drawn: list[Any]) -> Mapping[str, Floats]:
+    """By how much each body is moved in the exploded view, mm, (3,)."""
+    radius = record["target_mm"] / 2
+    seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
+    for part in record["parts"]:
+        if part["role"] == "cap":
+            seats[part["name"]] = seats[f"ball_{part['ball']}"]
+    moved = {}
+    for name, group, points, *_ in drawn:
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        away = APART * middle if group in STATIC else np.zeros(3)
+        moved[name] = away - LIFTED * radius * seats.get(name, np.zeros(3))
+    for one in record.get("fasteners", ()):
+        held = moved.get(one["through"][0] if one["through"] else "", np.zeros(3))
+        moved[one["name"]] = held - FASTENER_MM * np.array(one["along"])
+    return moved

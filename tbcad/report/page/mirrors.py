@@ -1,0 +1,191 @@
+"""What the page knows of each mirror: the record, the verification, the plan of the prototype."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tbcad.formats.checked_files import Finite, read_csv
+from tbcad.formats.checked_files import Record as Row
+from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.verdict import Verdict
+from tbcad.simulate.scene.exported import MISSING, Radius
+from tbcad.types import Floats
+
+UM_PER_MM = 1000.0
+PLAN, BALLS = "rotation_plan.csv", "balls.csv"
+
+
+class MirrorRow(Row):
+    """A row of mirrors.csv."""
+
+    id: str
+    camera: str
+    ux: Finite
+    uy: Finite
+    uz: Finite
+    px: Finite
+    py: Finite
+    pz: Finite
+    nx: Finite
+    ny: Finite
+    nz: Finite
+    radius_mm: Radius
+    size_mm: Finite
+    polar_deg: Finite
+    azimuth_deg: Finite
+    cell_area_mm2: Finite
+    coverage_mm: Finite
+
+
+class PlanRow(Row):
+    """A row of rotation_plan.csv."""
+
+    object_turn_deg: Finite
+    stop: int
+    base_angle_deg: Finite
+    ball: int
+    mirror: str
+    error_deg: Finite
+
+
+class BallRow(Row):
+    """A row of balls.csv."""
+
+    number: int
+    kind: str
+    size: str
+    radius_mm: Finite
+    px: Finite
+    py: Finite
+    pz: Finite
+    nx: Finite
+    ny: Finite
+    nz: Finite
+
+
+class Quantity(NamedTuple):
+    """A figure of every mirror.
+
+    Attributes:
+        key: short name.
+        label: what it is.
+        unit: of the values.
+        digits: after the point.
+        values: (m,); NaN is unknown.
+        on_map: whether the map can show it.
+        added: whether both halves of a mirror on the seam add up.
+    """
+
+    key: str
+    label: str
+    unit: str
+    digits: int
+    values: Floats
+    on_map: bool = True
+    added: bool = False
+
+
+def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:
+    """All mirrors of both cameras for the page, with the prototype's balls if there are any."""
+    rows = read_csv(folder / "mirrors.csv", MirrorRow, MISSING)
+    plan = _plan(folder)
+    quantities = [*_verified(rows, verdict), *_designed(rows), *_pointing(rows, plan)]
+    poses = [[*(row.ux, row.uy, row.uz), *(row.px, row.py, row.pz)] for row in rows]
+    normals = [[row.nx, row.ny, row.nz] for row in rows]
+    known = [one for one in quantities if np.isfinite(one.values).any()]
+    return {
+        "ids": [row.id for row in rows],
+        "pose": arrays.add(np.hstack([poses, normals]), "Float32Array"),
+        "radius": arrays.add(np.array([row.radius_mm or np.inf for row in rows]), "Float32Array"),
+        "size": arrays.add(np.array([row.size_mm for row in rows]), "Float32Array"),
+        "quantities": [_packed(one, arrays) for one in known],
+        "plan": [_photograph(plan.get(row.id)) for row in rows] if plan else [],
+        "balls": _balls(folder) if plan else [],
+    }
+
+
+def _verified(rows: Sequence[MirrorRow], verdict: Verdict | None) -> Iterator[Quantity]:
+    if verdict is None:
+        return
+    measured = {one.id: one for one in verdict.mirrors}
+
+    def column(name: str, factor: float = 1.0) -> Floats:
+        found = (getattr(measured.get(row.id), name, None) for row in rows)
+        return np.array([np.nan if value is None else factor * value for value in found])
+
+    yield Quantity(
+        "covered", "Coverage, on the spheres in the files", "mm", 2, column("coverage_fitted_mm")
+    )
+    yield Quantity(
+        "facets", "Coverage, on the facets in the files", "mm", 2, column("coverage_facet_mm")
+    )
+    yield Quantity("pixels", "Pixels", "", 0, column("pixels"), added=True)
+    yield Quantity(
+        "centre", "Centre in the files, off by", "µm", 3, column("centre_error_mm", UM_PER_MM)
+    )
+    yield Quantity(
+        "radius_error",
+        "Radius in the files, off by",
+        "µm",
+        3,
+        column("radius_error_mm", UM_PER_MM),
+    )
+
+
+def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
+    def column(name: str) -> Floats:
+        return np.array([getattr(row, name) for row in rows], dtype=np.float64)
+
+    yield Quantity("designed", "Coverage, as computed", "mm", 2, column("coverage_mm"))
+    yield Quantity("radius", "Radius", "mm", 2, column("radius_mm"))
+    yield Quantity("area", "Area of the cell", "mm²", 2, column("cell_area_mm2"), added=True)
+    yield Quantity("polar", "Polar angle about the axis", "°", 2, column("polar_deg"), False)
+    yield Quantity("azimuth", "Azimuth about the axis", "°", 2, column("azimuth_deg"), False)
+
+
+def _pointing(rows: Sequence[MirrorRow], plan: Mapping[str, PlanRow]) -> Iterator[Quantity]:
+    found = (plan.get(row.id) for row in rows)
+    values = np.array([np.nan if one is None else one.error_deg for one in found])
+    yield Quantity("pointing", "Prototype: direction off by", "°", 2, values)
+
+
+def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
+    return {
+        "key": quantity.key,
+        "label": quantity.label,
+        "unit": quantity.unit,
+        "digits": quantity.digits,
+        "map": quantity.on_map,
+        "added": quantity.added,
+        "values": arrays.add(quantity.values, "Float32Array"),
+    }
+
+
+def _plan(folder: Path) -> dict[str, PlanRow]:
+    """The photograph of each mirror by its ball; none without a prototype."""
+    if not (folder / PLAN).is_file():
+        return {}
+    rows = read_csv(folder / PLAN, PlanRow, MISSING)
+    return {row.mirror: row for row in rows}
+
+
+def _photograph(row: PlanRow | None) -> list[float] | None:
+    """Ball, stop, angle of the base and turn of the object, degrees."""
+    if row is None:
+        return None
+    return [row.ball, row.stop, round(row.base_angle_deg, 4), row.object_turn_deg]
+
+
+def _balls(folder: Path) -> list[dict[str, Any]]:
+    return [
+        {
+            "number": ball.number,
+            "name": f"ball {ball.size}" if ball.kind != "cap" else ball.size,
+            "apex": [ball.px, ball.py, ball.pz],
+            "normal": [ball.nx, ball.ny, ball.nz],
+            "radius": ball.radius_mm,
+        }
+        for ball in read_csv(folder / BALLS, BallRow, MISSING)
+    ]

@@ -1,0 +1,124 @@
+"""Pictures in the page: those beside the export, and the photographs of a capture."""
+
+import base64
+import warnings
+from collections.abc import Iterator
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tbcad.errors import InputError
+
+SUFFIXES = (".png", ".jpg", ".jpeg")
+MAX_FILE_BYTES = 40_000_000
+MAX_SIDE_PX = 1600
+PHOTOGRAPH_SIDE_PX = 2080
+QUALITY = 85
+
+
+class Picture(NamedTuple):
+    """A picture as a JPEG: file name, width and height in pixels, bytes."""
+
+    name: str
+    width: int
+    height: int
+    data: bytes
+
+    @property
+    def url(self) -> str:
+        """The picture itself as an address."""
+        return f"data:image/jpeg;base64,{base64.b64encode(self.data).decode('ascii')}"
+
+
+def read_pictures(folder: Path) -> list[Picture]:
+    """The pictures in a folder by name, made smaller where they are large; others are left out."""
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    found = (_read(path) for path in files if path.is_file())
+    return [one for one in found if one is not None]
+
+
+def pictures_html(pictures: list[Picture]) -> Iterator[str]:
+    """The pictures with their names."""
+    if not pictures:
+        yield (
+            "<p>No pictures in the folder. <code>tbcad picture</code> draws some; then run "
+            "<code>tbcad report</code> again.</p>"
+        )
+    for one in pictures:
+        yield (
+            f"<figure><img loading=lazy width={one.width} height={one.height} "
+            f'alt="{escape(one.name)}" src="{one.url}"><figcaption>{escape(one.name)}'
+            "</figcaption></figure>"
+        )
+
+
+def photographs(capture: Path, ids: list[str]) -> dict[str, Any]:
+    """Both photographs of a capture for the page, and where each mirror is in them.
+
+    Args:
+        capture: folder or file that `tbcad capture` or `tbcad merge` wrote.
+        ids: of all mirrors of the export, camera a's first.
+
+    Returns:
+        By camera: address of the picture, factor from its pixels to those of the boxes, and boxes
+        x0, y0, x1, y1 in pixels of the photograph.
+
+    Raises:
+        InputError: the capture cannot be read, or is of another design.
+    """
+    from tbcad.simulate.capture.light_field import LightField
+
+    record = {}
+    with LightField.open(capture) as field:
+        for camera, frame in field.frames.items():
+            wanted = sum(one.startswith(camera) for one in ids)
+            if len(frame.u) != wanted:
+                raise InputError(
+                    f"{capture}: camera {camera} has {len(frame.u)} mirrors, the export {wanted}: "
+                    "name a capture of this export"
+                )
+            picture = _jpeg(camera, frame.image(), PHOTOGRAPH_SIDE_PX)
+            x0, x1, y0, y1 = frame.boxes.T
+            record[camera] = {
+                "url": picture.url,
+                "size": [frame.camera.width_px, frame.camera.height_px],
+                "boxes": np.column_stack([x0, y0, x1, y1]).tolist(),
+            }
+    return record
+
+
+def _read(path: Path) -> Picture | None:
+    from PIL import Image
+
+    if path.stat().st_size > MAX_FILE_BYTES:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of a picture that is far too large
+            with Image.open(path, formats=("PNG", "JPEG")) as image:
+                image.draft("RGB", (MAX_SIDE_PX, MAX_SIDE_PX))
+                return _jpeg(path.name, np.asarray(_on_white(image)), MAX_SIDE_PX)
+    except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
+        return None
+
+
+def _on_white(image: Any) -> Any:
+    from PIL import Image
+
+    if "A" not in image.getbands() and "transparency" not in image.info:
+        return image.convert("RGB")
+    drawn = image.convert("RGBA")
+    return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
+
+
+def _jpeg(name: str, pixels: Any, side: int) -> Picture:
+    from PIL import Image
+
+    image = Image.fromarray(pixels)
+    image.thumbnail((side, side), Image.Resampling.LANCZOS)
+    data = BytesIO()
+    image.save(data, "jpeg", quality=QUALITY, optimize=True)
+    return Picture(name, image.width, image.height, data.getvalue())

@@ -1,0 +1,223 @@
+"""report.html of an export: verdict, 3D view, map of the virtual cameras, tables, pictures."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from tbcad_verify.report.as_made import AsMade
+
+from tbcad.atomic_files import replace_files
+from tbcad.errors import InputError
+from tbcad.output.manifest import (
+    MANIFEST,
+    REPORT,
+    REPORT_BEGIN,
+    Manifest,
+    is_listed,
+    is_report,
+    read_manifest,
+)
+from tbcad.prototype.files.bom_view import read_parts_list
+from tbcad.report.page import bodies, mirrors
+from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.parts_list import files_html, parts_html
+from tbcad.report.page.pictures import Picture, photographs, pictures_html, read_pictures
+from tbcad.report.page.verdict import (
+    Verdict,
+    checks_html,
+    printing_html,
+    read_verdict,
+    verdict_html,
+)
+from tbcad.simulate.scene.exported import MISSING, ExportedDesign, read_export
+
+MAX_BYTES = 6_000_000
+RECORDS = ("design.json", "mirrors.csv")
+PROTOTYPE = ("prototype.json", "prototype.glb", "balls.csv", "rotation_plan.csv", "bom.csv")
+SCRIPTS = ("data.js", "mesh.js", "viewer.js", "rays.js", "map.js", "page.js")
+GROUPS = {
+    "shell_a": "Shell of camera a",
+    "shell_b": "Shell of camera b",
+    "base": "Base (turns)",
+    "balls": "Balls",
+    "stage": "Object stage",
+    "frame": "Frame",
+    "bought": "Bought parts",
+    "shroud": "Shroud",
+    "fasteners": "Fasteners",
+    "views": "Light cone and object space",
+}
+
+
+def write_report(
+    folder: Path,
+    out: Path | None = None,
+    as_made: AsMade | None = None,
+    capture: Path | None = None,
+    *,
+    force: bool = False,
+) -> Path:
+    """Write the page of an export.
+
+    Args:
+        folder: the export.
+        out: file to write; None: report.html in the export.
+        as_made: simulated builds; None if there are none.
+        capture: a light field of the export, whose photographs the page then shows.
+        force: whether a file that tbcad did not write may be replaced.
+
+    Raises:
+        InputError: the file exists, the export or the capture cannot be read, or writing fails.
+    """
+    file = out or folder / REPORT
+    check_writable(file, force)
+    text = page(folder, as_made, capture, linked=file.parent.resolve() == folder.resolve())
+    return replace_files(file.parent, {file.name: text.encode("utf-8")})[0]
+
+
+def check_writable(file: Path, force: bool) -> None:
+    """Refuse, before any work, a file that cannot be written or is not tbcad's to replace.
+
+    Raises:
+        InputError: as said.
+    """
+    if file.suffix.lower() != ".html" or not file.parent.is_dir():
+        raise InputError(f"{file}: name a .html file in a folder that exists")
+    if file.is_dir():
+        raise InputError(f"{file} is a folder: choose another name")
+    if file.exists() and not is_report(file) and not force:
+        raise InputError(
+            f"{file} exists and tbcad did not write it: choose another name with --out, or replace "
+            "it with --force"
+        )
+
+
+def page(
+    folder: Path,
+    as_made: AsMade | None = None,
+    capture: Path | None = None,
+    *,
+    linked: bool = True,
+) -> str:
+    """The page as HTML, at most MAX_BYTES: pictures that do not fit are left out.
+
+    Args:
+        folder: the export.
+        as_made: simulated builds.
+        capture: a light field of the export.
+        linked: whether files of the export are linked to.
+
+    Raises:
+        InputError: the export or the capture cannot be read.
+    """
+    manifest = _checked_manifest(folder)
+    export, verdict = read_export(folder), read_verdict(folder)
+    data = _data(folder, export, verdict, manifest, capture)
+    parts = read_parts_list(folder) if PROTOTYPE[0] in manifest.files else None
+    views = 2 * len(export.reflectors[0]) - int(export.reflectors[0].cells.halved.sum())
+    balls = len(data["mirrors"]["balls"])
+    static = files("tbcad.report.page") / "static"
+    blocks = {
+        "begin": REPORT_BEGIN,
+        "title": escape(export.spec.name),
+        "subtitle": _subtitle(export, views, balls),
+        "style": (static / "page.css").read_text(encoding="utf-8"),
+        "verdict": _joined(verdict_html(verdict, as_made, views, balls, export.capture_mm)),
+        "checks": _joined(checks_html(verdict)),
+        "printing": _joined(printing_html(verdict.printing if verdict else ())),
+        "parts": _joined(parts_html(parts)),
+        "files": _joined(files_html({n: e.size for n, e in manifest.files.items()}, linked)),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        "script": "\n".join((static / name).read_text(encoding="utf-8") for name in SCRIPTS),
+    }
+    template = (static / "page.html").read_text(encoding="utf-8")
+    room = MAX_BYTES - len(_filled(template, {**blocks, "pictures": ""}).encode("utf-8"))
+    return _filled(template, {**blocks, "pictures": _pictures(read_pictures(folder), room)})
+
+
+def _checked_manifest(folder: Path) -> Manifest:
+    """The manifest; refuses an export in which a file that is shown is not as it was written."""
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise InputError(f"{folder / MANIFEST} is not there: {MISSING}")
+    prototype = PROTOTYPE if PROTOTYPE[0] in manifest.files else ()
+    for name in (*RECORDS, *prototype):
+        if not (folder / name).is_file():
+            raise InputError(f"{folder / name} is not there: {MISSING}")
+        if not is_listed(folder / name, manifest.files.get(name)):
+            raise InputError(
+                f"{folder / name} is not as tbcad wrote it (cut off, or changed since): build the "
+                "export again"
+            )
+    return manifest
+
+
+def _data(
+    folder: Path,
+    export: ExportedDesign,
+    verdict: Verdict | None,
+    manifest: Manifest,
+    capture: Path | None,
+) -> dict[str, Any]:
+    """What the scripts read."""
+    arrays = PackedArrays()
+    table = mirrors.packed_mirrors(folder, verdict, arrays)
+    facets = bodies.coarse_facets(export)
+    shells = "shell_a.stl" in manifest.files
+    drawn = bodies.packed_shells(export, facets, arrays) if shells else []
+    if PROTOTYPE[0] in manifest.files:
+        drawn += [bodies.packed_body(one, arrays) for one in bodies.prototype_bodies(folder)]
+    a = export.reflectors[0]
+    record = {
+        "target": export.capture_mm,
+        "axis": bodies.axis(a.camera.pinhole),
+        "distance": bodies.camera_distance(export),
+        "cameras": [
+            {"id": one.camera_id, "pinhole": one.camera.pinhole.tolist()}
+            for one in export.reflectors
+        ],
+        "mirrors": table,
+        "outlines": bodies.packed_outlines(facets, arrays),
+        "bodies": drawn,
+        "groups": {one["group"]: GROUPS.get(one["group"], one["group"]) for one in drawn},
+        "photographs": photographs(capture, table["ids"]) if capture else {},
+    }
+    return record | {"arrays": arrays.text()}
+
+
+def _subtitle(export: ExportedDesign, views: int, balls: int) -> str:
+    prototype = f"; prototype with {balls} balls" if balls else ""
+    return (
+        f"n = {export.spec.optics.n}: {views} virtual cameras round an object of "
+        f"{export.capture_mm:g} mm, two cameras of {export.spec.camera.width_px} x "
+        f"{export.spec.camera.height_px} pixels{prototype}"
+    )
+
+
+def _pictures(pictures: list[Picture], room: int) -> str:
+    """As many pictures as there is room for, and which are left out."""
+    shown, left_out = [], []
+    for one in pictures:
+        size = len(_joined(pictures_html([one])).encode("utf-8"))
+        if size > room:
+            left_out.append(one.name)
+            continue
+        room -= size
+        shown.append(one)
+    text = _joined(pictures_html(shown)) if shown or not left_out else ""
+    if left_out:
+        text += f"<p>Left out, to keep this file small: {escape(', '.join(left_out))}.</p>"
+    return text
+
+
+def _joined(lines: Iterable[str]) -> str:
+    return "\n".join(lines)
+
+
+def _filled(template: str, blocks: Mapping[str, str]) -> str:
+    """The template with each {{name}} replaced; what is put in is not looked through again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: blocks[found[1]], template)

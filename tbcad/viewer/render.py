@@ -1,0 +1,94 @@
+"""Views of one light field, one after the other, as quickly as they are asked for."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from io import BytesIO
+from itertools import count
+from threading import Lock
+
+import numpy as np
+from PIL import Image
+
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.views.method import suitable_method
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
+from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.types import Bytes
+from tbcad.viewer.query import Query
+
+JPEG_QUALITY = 88
+# While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
+MOVING_RADIUS2 = 2
+MOVING_STEP = 2
+
+
+class Superseded(Exception):
+    """Another view has been asked for meanwhile."""
+
+
+class Renderer:
+    """Pictures of a light field; one is made at a time, by all cores.
+
+    Attributes:
+        tiles: the light field.
+        method: of views that do not move: nearest rays, or a blend where that is better.
+    """
+
+    def __init__(self, source: LightField, method: Method | None = None) -> None:
+        """Take a light field, whose file stays open, and the method if it is not to be chosen."""
+        self.tiles = MirrorTiles(source)
+        self.method: Method = method or suitable_method(self.tiles).method
+        self._lock = Lock()
+        self._numbers = count(1)
+        self._latest = 0
+
+    @property
+    def capture_mm(self) -> float:
+        """Diameter of the capture sphere."""
+        return self.tiles.source.capture_mm
+
+    def jpeg(self, query: Query) -> bytes:
+        """The picture of a query, as a JPEG file.
+
+        Raises:
+            Superseded: another one was asked for while the lens's pinholes were being added up.
+        """
+        number = self._latest = next(self._numbers)
+
+        def proceed() -> None:
+            if number != self._latest:
+                raise Superseded
+
+        with self._lock:
+            image = self.picture(query, proceed)
+        return jpeg_bytes(image)
+
+    def picture(self, query: Query, proceed: Callable[[], None] = lambda: None) -> Bytes:
+        """The picture (h, w, 3) of a query; a lens that moves gives a smaller one.
+
+        Args:
+            query: the view.
+            proceed: called now and then while a lens's pinholes are added up; may raise.
+        """
+        view = query.camera(self.capture_mm)
+        if query.aperture == 0:
+            method: Method = self.method if query.still else "nearest"
+            return synthesise(self.tiles, view, method).image
+        lens = ThinLens(query.aperture, query.focus)
+        if query.still:
+            return refocus(self.tiles, view, lens, proceed=proceed).image
+        smaller = _smaller(query).camera(self.capture_mm)
+        return refocus(self.tiles, smaller, lens, lens_pinholes(MOVING_RADIUS2)).image
+
+
+def _smaller(query: Query) -> Query:
+    width, height = query.width // MOVING_STEP, query.height // MOVING_STEP
+    return replace(query, width=max(width, 1), height=max(height, 1))
+
+
+def jpeg_bytes(image: Bytes) -> bytes:
+    """An image (h, w, 3) as a JPEG file."""
+    with BytesIO() as buffer:
+        Image.fromarray(np.ascontiguousarray(image)).save(buffer, "JPEG", quality=JPEG_QUALITY)
+        return buffer.getvalue()

@@ -1,0 +1,127 @@
+"""A turntable: one page with pictures from all around the object, which opens from disk."""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from tbcad.atomic_files import refuse_existing, replace_files
+from tbcad.errors import InputError
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.types import Bytes, Progress
+from tbcad.viewer.page import filled
+
+MAX_BYTES = 6_000_000
+BEGIN = "<!doctype html>\n<!-- tbcad turntable -->"
+# Tried one after the other until the page is small enough.
+WEBP_QUALITIES = (85, 75, 65, 50, 35, 20)
+LOWEST_DEG, HIGHEST_DEG = 15.0, 75.0
+KIND = "data:image/webp;base64,"
+
+
+@dataclass(frozen=True)
+class Turntable:
+    """Which pictures a turntable has.
+
+    Attributes:
+        columns: views once around.
+        elevations_deg: a row of views each.
+        distance: of the camera from the middle of the object, mm.
+        size: columns and rows of a picture.
+        method: how they are made.
+    """
+
+    columns: int
+    elevations_deg: tuple[float, ...]
+    distance: float
+    size: tuple[int, int]
+    method: Method
+
+
+def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
+    """Elevations of rows: one at `middle_deg`, more evenly from LOWEST_DEG to HIGHEST_DEG."""
+    if rows == 1:
+        return (middle_deg,)
+    return tuple(np.linspace(LOWEST_DEG, HIGHEST_DEG, rows).tolist())
+
+
+def check_turntable_path(file: Path, force: bool) -> None:
+    """Refuse, before any work, a file that cannot be written or that exists.
+
+    Raises:
+        InputError: as said.
+    """
+    if file.suffix.lower() != ".html" or not file.parent.is_dir() or file.is_dir():
+        raise InputError(f"{file}: give a file that ends in .html, in a folder that exists")
+    refuse_existing(file, force)
+
+
+def write_turntable(
+    file: Path, tiles: MirrorTiles, table: Turntable, title: str, progress: Progress
+) -> int:
+    """Write the page; its size in bytes.
+
+    Raises:
+        InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
+    """
+    pictures = []
+    for k, elevation in enumerate(table.elevations_deg):
+        progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
+        pictures.append([_picture(tiles, table, elevation, i) for i in range(table.columns)])
+    page = smallest_loss(pictures, table, title)
+    replace_files(file.parent, {file.name: page})
+    return len(page)
+
+
+def smallest_loss(
+    pictures: Sequence[Sequence[Bytes]], table: Turntable, title: str, most: int = MAX_BYTES
+) -> bytes:
+    """The page with the best pictures that fit.
+
+    Raises:
+        InputError: none fit.
+    """
+    for quality in WEBP_QUALITIES:
+        page = turntable_page(pictures, table, title, quality).encode("utf-8")
+        if len(page) <= most:
+            return page
+    raise InputError(
+        f"{table.columns} x {len(pictures)} views do not fit into {most / 1e6:g} MB: give fewer "
+        "--frames or --rows, or a smaller --width and --height"
+    )
+
+
+def turntable_page(
+    pictures: Sequence[Sequence[Bytes]], table: Turntable, title: str, quality: int
+) -> str:
+    """The page with its pictures (h, w, 3), row by row, in WebP of a quality."""
+    frames = [[_webp(picture, quality) for picture in row] for row in pictures]
+    data = {
+        "size": table.size,
+        "elevations": table.elevations_deg,
+        "row": len(frames) // 2,
+        "kind": KIND,
+        "frames": frames,
+    }
+    views = sum(map(len, frames))
+    about = f"{views} views of {table.size[0]} x {table.size[1]} pixels from a light field."
+    return filled("turntable", title, data, begin=BEGIN, about=about)
+
+
+def _picture(tiles: MirrorTiles, table: Turntable, elevation: float, column: int) -> Bytes:
+    azimuth = 2 * np.pi * column / table.columns
+    capture = tiles.source.capture_mm
+    view = camera_around_object(azimuth, np.radians(elevation), table.distance, capture, table.size)
+    return synthesise(tiles, view, table.method).image
+
+
+def _webp(image: Bytes, quality: int) -> str:
+    with BytesIO() as buffer:
+        Image.fromarray(image).save(buffer, "WEBP", quality=quality, method=4)
+        return base64.b64encode(buffer.getvalue()).decode("ascii")
