@@ -1,0 +1,1 @@
+"""What the words of tbcad mean: terms, keys of a design, and where each is used."""
