@@ -21,7 +21,18 @@ from tbcad.version import __version__
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
 
-    from tbcad.api import Build, analyse, build, capture, design, verify
+    from tbcad.api import (
+        Build,
+        analyse,
+        build,
+        capture,
+        design,
+        export,
+        merge,
+        run,
+        verify,
+        view,
+    )
     from tbcad.errors import InputError
     from tbcad.mirrors.array import MirrorArray
     from tbcad.simulate.capture.light_field import LightField
@@ -44,8 +55,12 @@ __all__ = [
     "build",
     "capture",
     "design",
+    "export",
     "load_spec",
+    "merge",
+    "run",
     "verify",
+    "view",
 ]
 
 _MODULES = {

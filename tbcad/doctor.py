@@ -29,6 +29,7 @@ _MIN_DISK_GB = 1.0
 _NO_CORE_DUMP = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
 
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
+_MACHINE = ("pyserial", "gphoto2", "opencv-python-headless")
 _VTKS = ("vtk", "cadquery-vtk")
 _INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
 
@@ -118,6 +119,7 @@ def diagnose(folder: Path = Path()) -> list[Finding]:
         one_of("CAD kernel", _KERNELS, _installed(), needs),
         one_of("VTK", _VTKS, _installed(), needs),
         versions(needs, _installed()),
+        machine_libraries(_installed()),
         *findings,
         memory(_available_memory_gb()),
         disk(folder),
@@ -179,6 +181,16 @@ def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]])
     return Finding("versions", False, seen, f"{_pip('install')} {_quoted(wrong)}")
 
 
+def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
+    """Say which libraries for a real machine are there; a build needs none of them."""
+    present = dict(installed)
+    seen = [f"{name} {present[name]}" for name in _MACHINE if name in present]
+    missing = [name for name in _MACHINE if name not in present]
+    detail = ", ".join([*seen, *(f"no {name}" for name in missing)])
+    remedy = f"only tbcad run and calibrate need them: {_pip('install')} 'tbcad[machine]'"
+    return Finding("machine (optional)", True, detail, remedy if missing else "")
+
+
 def _is_met(need: Requirement, present: dict[str, str]) -> bool:
     version = present.get(canonicalize_name(need.name))
     return version is not None and need.specifier.contains(version, prereleases=True)
@@ -199,7 +211,7 @@ def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) ->
             command,
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             errors="replace",
             timeout=_TIMEOUT_S,
             check=False,

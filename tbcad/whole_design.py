@@ -26,6 +26,22 @@ class Design(MirrorDesign):
             f"minimum coverage {first.coverage.min():.2f} mm>"
         )
 
+    def _repr_html_(self) -> str:
+        """What notebooks show: main figures, and the directions of all mirrors from above."""
+        from tbcad.mirrors.hemisphere_map import hemisphere_map
+
+        radius = [array.mirrors.radius for array in self.arrays]
+        span = f"{min(r.min() for r in radius):.1f} to {max(r.max() for r in radius):.1f} mm"
+        rows = {
+            "subdivision n": self.spec.optics.n,
+            "mirrors": " + ".join(str(len(array)) for array in self.arrays),
+            "radius": "planar" if "nan" in span else f"{span} (dark: small)",
+            "minimum coverage": f"{min(array.coverage.min() for array in self.arrays):.2f} mm",
+        }
+        cells = "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows.items())
+        table = f"<table><caption>{self.spec.name}</caption>{cells}</table>"
+        return f"<div>{table}{hemisphere_map(self.arrays)}</div>"
+
     def shell(self, camera: Literal["a", "b"] = "a") -> "Part":
         """Return one camera's shell as a build123d part: mm, frame of the design, z up.
 

@@ -1,0 +1,37 @@
+"""The public functions of `import tbcad`: design, build, verify, photograph, calibrate, analyse.
+
+The commands of `tbcad` call the same functions. Heavy libraries are imported inside them, so that
+bad input is refused before they are loaded.
+"""
+
+from tbcad.api.builds import Build, as_made, build, report_page
+from tbcad.api.captures import Photographs, capture, photograph, view, write_photographs
+from tbcad.api.datasets import export
+from tbcad.api.designs import design
+from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
+from tbcad.api.tolerances import analyse, inspect
+from tbcad.api.verification import verify, verify_as_built
+
+__all__ = [
+    "Build",
+    "Photographs",
+    "analyse",
+    "as_built",
+    "as_made",
+    "build",
+    "calibrate",
+    "capture",
+    "design",
+    "export",
+    "inspect",
+    "merge",
+    "photograph",
+    "report_page",
+    "run",
+    "simulate_run",
+    "solve_intrinsics",
+    "verify",
+    "verify_as_built",
+    "view",
+    "write_photographs",
+]

@@ -1,0 +1,30 @@
+"""What several public functions take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tbcad.errors import InputError
+from tbcad.spec.design import Spec
+from tbcad.spec.load import load_spec, option_texts
+
+Settings = Mapping[str, str] | Sequence[str]
+
+
+def silent(_: str) -> None:
+    """Ignore a report of progress."""
+
+
+def chosen_spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> Spec:
+    """Return a spec as it is, or read a design file; None: the design of the paper.
+
+    Raises:
+        InputError: a spec comes with settings, or the file is not allowed.
+    """
+    if isinstance(spec, Spec):
+        if settings or n is not None:
+            raise InputError("n and settings go with a design file: give them to load_spec")
+        return spec
+    options = option_texts(settings) + ([f"optics.n={n}"] if n is not None else [])
+    return load_spec(None if spec is None else Path(spec), options)

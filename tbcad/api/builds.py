@@ -1,0 +1,189 @@
+"""Files from a spec, verified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from tbcad.api.arguments import chosen_spec, silent
+from tbcad.api.designs import design
+from tbcad.api.verification import checked_report
+from tbcad.errors import InputError
+from tbcad.loading import large_libraries
+from tbcad.spec.design import Spec
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.as_made import AsMade
+    from tbcad_verify.report.report import Report
+
+    from tbcad.types import Progress
+    from tbcad.whole_design import Design
+
+
+@dataclass(frozen=True)
+class Build:
+    """What a build wrote.
+
+    Attributes:
+        folder: that holds all files.
+        design: the mirrors.
+        parts: what was built: "shell", "prototype" or both.
+        note: why the prototype was left out; empty when it was not.
+        report: the verification of the files; None when it was not asked for.
+    """
+
+    folder: Path
+    design: Design
+    parts: tuple[str, ...]
+    note: str
+    report: Report | None
+
+    def __repr__(self) -> str:
+        """Return folder and verdict."""
+        verdict = "not verified" if self.report is None else self.report.verdict
+        return f"<Build {self.folder}: {' and '.join(self.parts)}; {verdict}>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the files are verified and pass every check."""
+        return self.report is not None and self.report.passed
+
+
+def build(
+    spec: Spec | Path | str | None = None,
+    out: Path | str = "exports",
+    *,
+    parts: Sequence[str] | None = None,
+    verify: bool = True,
+    force: bool = False,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> Build:
+    """Compute the mirrors, write all files into a folder, verify them, and write report.html.
+
+    The folder is replaced as a whole or not at all.
+
+    Args:
+        spec: a spec, a design file (TOML), or None for the design of the paper.
+        out: folder to write.
+        parts: "shell", "prototype" or both; None: both, but no prototype where none can be made.
+        verify: verify the files before they replace those of an earlier build.
+        force: keep files in the folder that tbcad did not write, instead of refusing.
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Raises:
+        InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
+    """
+    with large_libraries():
+        from tbcad.background import background_process
+        from tbcad.output.build import write_export
+        from tbcad.output.folder import check_replaceable, replacing
+        from tbcad.output.parts import PROTOTYPE, SHELL, default_parts
+        from tbcad.prototype.purchased.prices import load_prices
+        from tbcad.report.page.write import write_report
+        from tbcad.verification_process import verification_process
+        from tbcad.whole_design import Design
+
+    chosen, out = chosen_spec(spec, None, ()), Path(out)
+    asked = tuple(parts) if parts is not None else default_parts(chosen)
+    check_replaceable(out, force)
+    if PROTOTYPE in asked:
+        load_prices(chosen.prototype.prices)  # a wrong list is no reason to leave parts out
+    started = monotonic()
+    progress("mirrors: radii and cells")
+    with verification_process(needed=verify) as verify_files:
+        mirrors = design(chosen, detail=detail)
+        with replacing(out, force) as folder:
+            with background_process() as submit:
+                simulated = submit(_as_made, mirrors) if verify and SHELL in asked else None
+                export = write_export(
+                    mirrors, folder, asked, progress, submit, optional_prototype=parts is None
+                )
+            finished = Design(export.spec, mirrors.arrays)
+            report = None
+            if verify:
+                # The files are read back before they replace the old ones.
+                report = replace(
+                    checked_report(verify_files, folder, progress),
+                    folder=out,
+                    note=export.note,
+                    as_made=simulated.result() if simulated else None,
+                    seconds=monotonic() - started,
+                )
+            progress("report")
+            write_report(folder, as_made=report.as_made if report else None)
+    return Build(out, finished, export.parts, export.note, report)
+
+
+def _as_made(mirrors: Design) -> AsMade:
+    """Simulate a few builds of a design by every built-in process."""
+    from tbcad.simulate.scene.reflector import reflectors
+    from tbcad.tolerance.as_made import as_made
+
+    spec = mirrors.spec
+    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
+    return as_made(reflectors(mirrors), target, coat)
+
+
+def as_made(
+    exports: Path | str, progress: Progress = silent, detail: Progress = silent
+) -> AsMade | None:
+    """Simulate a few builds of an export by every built-in process.
+
+    Returns:
+        Their yields; None where no shell was built, or its record cannot be read.
+    """
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.tolerance.as_made import as_made as simulated
+
+    folder = Path(exports)
+    if not (folder / "shell_a.stl").is_file():
+        return None
+    progress("simulated builds by each process")
+    try:
+        export = read_export(folder)
+    except InputError:  # the verification says what is wrong with it
+        return None
+    coat = export.spec.mirrors.coating_um
+    return simulated(export.reflectors, export.capture_mm, coat, detail)
+
+
+def report_page(
+    exports: Path | str,
+    out: Path | str | None = None,
+    *,
+    capture: Path | str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> Path:
+    """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
+
+    Args:
+        exports: folder that `build` wrote.
+        out: file to write; None: report.html in the folder.
+        capture: folder that `capture` or `merge` wrote for this export; the page then shows what
+            each mirror photographs.
+        force: replace a file that tbcad did not write, instead of refusing.
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Returns:
+        The file.
+
+    Raises:
+        InputError: the export or the capture cannot be read, or the file may not be written.
+    """
+    with large_libraries():
+        from tbcad.report.page.write import check_writable, write_report
+
+    folder, file = Path(exports), Path(out) if out is not None else None
+    check_writable(file or folder / "report.html", force)
+    simulated = as_made(folder, progress, detail)
+    progress("report")
+    light_field = None if capture is None else Path(capture)
+    return write_report(folder, file, simulated, light_field, force=force)

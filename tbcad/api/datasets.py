@@ -1,0 +1,73 @@
+"""Captures as data of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tbcad.api.arguments import silent
+from tbcad.errors import InputError
+
+if TYPE_CHECKING:
+    from tbcad.datasets.options import Target
+    from tbcad.types import Progress
+
+
+def export(
+    capture: Path | str,
+    to: Target,
+    *,
+    out: Path | str,
+    every: int = 1,
+    size: int | None = None,
+    cameras: str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+    detail: Progress = silent,
+) -> dict[str, Any]:
+    """Write the light field of a capture as data that another program reads.
+
+    Args:
+        capture: folder that `capture` or `merge` wrote, or its lightfield.h5.
+        to: virtual cameras as pinholes with pictures and masks ("nerfstudio", "colmap"), or every
+            pixel with its ray, not resampled, for instant-ngp ("ngp-rays") or as numpy arrays
+            ("rays").
+        out: folder to write, replaced as a whole.
+        every: one virtual camera of so many, spread evenly.
+        size: width and height of the pictures, pixels; None: as fine as the capture.
+        cameras: "a", "b" or mirrors by name, apart by commas; None: all.
+        force: keep files in the folder that tbcad did not write.
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+
+    Returns:
+        What is in dataset.json: also how far the rays are from those of pinholes.
+
+    Raises:
+        InputError: the capture cannot be read, an option does not fit it, or out cannot be
+            replaced.
+    """
+    from tbcad.datasets.export import write_dataset
+    from tbcad.datasets.options import ExportOptions
+    from tbcad.output.folder import check_replaceable, replacing
+    from tbcad.output.manifest import write_manifest
+    from tbcad.simulate.capture.files import OBJECT, read_object
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.ray_casting import prepared_scene
+
+    options, place = ExportOptions(to, every, cameras, size), Path(capture)
+    _check_apart(place, Path(out))
+    check_replaceable(Path(out), force)
+    known = (place / OBJECT).is_file()
+    with LightField.open(place) as source, replacing(Path(out), force) as folder:
+        scene = prepared_scene(read_object(place)) if known else None
+        record = write_dataset(folder, source, scene, options, progress, detail)
+        write_manifest(folder)
+    return record
+
+
+def _check_apart(capture: Path, out: Path) -> None:
+    """Refuse to replace a capture by its own export."""
+    folder = capture if capture.is_dir() else capture.parent
+    if out.resolve() == folder.resolve():
+        raise InputError(f"{out} is the capture itself and would be replaced: name another folder")

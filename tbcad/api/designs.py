@@ -1,0 +1,42 @@
+"""Mirrors from a spec."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tbcad.api.arguments import Settings, chosen_spec, silent
+from tbcad.spec.design import Spec
+
+if TYPE_CHECKING:
+    from tbcad.types import Progress
+    from tbcad.whole_design import Design
+
+
+def design(
+    spec: Spec | Path | str | None = None,
+    *,
+    n: int | None = None,
+    settings: Settings = (),
+    detail: Progress = silent,
+) -> Design:
+    """Compute the mirrors of both cameras.
+
+    Args:
+        spec: a spec, a design file (TOML), or None for the design of the paper.
+        n: subdivision of the icosahedron, in place of the spec's.
+        settings: "key=value" texts or a mapping of them, on top of a design file.
+        detail: called with the state of the search for the radii.
+
+    Raises:
+        SpecError: the spec is not allowed, or its mirrors cannot be made; it says what to change.
+
+    >>> import tbcad
+    >>> tbcad.design(n=4)
+    <Design 'turtleback': n = 4, 49 + 49 mirrors, minimum coverage 60.60 mm>
+    """
+    from tbcad.mirrors.array import design as mirror_design
+    from tbcad.whole_design import Design
+
+    mirrors = mirror_design(chosen_spec(spec, n, settings), detail)
+    return Design(mirrors.spec, mirrors.arrays)

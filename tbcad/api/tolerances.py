@@ -1,0 +1,99 @@
+"""How exactly a design must be made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tbcad.api.arguments import Settings, silent
+from tbcad.loading import large_libraries
+from tbcad.spec.load import option_texts
+
+if TYPE_CHECKING:
+    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerance.options import ToleranceOptions
+    from tbcad.types import Progress
+
+
+def analyse(
+    exports: Path | str,
+    process: str | None = None,
+    object_file: Path | str | None = None,
+    *,
+    settings: Settings = (),
+    options: ToleranceOptions | None = None,
+    progress: Progress = silent,
+    detail: Progress = silent,
+    answer: Progress = silent,
+) -> Analysis:
+    """Simulate many builds by a manufacturing process, and find what limits their yield.
+
+    Args:
+        exports: folder that `build` wrote.
+        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file; by default "sla", and the
+            yields of all built-in processes are compared.
+        object_file: mesh that is photographed for the sharpness; None for a built-in knot.
+        settings: "kind=value" texts that change errors of the process.
+        options: number of builds, wanted yield, seed, whether margins are searched for ...
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+        answer: called with the yield, in words, as soon as it is known.
+
+    Raises:
+        InputError: export or process cannot be read, or mirrors are planar.
+    """
+    from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.tolerance.analysis import analyse as analyse_export
+    from tbcad.tolerance.options import ToleranceOptions
+    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
+    from tbcad.tolerance.stages import RECORD
+
+    asked = options or ToleranceOptions()
+    asked = asked if process else replace(asked, every_process=True)
+    made_by = load_process(process or DEFAULT_PROCESS, option_texts(settings))
+    progress(RECORD)
+    export = read_export(Path(exports))
+    subject = load_or_built_in(object_file, export.capture_mm)
+    return analyse_export(export, made_by, subject, asked, progress, detail, answer)
+
+
+def inspect(
+    exports: Path | str,
+    *,
+    out: Path | str,
+    wanted: float = 0.99,
+    force: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write by how much each mirror of a shell may be off: tables, and STEP with tolerances.
+
+    Args:
+        exports: folder that `build` wrote, with the shells.
+        out: folder to write.
+        wanted: share of the shells that are good with the standard deviations of the tables.
+        force: keep files in the folder that tbcad did not write.
+        progress: called with the name of each stage.
+
+    Returns:
+        What is in inspection.json.
+
+    Raises:
+        InputError: the export has no shells, their mirrors are planar or may not be off at all,
+            the share is not between 0 and 1, or out cannot be replaced.
+    """
+    from tbcad.tolerance.wanted_yield import check_yield
+
+    check_yield(wanted)
+    with large_libraries():
+        from tbcad.inspection.inspect import checked_export
+        from tbcad.inspection.inspect import inspect as write_files
+        from tbcad.output.folder import replacing
+        from tbcad.output.manifest import write_manifest
+
+    export = checked_export(Path(exports))
+    with replacing(Path(out), force) as folder:
+        record = write_files(export, wanted, folder, progress)
+        write_manifest(folder)
+    return record

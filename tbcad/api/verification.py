@@ -1,0 +1,81 @@
+"""The verification, whose errors become those of tbcad."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tbcad.api.arguments import silent
+from tbcad.errors import InputError
+
+if TYPE_CHECKING:
+    from tbcad_verify.as_built.report import AsBuiltReport
+    from tbcad_verify.report.report import Report
+    from tbcad_verify.run.verify import VerifyOptions
+
+    from tbcad.types import Progress
+
+
+def verify(
+    exports: Path | str,
+    options: VerifyOptions | None = None,
+    *,
+    progress: Progress = silent,
+) -> Report:
+    """Verify the files of a build with code that shares nothing with the code that wrote them.
+
+    Args:
+        exports: folder that `build` wrote.
+        options: what else to check, and how long a stage may take.
+        progress: called with the name of each stage.
+
+    Returns:
+        The report; `report.passed` is the verdict. It is written to verify.json too.
+
+    Raises:
+        InputError: the folder is no readable export.
+    """
+    from tbcad_verify.run.verify import VerifyOptions
+    from tbcad_verify.run.verify import verify as verify_files
+
+    chosen = options or VerifyOptions()
+    return checked_report(partial(verify_files, options=chosen), Path(exports), progress)
+
+
+def verify_as_built(
+    exports: Path | str, calibration: Path | str, *, progress: Progress = silent
+) -> AsBuiltReport:
+    """Verify the prototype of a build as a calibration found it: coverage, and what to shim.
+
+    Args:
+        exports: folder that `build` wrote.
+        calibration: folder that `tbcad calibrate` wrote.
+        progress: called with the name of each stage.
+
+    Raises:
+        InputError: one cannot be read, or they do not belong together. Nothing is written.
+    """
+    from tbcad_verify.as_built.verify import verify_as_built as verify_machine
+    from tbcad_verify.errors import BadExport
+
+    try:
+        return verify_machine(Path(exports), Path(calibration), progress)
+    except BadExport as error:
+        raise InputError(str(error)) from None
+
+
+def checked_report(
+    verify_files: Callable[[Path, Progress], Report], folder: Path, progress: Progress
+) -> Report:
+    """Verify a folder; a folder that is no export raises InputError."""
+    from tbcad_verify.errors import BadExport
+
+    def stage(name: str) -> None:
+        progress(f"verification: {name}")
+
+    try:
+        return verify_files(folder, stage)
+    except BadExport as error:
+        raise InputError(str(error)) from None
