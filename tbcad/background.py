@@ -8,10 +8,12 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, TypeAlias
 
 PR_SET_PDEATHSIG = 1  # prctl(2): the signal to get when the parent ends
+
+_repeated: list["Repeated"] = []  # those at work
 
 Submit: TypeAlias = Callable[..., "Future[Any]"]
 """Takes a function of a module and its arguments, which are copied; the result comes later."""
@@ -35,10 +37,11 @@ def background_process() -> Iterator[Submit]:
         RuntimeError: the process ended before its work was done.
     """
     others, futures = multiprocessing.active_children(), list[Future[Any]]()
-    with ProcessPoolExecutor(1, _context(), initializer=_begin) as pool:
+    with ProcessPoolExecutor(1, _context(), initializer=end_with_parent) as pool:
 
         def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-            futures.append(pool.submit(work, *arguments))
+            with nullcontext() if futures else pause():  # the first starts the process
+                futures.append(pool.submit(work, *arguments))
             return futures[-1]
 
         try:
@@ -56,15 +59,76 @@ def background_process() -> Iterator[Submit]:
 
 
 def _context() -> multiprocessing.context.BaseContext:
-    """A copy of this process, which has loaded all libraries, where that is safe.
+    """A copy of this process, which has loaded all libraries, where that is safe."""
+    return multiprocessing.get_context("fork" if may_fork() else "spawn")
+
+
+def may_fork() -> bool:
+    """Whether this process can be copied during a `pause`.
 
     A copy has no other threads: what they hold locked would stay locked in it.
     """
-    alone = sys.platform == "linux" and threading.active_count() == 1
-    return multiprocessing.get_context("fork" if alone else "spawn")
+    paused = sum(one.running for one in _repeated)
+    return sys.platform == "linux" and threading.active_count() - paused == 1
 
 
-def _begin() -> None:
+class Repeated:
+    """A function that a thread calls again and again while the block runs, but for a `pause`."""
+
+    def __init__(self, work: Callable[[], object], seconds: float) -> None:
+        """Call the function after each interval, seconds."""
+        self._work, self._seconds = work, seconds
+        self._thread: threading.Thread | None = None
+        self._end = threading.Event()
+
+    @property
+    def running(self) -> bool:
+        """Whether its thread is there."""
+        return self._thread is not None
+
+    def start(self) -> None:
+        """Begin to call."""
+        self._end.clear()
+        self._thread = threading.Thread(target=self._repeat, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and wait for its end."""
+        self._end.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _repeat(self) -> None:
+        while not self._end.wait(self._seconds):
+            self._work()
+
+    def __enter__(self) -> "Repeated":
+        """Begin."""
+        _repeated.append(self)
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        _repeated.remove(self)
+        self.stop()
+
+
+@contextmanager
+def pause() -> Iterator[None]:
+    """End the threads of all repeated functions for this block, so that it can copy the process."""
+    running = [one for one in _repeated if one.running]
+    for one in running:
+        one.stop()
+    try:
+        yield
+    finally:
+        for one in running:
+            one.start()
+
+
+def end_with_parent() -> None:
     """End with the process that waits, also when that is killed; leave interrupts to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":

@@ -1,5 +1,8 @@
 """The bar that shows the progress of a long command on a terminal."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -12,15 +15,21 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from tbcad.background import Repeated
 from tbcad.screen import TimeLeft
 
 BAR_WIDTH = 12
+REFRESH_S = 0.1
 MINUTE = 60
 
 
-def progress_bar(console: Console, time_left: TimeLeft | None) -> Progress:
-    """A bar, which vanishes at its end, with the stage and, if it is estimated, the time left."""
-    return Progress(
+@contextmanager
+def progress_bar(console: Console, time_left: TimeLeft | None) -> Iterator[Progress]:
+    """A bar, which vanishes at its end, with the stage and, if it is estimated, the time left.
+
+    It is drawn again by a thread that pauses while the process is copied; rich's own would not.
+    """
+    bar = Progress(
         SpinnerColumn(),
         BarColumn(bar_width=BAR_WIDTH),
         TimeElapsedColumn(),
@@ -28,7 +37,10 @@ def progress_bar(console: Console, time_left: TimeLeft | None) -> Progress:
         TextColumn("{task.description}", markup=False),
         console=console,
         transient=True,
+        auto_refresh=False,
     )
+    with bar, Repeated(bar.refresh, REFRESH_S):
+        yield bar
 
 
 class _TimeLeftColumn(ProgressColumn):

@@ -1,5 +1,7 @@
 """The command `tbcad`: thin; heavy libraries are imported inside the commands."""
 
+from tbcad.cli import garbage as _garbage  # noqa: F401, I001 - first of all
+
 import os
 import sys
 import warnings
@@ -8,14 +10,34 @@ from functools import partial
 
 import typer
 
+from tbcad.cli import as_built as _as_built  # noqa: F401 - adds its command
+from tbcad.cli import inspection as _inspection  # noqa: F401 - adds its command
+from tbcad.cli import assembly as _assembly  # noqa: F401 - adds its command
 from tbcad.cli import build as _build  # noqa: F401 - adds its commands
+from tbcad.cli import calibrate as _calibrate  # noqa: F401 - adds its commands
 from tbcad.cli import camera as _camera  # noqa: F401 - adds its command
+from tbcad.cli import explain as _explain  # noqa: F401 - adds its command
+from tbcad.cli import export as _export  # noqa: F401 - adds its command
+from tbcad.cli import init as _init  # noqa: F401 - adds its command
+from tbcad.cli import drawings as _drawings  # noqa: F401 - adds its command
+from tbcad.cli import merge as _merge  # noqa: F401 - adds its command
+from tbcad.cli import optimize as _optimize  # noqa: F401 - adds its command
+from tbcad.cli import parts as _parts  # noqa: F401 - adds its command
+from tbcad.cli import report as _report  # noqa: F401 - adds its command
+from tbcad.cli import run_command as _run_command  # noqa: F401 - adds its command
+from tbcad.cli import show as _show_command  # noqa: F401 - adds its command
 from tbcad.cli import simulate as _simulate  # noqa: F401 - adds its commands
+from tbcad.cli import simulated_run as _simulated_run  # noqa: F401 - adds its command
 from tbcad.cli import study as _study  # noqa: F401 - adds its commands
 from tbcad.cli import tolerance as _tolerance  # noqa: F401 - adds its command
 from tbcad.cli.app import app
+from tbcad.cli.examples import add_examples
+from tbcad.cli.help_order import order_help
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
+
+order_help(app)
+add_examples(app)
 
 INTERRUPTED = 130  # exit code of a command that is stopped from the keyboard
 
@@ -58,4 +80,6 @@ def main() -> None:
     """Entry point of the command."""
     # None of them concerns a design, and looking for them in all installed packages takes time.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # Both cores are at work; threads of the linear algebra would only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(run(sys.argv[1:]))

@@ -9,7 +9,6 @@ from tbcad.version import __version__
 app = typer.Typer(
     name="tbcad",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},

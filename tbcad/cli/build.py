@@ -1,6 +1,6 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -8,28 +8,24 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_are_printers, check_is_folder
-from tbcad.cli.options import Exports, Force, ForceFile, OutReplaced, Settings
-from tbcad.cli.output_mode import Full, Json, Quiet, output_mode
+from tbcad.cli.early_checks import check_are_printers, check_is_calibration, check_is_folder
+from tbcad.cli.for_process import DEFAULT_YIELD, asked_process, with_margins
+from tbcad.cli.options import Design, Exports, Force, ForceFile, JsonResult, OutReplaced, Settings
+from tbcad.cli.output_mode import Full, Json, Quiet, output_mode, print_json
 from tbcad.errors import InputError
 from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
-    from tbcad.doctor import Finding
-    from tbcad.tolerance.process.process import Process
+    from tbcad_verify.report.report import Output
 
-DEFAULT_YIELD = 0.99
+    from tbcad.doctor import Finding
+
 FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
 
 
 @app.command()
 def build(
-    design: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="DESIGN", help="Design file (TOML); by default the design of the paper."
-        ),
-    ] = None,
+    design: Design = None,
     n: Annotated[
         str | None,
         typer.Option(
@@ -56,9 +52,11 @@ def build(
     for_process: Annotated[
         str | None,
         typer.Option(
+            "--for-process",
+            "--process",
             metavar="NAME|FILE",
-            help="Add the coverage margin that a manufacturing process needs: fdm, sls, sla, cnc, "
-            "diamond, or a TOML file; see tbcad tolerance.",
+            help="Add the coverage margins that a manufacturing process needs, and say what they "
+            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance.",
         ),
     ] = None,
     share: Annotated[
@@ -92,19 +90,20 @@ def build(
     if not verify and not dry_run and output in ("full", "json"):
         raise InputError(f"--{output} shows a verification: leave --no-verify out")
     from tbcad.api import build as build_files
+    from tbcad.cli.memory import keep_freed_memory
     from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import check_parts, default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
     started = monotonic()
+    keep_freed_memory()
     asked = parse_parts(parts) if parts is not None else None
     options = list(settings or [])
     options += [f"optics.n={n}"] if n is not None else []
     options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
     spec = load_spec(design, options)
-    process = _process(for_process, share)
-    wanted_yield = DEFAULT_YIELD if share is None else share
+    process, wanted_yield = asked_process(for_process, share)
     chosen = asked or default_parts(spec)
     if asked is not None:
         check_parts(spec, asked)
@@ -113,13 +112,8 @@ def build(
     times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
     with stages(times, silent=quiet) as screen:
         if process is not None:
-            from tbcad.tolerance.margin import spec_for_process
-
             screen.stage(margin_stage(process.name))
-            spec = spec_for_process(spec, process, wanted_yield, screen.detail)
-            screen.note(
-                f"margin {spec.mirrors.margin_mm:g} mm, for {wanted_yield:.1%} by {for_process}"
-            )
+            spec = with_margins(spec, process, wanted_yield, screen)
         if dry_run:
             from tbcad.cli.dry_run import show_overview
 
@@ -142,23 +136,6 @@ def build(
     return 0 if built.passed else 1
 
 
-def _process(name: str | None, wanted_yield: float | None) -> "Process | None":
-    """The process whose margin is wanted, read and checked before anything takes long."""
-    if name is None and wanted_yield is None:
-        return None
-    from tbcad.tolerance.process.process import load_process
-    from tbcad.tolerance.wanted_yield import check_yield
-
-    if name is None:
-        raise InputError(
-            f"--yield {wanted_yield:g} is of no use without --for-process: name a process, or "
-            "leave --yield out"
-        )
-    if wanted_yield is not None:
-        check_yield(wanted_yield)
-    return load_process(name)
-
-
 @app.command("verify")
 def verify_command(
     folder: Exports,
@@ -177,6 +154,15 @@ def verify_command(
             "--clients", help="Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."
         ),
     ] = False,
+    as_built: Annotated[
+        Path | None,
+        typer.Option(
+            "--as-built",
+            metavar="CALIBRATION",
+            help="Instead of the files, verify the prototype as tbcad calibrate found it: what it "
+            "covers, and what to shim. Writes nothing.",
+        ),
+    ] = None,
     time_limit: Annotated[
         float,
         typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
@@ -193,6 +179,10 @@ def verify_command(
     if not time_limit > 0:
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
     check_is_folder(folder)
+    if as_built is not None:
+        if printers or clients:
+            raise InputError("--as-built is about no files: leave out --printer and --clients")
+        return _verify_as_built(folder, as_built, output)
     check_are_printers(printers or ())
     from tbcad_verify.run.verify import VerifyOptions
 
@@ -210,6 +200,16 @@ def verify_command(
     return 0 if report.passed else 1
 
 
+def _verify_as_built(folder: Path, calibration: Path, output: "Output") -> int:
+    check_is_calibration(calibration)
+    from tbcad.api import verify_as_built
+
+    with stages(3, silent=output == "quiet") as screen:
+        report = verify_as_built(folder, calibration, progress=screen.stage)
+    report.show(report_console(), output)
+    return 0 if report.passed else 1
+
+
 @app.command()
 def picture(
     folder: Exports,
@@ -221,7 +221,7 @@ def picture(
         str,
         typer.Option(
             help="Subject: shell (both halves from outside, and the mirrors from a camera); rig, "
-            "base, seat or exploded (the prototype)."
+            "sides, base, seat or exploded (the prototype)."
         ),
     ] = "shell",
     force: ForceFile = False,
@@ -236,12 +236,14 @@ def picture(
 
 
 @app.command()
-def doctor() -> int:
+def doctor(json: JsonResult = False) -> int:
     """Check that this Python environment has all that tbcad needs, and say how to repair it."""
     from tbcad.doctor import diagnose
 
     findings = diagnose()
-    for finding in findings:
+    if json:
+        print_json({"schema": "tbcad-doctor/1", "findings": [asdict(one) for one in findings]})
+    for finding in findings if not json else ():
         _show_finding(finding)
     return 0 if all(finding.ok for finding in findings) else 1
 

@@ -1,7 +1,7 @@
 """What `tbcad build --dry-run` prints: a dozen lines, or a record."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +61,7 @@ def overview_lines(figures: Overview, seconds: float) -> list[str]:
 
 
 def overview_record(figures: Overview, seconds: float) -> dict[str, Any]:
-    """The same for programs: fields of `Overview`, masses in grams, prices in euros."""
+    """The same for programs: fields of `Overview`, masses in grams, prices by currency."""
     record = asdict(figures) | {"spec": spec_dict(figures.spec)}
     return record | {"build_seconds": round(seconds)}
 
@@ -74,7 +74,7 @@ def _prototype_lines(figures: PrototypeOverview) -> Iterator[str]:
     yield f"  coverage        {figures.minimum_coverage_mm:.2f} mm, " + (
         f"{figures.kept_share:.0%} of the shell's pixels"
     )
-    yield f"  balls           {figures.ball_mass_g:.0f} g, about {figures.ball_price:.0f} EUR"
+    yield f"  balls           {figures.ball_mass_g:.0f} g, {_price_text(figures.ball_price)}"
     yield f"  turning         {figures.turning_mass_g:.0f} g, driven by {figures.motor}"
     yield f"  printed parts   {_print_text(figures.prints)}"
 
@@ -82,5 +82,11 @@ def _prototype_lines(figures: PrototypeOverview) -> Iterator[str]:
 def _print_text(figures: PrintEstimate) -> str:
     return (
         f"{figures.volume_cm3:.0f} cm3, about {figures.mass_g:.0f} g, {figures.hours:.0f} h, "
-        f"{figures.price:.0f} EUR by FDM"
+        f"{_price_text(figures.price)} by FDM"
     )
+
+
+def _price_text(prices: Mapping[str, float]) -> str:
+    """Sums in all currencies of the list of prices."""
+    sums = (f"{amount:.0f} {currency}" for currency, amount in prices.items())
+    return f"about {' and '.join(sums)}" if prices else "no price"

@@ -3,6 +3,7 @@
 The checks are those of the readers, who make them again.
 """
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,10 @@ from tbcad.errors import InputError
 
 DESIGN_FILE = "design.json"
 LIGHT_FIELD_FILE = "lightfield.h5"
+RUN_FILE = "run.json"
+MACHINE_FILE = "machine.json"
+CALIBRATION_FILE = "calibration.json"
+SHELL_CAMERAS = ("a", "b")  # folders of a shell's calibration
 
 
 def check_is_folder(folder: Path) -> None:
@@ -40,7 +45,7 @@ def check_is_object(path: Path | None) -> None:
         InputError: it is none.
     """
     if path is not None and not path.is_file():
-        raise InputError(f"{path} is no file: name a triangle mesh (PLY, STL, OBJ, GLB ...)")
+        raise InputError(f"{path}: no such file; give a triangle mesh (PLY, STL, OBJ, GLB ...)")
 
 
 def check_are_printers(names: Sequence[str]) -> None:
@@ -69,4 +74,62 @@ def check_is_capture(path: Path) -> None:
     """
     file = path / LIGHT_FIELD_FILE if path.is_dir() else path
     if not file.is_file():
-        raise InputError(f"{file} is no file: name a folder that tbcad capture wrote")
+        raise InputError(
+            f"{file}: no such file; give a light field: the folder that `tbcad capture` or "
+            "`tbcad merge` wrote, or its lightfield.h5"
+        )
+
+
+def check_is_run(folder: Path) -> None:
+    """Refuse a folder without the record of a run.
+
+    Raises:
+        InputError: it has none.
+    """
+    path = folder / RUN_FILE
+    if not path.is_file():
+        raise InputError(f"{path} is not there: name a folder that tbcad run or simulate-run wrote")
+
+
+def check_is_calibration(folder: Path) -> None:
+    """Refuse a folder without a calibrated prototype.
+
+    Raises:
+        InputError: it has none.
+    """
+    if any((one / MACHINE_FILE).is_file() for one in _cameras(folder)) or _is_of_shell(folder):
+        raise InputError(
+            f"{folder} is the calibration of a shell, which only tbcad merge takes: name that of a "
+            "prototype"
+        )
+    _check_has_machine(folder)
+
+
+def check_is_any_calibration(folder: Path) -> None:
+    """Refuse a folder without a calibrated prototype or shell.
+
+    Raises:
+        InputError: it has neither.
+    """
+    if not any((one / MACHINE_FILE).is_file() for one in _cameras(folder)):
+        _check_has_machine(folder)
+
+
+def _cameras(folder: Path) -> list[Path]:
+    """Folders of a shell's calibration, in that of the run."""
+    return [folder / name for name in SHELL_CAMERAS]
+
+
+def _is_of_shell(folder: Path) -> bool:
+    """Whether a calibration's record says that it is of one camera of a shell."""
+    try:
+        record = json.loads((folder / CALIBRATION_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False  # its readers say so
+    return isinstance(record, dict) and record.get("geometry") == "shell"
+
+
+def _check_has_machine(folder: Path) -> None:
+    path = folder / MACHINE_FILE
+    if not path.is_file():
+        raise InputError(f"{path} is not there: name a folder that tbcad calibrate wrote")

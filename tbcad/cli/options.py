@@ -5,6 +5,14 @@ from typing import Annotated, Literal
 
 import typer
 
+Design = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="DESIGN",
+        help="Design file (TOML), or the name of a design that comes with tbcad (tbcad init "
+        "--list); by default the design of the paper.",
+    ),
+]
 Exports = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad build.")]
 Settings = Annotated[
     list[str] | None,
@@ -18,6 +26,9 @@ OutReplaced = Annotated[
     typer.Option("--out", "-o", help="Folder for all files; replaced as a whole or not at all."),
 ]
 OutPicture = Annotated[Path, typer.Option("--out", "-o", help="PNG file to write.")]
+JsonResult = Annotated[
+    bool, typer.Option("--json", help="Print what is found as JSON, for other programs.")
+]
 Force = Annotated[
     bool,
     typer.Option(
@@ -28,6 +39,20 @@ ForceFile = Annotated[
     bool, typer.Option("--force", help="Replace files that exist, instead of refusing.")
 ]
 Capture = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad capture.")]
+RunFolder = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Folder written by tbcad run or simulate-run.")
+]
+ExportsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--exports",
+        metavar="FOLDER",
+        help="Folder written by tbcad build; by default the one that the calibration names.",
+    ),
+]
+CalibrationFolder = Annotated[
+    Path, typer.Option("--calibration", metavar="FOLDER", help="Folder written by tbcad calibrate.")
+]
 Azimuth = Annotated[float, typer.Option(help="Azimuth of the camera about z, from x, degrees.")]
 Elevation = Annotated[float, typer.Option(help="Elevation of the camera, 0 to 90 degrees.")]
 Distance = Annotated[
@@ -56,6 +81,10 @@ ObjectFile = Annotated[
         help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with vertex "
         "colours or a texture; by default a built-in knot.",
     ),
+]
+PlotFormatOption = Annotated[
+    Literal["png", "svg", "pdf"],
+    typer.Option("--format", help="Of plots: png, or svg and pdf for papers."),
 ]
 METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "

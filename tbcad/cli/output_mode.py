@@ -28,3 +28,10 @@ def output_mode(full: bool, quiet: bool, json: bool) -> "Output":
         given = " and ".join(f"--{name}" for name in chosen)
         raise InputError(f"{given} exclude each other: give only one of them")
     return chosen[0] if chosen else "summary"
+
+
+def print_json(record: object) -> None:
+    """Print a record for other programs."""
+    import json
+
+    typer.echo(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))

@@ -17,6 +17,7 @@ from tbcad.cli.options import (
     ForceFile,
     Fov,
     Height,
+    JsonResult,
     MethodOfView,
     ObjectFile,
     OutPicture,
@@ -24,6 +25,7 @@ from tbcad.cli.options import (
     PaintOption,
     Width,
 )
+from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
@@ -69,6 +71,7 @@ def capture(
         ),
     ] = False,
     force: Force = False,
+    json: JsonResult = False,
 ) -> int:
     """Simulate the photographs of an object by both cameras through the mirrors of an export.
 
@@ -89,6 +92,9 @@ def capture(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
         )
         record = write_photographs(photographs, out, force, screen.stage)
+    if json:
+        print_json(record)
+        return 0
     for camera, counts in record["cameras"].items():
         seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
         typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
@@ -241,7 +247,7 @@ def _check_pictures(capture: Path, out: Path, force: bool) -> None:
 
 def _compared_files(out: Path) -> list[Path]:
     """The ground truth and the comparison that are written beside a picture."""
-    return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "beside")]
+    return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "and-truth")]
 
 
 def _has_object(capture: Path) -> bool:

@@ -21,45 +21,47 @@ Seconds = dict[str, float]
 MIRRORS: Seconds = {"mirrors: radii and cells": 1.0}
 SHELLS: Seconds = {
     "shell_a: solid": 2.0,
-    "shell_a: files": 5.0,
+    "shell_a: files": 2.0,
     "shell_b: solid": 2.0,
     "shell_b: files": 2.0,
 }
 PROTOTYPE_PARTS: Seconds = {
     "prototype: balls, their places, stops": 3.0,
-    "prototype: base": 11.0,
+    "prototype: base": 10.0,
     "prototype: stage and frame": 2.0,
-    "prototype: caps and coupon": 2.0,
+    "prototype: caps and coupon": 0.3,
     "prototype: files": 0.5,
     "prototype: assembly": 3.0,
 }
 WAIT_FOR_SHELLS: Seconds = {"shells": 1.0}
 MANIFEST: Seconds = {"manifest": 1.0}
+REPORT: Seconds = {"report": 1.5}
 VERIFY: Seconds = {
     "verification: reading": 0.5,
     "verification: 3MF": 2.0,
     "verification: files and record": 0.3,
-    "verification: meshes and mirrors": 2.5,
-    "verification: printability": 2.5,
+    "verification: meshes and mirrors": 3.5,
+    "verification: printability": 4.0,
 }
 VERIFY_SHELLS: Seconds = {
     "verification: optical setup": 1.5,
     "verification: coverage": 0.7,
     "verification: every pixel": 2.5,
 }
+# Most of it runs beside the stages of the shells.
 VERIFY_PROTOTYPE: Seconds = {
     "verification: prototype's record": 0.1,
-    "verification: printed parts": 0.3,
-    "verification: parts and purchases": 0.7,
-    "verification: seats": 0.4,
-    "verification: light paths of the balls": 1.5,
-    "verification: swing": 1.0,
-    "verification: printability of the prototype": 0.7,
+    "verification: printed parts": 0.1,
+    "verification: parts and purchases": 0.1,
+    "verification: seats": 0.1,
+    "verification: light paths of the balls": 0.1,
+    "verification: swing": 0.1,
+    "verification: printability of the prototype": 0.1,
 }
 VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 0.3}
 VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 0.2}
 AS_MADE: Seconds = {"simulated builds by each process": 3.0}
-MARGIN_SECONDS = 45.0  # a search for the margin of a process
+MARGIN_SECONDS = 100.0  # a search for the margins of a process, and what they cost in pixels
 
 
 def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None) -> Seconds:
@@ -77,7 +79,13 @@ def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None)
     solids = prototype | scaled(WAIT_FOR_SHELLS, n) if both else shells | prototype
     margin = {} if process is None else scaled({margin_stage(process): MARGIN_SECONDS}, n)
     times = margin | scaled(MIRRORS, n) | solids | MANIFEST
-    return times | (verify_times(n, parts) if verify else {})
+    return times | (verify_times(n, parts) if verify else {}) | scaled(REPORT, n)
+
+
+def report_times(folder: Path) -> Seconds:
+    """Expected seconds of the page of a folder, after its simulated builds."""
+    n, parts = look_at(folder)
+    return as_made_times(n, parts) | scaled(REPORT, n)
 
 
 def margin_stage(process: str) -> str:

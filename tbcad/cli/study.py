@@ -1,6 +1,5 @@
 """The studies of the paper: heavy libraries are imported inside the commands."""
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,19 +9,22 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_export, check_is_object
 from tbcad.cli.options import (
+    Design,
     Distance,
     Exports,
+    JsonResult,
     MethodOption,
     ObjectFile,
     Out,
     PaintOption,
+    PlotFormatOption,
     Scheduler,
     Settings,
 )
-from tbcad.screen import paragraph, report_console, stages
+from tbcad.cli.study_output import run_study
+from tbcad.errors import InputError
 
 if TYPE_CHECKING:
-    from tbcad.simulate.study.study import Study
     from tbcad.spec.design import Spec
 
 study = typer.Typer(
@@ -32,9 +34,8 @@ study = typer.Typer(
 )
 app.add_typer(study, name="study")
 
-DesignFile = Annotated[
-    Path | None, typer.Option(help="Design file (TOML); by default the design of the paper.")
-]
+# As the argument DESIGN was given once.
+OldDesign = Annotated[Path | None, typer.Option("--design", hidden=True)]
 First = Annotated[int, typer.Option("--from", metavar="N", help="Smallest n, 1 or more.")]
 Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n, up to 60.")]
 Sensors = Annotated[
@@ -52,9 +53,12 @@ STUDIES = Path("studies")
 
 @study.command("resolution")
 def resolution_command(
-    design: DesignFile = None,
+    design: Design = None,
+    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     first: First = 2,
     last: Last = 40,
     sensors: Sensors = None,
@@ -76,16 +80,21 @@ def resolution_command(
     ns = n_range(first, last)
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
-    spec = _spec(design, settings)
+    spec = _spec(design, old_design, settings)
     counted = given or default_sensors(spec)
-    return _write(out, partial(resolution, spec, ns, counted, wanted, scheduler=scheduler))
+    return run_study(
+        out, json, plot, partial(resolution, spec, ns, counted, wanted, scheduler=scheduler)
+    )
 
 
 @study.command("capture-area")
 def capture_area_command(
-    design: DesignFile = None,
+    design: Design = None,
+    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     first: First = 2,
     last: Last = 36,
     scheduler: Scheduler = None,
@@ -95,25 +104,33 @@ def capture_area_command(
     from tbcad.simulate.study.sweep import n_range
 
     ns = n_range(first, last)
-    spec = _spec(design, settings)
-    return _write(out, partial(capture_area, spec, ns, scheduler=scheduler))
+    spec = _spec(design, old_design, settings)
+    return run_study(out, json, plot, partial(capture_area, spec, ns, scheduler=scheduler))
 
 
 @study.command("elevation")
 def elevation_command(
-    design: DesignFile = None, settings: Settings = None, out: Out = STUDIES
+    design: Design = None,
+    old_design: OldDesign = None,
+    settings: Settings = None,
+    out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
 ) -> int:
     """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
     from tbcad.simulate.study.elevation import elevation
 
-    return _write(out, partial(elevation, _spec(design, settings)))
+    return run_study(out, json, plot, partial(elevation, _spec(design, old_design, settings)))
 
 
 @study.command("depth-of-field")
 def depth_command(
-    design: DesignFile = None,
+    design: Design = None,
+    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     blur_px: Annotated[float, typer.Option(help="Largest blur circle, in pixels.")] = 1.0,
     pixel_um: Annotated[float, typer.Option(help="Width of a pixel, micrometres.")] = 3.45,
     wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
@@ -122,14 +139,19 @@ def depth_command(
     from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 
     optics = LensOptions(blur_px, pixel_um, wide_open).checked()
-    return _write(out, partial(depth_of_field, _spec(design, settings), optics))
+    return run_study(
+        out, json, plot, partial(depth_of_field, _spec(design, old_design, settings), optics)
+    )
 
 
 @study.command("ssim")
 def ssim_command(
-    design: DesignFile = None,
+    design: Design = None,
+    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     sensors: Sensors = None,
@@ -147,16 +169,18 @@ def ssim_command(
 
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
-    spec = _spec(design, settings)
+    spec = _spec(design, old_design, settings)
     subject = load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint)
     simulated = given or default_sensors(spec)
-    return _write(out, partial(ssim, spec, subject, simulated, places, method))
+    return run_study(out, json, plot, partial(ssim, spec, subject, simulated, places, method))
 
 
 @study.command("prototype")
 def prototype_command(
     folder: Exports,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     method: MethodOption = "nearest",
@@ -177,13 +201,17 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
-    return _write(out, partial(prototype_vs_shell, export, subject, places, method, samples))
+    return run_study(
+        out, json, plot, partial(prototype_vs_shell, export, subject, places, method, samples)
+    )
 
 
 @study.command("low-pass")
 def low_pass_command(
     folder: Exports,
     out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     azimuths: Azimuths = 4,
@@ -223,42 +251,28 @@ def low_pass_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
-    return _write(out, partial(low_pass, export, subject, places, options))
+    return run_study(out, json, plot, partial(low_pass, export, subject, places, options))
 
 
-def _spec(design: Path | None, settings: list[str] | None) -> "Spec":
+@study.command("calibration")
+def calibration_command(
+    folder: Exports,
+    out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
+) -> int:
+    """Find how well rays are known after calibration, by LEDs, noise and process (5.2)."""
+    check_is_export(folder)
+    from tbcad.calibration.study import calibration_study
+    from tbcad.simulate.scene.exported import read_export
+
+    export = read_export(folder)
+    return run_study(out, json, plot, partial(calibration_study, export))
+
+
+def _spec(design: Path | None, old_design: Path | None, settings: list[str] | None) -> "Spec":
     from tbcad.spec.load import load_spec
 
-    return load_spec(design, settings or ())
-
-
-def _write(out: Path, work: "Callable[[Callable[[str], None]], Study]") -> int:
-    """Make a study, write its files, and show its figures next to the paper's."""
-    from tbcad.simulate.study.study import check_study_folder, write_study
-
-    check_study_folder(out)
-    with stages(2) as screen:
-        screen.stage("study: mirrors and rays")
-        result = work(screen.detail)
-        screen.stage("study: files")
-        files = write_study(result, out)
-    _show(result)
-    typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
-    return 0
-
-
-def _show(result: "Study") -> None:
-    from rich.table import Table
-
-    table = Table(box=None)
-    for heading in ("quantity", "tbcad", "the paper", "where in the paper"):
-        table.add_column(heading, overflow="fold")
-    for quantity, unit, ours, paper, where in result.summary.rows:
-        table.add_row(str(quantity), _shown(ours, unit), _shown(paper, unit), str(where))
-    report_console().print(table)
-
-
-def _shown(value: str | int | float | None, unit: str | int | float | None) -> str:
-    """A figure with four digits; the files have all of them."""
-    short = f"{value:.4g}" if isinstance(value, float) else "-" if value is None else str(value)
-    return f"{short} {unit}".rstrip() if value is not None else short
+    if design is not None and old_design is not None:
+        raise InputError(f"there are two designs, {design} and {old_design}: name one")
+    return load_spec(design or old_design, settings or ())

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import Exports, ObjectFile, Out, Scheduler
+from tbcad.cli.early_checks import check_is_calibration, check_is_export, check_is_object
+from tbcad.cli.options import Exports, JsonResult, ObjectFile, Out, PlotFormatOption, Scheduler
+from tbcad.errors import InputError
 from tbcad.screen import paragraph, stages
 
 
@@ -45,14 +46,31 @@ def tolerance(
     calibrated_mrad: Annotated[
         float, typer.Option(help="Error of each mirror's direction after calibration, mrad.")
     ] = 0.5,
+    as_built: Annotated[
+        Path | None,
+        typer.Option(
+            "--as-built",
+            metavar="CALIBRATION",
+            help="Instead of a process: this very prototype, with what its calibration (a folder "
+            "that tbcad calibrate wrote) leaves unknown.",
+        ),
+    ] = None,
     object_file: ObjectFile = None,
     scheduler: Scheduler = None,
     out: Out = Path("tolerance"),
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
 ) -> int:
     """Simulate many builds with random errors: how many reach the target, and what limits them.
 
-    Writes tolerance.json, tables, notes and plots.
+    Writes tolerance.json, which --json prints too, tables, notes and plots.
     """
+    if as_built is not None:
+        if process or margins or settings:
+            raise InputError(
+                "--as-built is about no process: leave out --process, --margins and --set"
+            )
+        return _as_built(folder, as_built, builds, seed, out, json)
     from tbcad.cli.tolerance_times import tolerance_times
     from tbcad.tolerance.options import ToleranceOptions
     from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
@@ -83,7 +101,48 @@ def tolerance(
         )
         screen.stage(TABLES)
         more = {"tolerance.json": json_text(analysis).encode()}
-        files = write_study(tolerance_study(analysis), out, more)
+        files = write_study(tolerance_study(analysis), out, more, plot)
+    if json:
+        typer.echo(json_text(analysis), nl=False)
+        return 0
     typer.echo(paragraph(summary_text(analysis)))
+    typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
+    return 0
+
+
+def _as_built(
+    folder: Path, calibration: Path, builds: int, seed: int, out: Path, json: bool
+) -> int:
+    if builds < 1:
+        raise InputError(f"--builds {builds} is too few: allowed is 1 or more")
+    check_is_export(folder)
+    check_is_calibration(calibration)
+    from json import dumps
+
+    from tbcad.as_built.tolerance import (
+        as_built_tolerance,
+        summary,
+        tolerance_record,
+        tolerance_table,
+    )
+    from tbcad.atomic_files import replace_files
+    from tbcad.simulate.study.study import check_study_folder
+    from tbcad.simulate.study.tables import csv_text
+
+    check_study_folder(out)
+    with stages(1) as screen:
+        screen.stage("coverage and rays as calibrated")
+        found = as_built_tolerance(calibration, folder, builds, seed)
+    out.mkdir(parents=True, exist_ok=True)
+    record = dumps(tolerance_record(found, builds, seed), indent=1) + "\n"
+    contents = {
+        "as-built.json": record.encode(),
+        "as-built.csv": csv_text(tolerance_table(found)).encode(),
+    }
+    files = replace_files(out, contents)
+    if json:
+        typer.echo(record, nl=False)
+        return 0
+    typer.echo(paragraph(summary(found)))
     typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
     return 0

@@ -6,7 +6,15 @@ from itertools import chain, count
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, VERDICT, is_file, is_listed, read_manifest
+from tbcad.output.manifest import (
+    MANIFEST,
+    REPORT,
+    VERDICT,
+    is_file,
+    is_listed,
+    is_report,
+    read_manifest,
+)
 
 # Files that a checkout has in its folder of exports: no build writes them, and each keeps them.
 ALWAYS_KEPT = (".gitignore", "README.md")
@@ -15,20 +23,27 @@ ALWAYS_KEPT = (".gitignore", "README.md")
 def foreign_files(folder: Path) -> list[Path]:
     """Return the files and folders that tbcad did not write, sorted.
 
-    tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself and
-    verify.json. It makes no folders, so each folder is the user's, as a whole.
+    tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself,
+    verify.json, and report.html if it begins as tbcad's does. A folder all of whose files are
+    listed in the same way is tbcad's; any other is the user's, as a whole.
 
     Raises:
         OSError: the folder cannot be read.
     """
     manifest = read_manifest(folder)
     of_tbcad = {MANIFEST, VERDICT} if manifest else set()
+    if manifest and os.path.lexists(folder / REPORT) and is_report(folder / REPORT):
+        of_tbcad.add(REPORT)
     listed = manifest.files if manifest else {}
-    return [
-        path
-        for path in sorted(folder.iterdir())
-        if not (is_file(path) and (path.name in of_tbcad or is_listed(path, listed.get(path.name))))
-    ]
+
+    def is_of_tbcad(path: Path) -> bool:
+        if path.is_dir() and not path.is_symlink() and not os.path.ismount(path):
+            inner = list(path.iterdir())
+            return bool(inner) and all(map(is_of_tbcad, inner))
+        name = path.relative_to(folder).as_posix()
+        return is_file(path) and (name in of_tbcad or is_listed(path, listed.get(name)))
+
+    return [path for path in sorted(folder.iterdir()) if not is_of_tbcad(path)]
 
 
 def is_always_kept(path: Path) -> bool:

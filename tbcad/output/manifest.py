@@ -12,16 +12,21 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from tbcad.version import __version__
 
-MANIFEST, VERDICT = "manifest.json", "verify.json"
+MANIFEST, VERDICT, REPORT = "manifest.json", "verify.json", "report.html"
+# Written after the manifest, and not in it: verdict and page come when the files are verified.
+UNLISTED = (MANIFEST, VERDICT, REPORT)
+# How report.html begins, so that no page of the user is taken for it.
+REPORT_BEGIN = "<!doctype html>\n<!-- tbcad report -->"
 SCHEMA = "tbcad-manifest/1"
 LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh")
 
 _MAX_MANIFEST_BYTES = 4_000_000
-_MAX_FILES = 10_000
+_MAX_FILES = 30_000  # three for each of 6578 mirrors at n = 36, and more
 
 
 def _plain_name(name: str) -> str:
-    if name in ("", ".", "..") or {"/", "\\", "\0"} & {*name}:
+    parts = name.split("/")
+    if {"", ".", ".."} & {*parts} or {"\\", "\0"} & {*name}:
         raise ValueError("not the name of a file in the folder")
     return name
 
@@ -43,8 +48,12 @@ class Manifest(BaseModel):
 
 
 def write_manifest(folder: Path) -> None:
-    """Write manifest.json over all files of the folder but itself and the verdict."""
-    names = sorted(p.name for p in folder.iterdir() if p.name not in (MANIFEST, VERDICT))
+    """Write manifest.json over all files of the folder but itself, the verdict and the page.
+
+    Files in folders of the folder are listed with their path: images/a0001.png.
+    """
+    paths = (path.relative_to(folder).as_posix() for path in folder.rglob("*") if is_file(path))
+    names = sorted(name for name in paths if name not in UNLISTED)
     versions = {"tbcad": __version__, **{name: version(name) for name in LIBRARIES}}
     document = {
         "schema": SCHEMA,
@@ -81,6 +90,15 @@ def is_listed(path: Path, entry: Entry | None) -> bool:
         and entry.size == path.lstat().st_size
         and entry.model_dump() == fingerprint(path)
     )
+
+
+def is_report(path: Path) -> bool:
+    """Tell a page of `tbcad report` from any other file."""
+    begin = REPORT_BEGIN.encode()
+    if not is_file(path):
+        return False
+    with path.open("rb") as file:
+        return file.read(len(begin)) == begin
 
 
 def is_file(path: Path) -> bool:

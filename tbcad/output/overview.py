@@ -13,17 +13,17 @@ from tbcad.geometry.primitives import Component, volume
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import Arrangement, arrange
+from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
+from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.shell.files import camera_a_mesh
 from tbcad.spec.design import MeshSpec, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
-# Hours of printing for a cubic centimetre of solid volume, and what share of it the slicer fills:
-# carrier, shell, head and post of the paper's design by PrusaSlicer 2.5 (0.4 mm nozzle, 0.2 mm
-# layers, 15 % infill) took 0.035 to 0.076 hours and 40 to 98 %.
-HOURS_PER_CM3, FILLED = 0.05, 0.5
-# Judgements on prices of 2026, in euros for a kilogram: filament; steel balls of 10 to 60 mm.
-FILAMENT_PER_KG, BALLS_PER_KG = 25.0, 40.0
+# Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a
+# share of it: the mean of 14 parts of the paper's prototype by PrusaSlicer 2.5 with the settings of
+# the parts list's estimates (tbcad.prototype.printing.estimate).
+HOURS_PER_CM3, FILLED = 0.087, 0.84
 COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.5)
 MM3_PER_CM3 = 1000.0
 
@@ -36,13 +36,13 @@ class PrintEstimate:
         volume_cm3: of the solids.
         mass_g: of the filament.
         hours: on an FDM printer.
-        price: of the filament, euros.
+        price: of the filament by the spec's list of prices, by currency; empty without one.
     """
 
     volume_cm3: float
     mass_g: float
     hours: float
-    price: float
+    price: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class PrototypeOverview:
         minimum_coverage_mm: diameter that every mirror's ball shows.
         kept_share: of the shell's pixels.
         ball_mass_g: of the bought balls.
-        ball_price: of the bought balls, euros.
+        ball_price: of the bought balls, by currency.
         turning_mass_g: of all that turns with the base.
         motor: part of the drive.
         prints: carrier, caps, stage and frame, without the coupon.
@@ -70,7 +70,7 @@ class PrototypeOverview:
     minimum_coverage_mm: float
     kept_share: float
     ball_mass_g: float
-    ball_price: float
+    ball_price: dict[str, float]
     turning_mass_g: float
     motor: str
     prints: PrintEstimate
@@ -152,7 +152,7 @@ def _prototype(arrangement: Arrangement) -> PrototypeOverview:
         minimum_coverage_mm=float(layout.fit.coverage.min()),
         kept_share=layout.fit.kept_share,
         ball_mass_g=layout.mass_g,
-        ball_price=layout.mass_g / 1000 * BALLS_PER_KG,
+        ball_price=by_currency(ball_rows(layout, _prices(arrangement.spec))),
         turning_mass_g=arrangement.balance.mass_g,
         motor=arrangement.drive.motor.name,
         prints=_print_estimate(_printed_volume(arrangement), arrangement.spec),
@@ -176,6 +176,10 @@ def _component_volume(component: Component) -> float:
 def _print_estimate(volume_mm3: float, spec: Spec) -> PrintEstimate:
     volume_cm3 = volume_mm3 / MM3_PER_CM3
     mass = volume_cm3 * FILLED * spec.printer.density_g_cm3
-    return PrintEstimate(
-        volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, mass / 1000 * FILAMENT_PER_KG
-    )
+    price = _prices(spec).of(PRINT_MATERIAL, mass)
+    money = {price.currency: price.amount} if price else {}
+    return PrintEstimate(volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, money)
+
+
+def _prices(spec: Spec) -> Prices:
+    return load_prices(spec.prototype.prices)

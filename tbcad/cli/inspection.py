@@ -1,0 +1,51 @@
+"""What a workshop is told of a shell: heavy libraries are imported inside the command."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tbcad.cli.app import app
+from tbcad.cli.early_checks import check_is_export
+from tbcad.cli.options import Exports, Force, JsonResult, OutReplaced
+from tbcad.cli.output_mode import print_json
+from tbcad.screen import stages
+
+
+@app.command()
+def inspection(
+    folder: Exports,
+    share: Annotated[
+        float,
+        typer.Option(
+            "--yield", help="Share of the shells that must be good with the standard deviations."
+        ),
+    ] = 0.99,
+    out: OutReplaced = Path("inspection"),
+    force: Force = False,
+    json: JsonResult = False,
+) -> int:
+    """Write what a workshop needs for the shells: limits of every mirror, tolerances in STEP.
+
+    inspection_a.csv and inspection_b.csv have each mirror's sphere and by how much it may be off;
+    shell_a_tolerances.step and shell_b_tolerances.step (AP242) the same with datums A, B, C.
+    """
+    check_is_export(folder)
+    from tbcad.api import inspect
+    from tbcad.output.folder import check_replaceable
+
+    check_replaceable(out, force)
+    with stages(3) as screen:
+        record = inspect(folder, out=out, wanted=share, force=force, progress=screen.stage)
+    if json:
+        print_json(record)
+        return 0
+    smallest = record["limits"]["smallest"]
+    typer.echo(
+        f"Every mirror may be off by {smallest['offset_um']:.2f} um along its normal, "
+        f"{smallest['tilt_mrad']:.2f} mrad and {smallest['radius_mm'] * 1000:.0f} um of radius, "
+        "all at once;\nmost by more: see the tables. Shells at their limits show "
+        f"{record['simulated_minimum_mm']:.2f} of {record['target_mm']:g} mm (simulated)."
+    )
+    typer.echo(f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}")
+    return 0
