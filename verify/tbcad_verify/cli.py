@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from tbcad_verify.as_built.verify import verify_as_built
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
 from tbcad_verify.report.report import Output
@@ -53,6 +54,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--clients", action="store_true", help="also ask FreeCAD, gmsh, PrusaSlicer and admesh"
     )
     parser.add_argument(
+        "--as-built",
+        metavar="DIR",
+        type=Path,
+        help="instead of the files, verify the prototype as tbcad calibrate found it",
+    )
+    parser.add_argument(
         "--time-limit",
         metavar="S",
         type=float,
@@ -71,6 +78,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if len(outputs) > 1:
         return _refused(f"{' and '.join(f'--{name}' for name in outputs)}: give only one of them")
     try:
+        if arguments.as_built is not None:
+            return _verify_as_built(arguments.folder, arguments.as_built, *outputs)
         return _verify(arguments.folder, options, *outputs)
     except BadExport as error:
         return _refused(str(error))
@@ -84,6 +93,14 @@ def _verify(folder: Path, options: VerifyOptions, output: Output) -> int:
 
     silent = output == "quiet"
     report = verify(folder, (lambda _: None) if silent else _stage_printer(), options)
+    report.show(Console() if sys.stdout.isatty() else Console(width=WIDTH), output)
+    return 0 if report.passed else 1
+
+
+def _verify_as_built(folder: Path, calibration: Path, output: Output) -> int:
+    from rich.console import Console
+
+    report = verify_as_built(folder, calibration)
     report.show(Console() if sys.stdout.isatty() else Console(width=WIDTH), output)
     return 0 if report.passed else 1
 

@@ -107,19 +107,32 @@ def _without_lists(model: bytes) -> bytes:
     """
     if b"<!" in model or model.count(b"<?") > 1:
         raise ValueError("comments, entities and instructions are not allowed")
+    spans = {name: _list_span(model, name) for name in LISTS}
     for name, (item, attributes) in LISTS.items():
-        head, opened, rest = model.partition(b"<%s>" % name.encode())
-        body, closed, tail = rest.partition(b"</%s>" % name.encode())
-        if not (opened and closed) or opened in tail:
-            raise ValueError(f"one list of {name} is allowed, without attributes")
-        count = body.count(b"<%s " % item)
-        same = [body.count(b"<"), body.count(b"/>"), body.count(b">")]
-        same += [body.count(b' %s="' % key) for key in attributes]
-        if set(same) != {count} or body.count(b"=") != len(attributes) * count:
+        # Counted where they are: copies of the text would take longer than the counting.
+        count, *same = (
+            model.count(text, *spans[name])
+            for text in (b"<%s " % item, b"<", b"/>", b">", *(b' %s="' % key for key in attributes))
+        )
+        if set(same) != {count} or model.count(b"=", *spans[name]) != len(attributes) * count:
             keys = ", ".join(key.decode() for key in attributes)
             raise ValueError(f"a list of {name} has {item.decode()} with {keys} only")
-        model = head + opened + closed + tail
-    return model
+    starts, ends = zip(*sorted(spans.values()), strict=True)
+    return b"".join(model[i:j] for i, j in zip((0, *ends), (*starts, None), strict=True))
+
+
+def _list_span(model: bytes, name: str) -> tuple[int, int]:
+    """Where a list's items begin and end in the model's text.
+
+    Raises:
+        ValueError: there is no such list, or a second one.
+    """
+    opened, closed = b"<%s>" % name.encode(), b"</%s>" % name.encode()
+    start = model.find(opened) + len(opened)
+    end = model.find(closed, start)
+    if start < len(opened) or end < 0 or model.find(opened, end) >= 0:
+        raise ValueError(f"one list of {name} is allowed, without attributes")
+    return start, end
 
 
 def _check_element(element: ElementTree.Element, name: str) -> None:

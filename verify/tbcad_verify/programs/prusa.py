@@ -30,12 +30,24 @@ SOLID_PERCENT = 5.0  # a print's volume is that of its lines; 1.0 to 1.8 too muc
 TAIL = 1_000_000  # bytes of G-code that hold the figures at its end
 HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
 
-# A solid print on a bed that is large enough; coordinates end at 2 m.
-PROFILE = (
+# On a bed that is large enough; coordinates end at 2 m.
+MACHINE = (
     *("--bed-shape", "0x0,1000x0,1000x1000,0x1000"),
-    *("--filament-diameter", str(FILAMENT_MM), "--nozzle-diameter", "0.4"),
+    *("--filament-diameter", str(FILAMENT_MM), "--nozzle-diameter", "0.4", "--skirts", "0"),
+)
+# A solid print.
+PROFILE = (
+    *MACHINE,
     *("--layer-height", "0.3", "--first-layer-height", "0.3"),
-    *("--fill-density", "100%", "--fill-pattern", "rectilinear", "--skirts", "0"),
+    *("--fill-density", "100%", "--fill-pattern", "rectilinear"),
+)
+# As the parts list estimates prints.
+PRINT_PROFILE = (
+    *MACHINE,
+    *("--layer-height", "0.2", "--first-layer-height", "0.2", "--perimeters", "4"),
+    *("--top-solid-layers", "5", "--bottom-solid-layers", "5"),
+    *("--fill-density", "25%", "--fill-pattern", "gyroid"),
+    *("--support-material", "--support-material-threshold", "40"),
 )
 
 
@@ -64,15 +76,50 @@ def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName])
         Unknown: the program gives no answer.
     """
     slices, filament, time = names
-    code = sandbox.folder / "sliced.gcode"
-    data = ("--datadir", sandbox.folder / "home")
-    text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
-    length, hours = _print(_tail(code))
+    length, hours = _sliced(sandbox, PROFILE)
     return [
         _slices(slices, length, expected.volume),
         informative(filament, length / 1e3),
         informative(time, round(hours, 1)),  # seconds differ from run to run
     ]
+
+
+def ask_prints(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
+    """By how much the list's estimate is off, of filament and hours; both inform.
+
+    Raises:
+        Unknown: the program gives no answer, or there is no estimate.
+    """
+    if expected.listed is None:
+        raise Unknown("the parts list has no estimate of it")
+    length, hours = _sliced(sandbox, PRINT_PROFILE)
+    cm3, listed_cm3 = _volume(length) / 1e3, expected.listed.filament_mm3 / 1e3
+    listed_hours = expected.listed.hours
+    return [
+        _deviation(names[0], listed_cm3, cm3, f"{cm3:.3g} cm^3, the list has {listed_cm3:.3g}"),
+        _deviation(
+            names[1], listed_hours, hours, f"{hours:.2g} h, the list has {listed_hours:.2g}"
+        ),
+    ]
+
+
+def _deviation(name: CheckName, listed: float, answer: float, detail: str) -> Check:
+    if answer <= 0:
+        return unknown(name, "a print of nothing")
+    return informative(name, round(100 * (listed / answer - 1)), detail)
+
+
+def _sliced(sandbox: Sandbox, profile: tuple[str, ...]) -> tuple[float, float]:
+    """Length of filament, mm, and time, h, of a print."""
+    code = sandbox.folder / "sliced.gcode"
+    data = ("--datadir", sandbox.folder / "home")
+    text_of(sandbox.run(*data, "--export-gcode", *profile, "--output", code, sandbox.copy))
+    return _print(_tail(code))
+
+
+def _volume(length: float) -> float:
+    """Of filament of a length, mm^3."""
+    return length * math.pi / 4 * FILAMENT_MM**2
 
 
 def _lines(text: str) -> list[tuple[str, str]]:
@@ -107,7 +154,7 @@ def _sum(lines: list[tuple[str, str]], key: str) -> float:
 def _slices(name: CheckName, length: float, mesh: float) -> Check:
     if not math.isfinite(mesh) or mesh <= 0:
         return unknown(name, "the mesh's volume is unknown")
-    printed = length * math.pi / 4 * FILAMENT_MM**2
+    printed = _volume(length)
     detail = f"a solid print takes {printed:.6g} mm^3, but the mesh has {mesh:.6g}"
     return at_most(name, 100 * abs(printed / mesh - 1), SOLID_PERCENT, detail)
 
@@ -145,4 +192,13 @@ SLICES = ProgramQuery(
     questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
     find=find,
     ask=ask_slices,
+)
+PRINTS = ProgramQuery(
+    program="prusa",
+    kind="stl",
+    install=INSTALL,
+    questions={"prusa listed filament": "%", "prusa listed hours": "%"},
+    find=find,
+    ask=ask_prints,
+    of_prints=True,
 )

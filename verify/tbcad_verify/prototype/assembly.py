@@ -22,6 +22,7 @@ from tbcad_verify.types import Floats, Ints
 Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
 CHECKS = {"assembly": "mm"}
+SUNK = ("INSERT-", "DOWEL-", "MAGNET-", "LED-")  # fasteners that stand out of nothing
 OFF_MM = 0.25  # the assembly is meshed coarsely
 METRE_MM = 1000.0
 # glTF's y is up: rows that its x, y and z are in the frame of the shell.
@@ -62,19 +63,47 @@ def checks(
 
 
 def fixed_solids(context: PrototypeContext, drawn: dict[str, Shape]) -> list[tuple[str, Any]]:
-    """Names and manifold3d solids of the purchased parts that do not rotate with the base.
+    """Names and manifold3d solids of panels and what is bought that do not rotate with the base.
 
     Raises:
         Unknown: one is missing, or no closed solid.
     """
+    shroud = context.prototype.shroud
     names = [one.name for one in context.prototype.bought if not one.turns]
-    if missing := [name for name in names if name not in drawn]:
-        raise Unknown(f"the assembly lacks {short_list(missing)}")
-    solids = [(name, manifold(*drawn[name])) for name in names]
-    for name, solid in solids:
-        if solid.status().name != "NoError":
-            raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
-    return solids
+    names += [panel.name for panel in shroud.panels] if shroud else []
+    solids = [(name, _solid(name, drawn)) for name in names]
+    return [*solids, *fastener_solids(context, drawn, turns=False)]
+
+
+def fastener_solids(
+    context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool
+) -> list[tuple[str, Any]]:
+    """All screws and nuts that rotate with the base, or all others, as one solid with a name.
+
+    Inserts, dowels, magnets and LEDs are inside of what holds them.
+
+    Raises:
+        Unknown: one is missing, or no closed solid.
+    """
+    import manifold3d
+
+    some = [
+        one.name
+        for one in context.prototype.fasteners
+        if one.turns == turns and not one.part.startswith(SUNK)
+    ]
+    title = "fasteners of the base" if turns else "fasteners of stage and frame"
+    solids = [_solid(name, drawn) for name in some]
+    return [(title, manifold3d.Manifold.compose(solids))] if solids else []
+
+
+def _solid(name: str, drawn: dict[str, Shape]) -> Any:
+    if name not in drawn:
+        raise Unknown(f"the assembly lacks {name}")
+    solid = manifold(*drawn[name])
+    if solid.status().name != "NoError":
+        raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
+    return solid
 
 
 def _shapes(data: bytes) -> Iterable[tuple[str, Shape]]:

@@ -24,6 +24,7 @@ from tbcad_verify.prototype.pinhole_cells import (
 )
 from tbcad_verify.prototype.ray_transfer import (
     RayTransfer,
+    Reflecting,
     nearest_points,
     ray_transfer,
     rotated,
@@ -80,9 +81,9 @@ def ball_views(measured: MeasuredPrototype) -> BallViews:
     """Trace all mirrors of the camera, each on its ball at its stop."""
     shell, transfer = mirror_spheres(measured.context), ray_transfer(measured)
     cells = cell_outlines(shell)
-    outlines, nearest = _ended_on_balls(transfer, cells)
+    outlines, nearest = ended_on_balls(transfer, cells)
     rim, rim_mirror = _rim_rays(transfer, outlines, nearest)
-    pixel, pixel_mirror, weight, pixels_shell = _pixel_rays(transfer, shell)
+    pixel, pixel_mirror, weight, pixels_shell = pixel_rays(transfer, shell)
     mirror, count = np.append(rim_mirror, pixel_mirror), shell.radius.size
     blocked, blockers = blocked_rays(transfer, mirror, np.hstack([rim, pixel]))
     return BallViews(
@@ -143,9 +144,7 @@ def _ray_counts(ids: list[str], counts: Floats) -> str:
     return worst_offenders(ids, counts, "rays", counts > 0, ".0f")
 
 
-def _ended_on_balls(
-    transfer: RayTransfer, cells: PinholeOutlines
-) -> tuple[PinholeOutlines, Floats]:
+def ended_on_balls(transfer: Reflecting, cells: PinholeOutlines) -> tuple[PinholeOutlines, Floats]:
     """Outlines drawn in to where a ball ends before its mirror's cell does.
 
     Returns:
@@ -163,7 +162,7 @@ def _ended_on_balls(
 
 
 def _largest_share(
-    transfer: RayTransfer, outlines: PinholeOutlines, some: Ints, search: Bools, radius: float
+    transfer: Reflecting, outlines: PinholeOutlines, some: Ints, search: Bools, radius: float
 ) -> Floats:
     """(s, directions) share of the angle to the outline up to which rays pass within a radius.
 
@@ -185,24 +184,39 @@ def _largest_share(
 
 
 def _coverage(transfer: RayTransfer, outlines: PinholeOutlines, nearest: Floats) -> Floats:
-    """(m,) twice the minimum distance of the outline's image from the origin, mm.
+    """(m,) coverage of all mirrors in the frame of the base, mm."""
+    context = transfer.measured.context
+    apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
+    middle = unit(apex - context.pinhole[:, None])
+    d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
+    return outline_coverage(outlines.is_edge, nearest, d, middle, context.halved)
+
+
+def outline_coverage(
+    is_edge: Bools, nearest: Floats, d: Floats, middle: Floats, halved: Bools
+) -> Floats:
+    """(m,) twice the minimum distance of outlines' images from the origin, mm.
 
     Zero where the outline does not run once round the direction in which the ball shows the
     origin; a halved mirror's outline without its cut runs half round it.
+
+    Args:
+        is_edge: (m, s) directions that are on an edge of a cell.
+        nearest: (3, m, s) where their reflected rays are nearest to the origin; NaN for none.
+        d: (3, m, s) the directions, as they meet the balls.
+        middle: (3, m) unit, in which the balls show the origin.
+        halved: (m,) mirrors that the seam cuts.
     """
-    context = transfer.measured.context
-    both = outlines.is_edge & np.roll(outlines.is_edge, -1, axis=1)
+    both = is_edge & np.roll(is_edge, -1, axis=1)
     ends = [x.reshape(3, -1) for x in (nearest, np.roll(nearest, -1, axis=2))]
     distance = distances_to_segments(np.zeros_like(ends[0]), *ends).reshape(both.shape)
     # A ray that misses the ball shows nothing of the object, and does not count.
     diameter = 2 * np.where(both & np.isfinite(distance), distance, np.inf).min(axis=1)
-    apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
-    middle = np.repeat(unit(apex - context.pinhole[:, None]), both.shape[1], axis=1)
-    d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
+    about = np.repeat(middle, both.shape[1], axis=1)
     ends = [x.reshape(3, -1) for x in (d, np.roll(d, -1, axis=2))]
-    angle = np.where(both, rotation_angles(middle, *ends).reshape(both.shape), 0)
+    angle = np.where(both, rotation_angles(about, *ends).reshape(both.shape), 0)
     turns = np.abs(angle.sum(axis=1)) / (2 * np.pi)
-    expected = np.where(context.halved, 0.5, 1.0)
+    expected = np.where(halved, 0.5, 1.0)
     return np.where(np.abs(turns - expected) <= TURNS, diameter, 0.0)
 
 
@@ -233,7 +247,7 @@ def _rim_rays(
     return np.concatenate(rays, axis=1), np.concatenate(mirrors)
 
 
-def _pixel_rays(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, Floats, Floats]:
+def pixel_rays(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, Floats, Floats]:
     """Rays of sampled pixels that meet the capture sphere after their ball.
 
     Returns:

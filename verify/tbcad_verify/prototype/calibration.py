@@ -178,7 +178,9 @@ def _derivative(
 ) -> Floats:
     """(2, m) pixels by which highlights move for each mm of their spheres' centres."""
     step = STEP_MM * axis[:, None]
-    ends = [_image(context, _highlight(context, centre + s, radius, led)) for s in (-step, step)]
+    ends = [
+        _image(context, highlights(context.pinhole, centre + s, radius, led)) for s in (-step, step)
+    ]
     return np.asarray((ends[1] - ends[0]) / (2 * STEP_MM))
 
 
@@ -190,12 +192,12 @@ def _image(context: PrototypeContext, points: Floats) -> Floats:
     return np.stack([dot(axis[:, None], ray) / depth for axis in (camera.right, camera.down)])
 
 
-def _highlight(context: PrototypeContext, centre: Floats, radius: Floats, led: Floats) -> Floats:
-    """(3, m) points of spheres by which the way from LED to pinhole is shortest.
+def highlights(pinhole: Floats, centre: Floats, radius: Floats, led: Floats) -> Floats:
+    """(3, m) points of spheres by which the way from a light (3,) to the pinhole is shortest.
 
-    They lie in the plane of centre, LED and pinhole, between both, where the way's slope is zero.
+    They lie in the plane of centre, light and pinhole, between both, where the way's slope is zero.
     """
-    to_led, to_pinhole = led[:, None] - centre, context.pinhole[:, None] - centre
+    to_led, to_pinhole = led[:, None] - centre, pinhole[:, None] - centre
     first, between = unit(to_led), dot(to_led, to_pinhole) / (norm(to_led) * norm(to_pinhole))
     second = unit(to_pinhole - dot(to_pinhole, first) * first)
     low, high = np.zeros(radius.size), np.arccos(np.clip(between, -1, 1))

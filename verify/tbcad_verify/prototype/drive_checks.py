@@ -7,27 +7,29 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from tbcad_verify.prototype import drive_loads
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.drive_loads import FULL_STEPS, SHARE, TINY, Gear, unlike
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.prototype.purchases import cap_volume
+from tbcad_verify.record.prototype import PARTS_LIST
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line
 from tbcad_verify.types import Floats
 
 GRAVITY = 9.80665  # m/s^2, standard
 MOTORS_NMM = {"NEMA17-40": 450.0, "NEMA17-48": 590.0, "NEMA17-60": 650.0, "STAGE-60": 300.0}
+NARROW_MM = 6.0  # of wheels whose names give no width
+MIN_BELT_MM = 150  # a longer one is no wheel
 STAGE_RATIO = 90.0
 EFFICIENCY = {"nema17-belt": 0.95, "nema17-direct": 1.0, "stage-60": 0.3}
-FULL_STEPS = 200.0
-STEPS_PER_PERIOD = 4.0  # full steps in a period of a stepper's torque
 PITCH_MM, RIM_MM = 2.0, 1.5  # of GT2; of a wheel's rim over the pitch circle
 MASS_SHARE = 2e-3  # by which meshes and STEP files may differ in mass
 INERTIA_SHARE = 2e-2
 CENTRE_MM = 0.1
-SHARE = 1e-6  # of figures that follow from others
 AXIS_MM = 1e-6
-TINY_NMM = 1e-9
-CHECKS = {"drive": "faults"}
+CHECKS = {"drive": "faults", "motor bearing": "N"}
+WIND_UP_DEG = 1e-6
 
 
 def checks(
@@ -38,7 +40,31 @@ def checks(
 ) -> list[Check]:
     """Compare the drive's record with masses, gears and motion."""
     faults = [*_balance(context, parts), *_torques(context), *_gears(context, solids)]
-    return [at_most(names[0], len(faults), 0, short_list(faults))]
+    radial, limit, unlike_record = _shaft(context, solids)
+    faults += unlike_record
+    lasts = f"the belt pulls with {radial:.0f} N, {limit:.0f} N are allowed"
+    return [
+        at_most(names[0], len(faults), 0, short_list(faults)),
+        at_most(names[1], radial, limit, lasts),
+    ]
+
+
+def _shaft(
+    context: PrototypeContext, solids: Mapping[str, TextSolid]
+) -> tuple[float, float, list[str]]:
+    """Force on the motor's shaft, its limit, N, and where the record has others."""
+    drive = context.prototype.drive
+    bought = {one.name: one.part for one in context.prototype.bought}
+    radial = drive_loads.shaft_load(drive, _gear(context, solids, bought))
+    limit = drive_loads.shaft_limit(drive)
+    return (
+        radial,
+        limit,
+        [
+            *unlike("motor_radial_n", drive.motor_radial_n, radial, drive_loads.FIGURE_SHARE),
+            *unlike("motor_radial_limit_n", drive.motor_radial_limit_n, limit),
+        ],
+    )
 
 
 def _balance(context: PrototypeContext, parts: list[MeasuredPart]) -> Iterator[str]:
@@ -56,7 +82,7 @@ def _balance(context: PrototypeContext, parts: list[MeasuredPart]) -> Iterator[s
         yield f"inertia_g_mm2 is not {inertia:.4g}"
     zero, third = (drive.mass_g * drive.centre @ axis for axis in axes[1:])
     moment = float(np.hypot(zero, third))
-    yield from _unlike("moment_g_mm", drive.moment_g_mm, moment)
+    yield from unlike("moment_g_mm", drive.moment_g_mm, moment)
     azimuth_error = np.radians(drive.azimuth_deg) - np.arctan2(third, zero)
     if moment * abs(np.sin(azimuth_error / 2)) > SHARE * moment:
         yield "azimuth_deg"
@@ -79,16 +105,14 @@ def _torques(context: PrototypeContext) -> Iterator[str]:
     drive, motion = context.prototype.drive, context.export.spec.prototype.motion
     torque = _worst_torque(context)
     acceleration = np.radians(motion.acceleration_deg_s2)
-    required = motion.safety * (torque + drive.inertia_g_mm2 * acceleration * 1e-6)
-    yield from _unlike("worst_torque_nmm", drive.worst_torque_nmm, torque)
-    yield from _unlike("safety", drive.safety, motion.safety)
-    yield from _unlike("required_torque_nmm", drive.required_torque_nmm, required)
+    peak = torque + drive.inertia_g_mm2 * acceleration * 1e-6
+    required = motion.safety * peak
+    yield from unlike("worst_torque_nmm", drive.worst_torque_nmm, torque)
+    yield from unlike("peak_torque_nmm", drive.peak_torque_nmm, peak)
+    yield from unlike("safety", drive.safety, motion.safety)
+    yield from unlike("required_torque_nmm", drive.required_torque_nmm, required)
     if drive.holding_torque_nmm < drive.required_torque_nmm:
         yield "the drive does not hold the base"
-    lever = drive.counterweight_radius_mm
-    yield from _unlike("counterweight_g", drive.counterweight_g * lever, drive.moment_g_mm)
-    if not lever > 0:
-        yield "counterweight_radius_mm"
 
 
 def _worst_torque(context: PrototypeContext) -> float:
@@ -104,7 +128,7 @@ def _worst_torque(context: PrototypeContext) -> float:
 
 
 def _gears(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
-    """Motor, ratio, steps, belt and stiffness."""
+    """Motor, ratio, steps, and what belt and motor bear."""
     drive, spec = context.prototype.drive, context.export.spec.prototype
     bought = {one.name: one.part for one in context.prototype.bought}
     motor = bought.get("motor") or bought.get("rotary_stage")
@@ -113,47 +137,75 @@ def _gears(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterat
     if drive.motor != motor or motor not in MOTORS_NMM:
         yield f"motor is {drive.motor}, {motor} is bought"
         return
-    ratio, radius, distance = _ratio(context, solids, bought)
-    yield from _unlike("ratio", drive.ratio, ratio)
-    yield from _unlike("belt_centre_mm", drive.belt_centre_mm, distance)
-    pull = drive.worst_torque_nmm / radius if radius else 0.0
-    yield from _unlike("belt_pull_n", drive.belt_pull_n, pull)
-    steps = FULL_STEPS * spec.motion.microsteps * ratio / 360
-    yield from _unlike("steps_per_deg", drive.steps_per_deg, steps)
-    motor_torque = MOTORS_NMM[motor] * ratio
+    gear = _gear(context, solids, bought)
+    yield from unlike("ratio", drive.ratio, gear.ratio)
+    yield from unlike("belt_centre_mm", drive.belt_centre_mm, gear.distance)
+    steps = FULL_STEPS * spec.motion.microsteps * gear.ratio / 360
+    yield from unlike("steps_per_deg", drive.steps_per_deg, steps)
+    motor_torque = MOTORS_NMM[motor] * gear.ratio
     holds = motor_torque * EFFICIENCY[spec.base.drive]
-    yield from _unlike("holding_torque_nmm", drive.holding_torque_nmm, holds)
-    share = min(drive.worst_torque_nmm / motor_torque, 1.0)
-    angle = np.degrees(np.arcsin(share)) * STEPS_PER_PERIOD / FULL_STEPS / ratio
-    yield from _unlike("wind_up_deg", drive.wind_up_deg, float(angle))
+    yield from unlike("holding_torque_nmm", drive.holding_torque_nmm, holds)
+    yield from drive_loads.belt_faults(drive, gear)
+    yield from drive_loads.motor_faults(
+        drive, motor_torque, EFFICIENCY[spec.base.drive], gear.ratio
+    )
+    yield from _stops(context, gear.ratio)
 
 
-def _ratio(
+def _stops(context: PrototypeContext, ratio: float) -> Iterator[str]:
+    """Gravity's torque at each stop, and how far it turns the base beyond its place at zero."""
+    drive, stops = context.prototype.drive, context.prototype.stops
+    angle = np.append(np.radians(stops.angle), 0.0)
+    weight = np.array([0.0, 0.0, -drive.mass_g * 1e-3 * GRAVITY])
+    centre = context.base_rotation(angle).apply(drive.centre)
+    torque = np.cross(centre, weight) @ context.frame[0]
+    turned = drive_loads.wind_ups(drive, torque, ratio)
+    for name, recorded, mine, limit in (
+        ("torque_nmm", stops.torque, torque[:-1], SHARE * np.abs(torque).max()),
+        ("wind_up_deg", stops.wind_up, turned[:-1] - turned[-1], WIND_UP_DEG),
+    ):
+        off = np.flatnonzero(np.abs(recorded - mine) > limit + TINY)
+        yield from (f"stop {k + 1}: {name} is not {mine[k]:g}" for k in off.tolist())
+
+
+def _gear(
     context: PrototypeContext, solids: Mapping[str, TextSolid], bought: Mapping[str, str | None]
-) -> tuple[float, float, float]:
-    """Turns of the motor for one of the base; pitch radius of the wheel and distance of the pinion.
+) -> Gear:
+    """Wheels of the assembly, and the belt of the parts list; their sizes are in their names.
 
-    The number of teeth is taken from the wheel's name, and must be that of its body.
+    Raises:
+        Unknown: wheels that are not known, or not as drawn.
     """
     drive = context.export.spec.prototype.base.drive
     if drive != "nema17-belt":
-        return (STAGE_RATIO if drive == "stage-60" else 1.0), 0.0, 0.0
-    teeth, rims = {}, {}
+        return Gear(STAGE_RATIO if drive == "stage-60" else 1.0)
+    teeth, rims, widths = {}, {}, {}
     for name in ("wheel", "pinion"):
-        pulley = re.fullmatch(r"GT2-(\d+)", bought.get(name) or "")
+        pulley = re.fullmatch(r"GT2-(\d+)(?:-(\d+))?", bought.get(name) or "")
         solid = solids.get(name)
         if not pulley or solid is None:
             raise Unknown(f"there is no {name} of known teeth")
-        teeth[name] = int(pulley[1])
+        teeth[name], widths[name] = int(pulley[1]), float(pulley[2] or NARROW_MM)
         rims[name] = next(face for face in solid.faces if not face.hollow)
         expected = teeth[name] * PITCH_MM / (2 * np.pi) + RIM_MM
         if abs(rims[name].radius - expected) > AXIS_MM:
             raise Unknown(f"the {name} of the assembly has not {teeth[name]} teeth")
     wheel, pinion = rims["wheel"], rims["pinion"]
     distance = distance_to_line(pinion.point, wheel.point, wheel.axis)
-    return teeth["wheel"] / teeth["pinion"], wheel.radius - RIM_MM, distance
+    length, width = _belt(context)
+    if widths != {"wheel": width, "pinion": width}:
+        raise Unknown(
+            f"wheels of {widths['wheel']:g} and {widths['pinion']:g} mm, belt {width:g} mm"
+        )
+    radii = wheel.radius - RIM_MM, pinion.radius - RIM_MM
+    return Gear(teeth["wheel"] / teeth["pinion"], *radii, distance, teeth["pinion"], length, width)
 
 
-def _unlike(name: str, recorded: float, expected: float) -> Iterator[str]:
-    if not abs(recorded - expected) <= SHARE * abs(expected) + TINY_NMM:
-        yield f"{name} is {recorded:g}, not {expected:g}"
+def _belt(context: PrototypeContext) -> tuple[float, float]:
+    """Length and width of the belt in the parts list, mm."""
+    bill = require(context.prototype.parts_list, f"there is no {PARTS_LIST}")
+    found = [re.fullmatch(r"GT2-(\d+)-(\d+)", name) for name in bill.part.tolist()]
+    belts = [one for one in found if one and int(one[1]) >= MIN_BELT_MM]
+    if len(belts) != 1:
+        raise Unknown(f"{len(belts)} belts are in the parts list")
+    return float(belts[0][1]), float(belts[0][2])

@@ -37,6 +37,8 @@ FULL_STEPS = 200.0
 MAX_STEPS_S = 30_000.0  # that GRBL makes
 MAX_SEEK_DEG_MIN = 720.0
 PULL_OFF_DEG = 2.0
+# A pulled-up input is high with an open switch and with none: pressed, unless $5 inverts it.
+XYZ = 0b111
 MAX_BEYOND_DEG = 4.0  # of soft limits beyond the program
 AXES = "XYZA"
 CHECKS = {"homing": "faults", "controller settings": "faults"}
@@ -172,7 +174,7 @@ def _settings(context: PrototypeContext) -> Iterator[str]:
     }
     mask = float(1 << axis)
     if motion.controller == "grblhal":
-        expected |= {5: mask, 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
+        expected |= {5: XYZ & ~(1 << axis), 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
         expected |= {44: mask, 45: 0, 46: 0}
     for number, value in expected.items():
         if not math.isclose(values.get(number, math.nan), value, rel_tol=SHARE):

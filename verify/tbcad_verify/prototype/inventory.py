@@ -25,6 +25,8 @@ ZERO_DISC = "zero_disc"  # of the base, beside its carrier
 FRAME = frozenset(
     {"bearing_head", "home_bracket", "upright_foot_front", "upright_foot_back", "stage_foot"}
 )
+CAMERA = frozenset({"camera_bracket", "camera_plate", "camera_fence"})
+GAUGE = "camera_gauge"  # a tool, with a camera
 STOCK = frozenset({"plate", "upright_left", "upright_right", "home_switch"})
 # Bought bodies of each drive; those that turn with the base.
 DRIVES: dict[str, frozenset[str]] = {
@@ -32,9 +34,12 @@ DRIVES: dict[str, frozenset[str]] = {
         {"motor", "wheel", "pinion", "shaft", "bearing_front", "bearing_rear", "collar"}
     ),
     "nema17-direct": frozenset({"motor", "coupling"}),
-    "stage-60": frozenset({"rotary_stage"}),
+    "stage-60": frozenset({"rotary_stage", "rotary_stage_top"}),
 }
-TURNING = frozenset({"wheel", "shaft", "collar", "coupling"})
+FOUR_STANDS = frozenset({"lamp_stand_1", "lamp_stand_2", "lamp_holder_3", "lamp_holder_4"})
+STANDS = {4: FOUR_STANDS, 2: frozenset({"lamp_stand_1", "lamp_holder_2"})}  # of so many lamps
+PANELS = frozenset(f"shroud_{name}" for name in ("floor", "lid", "front", "back", "left", "right"))
+TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
 # Names of what the base, or a set of coupons, is cut into.
 NUMBERED = r"(_[1-9][0-9]*)?"
@@ -65,26 +70,36 @@ class Expected:
     Attributes:
         parts: printed, by role; of base and tools any number of pieces.
         bought: bodies of purchased parts.
+        panels: of the shroud.
         balls: bodies of balls.
     """
 
     parts: dict[str, frozenset[str]]
     bought: frozenset[str]
+    panels: frozenset[str]
     balls: frozenset[str]
 
 
 def expected(context: PrototypeContext) -> Expected:
     """What the prototype must consist of."""
     spec, cap = context.export.spec.prototype, context.prototype.balls.cap
+    lamps = context.prototype.lamps
+    count = 0 if spec.light.lamp_z_mm == 0 else 4 if lamps is None else len(lamps.places)
     camera = spec.camera_diameter_mm > 0
     numbers = 1 + np.arange(cap.size)
     return Expected(
         parts={
             "cap": frozenset(f"cap_{k}" for k in numbers[cap]),
             "stage": STAGE,
-            "frame": FRAME | ({"camera_bracket"} if camera else set()),
+            "frame": FRAME
+            | (CAMERA if camera else frozenset())
+            | (STANDS.get(count, FOUR_STANDS) if count else frozenset()),
         },
-        bought=STOCK | DRIVES[spec.base.drive] | ({"camera"} if camera else set()),
+        bought=STOCK
+        | DRIVES[spec.base.drive]
+        | ({"camera"} if camera else set())
+        | {f"lamp_{k}" for k in range(1, count + 1)},
+        panels=PANELS if spec.light.shroud else frozenset(),
         balls=frozenset(f"ball_{k}" for k in numbers[~cap]),
     )
 
@@ -162,11 +177,16 @@ def _record_faults(context: PrototypeContext) -> Iterable[str]:
         if role == "base":
             yield from () if ZERO_DISC in found else [f"{role} part {ZERO_DISC} is missing"]
             found -= {ZERO_DISC}
+        elif spec.camera_diameter_mm > 0:
+            yield from () if GAUGE in found else [f"{role} {GAUGE} is missing"]
+            found -= {GAUGE}
         if not found or not all(re.fullmatch(stem + NUMBERED, name) for name in found):
             yield f"{role} parts are {short_list(sorted(found)) or 'missing'}"
         elif len(found) > 1 and found != {f"{stem}_{k}" for k in range(1, len(found) + 1)}:
             yield f"{role} parts are not numbered from 1"
     yield from _differences(must.bought, {one.name for one in prototype.bought}, "purchased part")
+    panels = prototype.shroud.panels if prototype.shroud else []
+    yield from _differences(must.panels, {one.name for one in panels}, "panel")
     for one in prototype.bought:
         if one.turns != (one.name in TURNING):
             yield f"{one.name} turns" if one.turns else f"{one.name} does not turn"
@@ -180,7 +200,9 @@ def _file_faults(
     """What assembly and parts list have too little or too much."""
     must, prototype = expected(context), context.prototype
     placed = {part.name for part in prototype.parts if part.role != TOOL}
-    names = placed | must.balls | must.bought | VIEWS | {*must.parts["stage"], *must.parts["frame"]}
+    names = placed | must.balls | must.bought | must.panels | VIEWS
+    names |= {*must.parts["stage"], *must.parts["frame"]}
+    names |= {one.name for one in prototype.fasteners}
     yield from _differences(names, set(drawn), f"body in {prototype.assembly.glb}")
     yield from _differences(names, set(solids), f"solid in {prototype.assembly.step}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,6 +15,13 @@ from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.types import Floats, Ints
+
+
+class Reflecting(Protocol):
+    """What takes directions of the shell's picture to rays after the balls."""
+
+    def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
+        """Directions (3, N) of mirrors' cells as they meet the balls, and their reflections."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +92,7 @@ def rotated(matrix: Floats, d: Floats) -> Floats:
     return np.asarray(np.einsum("ijn,jn->in", matrix, d))
 
 
-def nearest_points(transfer: RayTransfer, mirror: Ints, d: Floats) -> Floats:
+def nearest_points(transfer: Reflecting, mirror: Ints, d: Floats) -> Floats:
     """(3, m, s) where reflected rays are nearest to the origin; NaN beside the ball.
 
     Args:

@@ -13,16 +13,31 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.prototype import (
     assembly,
     ball_views,
+    bodies,
     calibration,
+    camera_gauge_checks,
+    camera_mount_checks,
+    cap_checks,
     caps,
+    darkness,
+    drawing_checks,
     drive_checks,
+    fastener_checks,
+    holding_checks,
     homing_checks,
     inventory,
+    key_access,
     klipper_checks,
+    lamp_light,
+    lamp_views,
     leds,
+    list_checks,
+    pad_pose,
     plan_checks,
+    power_checks,
     purchases,
     seats,
+    shroud_checks,
     swing,
     wiring_checks,
 )
@@ -65,7 +80,10 @@ STAGES = (
 )
 RECORD, PARTS, PURCHASES, SEATS, LIGHT, SWING, PRINTING = STAGES
 PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
+OWN = ("camera",)  # body that its own rays start in
 NO_SEATS = "the seats could not be measured"
+PATTERNS = "shroud_*.dxf"
+DRAWINGS = "drawing_*.dxf"
 DIGITS = 9
 
 Row = dict[str, Any]
@@ -98,7 +116,14 @@ def verify_prototype(
         sink(Results(checks=part.checks, masses=masses))
     sink(Results(stages=[PURCHASES]))
     drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
-    _purchases(context, parts, sink, lambda: require(drawn, no_drawing))
+    solids, no_solids = attempt(lambda: inventory.assembly_solids(context))
+    _purchases(
+        context,
+        parts,
+        sink,
+        lambda: require(drawn, no_drawing),
+        lambda: require(solids, no_solids),
+    )
     sink(Results(stages=[SEATS]))
     seats_measured = _seats(context, parts, sink)
     fitted = _caps(context, parts, sink) if prototype.balls.cap.any() else []
@@ -116,6 +141,7 @@ def verify_prototype(
         sink,
         lambda: require(measured, reason),
         lambda: require(drawn, no_drawing),
+        lambda: require(solids, no_solids),
     )
     sink(Results(prototype=json_rows(context, seats_measured, views)))
     return parts
@@ -134,15 +160,15 @@ def _purchases(
     parts: list[MeasuredPart],
     sink: ResultSink,
     drawn: Callable[[], dict[str, Shape]],
+    solids: Callable[[], dict[str, TextSolid]],
 ) -> None:
     """What there is, in all files that list it, and what follows from it."""
-    drawn_solids, reason = attempt(lambda: inventory.assembly_solids(context))
     part_files, no_part_files = attempt(lambda: inventory.part_solids(context))
     counted, no_solids = attempt(
         lambda: purchases.Solids(
             _carriers(context, require(part_files, no_part_files)),
             _of_role(context, "cap", require(part_files, no_part_files)),
-            require(drawn_solids, reason),
+            solids(),
         )
     )
     _add(
@@ -152,24 +178,34 @@ def _purchases(
         lambda: (
             context,
             drawn(),
-            require(drawn_solids, reason),
+            solids(),
             require(part_files, no_part_files),
         ),
     )
+    _add(sink, fastener_checks, RECORD_FILE, lambda: (context, solids()))
+    _add(sink, key_access, RECORD_FILE, lambda: (context, drawn()))
     _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
+    _add(sink, list_checks, PARTS_LIST, lambda: (context,))
     _add(
         sink,
         homing_checks,
         SETTINGS,
         lambda: (
             context,
-            require(drawn_solids, reason),
+            solids(),
             _carriers(context, require(part_files, no_part_files)),
         ),
     )
+    _add(sink, drawing_checks, DRAWINGS, lambda: (context, solids()))
     _add(sink, klipper_checks, KLIPPER, lambda: (context,))
-    _add(sink, wiring_checks, WIRING, lambda: (context, require(drawn_solids, reason)))
-    _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, require(drawn_solids, reason)))
+    _add(sink, wiring_checks, WIRING, lambda: (context, solids()))
+    _add(sink, holding_checks, RECORD_FILE, lambda: (context, require(counted, no_solids)))
+    if context.prototype.balls.cap.any():
+        _add(sink, cap_checks, RECORD_FILE, lambda: (context, require(counted, no_solids)))
+    _add(sink, camera_mount_checks, RECORD_FILE, lambda: (context, solids()))
+    _add(sink, camera_gauge_checks, RECORD_FILE, lambda: (context, parts))
+    _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, solids()))
+    _add(sink, power_checks, RECORD_FILE, lambda: (context,))
 
 
 def _carriers(context: PrototypeContext, solids: dict[str, TextSolid]) -> list[TextSolid]:
@@ -190,6 +226,7 @@ def _seats(
     base, no_base = attempt(lambda: joined_meshes(of_roles(parts, "base"))[0])
     seats_measured, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
     _add(sink, seats, stl_names(parts, "base"), lambda: (context, require(seats_measured, reason)))
+    _add(sink, pad_pose, stl_names(parts, "base"), lambda: (context, of_roles(parts, "base")))
     return seats_measured
 
 
@@ -208,14 +245,36 @@ def _swing(
     sink: ResultSink,
     measured: Callable[[], MeasuredPrototype],
     drawn: Callable[[], dict[str, Shape]],
+    solids: Callable[[], dict[str, TextSolid]],
 ) -> None:
-    bought, reason = attempt(lambda: assembly.fixed_solids(context, drawn()))
+    bought, reason = attempt(
+        lambda: (
+            assembly.fixed_solids(context, drawn()),
+            assembly.fastener_solids(context, drawn(), turns=True),
+        )
+    )
     files, file = stl_names(parts, *PLACED), context.prototype.assembly.glb
-    _add(sink, swing, files, lambda: (measured(), parts, require(bought, reason)))
+    _add(sink, swing, files, lambda: (measured(), parts, *require(bought, reason)))
     _add(sink, assembly, file, lambda: (context, parts, drawn()))
     _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
+    _add(sink, darkness, file, lambda: (context, bodies.assembled_bodies(context, drawn(), OWN)))
+    _add(
+        sink,
+        lamp_views,
+        file,
+        lambda: (measured(), bodies.assembled_bodies(context, drawn(), _followed(context))),
+    )
+    _add(sink, shroud_checks, PATTERNS, lambda: (context, drawn(), solids()))
+    _add(sink, lamp_light, file, lambda: (context, drawn(), solids()))
     static = of_roles(parts, "stage", "frame")
     _add(sink, calibration, stl_names(static, "stage", "frame"), lambda: (context, static))
+
+
+def _followed(context: PrototypeContext) -> set[str]:
+    """Bodies that other checks follow rays past, and the camera."""
+    parts = {part.name for part in context.prototype.parts}
+    fasteners = {one.name for one in context.prototype.fasteners}
+    return ({*OWN} | parts | fasteners) - bodies.stage_bodies(context)
 
 
 def json_rows(

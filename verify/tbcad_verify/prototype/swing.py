@@ -29,8 +29,10 @@ TOUCH_MM3 = 0.01
 # Faces in contact, as of screwed parts, overlap by the error of facets and float32.
 CONTACT_MM3 = 1.0
 BALL_SEGMENTS = 64
-GRAIN_MM = 2.0  # of points on surfaces
+GRAIN_MM, COARSE_MM = 2.0, 8.0  # of points on surfaces: of many, and of few
+BETWEEN_MM = 2 * GRAIN_MM  # more than points of two surfaces are farther apart than these
 CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
+GROWTH = 1.5  # of a distance from one sample to the next, mostly at most
 MIN_LEVER_MM = 1e-9
 FAR_MM = 1e3  # reported of a prototype with one ball
 NAMED = 3  # pairs of parts
@@ -46,26 +48,81 @@ NamedSolids = list[tuple[str, Any]]  # name and manifold3d solid
 
 
 @dataclass(frozen=True)
+class SurfacePoints:
+    """Points all over a surface, as they lie about the axis.
+
+    Attributes:
+        profile: (P, 2) position along the axis and distance from it, mm.
+        grain: longest edge between them, mm.
+    """
+
+    profile: Floats
+    grain: float
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The points, to be searched."""
+        return cKDTree(self.profile)
+
+    def distance_at_any_angle(self, other: SurfacePoints, limit: float) -> float:
+        """Distance that two surfaces keep at any angle about the axis, mm; may be negative.
+
+        It is infinite where it is more than a limit, mm. No point of a facet is farther from a
+        corner than 1/sqrt(3) of its longest edge.
+        """
+        between = (self.grain + other.grain) / float(np.sqrt(3))
+        farthest = limit + between
+        low, high = self.profile.min(axis=0) - farthest, self.profile.max(axis=0) + farthest
+        near = other.profile[((other.profile >= low) & (other.profile <= high)).all(axis=1)]
+        distance = self.tree.query(near, distance_upper_bound=farthest)[0]
+        return float(np.min(distance, initial=np.inf)) - between
+
+
+@dataclass(frozen=True)
 class AxialSolid:
     """A solid, and how it lies about the axis.
 
     Attributes:
         name: of the part.
         solid: at angle zero, as manifold3d has it.
-        reach: maximum distance from the axis, mm.
-        profile: (P, 2) position along the axis and distance from it of points all over the
-            surface, mm.
+        frame: (3, 3) unit vectors along the axis and across it, as rows.
     """
 
     name: str
     solid: Any
-    reach: float
-    profile: Floats
+    frame: Floats
 
     @cached_property
-    def tree(self) -> cKDTree:
-        """The profile's points, to be searched."""
-        return cKDTree(self.profile)
+    def box(self) -> Floats:
+        """(2, 2) lower and upper bounds of position along the axis and distance from it, mm."""
+        mesh = self.solid.to_mesh64()
+        along, *across = self.frame @ mesh.vert_properties[:, :3].T
+        corner = np.stack(across)[:, mesh.tri_verts]  # (2, F, 3)
+        # A facet is no nearer to the axis than the rectangle round it.
+        inner = np.maximum(corner.min(axis=2), -corner.max(axis=2)).clip(min=0)
+        nearest = np.hypot(*inner).min(initial=np.inf)
+        farthest = np.hypot(*across).max(initial=0)
+        return np.array([[along.min(initial=np.inf), nearest], [along.max(initial=0), farthest]])
+
+    @cached_property
+    def coarse(self) -> SurfacePoints:
+        """Few points."""
+        return self._points(COARSE_MM)
+
+    @cached_property
+    def fine(self) -> SurfacePoints:
+        """Many points."""
+        return self._points(GRAIN_MM)
+
+    def _points(self, grain: float) -> SurfacePoints:
+        points = self.solid.refine_to_length(grain).to_mesh64().vert_properties[:, :3]
+        along, *across = self.frame @ points.T
+        return SurfacePoints(np.stack([along, np.hypot(*across)], axis=1), grain)
+
+    @property
+    def reach(self) -> float:
+        """Maximum distance from the axis, mm."""
+        return float(self.fine.profile[:, 1].max(initial=0))
 
 
 @dataclass(frozen=True)
@@ -99,6 +156,7 @@ def checks(
     measured: MeasuredPrototype,
     parts: list[MeasuredPart],
     bought: NamedSolids,
+    on_base: NamedSolids,
 ) -> list[Check]:
     """Rotate the base from end to end of its swing, and test whether parts fit at angle zero.
 
@@ -106,11 +164,12 @@ def checks(
         names: of the checks.
         measured: the prototype.
         parts: printed.
-        bought: purchased parts that are fixed.
+        bought: what is bought and fixed.
+        on_base: what is bought and rotates with the base, without the balls.
     """
     swing, clearance, samples, apart, balls = names
     rotating, fixed = _solids(parts, "base", "cap"), _solids(parts, "stage", "frame")
-    moving = [axial_solid(measured, *one) for one in [*rotating, *_ball_solids(measured)]]
+    moving = [axial_solid(measured, *one) for one in [*rotating, *on_base, *_ball_solids(measured)]]
     still = [axial_solid(measured, *one) for one in [*fixed, *bought]]
     sweeps = [sweep(measured, one, two) for one in moving for two in still]
     volume = max((one.volume for one in sweeps), default=0.0)
@@ -142,18 +201,19 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
         still: fixed.
     """
     low, high = np.radians(measured.context.prototype.swing).tolist()
-    lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
-    bound = _distance_at_any_angle(moving, still)
     names = (moving.name, still.name)
+    if _boxes_apart(moving, still):
+        return PairSweep(names, 0.0, SEARCH_MM, low, 1, 0.0)
+    bound = _distance_at_any_angle(moving, still)
     if bound >= CLEAR_MM:
-        one, two = _placed(measured, moving, still, low)
-        return PairSweep(names, (one ^ two).volume(), min(SEARCH_MM, bound), low, 1, 0.0)
+        shared = _volume_inside(measured, moving, still, low)
+        return PairSweep(names, shared, min(SEARCH_MM, bound), low, 1, 0.0)
+    lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
     at, samples, blind = low, 0, 0.0
-    volume, worst, gap = 0.0, low, SEARCH_MM
+    volume, worst, gap, distance = 0.0, low, SEARCH_MM, SEARCH_MM
     while True:
         one, two = _placed(measured, moving, still, at)
-        distance = one.min_gap(two, SEARCH_MM)  # 0 where they share room, also one inside the other
-        shared = 0.0 if distance > 0 else (one ^ two).volume()
+        distance, shared = _gap_and_volume(one, two, distance)
         samples += 1
         if shared > volume or (volume == 0 and distance < gap):
             worst = at
@@ -163,6 +223,49 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
         step = max(distance / lever, MIN_STEP_RAD)
         blind = max(blind, min(step, high - at) - distance / lever)
         at = min(at + step, high)
+
+
+def _gap_and_volume(one: Any, two: Any, before: float) -> tuple[float, float]:
+    """Distance of two solids, mm, and the volume that they share, mm^3; one of both is 0.
+
+    Solids that overlapped at the angle before mostly still do: then the distance is not searched.
+    """
+    if before == 0 and not (both := one ^ two).is_empty():
+        return 0.0, float(both.volume())
+    distance = _gap(one, two, before)
+    return distance, 0.0 if distance > 0 else float((one ^ two).volume())
+
+
+def _volume_inside(
+    measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid, angle: float
+) -> float:
+    """Volume, mm^3, that two solids share whose surfaces never meet: one is inside the other.
+
+    It is where its positions along the axis are between those of the other, and its farthest point
+    from the axis is nearer than the other's; else no volume need be worked out.
+    """
+    if not (_may_be_inside(moving, still) or _may_be_inside(still, moving)):
+        return 0.0
+    one, two = _placed(measured, moving, still, angle)
+    return float((one ^ two).volume())
+
+
+def _may_be_inside(inner: AxialSolid, outer: AxialSolid) -> bool:
+    low, high = inner.box
+    return bool(low[0] >= outer.box[0, 0] and (high <= outer.box[1]).all())
+
+
+def _gap(one: Any, two: Any, before: float) -> float:
+    """Distance of two solids, mm, `SEARCH_MM` at most; 0 where they share room.
+
+    Args:
+        one: a solid; it may be inside the other.
+        two: another.
+        before: the distance at the angle before, mm: near it the search is short.
+    """
+    if 0 < (near := GROWTH * before) < SEARCH_MM and (distance := one.min_gap(two, near)) < near:
+        return float(distance)
+    return float(one.min_gap(two, SEARCH_MM))
 
 
 def _placed(
@@ -184,25 +287,25 @@ def _rotated(measured: MeasuredPrototype, one: AxialSolid, angle: float) -> Any:
 
 
 def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSolid:
-    """Measure a solid about the base's axis."""
-    points = solid.refine_to_length(GRAIN_MM).to_mesh64().vert_properties[:, :3]
-    along = points @ measured.context.frame[0]
-    out = np.linalg.norm(np.cross(points, measured.context.frame[0]), axis=1)
-    return AxialSolid(name, solid, float(out.max(initial=0)), np.stack([along, out], axis=1))
+    """A solid about the base's axis."""
+    return AxialSolid(name, solid, measured.context.frame)
+
+
+def _boxes_apart(one: AxialSolid, two: AxialSolid) -> bool:
+    """Whether two solids are farther apart at any angle than points of them are searched for."""
+    between = np.maximum(one.box[0] - two.box[1], two.box[0] - one.box[1]).clip(min=0)
+    return bool(np.hypot(*between) > SEARCH_MM + BETWEEN_MM)
 
 
 def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
-    """Distance that two solids keep at any angle about the axis, mm; may be negative.
+    """Distance that two solids' surfaces keep at any angle about the axis, mm.
 
-    It is infinite where it is more than `SEARCH_MM`. No point of a facet is farther from a corner
-    than 1/sqrt(3) of its longest edge.
+    The few points are asked for more than `SEARCH_MM`: where they find nothing, neither would the
+    many.
     """
-    between = 2 * GRAIN_MM / float(np.sqrt(3))
-    farthest = SEARCH_MM + between
-    low, high = one.profile.min(axis=0) - farthest, one.profile.max(axis=0) + farthest
-    near = two.profile[((two.profile >= low) & (two.profile <= high)).all(axis=1)]
-    distance = one.tree.query(near, distance_upper_bound=farthest)[0]
-    return float(np.min(distance, initial=np.inf)) - between
+    if np.isinf(one.coarse.distance_at_any_angle(two.coarse, SEARCH_MM + BETWEEN_MM)):
+        return np.inf
+    return one.fine.distance_at_any_angle(two.fine, SEARCH_MM)
 
 
 def _solids(parts: list[MeasuredPart], *roles: str) -> NamedSolids:

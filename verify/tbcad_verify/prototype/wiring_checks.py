@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.drive_loads import PHASES
 from tbcad_verify.prototype.gcode_checks import expected_lights
 from tbcad_verify.prototype.gcode_lines import LAMP
 from tbcad_verify.record.prototype import WIRING
@@ -33,6 +34,10 @@ MAX_FILL = 0.5  # of the bore's section by the wires' squares
 GROOVE_MM = 0.8  # depth of the arms' grooves
 LEAST_LEAD_MM = 500.0  # of wire beyond the stage
 WIRES = 2  # of an LED
+SUPPLY = ("SUPPLY-24V", "FUSE-2A", 24.0)
+STRIP_V = 24.0
+STRIPS_W_MM = {"STRIP-COB-24V": 10e-3, "STRIP-240-24V": 19.2e-3}  # of the lamps' strips
+LAMPS_MA = 1000.0  # beside the motor, from a supply of 2 A
 SHARE = 1e-9
 AXIAL_MM = 1e-6
 UP = np.array([0.0, 0.0, 1.0])
@@ -94,7 +99,8 @@ def _lines(context: PrototypeContext) -> Iterator[str]:
     lines = require(context.prototype.wiring, f"there is no {WIRING}")
     motion, leds = context.export.spec.prototype.motion, len(context.prototype.leds)
     signals = ["lamp", *(f"led_{k}" for k in range(1, leds + 1))]
-    expected = [*signals, *(["release"] if motion.trigger == "coolant" else []), "home"]
+    released = ["release"] if motion.trigger == "coolant" else []
+    expected = [*signals, *released, "home", "motor", "supply"]
     if lines.signal.tolist() != expected or lines.line.tolist() != [*range(1, len(expected) + 1)]:
         yield f"lines are {short_list(lines.signal.tolist())}, not {short_list(expected)}"
         return
@@ -104,18 +110,54 @@ def _lines(context: PrototypeContext) -> Iterator[str]:
         means = ("by hand", "", "") if hand else _commands(output)
         if told != means:
             yield f"{signal} is switched by {' '.join(told)}"
+    yield from _lamp(context, lines)
     for k in range(leds):
         yield from (f"led_{k + 1}: {what}" for what in _led(context, lines, k))
-    for k in {0, *range(1 + leds, len(expected))}:
+    row = {signal: k for k, signal in enumerate(expected)}
+    for k in (row[signal] for signal in ("lamp", *released, "home", "supply")):
         if lines.wire[k] != CABLE or not lines.length_mm[k] >= LEAST_CABLE_MM:
             yield f"{expected[k]} has {lines.length_mm[k]:g} mm of {lines.wire[k] or 'no cable'}"
-    told = (str(lines.output[-1]), str(lines.part[-1]))
+    told = (str(lines.output[row["home"]]), str(lines.part[row["home"]]))
     if told != (f"limit {motion.axis}", "SWITCH-SS-5GL2"):
         yield f"the switch is {told[1]} on {told[0]}"
-    if motion.trigger == "coolant":
-        told = tuple(str(column[-2]) for column in (lines.output, lines.on, lines.off, lines.part))
+    for k in (row[signal] for signal in released):
+        told = tuple(str(column[k]) for column in (lines.output, lines.on, lines.off, lines.part))
         if told != ("coolant", "M8", "M9", "RELAY"):
             yield f"the release is switched by {' '.join(told)}"
+    yield from _motor(context, lines, row["motor"])
+    yield from _supply(lines, row["supply"])
+
+
+def _lamp(context: PrototypeContext, lines: Wiring) -> Iterator[str]:
+    """The lamps' line has their part, voltage and current."""
+    lamps, part = context.prototype.lamps, str(lines.part[0])
+    if lamps is None:
+        yield from () if part == "lamp" else [f"the lamp is {part}"]
+        return
+    watt = lamps.strips * len(lamps.places) * lamps.length * STRIPS_W_MM.get(lamps.strip, 0.0)
+    current = watt / STRIP_V * 1e3
+    if part != lamps.strip or float(lines.supply_v[0]) != STRIP_V:
+        yield f"the lamps are {part} at {float(lines.supply_v[0]):g} V"
+    if not math.isclose(float(lines.current_ma[0]), current, rel_tol=SHARE) or current > LAMPS_MA:
+        yield f"the lamps take {current:.0f} mA, {LAMPS_MA:.0f} are allowed"
+
+
+def _motor(context: PrototypeContext, lines: Wiring, k: int) -> Iterator[str]:
+    """The motor is on the driver of its axis, with the current of its maker's sheet."""
+    drive, axis = context.prototype.drive, context.export.spec.prototype.motion.axis
+    told = (str(lines.part[k]), str(lines.output[k]))
+    if told != (drive.motor, f"driver {axis}"):
+        yield f"the motor is {told[0]} on {told[1]}"
+    rated = PHASES.get(drive.motor, (math.nan,))[0] * 1e3
+    if not np.isclose(lines.current_ma[k], rated, rtol=SHARE, equal_nan=True):
+        yield f"the motor takes {float(lines.current_ma[k]):g} mA, not {rated:g}"
+
+
+def _supply(lines: Wiring, k: int) -> Iterator[str]:
+    """The supply is fused."""
+    told = (str(lines.part[k]), str(lines.connector[k]), float(lines.supply_v[k]))
+    if told != SUPPLY:
+        yield f"the supply is {told[0]} by {told[1] or 'no fuse'} at {told[2]:g} V"
 
 
 def _commands(output: int) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
 from tbcad_verify.mesh.vectors import cross, dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
@@ -54,14 +54,23 @@ class Depths:
     far: float
 
 
+def read_sheet(export: Export) -> Requirements:
+    """What camera.json asks.
+
+    Raises:
+        BadExport: the sheet is missing or malformed.
+    """
+    text = read(export.folder, SHEET, MAX_TEXT_BYTES)
+    return validated(SHEET, Sheet, parse_json(text, SCHEMA)).requirements
+
+
 def sheet_check(name: CheckName, export: Export) -> Check:
     """The requirements are those of the cameras and mirrors on record.
 
     Raises:
         BadExport: the sheet is missing or malformed.
     """
-    text = read(export.folder, SHEET, MAX_TEXT_BYTES)
-    sheet = validated(SHEET, Sheet, parse_json(text, SCHEMA)).requirements
+    sheet = read_sheet(export)
     camera = next(iter(export.cameras.values()))
     expected = _figures(camera, image_depths(export, camera))
     wrong = [
@@ -101,7 +110,9 @@ def image_depths(export: Export, camera: Camera) -> Depths:
     """
     mirrors = _own(export, camera)
     surfaces, apex = mirrors.surfaces(), mirrors.columns("px", 3)
-    inward, to_origin = -unit(apex), norm(apex)
+    # Along the principal ray, which a mirror on the seam does not send to the origin.
+    inward = unit(reflect_directions(apex - camera.pinhole[:, None], surfaces.normal))
+    to_origin = norm(apex)
     depth = [
         camera.forward @ (image - camera.pinhole[:, None])
         for reach in (-1.0, 1.0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.lines import axis_frame, polar_and_azimuth, wrapped
+from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
@@ -71,14 +72,16 @@ def pose_errors(export: Export) -> Floats:
     """(M,) largest deviation of each mirror from the design, mm; inf where its camera is unknown.
 
     Checked, angles as lengths at 1 mm: u and n are unit; p lies along u and on the ellipsoid with
-    the spec's semi-minor axis and foci at the origin and the pinhole; n bisects -u and the
-    direction to the pinhole; c = p - r n.
+    the spec's semi-minor axis and foci at the origin and the pinhole; n bisects the directions to
+    the pinhole and to the aim, which is the origin; c = p - r n. Rule "traced" aims mirrors on the
+    seam at a point of the x axis beyond it, within the object.
     """
     mirrors = export.mirrors
     errors = np.full(len(mirrors), np.inf)
+    largest = export.target_mm / 2 if export.spec.mirrors.radius_rule == "traced" else 0.0
     for camera in export.cameras.values():
         rows = np.flatnonzero(mirrors.camera == camera.id)
-        errors[rows] = _deviations(mirrors, rows, camera, export.semi_minor_mm)
+        errors[rows] = _deviations(mirrors, rows, camera, export.semi_minor_mm, largest)
     return errors
 
 
@@ -158,23 +161,41 @@ def geodesic(n: int) -> Floats:
     return np.ascontiguousarray(points[np.sort(first)].T)
 
 
-def _deviations(mirrors: Mirrors, rows: NDArray[np.intp], camera: Camera, b: float) -> Floats:
+def _deviations(
+    mirrors: Mirrors, rows: NDArray[np.intp], camera: Camera, b: float, largest_aim: float
+) -> Floats:
     u, p, n, c = (mirrors.columns(key, 3)[:, rows] for key in ("ux", "px", "nx", "cx"))
     radius = mirrors.columns("radius_mm")[0, rows]
     pinhole = camera.pinhole[:, None]
     double_a = 2 * np.sqrt(b**2 + (camera.pinhole @ camera.pinhole) / 4)
+    aim = _aims(u, p, n, camera, largest_aim)
     deviations = np.max(
         [
             np.abs(norm(u) - 1),
             np.abs(norm(n) - 1),
             norm(p - dot(p, u) * u),
             np.abs(norm(p) + norm(pinhole - p) - double_a),
-            norm(unit(unit(pinhole - p) - u) - n),
+            norm(unit(unit(pinhole - p) + unit(aim - p)) - n),
             np.where(mirrors.flat[rows], 0, norm(c - (p - radius * n))),
         ],
         axis=0,
     )
     return np.asarray(deviations)
+
+
+def _aims(u: Floats, p: Floats, n: Floats, camera: Camera, largest: float) -> Floats:
+    """(3, M) points at which mirrors with apices p and normals n may be aimed, mm.
+
+    The origin; for mirrors on the seam the point of the x axis nearest to which the ray over the
+    apex comes, as far as it lies on the other camera's side of the seam and up to `largest` away.
+    """
+    aim, seam = np.zeros_like(p), np.abs(u[0]) < ON_SEAM
+    point, away = p[:, seam], -np.sign(camera.pinhole[0])
+    ray = reflect_directions(point - camera.pinhole[:, None], n[:, seam])
+    squared = dot(ray[1:], ray[1:])
+    along = -dot(point[1:], ray[1:]) / np.where(squared > 0, squared, np.inf)
+    aim[0, seam] = away * np.clip(away * (point[0] + along * ray[0]), 0.0, largest)
+    return aim
 
 
 def _match_vertices(u: Floats, vertices: Floats) -> tuple[NDArray[np.intp], int]:

@@ -16,16 +16,26 @@ from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import (
     Angle,
     Assembly,
+    AssemblyStep,
     Calibration,
+    CameraPlace,
+    CapRecord,
     Controller,
+    Drawing,
     DriveRecord,
     Frame,
     FrameStock,
+    Holding,
     Home,
+    Lamps,
     Led,
+    ListTotals,
+    PlacedFastener,
+    PowerOff,
     PrintedPart,
     PurchasedBody,
     Seat,
+    Shroud,
 )
 from tbcad_verify.record.prototype_tables import (
     MOST,
@@ -64,15 +74,25 @@ class Prototype(Strict):
         swing: smallest and largest base angle driven, degrees.
         pad_um: largest error of a ball's centre that its pads may cause.
         seats: one for each ball.
+        holding: what holds each ball.
         parts: printed.
         leds: of the stage.
         calibration: by the LEDs; None without any.
         controller: of motion and lights.
+        caps: key, limits and finish of each cap.
+        camera_place: how the camera is put in its place; None without one.
         home: angles of homing.
-        bought: purchased parts other than balls.
+        bought: purchased parts other than balls and fasteners.
+        fasteners: in their places.
+        assembly_steps: in their order.
+        lamps: that light the object; None without any.
+        shroud: round the rig; None without.
         frame_stock: parts of the frame that are cut or drilled.
+        totals: of the parts list.
+        drawings: of what is cut or drilled.
         assembly: files of the whole.
         drive: of the base.
+        power_off: the base without power.
         balls: K of them.
         plan: every picture.
         stops: of the base.
@@ -93,15 +113,25 @@ class Prototype(Strict):
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
     pad_um: float = Field(alias="target_pad_um", ge=1e-3, le=1e4)
     seats: list[Seat] = Field(max_length=MOST)
+    holding: Holding
     parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     calibration: Calibration | None = None
     controller: Controller
+    caps: list[CapRecord] = Field(max_length=MOST)
+    camera_place: CameraPlace | None = None
     home: Home
     bought: list[PurchasedBody] = Field(max_length=MOST)
+    fasteners: list[PlacedFastener] = Field(max_length=MOST)
+    assembly_steps: list[AssemblyStep] = Field(max_length=MOST)
+    lamps: Lamps | None
+    shroud: Shroud | None
     frame_stock: FrameStock
+    totals: ListTotals
+    drawings: list[Drawing] = Field(max_length=MOST)
     assembly: Assembly = Assembly()
     drive: DriveRecord
+    power_off: PowerOff
     balls: Balls
     plan: Plan
     stops: Stops
@@ -120,6 +150,8 @@ class Prototype(Strict):
             raise ValueError(f"swing_deg must ascend, not {self.swing}")
         if [seat.ball for seat in self.seats] != list(range(1, len(self.balls) + 1)):
             raise ValueError("seats must be one for each ball, in order")
+        if [one.ball for one in self.holding.balls] != list(range(1, len(self.balls) + 1)):
+            raise ValueError("holding.balls must be one for each ball, in order")
         for part in self.parts:
             balls = range(1, len(self.balls) + 1) if part.role == "cap" else (None,)
             if part.number not in balls:

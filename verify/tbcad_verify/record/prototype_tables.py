@@ -84,10 +84,18 @@ class PartsList(Columns):
     quantity: Counts
     part: Texts
     what: Texts
+    standard: Texts
     material: Texts
     mass_g: Masses
     total_mass_g: Masses
     print_volume_mm3: Masses
+    filament_g: Masses
+    print_hours: Masses
+    unit_price: Masses
+    total_price: Masses
+    currency: Texts
+    price_date: Texts
+    price_source: Texts
     origin: Annotated[
         NDArray[np.str_], column(Literal["bought", "printed"], np.str_), Field(alias="from")
     ]
@@ -172,6 +180,8 @@ class Stops(Columns):
     balls: Annotated[tuple[tuple[int, ...], ...], array(list[BallList], _ball_lists)]
     azimuth_error: Angles = Field(alias="azimuth_error_deg")
     error: Angles = Field(alias="error_deg")
+    torque: Numbers = Field(alias="torque_nmm")
+    wind_up: Angles = Field(alias="wind_up_deg")
 
     @property
     def errors(self) -> Floats:

@@ -1,7 +1,8 @@
 """Recorded radii and coverages against the rule of the spec.
 
-Rule "traced" gives every mirror the coverage that is asked for, with its margin, unless the mirror
-has the largest radius allowed; "paper" gives it the radius of equation 2; "flat" gives it none.
+Rule "traced" gives every mirror the coverage that is asked for, with the margin of the spec or one
+of its own, unless the mirror has the largest radius allowed; "paper" gives it the radius of
+equation 2; "flat" gives it none.
 """
 
 from __future__ import annotations
@@ -39,10 +40,28 @@ def _paper(export: Export) -> Bools:
 
 def _traced(export: Export) -> Bools:
     mirrors, largest = export.mirrors, _largest(export)
-    beyond = mirrors.coverage_mm - (export.target_mm + export.spec.mirrors.margin_mm)
+    margin = _margins(export)
+    beyond = mirrors.coverage_mm - (export.target_mm + margin)
     # Where spheres of the largest radius would not meet, tbcad makes them flatter still.
     at_largest = mirrors.radius_mm >= largest * (1 - RULE_SHARE)
-    return np.asarray((np.abs(beyond) <= RULE_MM) | (at_largest & (beyond >= -RULE_MM)))
+    good = (np.abs(beyond) <= RULE_MM) | (at_largest & (beyond >= -RULE_MM))
+    return np.asarray(good & (margin >= export.spec.mirrors.margin_mm))
+
+
+def _margins(export: Export) -> Floats:
+    """(M,) margin of each mirror, mm; NaN where there are own margins for another number of them.
+
+    Both cameras' mirrors have the same, in the order of the file.
+    """
+    mirrors, own = export.mirrors, export.spec.mirrors.own_margins_mm
+    if not own:
+        return np.full(len(mirrors.camera), export.spec.mirrors.margin_mm)
+    margins = np.full(len(mirrors.camera), np.nan)
+    for camera in set(mirrors.camera.tolist()):
+        rows = np.flatnonzero(mirrors.camera == camera)
+        if len(rows) == len(own):
+            margins[rows] = own
+    return margins
 
 
 def _largest(export: Export) -> Floats:

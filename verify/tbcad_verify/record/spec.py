@@ -52,6 +52,10 @@ class MirrorsSpec(Strict):
 
     radius_rule: Literal["traced", "paper", "flat"]
     margin_mm: float = Field(ge=0, le=20)
+    # Exports from before this key have none.
+    own_margins_mm: list[Annotated[float, Field(ge=0, le=20)]] = Field(
+        default=[], max_length=50_000
+    )
     max_radius_widths: float = Field(ge=5, le=1000)
     coating_um: float = Field(ge=0, le=500)
 
@@ -71,6 +75,8 @@ class ShellSpec(Strict):
     """The body behind the mirrors."""
 
     wall_mm: float = Field(ge=0.4, le=50)
+    edges: Literal["valley", "pedestal"] = "valley"  # exports from before these keys have none
+    groove_mm: float = Field(default=0.1, ge=0.02, le=5)
     seam_flange: FlangeSpec
     foot_flange: FlangeSpec
 
@@ -122,8 +128,10 @@ class BaseSpec(Strict):
         list[Annotated[float, Field(ge=1, le=50)]], Field(min_length=1, max_length=20)
     ]
     magnet_height_mm: float = Field(ge=0.5, le=20)
+    strong_magnet_height_mm: float = Field(ge=0.5, le=20)
     magnet_gap_mm: float = Field(ge=0.1, le=5)
     magnet_play_mm: float = Field(ge=0, le=1)
+    cap_play_mm: float = Field(ge=0.02, le=0.5)
     digit_mm: float = Field(ge=3, le=30)
     relief_mm: float = Field(ge=0.2, le=3)
     drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
@@ -178,6 +186,16 @@ class StageSpec(Strict):
     wall_mm: float = Field(ge=1, le=20)
 
 
+class LightSpec(Strict):
+    """Lamps that light the object, and a shroud of card."""
+
+    lamp_z_mm: Annotated[float, Field(ge=-1000, le=0), OR_AUTO]
+    strips: int = Field(ge=1, le=6)
+    segments: int = Field(ge=1, le=6)
+    shroud: Annotated[bool, OR_AUTO]
+    shroud_gap_mm: float = Field(ge=2, le=500)
+
+
 class FrameSpec(Strict):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
@@ -202,6 +220,7 @@ class PrototypeSpec(Strict):
     auto_direction_median_deg: Annotated[float, Field(gt=0, le=90), OR_AUTO]
     auto_lost_percent: float = Field(ge=0, le=100)
     catalogues: Annotated[list[str], Field(min_length=1)]
+    prices: Annotated[list[str], Field(min_length=1)]
     grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     snap: Literal["cover", "nearest"]
@@ -218,11 +237,18 @@ class PrototypeSpec(Strict):
     base: BaseSpec
     motion: MotionSpec
     stage: StageSpec
+    light: LightSpec
     frame: FrameSpec
 
     def left_open(self) -> list[str]:
         """Keys without a value, which only an export without a prototype may have."""
-        sections = {"": self, "base.": self.base, "stage.": self.stage, "frame.": self.frame}
+        sections = {
+            "": self,
+            "base.": self.base,
+            "stage.": self.stage,
+            "light.": self.light,
+            "frame.": self.frame,
+        }
         return [
             f"prototype.{name}{key}"
             for name, section in sections.items()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from tbcad_verify.report.checks import Check
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.checks import Check
 
 _DAMAGED = "a file was changed or damaged after the build: build again"
 _RECORD = "the record is not what was built: build again"
@@ -12,9 +15,11 @@ _SEES = "mirrors.radius_rule traced, a larger margin_mm, a smaller chord_error_m
 _BALLS = "a larger mirrors.margin_mm, or more balls: prototype.k"
 _SPACE = "more clearance: keys of [prototype.base], .stage and .frame"
 _LEDS = "move LEDs or stage: keys in [prototype.stage]"
+_LIGHT = "lamps farther from what the base sweeps: prototype.light.lamp_z_mm"
 _PLAN = "the plan was changed after the build: build again"
 _PRINT = "another --printer, or other keys of [shell] and [printer]"
 _STEP = "the STEP file differs from record or mesh: build again, else report it"
+_SEATS = "shim or re-seat the balls that fall short, then calibrate again"
 _PROGRAM = "the program reads the file otherwise: see --full, try its newest version"
 
 # The remedy for a check is that of the longest beginning of its name in this table.
@@ -29,9 +34,17 @@ REMEDIES = {
     "directions": _RECORD,
     "radius rule": _RECORD,
     "camera sheet": _RECORD,
+    "camera mount": _RECORD,
+    "camera gauge": _RECORD,
+    "camera place": "more pixels: camera.width_px, or a wider picture: camera.hfov_deg fit",
     "drive": _RECORD,
+    "motor bearing": "the belt pulls hard: a smaller prototype.largest_ball_mm, fewer balls",
+    "holding": _RECORD,
+    "hold ratio": "a ball is held weakly: larger prototype.base.magnets_mm or a smaller gap",
     "inventory": _RECORD,
     "parts list": _RECORD,
+    "list figures": _RECORD,
+    "drawings": _RECORD,
     "plate holes": _RECORD,
     "wiring": _RECORD,
     "homing": _RECORD,
@@ -54,6 +67,7 @@ REMEDIES = {
     "surface error": _MIRROR,
     "coverage": _SEES,
     "mirrors visible": _SEES,
+    "seam gap": _SEES,
     "light paths": "parts stand in the light: a thinner flange or wall, keys of [shell]",
     "object clearance": "a smaller optics.capture_diameter_mm, or a larger optics.semi_minor_mm",
     "pixels, minimum": "fewer mirrors (--n), or more pixels: camera.width_px, height_px",
@@ -62,21 +76,36 @@ REMEDIES = {
     "ball centres": _MESH,
     "balls clear": _MESH,
     "pads": _MESH,
+    "pads printed up": "the carrier lies otherwise on the bed than it was built: build again",
     "cap": _MESH,
+    "cap tilt": "prototype.base.cap_play_mm smaller",
+    "cap drawings": _RECORD,
     "cells": _BALLS,
     "coverage, balls": _BALLS,
     "light paths, balls": _SPACE,
     "swing": _SPACE,
+    "key access": "a part stands in the way of a key: other keys of [prototype.frame]",
+    "power off": _RECORD,
     "parts apart": _SPACE,
     "balls apart": _SPACE,
     "assembly": "prototype.glb differs from the parts: build again",
     "leds": _LEDS,
     "object room": _LEDS,
+    "lamps": _RECORD,
+    "shroud": _RECORD,
+    "light past lamps and card": _SPACE,
+    "light before and after": _LIGHT,
+    "light in the stage's shadow": _LEDS,
+    "dark background": "list what the camera sees as matt black, and paint it",
     "calibration": _RECORD,
     "plan": _PLAN,
     "print pose": _RECORD,
     "on the bed": _RECORD,
     "print": _PRINT,
+    "as built: coverage": _SEATS,
+    "as built: stops": "photograph what is missing, tbcad run --resume, and calibrate again",
+    "as built: windows in the picture": "turn the camera until all mirrors are in its picture",
+    "as built: object clearance": "put the camera where the drawing has it, or use smaller objects",
     "step": _STEP,
     "freecad": _PROGRAM,
     "gmsh": _PROGRAM,
@@ -91,5 +120,10 @@ def remedy(check: Check) -> str:
     """What to do about a check that did not pass."""
     if check.passed is None:
         return UNKNOWN
-    matching = [name for name in REMEDIES if check.name.startswith(name)]
+    return remedy_by_name(check.name)
+
+
+def remedy_by_name(check: str) -> str:
+    """What to do about a check that fails, by its name."""
+    matching = [name for name in REMEDIES if check.startswith(name)]
     return REMEDIES[max(matching, key=len)] if matching else ELSE

@@ -25,6 +25,7 @@ from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, Part, read_export
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
+from tbcad_verify.run.fork import StagesWork, in_order
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
@@ -84,13 +85,20 @@ def stage_titles(export: Export) -> tuple[str, ...]:
     return (*SHELL_STAGES, *(PROTOTYPE_STAGES if export.prototype else ()))
 
 
-def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> None:
+def run_stages(
+    folder: Path,
+    sink: ResultSink,
+    printers: Sequence[str] = (),
+    begin: Callable[[StagesWork], StagesWork] = in_order,
+) -> None:
     """Run all stages, and hand over what each measures.
 
     Args:
         folder: what `tbcad build` wrote.
         sink: takes the results.
         printers: profiles that every part must suit; without any, the built-in ones inform only.
+        begin: may do the prototype's stages while the shells' are done, by its value when it is
+            called.
 
     Raises:
         BadExport: the folder is not a readable export, or a profile cannot be used.
@@ -113,24 +121,46 @@ def run_stages(folder: Path, sink: ResultSink, printers: Sequence[str] = ()) -> 
     manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
     sink(Results(checks=manifest + record_checks(export)))
 
+    printed, facets = facets[len(export.parts) :], facets[: len(export.parts)]
+    prototype = begin(lambda to: _verify_prototype(export, printed, profiles, bool(printers), to))
+    _verify_shells(export, facets, profiles, bool(printers), sink)
+    prototype(sink)
+
+
+def _verify_shells(
+    export: Export,
+    facets: list[Facets],
+    profiles: list[Profile],
+    required: bool,
+    sink: ResultSink,
+) -> None:
     sink(Results(stages=[MESHES]))
-    shells = _measure_shells(export, facets[: len(export.parts)], sink)
-    facets[: len(export.parts)] = []  # half of the memory
+    shells = _measure_shells(export, facets, sink)
+    facets.clear()  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
     holes = {}
     for shell in shells:
-        measures = _assess_printing(shell, profiles, bool(printers), sink)
+        measures = _assess_printing(shell, profiles, required, sink)
         if measures:
             holes[shell.part.name] = measures.holes
-
-    if export.parts:
+    if shells:
         _trace_shells(export, shells, holes, sink)
-    if export.prototype:
-        measured = verify_prototype(export, export.prototype, facets, sink)
-        sink(Results(stages=[PRINTING]))
-        for printed in measured:
-            _assess_printing(printed, profiles, bool(printers), sink)
+
+
+def _verify_prototype(
+    export: Export,
+    facets: list[Facets],
+    profiles: list[Profile],
+    required: bool,
+    sink: ResultSink,
+) -> None:
+    if export.prototype is None:
+        return
+    measured = verify_prototype(export, export.prototype, facets, sink)
+    sink(Results(stages=[PRINTING]))
+    for printed in measured:
+        _assess_printing(printed, profiles, required, sink)
 
 
 def _compare_3mf(

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import math
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache, partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
-from tbcad_verify.programs import ExpectedPart, check_with_programs
+from tbcad_verify.programs import ExpectedPart, ListedPrint, check_with_programs
 from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, read_export
 from tbcad_verify.record.files import listing, open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import NAME, Report
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.child import Limits, kill_group
+from tbcad_verify.run.fork import ForkedResult
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
+from tbcad_verify.run.worker import send_stages
 from tbcad_verify.step.shell_checks import (
     ShellComparison,
+    area_checks,
     shell_comparisons,
     shell_step_checks,
 )
@@ -32,9 +39,12 @@ from tbcad_verify.step.step_file import StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
+MM3_PER_CM3 = 1e3
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
 Comparisons = dict[str, ShellComparison | Unknown]
+AreaChecks = list[Check] | None
+Steps = tuple[Files, Comparisons, AreaChecks]
 
 
 @dataclass(frozen=True)
@@ -48,6 +58,8 @@ class VerifyOptions:
         printers: profiles, by name or path, that every part must suit. Without any, the built-in
             ones are tried, and what they find informs only.
         clients: also ask the programs that users open the files with, where they are installed.
+        fork: other processes are copies of this one, which has no threads: quicker where it has
+            loaded the libraries.
     """
 
     write: bool = True
@@ -55,6 +67,7 @@ class VerifyOptions:
     seconds: float = STAGE_LIMIT_S
     printers: tuple[str, ...] = ()
     clients: bool = False
+    fork: bool = False
 
 
 def verify(
@@ -105,39 +118,62 @@ def verify(
 
 def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> None:
     """All stages; an interrupt ends the processes that read files, which take long."""
-    limits = Limits(options.seconds)
+    limits = Limits(options.seconds, fork=options.fork)
+    with _steps(export, limits) as steps:
+        # Reading STEP files needs none of the stages, and takes as long as they do.
+        if options.apart:
+            watch(_worker(export, options), stage_titles(export), results, options.seconds)
+        else:
+            run_stages(export.folder, results.add, options.printers)
+        _compare_steps(export, results, steps)
+
+
+def _worker(export: Export, options: VerifyOptions) -> Sequence[str] | Callable[[Connection], None]:
+    if options.fork:
+        return partial(send_stages, export.folder, options.printers)
+    return worker_command(export.folder, options.printers)
+
+
+@contextmanager
+def _steps(export: Export, limits: Limits) -> Iterator[Callable[[], Steps]]:
+    """Read STEP files while the block runs; the value waits for them."""
+    if limits.fork:
+        reading = ForkedResult(partial(_read_steps, export, limits), partial(_no_steps, export))
+        try:
+            yield reading.result
+        finally:
+            kill_group(reading.fork)
+        return
     with ThreadPoolExecutor(1) as pool:
         try:
-            # Reading STEP files needs none of the stages, and takes as long as they do.
-            steps = pool.submit(_read_steps, export, limits)
-            if options.apart:
-                command = worker_command(export.folder, options.printers)
-                watch(command, stage_titles(export), results, options.seconds)
-            else:
-                run_stages(export.folder, results.add, options.printers)
-            _compare_steps(export, results, steps)
+            yield pool.submit(_read_steps, export, limits).result
         except BaseException:
             limits.stop.set()
             raise
 
 
-def _read_steps(export: Export, limits: Limits) -> tuple[Files, Comparisons]:
+def _no_steps(export: Export, reason: str) -> Steps:
+    files: Files = {part.name: Unknown(reason) for part in (*export.parts, *export.printed)}
+    return files, shell_comparisons(export, files), None
+
+
+def _read_steps(export: Export, limits: Limits) -> Steps:
     files = read_step_files(export, limits)
-    return files, shell_comparisons(export, files)
+    areas = area_checks(export) if any(part.step for part in export.parts) else None
+    return files, shell_comparisons(export, files), areas
 
 
-def _compare_steps(
-    export: Export, results: CollectedResults, steps: Future[tuple[Files, Comparisons]]
-) -> None:
+def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:
+    wait = cache(steps)
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        _, comparisons = steps.result()
+        _, comparisons, areas = wait()
         coverage = results.mirrors.get("coverage_fitted_mm")
-        checks = shell_step_checks(export, results.masses, comparisons, coverage)
+        checks = shell_step_checks(export, results.masses, comparisons, coverage, areas)
         results.add(Results(checks=checks))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files, _ = steps.result()
+        files, _, _ = wait()
         results.add(Results(checks=part_step_checks(export, results.masses, files)))
 
 
@@ -174,4 +210,17 @@ def _expected(
         spheres,
         volume,
         max(area * export.mesh_error_mm, FLOAT32_SHARE * abs(volume)),
+        _listed_print(export, part),
     )
+
+
+def _listed_print(export: Export, part: PartFiles) -> ListedPrint | None:
+    """What the parts list estimates; None without a list, or where it has no such print."""
+    bill = export.prototype.parts_list if export.prototype else None
+    if bill is None:
+        return None
+    names = (part.name, part.name.replace("cap_", "cap "))
+    for row in np.flatnonzero(np.isin(bill.part, names) & (bill.print_hours > 0)):
+        filament = float(bill.filament_g[row]) / export.spec.printer.density_g_cm3 * MM3_PER_CM3
+        return ListedPrint(filament, float(bill.print_hours[row]))
+    return None

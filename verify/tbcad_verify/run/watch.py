@@ -7,12 +7,14 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.report.checks import Check, unknown
-from tbcad_verify.run.child import crash_reason, kill_group
+from tbcad_verify.run.child import Child, crash_reason, kill_group
+from tbcad_verify.run.fork import start_fork
 from tbcad_verify.run.results import CollectedResults, Results
 
 STAGE_LIMIT_S = 600.0
@@ -26,12 +28,16 @@ def worker_command(folder: Path, printers: Sequence[str]) -> list[str]:
 
 
 def watch(
-    command: Sequence[str], titles: Sequence[str], results: CollectedResults, seconds: float
+    command: Sequence[str] | Callable[[Connection], None],
+    titles: Sequence[str],
+    results: CollectedResults,
+    seconds: float,
 ) -> None:
     """Run a worker process, which sends its results; stages that it does not end are unknown.
 
     Args:
-        command: program and arguments. The program's stdout is the pipe to which it sends.
+        command: program and arguments, whose stdout is the pipe to which it sends; or a function,
+            called in a copy of this process, which is given that pipe.
         titles: of all stages, in order.
         results: are added to.
         seconds: time limit of one stage.
@@ -42,13 +48,7 @@ def watch(
     reader, writer = Pipe(duplex=False)
     with reader, ThreadPoolExecutor(1) as receiver:
         with writer:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=writer.fileno(),
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )
+            process = _start(command, writer)
         try:
             reason = _collect(process, lambda: receiver.submit(reader.recv), results, seconds)
         finally:
@@ -57,8 +57,20 @@ def watch(
         results.checks += _unknown_stages(titles, results.stages, reason)
 
 
+def _start(command: Sequence[str] | Callable[[Connection], None], writer: Connection) -> Child:
+    if callable(command):
+        return start_fork(command, writer, group=True)
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=writer.fileno(),
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
 def _collect(
-    process: subprocess.Popen[bytes],
+    process: Child,
     receive: Callable[[], Future[Any]],
     results: CollectedResults,
     seconds: float,

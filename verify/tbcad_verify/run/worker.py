@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from tbcad_verify.errors import BadExport
+from tbcad_verify.run.fork import meanwhile
 from tbcad_verify.run.stages import run_stages
 
 
@@ -20,8 +22,13 @@ def main(folder: Path, printers: list[str]) -> None:
     """Run all stages on a folder; what libraries print goes to stderr."""
     pipe = Connection(os.dup(1), readable=False)
     os.dup2(2, 1)
+    send_stages(folder, printers, pipe)
+
+
+def send_stages(folder: Path, printers: Sequence[str], pipe: Connection) -> None:
+    """Run all stages on a folder and send what they measure."""
     try:
-        run_stages(folder, pipe.send, printers)
+        run_stages(folder, pipe.send, printers, meanwhile)
         pipe.send(None)
     except BadExport as error:
         pipe.send(error)

@@ -52,7 +52,8 @@ class Coverage:
         facet: (V,) diameter by facets, mm; 0 where the outline's image does not surround the
             object's middle, NaN where a mirror is missing.
         fitted: (V,) the same by fitted surfaces.
-        gap: (V,) widest stretch that neither half of a mirror on the seam sees, mm.
+        gap: (V,) widest stretch that neither half of a mirror on the seam sees by fitted surfaces,
+            mm; NaN where a half is missing.
         hidden: (M,) points of each mirror that the pinhole does not see.
         blockers: what hides them.
     """
@@ -80,10 +81,16 @@ def measure(setup: OpticalSetup) -> Coverage:
     )
     hits = [_hidden(setup, camera, outline) for camera, outline in pairs]
     hidden, blockers = (np.concatenate([pair[k] for pair in hits]) for k in range(2))
+    by_facets, by_fits = (
+        seam.gaps(outlines, lines, virtual, u, setup.radius) for lines in (facet, fitted)
+    )
+    # Planar halves see up to x = 0 and no farther: there facets show their rounding alone.
+    planar = virtual.index[setup.export.mirrors.flat]
+    by_facets[planar] = by_fits[planar]
     return Coverage(
-        _diameters(setup, outlines, facet, turned),
-        _diameters(setup, outlines, fitted, turned),
-        seam.gaps(outlines, fitted, virtual, u, setup.radius),
+        seam.counted(_diameters(setup, outlines, facet, turned), by_facets, setup.radius),
+        seam.counted(_diameters(setup, outlines, fitted, turned), by_fits, setup.radius),
+        by_fits,
         np.bincount(hidden, minlength=len(setup.export.mirrors)).astype(np.float64),
         tuple(setup.names(blockers)),
     )
@@ -94,12 +101,11 @@ def checks(setup: OpticalSetup, coverage: Coverage, files: str) -> list[Check]:
     facets, spheres, seen, gap, off = check_names(CHECKS, files)
     ids, hidden = setup.export.mirrors.ids, coverage.hidden
     who = worst_offenders(ids, hidden, "points", hidden > 0, ".0f")
-    widest = setup.virtual_ids[int(np.argmax(coverage.gap))]
     return [
         _covers(setup, facets, coverage.facet),
         _covers(setup, spheres, coverage.fitted),
         at_most(seen, int(hidden.sum()), 0, f"{who}; behind {short_list(coverage.blockers)}"),
-        informative(gap, float(coverage.gap.max()), f"widest at {widest}"),
+        _no_gap(setup, gap, coverage.gap),
         informative(off, _off_the_record(setup, coverage)),
     ]
 
@@ -135,6 +141,14 @@ def _covers(setup: OpticalSetup, name: CheckName, diameter: Floats) -> Check:
     measured = -np.inf if lost.all() else float(known.min())
     # A missing mirror counts as one that sees nothing.
     return at_least(name, 0.0 if unseen else measured, target, "; ".join(parts))
+
+
+def _no_gap(setup: OpticalSetup, name: CheckName, gap: Floats) -> Check:
+    lost, wide = np.isnan(gap), np.nan_to_num(gap)
+    missing = [setup.virtual_ids[k] for k in np.flatnonzero(lost).tolist()]
+    parts = [f"neither half sees: {worst_offenders(setup.virtual_ids, wide, 'mm', wide > 0)}"]
+    parts += [f"unknown, because a half is missing: {short_list(missing)}"] if missing else []
+    return at_most(name, np.nan if missing else float(wide.max()), 0.0, "; ".join(parts))
 
 
 def _off_the_record(setup: OpticalSetup, coverage: Coverage) -> float:

@@ -36,7 +36,8 @@ from tbcad_verify.report.report import NAME
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # of files that must be measured
-OWN_FILES = frozenset({"manifest.json", NAME})
+# Written after the manifest; report.html shows what a verification found, and is no part.
+OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
 MANIFEST = (("manifest", "manifest.json", "wrong files"), ("other files", "", "files"))
 TOPOLOGY = {
     "watertight": "bad edges",

@@ -45,10 +45,10 @@ CHECKS = {"mesh wall": "mm", "mesh holes": "faults"}
 
 @dataclass(frozen=True)
 class Valleys:
-    """Corners of one part's mesh where mirrors meet.
+    """Corners of one part's mesh where mirrors meet, or the walls of their pedestals.
 
     Attributes:
-        point: (3, V) mm.
+        point: (3, V) mm; of grooves between mirrors, their bottoms.
         inner: (V,) whether only mirrors meet there, and no joining face.
     """
 
@@ -171,17 +171,34 @@ def _each(holes: RoundHoles) -> list[Hole]:
 
 
 def find_valleys(setup: OpticalSetup, number: int) -> Valleys:
-    """Corners of edges that have another mirror of the part on each side."""
+    """Corners of edges that have another mirror of the part on each side, or grooves' bottoms."""
     mesh, label = setup.mesh, setup.recovery.segments.label
     mine = setup.part[label] == number
     mirror = np.where(mine, setup.owner()[label], -1)
     half = np.flatnonzero(np.repeat(mirror >= 0, 3) & (mesh.twin >= 0))
     one, two = mirror[half // 3], mirror[mesh.twin[half] // 3]
     half = half[(two >= 0) & (one != two)]
+    if not half.size:
+        return _grooves(setup, mine, mirror >= 0)
     corner = np.unique(mesh.faces[half // 3, half % 3])
     joining = np.zeros(len(mesh.points), dtype=np.bool_)
     joining[mesh.faces[mine & (mirror < 0)]] = True
     return Valleys(np.ascontiguousarray(mesh.points[corner].T), ~joining[corner])
+
+
+def _grooves(setup: OpticalSetup, mine: Bools, mirror: Bools) -> Valleys:
+    """Corners of the bottoms of grooves: of facets beside mirrors, but in no joining face."""
+    mesh = setup.mesh
+    upper = np.zeros(len(mesh.points), dtype=np.bool_)
+    upper[mesh.faces[mirror]] = True
+    beside = np.flatnonzero(mine & ~mirror & upper[mesh.faces].any(axis=1))
+    blur = ROUNDINGS * rounding(mesh)
+    away = np.abs(mesh.points[:, [0, 2]] - np.array([0, setup.export.foot_z_mm]))
+    planes: Bools = np.asarray(away <= blur)
+    joining = np.any(planes[mesh.faces[beside]].all(axis=1), axis=1)
+    corner = np.unique(mesh.faces[beside[~joining]])
+    corner = corner[~upper[corner]]
+    return Valleys(np.ascontiguousarray(mesh.points[corner].T), ~np.any(planes[corner], axis=1))
 
 
 def _back(setup: OpticalSetup, valleys: Valleys, camera: Camera) -> Floats:

@@ -1,7 +1,7 @@
-"""The wedge of the object that neither half of a mirror on the seam sees.
+"""What neither half of a mirror on the seam sees of the object.
 
 The two halves are different spheres: their cuts along x = 0 map to slightly different curves at
-the object. Neither half sees what lies between the curves; where they cross, both do.
+the object. Where the halves overlap, both see what lies between the curves; elsewhere neither does.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from tbcad_verify.shell.outline import Outline
 from tbcad_verify.types import Floats
 
 STEPS = 121
+# Coordinates of 32 bits displace images by less than this: a narrower gap is none.
+ROUNDING_MM = 5e-3
 
 
 def gaps(
@@ -48,8 +50,18 @@ def gaps(
     chord = np.sqrt(np.maximum(radius_mm**2 - height**2, 0))
     (one, side), (two, _) = cuts
     one, two = np.clip(one, -chord, chord), np.clip(two, -chord, chord)
-    widest[halves] = np.maximum(side[:, None] * (one - two), 0).max(axis=1)
+    gap = (side[:, None] * (one - two)).max(axis=1)
+    widest[halves] = np.where(gap < ROUNDING_MM, 0.0, gap)
     return widest
+
+
+def counted(diameter: Floats, gap: Floats, radius_mm: float) -> Floats:
+    """(V,) coverage diameters that fall short of the object by what the halves leave unseen, mm.
+
+    A boundary short of the disc's edge by e takes 2 e from a diameter. Halves that each end e
+    before the other's begin at x = 0 leave a gap of 2 e, which is counted alike.
+    """
+    return np.asarray(np.where(gap > 0, np.minimum(diameter, 2 * radius_mm - gap), diameter))
 
 
 def _cut(

@@ -32,7 +32,7 @@ class Casing:
         semi_axes: of the back along the axis and across it, mm.
         centre: (3,) of the back, mm.
         axis: (3,) unit, of the back.
-        valleys: (V, 3) corners of the mirrors, mm.
+        valleys: (V, 3) corners of the mirrors and of the walls below them, mm.
         holes: round, by diameter, from the spec.
     """
 
@@ -48,7 +48,7 @@ def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
 
     Args:
         text: of the STEP file.
-        mirrors: names of the mirrors' faces.
+        mirrors: names of the mirrors' faces and of the walls below them.
 
     Raises:
         Unknown: there is no back, more than one, or no spheroid.

@@ -36,7 +36,9 @@ from tbcad_verify.step.part_checks import (
     names_of,
     run_checks,
 )
-from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export
+from tbcad_verify.step.pedestal_faces import fronts, wall_errors
+from tbcad_verify.step.pedestals import PedestalWalls
+from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export, walls_of_export
 from tbcad_verify.step.step_file import StepFile, known, load
 from tbcad_verify.types import Floats, Ints
 
@@ -61,6 +63,8 @@ class ShellComparison(PartComparison):
         face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
         cells: (m,) in closed form.
         casing: back and holes.
+        wall: thickness behind the deepest valley, mm.
+        walls: of pedestals, by the record.
         export: the record.
         camera: that the shell is for.
     """
@@ -71,6 +75,8 @@ class ShellComparison(PartComparison):
     face: Ints
     cells: ClosedFormCells
     casing: Casing
+    wall: float | Unknown
+    walls: PedestalWalls | None
     export: Export
     camera: Camera
 
@@ -98,6 +104,7 @@ def shell_step_checks(
     masses: dict[str, MassProperties],
     comparisons: dict[str, ShellComparison | Unknown],
     coverage: Floats | None = None,
+    areas: Sequence[Check] | None = None,
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
@@ -106,22 +113,29 @@ def shell_step_checks(
         masses: of the meshes, by part.
         comparisons: by part.
         coverage: (M,) mm, as measured on spheres.
+        areas: what `area_checks` gives; None: it is called.
     """
 
     def of_part(part: Part) -> list[Check]:
         comparison = known(comparisons[part.name])
-        return run_checks(CHECKS, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
+        return run_checks(chosen, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
 
+    chosen = {**CHECKS, **(WALLS if export.spec.shell.edges == "pedestal" else {})}
     checks = [
         check
         for part in export.parts
         if part.step
-        for check in guarded(names_of(CHECKS, part.step), partial(of_part, part))
+        for check in guarded(names_of(chosen, part.step), partial(of_part, part))
     ]
-    areas = guarded([AREAS], lambda: [_recorded_areas(export)])
-    areas += guarded([RULE], lambda: [rule_check(export)])
-    areas += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
-    return areas + checks
+    recorded = [*(area_checks(export) if areas is None else areas)]
+    recorded += guarded([RULE], lambda: [rule_check(export)])
+    recorded += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
+    return recorded + checks
+
+
+def area_checks(export: Export) -> list[Check]:
+    """The check of the recorded areas, which takes long and needs the record alone."""
+    return guarded([AREAS], lambda: [_recorded_areas(export)])
 
 
 def _recorded_areas(export: Export) -> Check:
@@ -146,19 +160,25 @@ def _comparison(export: Export, part: Part, read: StepFile | Unknown) -> ShellCo
     mirrors = export.mirrors.take(np.flatnonzero(mine))
     count = Counter(file.faces.names)
     index = {name: k for k, name in enumerate(file.faces.names)}
+    ids, text = frozenset(mirrors.ids), load(export.folder, part.step).text()
+    casing = read_casing(text, fronts(file.faces, ids))
+    camera = export.cameras[part.camera]
+    thickness, no_wall = attempt(lambda: wall(casing, camera, export.semi_minor_mm))
     return ShellComparison(
         part.name,
         file,
         None,
         export.mesh_error_mm,
         mirrors=mirrors,
-        foreign=frozenset(export.mirrors.ids) - frozenset(mirrors.ids),
+        foreign=frozenset(export.mirrors.ids) - ids,
         coating_mm=export.coating_mm,
         face=np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
         cells=cells_of_export(export, part.camera),
-        casing=read_casing(load(export.folder, part.step).text(), frozenset(mirrors.ids)),
+        casing=casing,
+        wall=Unknown(no_wall) if thickness is None else thickness,
+        walls=walls_of_export(export, part.camera),
         export=export,
-        camera=export.cameras[part.camera],
+        camera=camera,
     )
 
 
@@ -230,10 +250,16 @@ def _front_volume(name: CheckName, shell: ShellComparison) -> Check:
     )
 
 
+def _walls(name: CheckName, shell: ShellComparison) -> Check:
+    """The walls of pedestals, against those that follow from the record."""
+    errors = wall_errors(shell.file.faces, shell.mirrors.ids, shell.walls)
+    return _worst_of(name, *errors, SURFACE_MM, "mm")
+
+
 def _wall(name: CheckName, shell: ShellComparison) -> Check:
     """Material behind the deepest valley, as the spec has it."""
     asked = shell.export.spec.shell.wall_mm
-    measured = wall(shell.casing, shell.camera, shell.export.semi_minor_mm)
+    measured = known(shell.wall)
     detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
     return at_most(name, abs(measured - asked), WALL_MM, detail)
 
@@ -260,6 +286,7 @@ def _worst_of(name: CheckName, ids: Sequence[str], error: Floats, limit: float, 
     return each_at_most(name, ids, error, limit, unit)
 
 
+WALLS: Checks = {"step walls": ("mm", _walls)}
 CHECKS: Checks = {
     **SOLID_CHECKS,
     "step names": ("missing or extra", _names),

@@ -6,6 +6,7 @@ numbers are searched for in the text of each entity's parameters, which are not 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -68,6 +69,7 @@ class StepTable:
         entities = read_entities(text).texts
         self.kinds = {number: kind for number, (kind, _) in entities.items()}
         self.bodies = {number: body for number, (_, body) in entities.items()}
+        self._references: dict[int, list[int]] = {}
 
     def of(self, kind: str) -> list[int]:
         """Numbers of all entities of a kind."""
@@ -75,7 +77,10 @@ class StepTable:
 
     def references(self, number: int) -> list[int]:
         """What an entity refers to."""
-        return [int(digits) for digits in REFERENCE.findall(self.bodies.get(number, ""))]
+        if number not in self._references:
+            digits = REFERENCE.findall(self.bodies.get(number, ""))
+            self._references[number] = [int(one) for one in digits]
+        return self._references[number]
 
     def numbers(self, number: int) -> list[float]:
         """Decimal numbers in an entity."""
@@ -87,9 +92,10 @@ class StepTable:
         while todo:
             number = todo.pop()
             yield number
-            new = [one for one in self.references(number) if one not in seen]
-            seen.update(new)
-            todo += new
+            if references := self.references(number):
+                new = [one for one in references if one not in seen]
+                seen.update(new)
+                todo += new
 
     def triple(self, number: int) -> Floats:
         """(3,) of a point or direction."""
@@ -170,13 +176,19 @@ def _lines(faces: list[RoundFace]) -> list[list[RoundFace]]:
 
 
 def _is_on(one: RoundFace, two: RoundFace) -> bool:
-    parallel = float(np.linalg.norm(np.cross(one.axis, two.axis))) <= PARALLEL
+    parallel = cross_length(one.axis, two.axis) <= PARALLEL
     return parallel and distance_to_line(two.point, one.point, one.axis) <= SAME_LINE_MM
 
 
 def distance_to_line(point: Floats, start: Floats, axis: Floats) -> float:
     """Distance of a point (3,) from a line through another along a unit axis, mm."""
-    return float(np.linalg.norm(np.cross(point - start, axis)))
+    return cross_length(point - start, axis)
+
+
+def cross_length(one: Floats, other: Floats) -> float:
+    """Length of the cross product of two vectors (3,); numpy's takes twenty times as long."""
+    (x, y, z), (a, b, c) = one.tolist(), other.tolist()
+    return math.hypot(y * c - z * b, z * a - x * c, x * b - y * a)
 
 
 def _span_on(first: RoundFace, face: RoundFace) -> tuple[float, float]:

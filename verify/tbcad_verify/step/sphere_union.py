@@ -16,13 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import dot
+from tbcad_verify.mesh.vectors import dot, unit
 from tbcad_verify.record.export import Export
 from tbcad_verify.step.arc_loops import arc_loops, front_pieces
 from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
 from tbcad_verify.step.cell_moments import cell_moments
-from tbcad_verify.step.map_arcs import MapArcs
-from tbcad_verify.step.stereographic import to_surface
+from tbcad_verify.step.map_arcs import MapArcs, free_arcs
+from tbcad_verify.step.pedestals import Mirrors, PedestalWalls, pedestal_walls
+from tbcad_verify.step.stereographic import plane_circles, surface_maps, to_surface
 from tbcad_verify.types import Bools, Floats, Ints
 
 SAME_CORNER = 1e-11  # of the spread
@@ -113,6 +114,17 @@ def cells_of_balls(centre: Floats, radius: Floats, walls: Floats) -> ClosedFormC
     return closed_form_cells(centre + radius[:, None] * up, up, 1 / radius, walls, front=False)
 
 
+def cells_within(mirrors: Surfaces, point: Floats, normal: Floats, real: Bools) -> ClosedFormCells:
+    """Cells of M mirrors, each between planes of its own: see `plane_circles`."""
+    spread = float(np.hypot.reduce(np.ptp(mirrors.point, axis=1)))
+    maps = surface_maps(mirrors, True, spread)
+    arcs = free_arcs(plane_circles(maps, point, normal, real), spread)
+    arcs = arcs.take(arcs.length > SAME_CORNER * spread)
+    whole = np.zeros(len(mirrors.curvature), dtype=np.bool_)
+    boundaries = CellBoundaries(maps, front_pieces(arcs, spread), whole, spread)
+    return _measured(boundaries, point.shape[1])
+
+
 def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> ClosedFormCells:
     """The cells of one camera's rows of mirrors.csv, in their order, as the solid has them.
 
@@ -120,12 +132,32 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     `coated`. A row without a radius is a plane. The walls are the seam x = 0, of which the camera
     has the side of its pinhole, and the foot plane. The recorded `cell_area_mm2` is the coated one.
     """
+    light, walls = _mirrors_and_bounds(export, camera)
+    solid = light.coated(0.0 if coated else -export.coating_mm)
+    if planes := walls_of_export(export, camera):
+        return cells_within(solid, planes.point, planes.normal, planes.real)
+    return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
+
+
+def walls_of_export(export: Export, camera: str) -> PedestalWalls | None:
+    """The planes that end the mirrors of one camera; None where neighbouring spheres meet."""
+    if export.spec.shell.edges != "pedestal":
+        return None
+    light, walls = _mirrors_and_bounds(export, camera)
+    point, normal, pinhole = light.point.T, light.normal.T, export.cameras[camera].pinhole
+    # Planar mirrors that send the rays to their apices on to the origin.
+    between = unit(unit(pinhole[:, None] - light.point) - unit(light.point)).T
+    flat = closed_form_cells(point, between, np.zeros_like(light.curvature), walls)
+    groove = export.spec.shell.groove_mm
+    return pedestal_walls(Mirrors(point, normal, light.curvature, walls, pinhole, groove), flat.rim)
+
+
+def _mirrors_and_bounds(export: Export, camera: str) -> tuple[Surfaces, Floats]:
+    """One camera's mirrors as they reflect, and (2, 4) the planes of seam and foot."""
     rows = export.mirrors
-    mine = np.flatnonzero(rows.camera == camera)
-    solid = rows.surfaces().take(mine).coated(0.0 if coated else -export.coating_mm)
     side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
     walls = np.array([[side, 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
-    return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
+    return rows.surfaces().take(np.flatnonzero(rows.camera == camera)), walls
 
 
 def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:

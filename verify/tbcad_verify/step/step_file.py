@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import MassProperties
@@ -20,10 +21,12 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
+from tbcad_verify.step.__main__ import main as read_files
 from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
+SAME_SURFACE = 2e-9  # mm and differences of unit vectors: digits of the text
 EXACT_KINDS = ("sphere", "plane")
 FILES = (("part", "step"), ("answer", "json"))
 PROCESSES = min(os.cpu_count() or 1, 4)  # read files at the same time, 0.2 GB each
@@ -139,6 +142,9 @@ def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | U
 def _read(place: Path, order: Sequence[int], limits: Limits) -> str:
     """Read files in a child process; why it failed, or empty."""
     pairs = [f"{place}/{word}{k}.{end}" for k in order for word, end in FILES]
+    if limits.fork:
+        read_files(limits.seconds, PROCESSES, [Path(path) for path in pairs])
+        return ""
     command = [sys.executable, *READER, str(limits.seconds), str(PROCESSES), *pairs]
     # Loading the kernel, and one file after the other.
     outcome = run(command, place, replace(limits, seconds=limits.seconds * (1 + len(order))))
@@ -176,18 +182,32 @@ def parse(text: Row, solid: Row) -> StepFile:
         solid["gap"],
         MassProperties(solid["volume"], area, solid["centroid"], *solid["box"]),
         text["properties"],
-        _faces(text["faces"], {_key(row): row for row in rows}),
+        _faces(text["faces"], rows),
     )
 
 
-def _key(row: Row) -> tuple[Any, ...]:
-    """A surface as both readers give it, to the precision of the text."""
-    numbers = [*row.get("point", ()), *row.get("axis", ()), row.get("radius", 0.0)]
-    return row["kind"], *(round(number, 9) + 0.0 for number in numbers)
+def _joined(rows: list[Row], measured: list[Row]) -> list[Row]:
+    """Each row with what the kernel measured of the same surface, to the precision of the text."""
+    joined: list[Row] = [{} for _ in rows]
+    for kind in EXACT_KINDS:
+        mine, theirs = (
+            [k for k, row in enumerate(some) if row["kind"] == kind] for some in (rows, measured)
+        )
+        if mine and theirs:
+            tree = cKDTree(np.nan_to_num([_numbers(measured[k]) for k in theirs]))
+            found = tree.query(np.nan_to_num([_numbers(rows[k]) for k in mine]))
+            distance, nearest = (np.atleast_1d(one).tolist() for one in found)
+            for k, far, there in zip(mine, distance, nearest, strict=True):
+                joined[k] = measured[theirs[there]] if far <= SAME_SURFACE else {}
+    return joined
 
 
-def _faces(rows: list[Row], measured: dict[tuple[Any, ...], Row]) -> StepFaces:
-    joined = [measured.get(_key(row), {}) if row["kind"] in EXACT_KINDS else {} for row in rows]
+def _numbers(row: Row) -> list[float]:
+    return [*row.get("point", ()), *row.get("axis", ()), row.get("radius", 0.0)]
+
+
+def _faces(rows: list[Row], measured: list[Row]) -> StepFaces:
+    joined = _joined(rows, measured)
     return StepFaces(
         tuple(row["name"] for row in rows),
         np.array([row["kind"] for row in rows], dtype=str),

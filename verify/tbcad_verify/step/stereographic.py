@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, dot, take, tangent_basis
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.types import Bools, Floats, Ints
 
 COINCIDENT = 1e-12
 FAR = 1e4
@@ -115,6 +115,29 @@ def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float
     scale = 1 / np.sqrt(np.where(real, square, 1))
     return _with_horizon(
         MapCircles(alpha * scale, beta * scale, gamma * scale, real, covers), maps.reach
+    )
+
+
+def plane_circles(maps: SurfaceMaps, point: Floats, normal: Floats, real: Bools) -> MapCircles:
+    """What planes of its own, and last the horizon, leave of each of M maps: (M, K + 1) circles.
+
+    Args:
+        maps: of the mirrors.
+        point: (M, K, 3) mm, on the planes.
+        normal: (M, K, 3) unit, to the side that is kept.
+        real: (M, K) false for places in the table without a plane.
+    """
+    mine = maps.surfaces
+    gamma = np.einsum("mkx,mkx->mk", normal, mine.point.T[:, None] - point)
+    along = [np.einsum("mkx,xm->mk", normal, a) for a in (maps.right, maps.up, mine.normal)]
+    k = mine.curvature[:, None]
+    alpha, beta = k**2 / 4 * gamma - k * along[2] / 2, np.stack(along[:2])
+    square = beta[0] ** 2 + beta[1] ** 2 - 4 * alpha * gamma
+    cuts = real & (square > COINCIDENT)
+    scale = 1 / np.sqrt(np.where(cuts, square, 1))
+    covers = real & ~cuts & (gamma < 0)
+    return _with_horizon(
+        MapCircles(alpha * scale, beta * scale, gamma * scale, cuts, covers), maps.reach
     )
 
 

@@ -33,7 +33,7 @@ from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_IN, TopAbs_ON
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from tbcad_verify.step.kernel.topology import corners_of, edges_of, faces_of, triple
+from tbcad_verify.step.kernel.topology import edges_of, faces_of, triple
 from tbcad_verify.types import Floats
 
 RULED = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_SurfaceOfExtrusion)
@@ -43,9 +43,9 @@ FAR_MM = 1e4  # farther than any part, near enough for the digits
 OUTWARD = np.vstack([-np.eye(3), np.eye(3)])  # minimum x, y, z, then maximum
 
 
-def box(shape: TopoDS_Shape) -> list[list[float]]:
-    """Minimum and maximum x, y, z, mm; infinite without corners and edges."""
-    reach = np.maximum(_of_corners(shape), _of_edges(shape))
+def box(shape: TopoDS_Shape, corners: Floats) -> list[list[float]]:
+    """Minimum and maximum x, y, z, mm; infinite without corners (V, 3) and edges."""
+    reach = np.maximum(_of_corners(corners), _of_edges(shape))
     faces = [(face, BRepAdaptor_Surface(face)) for face in faces_of(shape)]
     spheres = [pair for pair in faces if pair[1].GetType() == GeomAbs_Sphere]
     others = [face for face, surface in faces if surface.GetType() not in (GeomAbs_Sphere, *RULED)]
@@ -55,9 +55,9 @@ def box(shape: TopoDS_Shape) -> list[list[float]]:
     return [(-reach[:3]).tolist(), reach[3:].tolist()]
 
 
-def _of_corners(shape: TopoDS_Shape) -> Floats:
-    """(6,) how far the corners reach along `OUTWARD`."""
-    return np.asarray((OUTWARD @ corners_of(shape).T).max(axis=1, initial=-np.inf))
+def _of_corners(corners: Floats) -> Floats:
+    """(6,) how far corners reach along `OUTWARD`."""
+    return np.asarray((OUTWARD @ corners.T).max(axis=1, initial=-np.inf))
 
 
 def _of_edges(shape: TopoDS_Shape) -> Floats:

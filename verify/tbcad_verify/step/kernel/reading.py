@@ -30,7 +30,8 @@ def read_solid(path: Path) -> Row:
         ValueError: the kernel cannot read it, or finds no shape in it.
     """
     shape = transferred(path)
-    origin = corners_of(shape).mean(axis=0)
+    corners = corners_of(shape)
+    origin = corners.mean(axis=0)
     gap = ShapeAnalysis_ShapeTolerance().Tolerance(shape, MAXIMUM)
     measured = [measure_face(face, origin, gap) for face in faces_of(shape)]
     volume, *moment = np.sum([enclosed for _, enclosed in measured], axis=0).tolist()
@@ -42,7 +43,7 @@ def read_solid(path: Path) -> Row:
         "gap": gap,
         "volume": volume,
         "centroid": (origin + np.divide(moment, volume)).tolist(),
-        "box": box(shape),
+        "box": box(shape, corners),
         "faces": [row for row, _ in measured],
     }
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.gp import gp_XYZ
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
@@ -66,5 +65,4 @@ def open_edges(shape: TopoDS_Shape) -> int:
 
 def triple(vector: Any) -> list[float]:
     """Coordinates of a point or direction of the kernel."""
-    xyz: gp_XYZ = vector.XYZ()
-    return [xyz.X(), xyz.Y(), xyz.Z()]
+    return list(vector.Coord())

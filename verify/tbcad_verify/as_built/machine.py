@@ -1,0 +1,157 @@
+"""machine.json: camera, axis and balls as a calibration found them, validated strictly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from tbcad_verify.errors import BadExport
+from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read
+from tbcad_verify.record.validation import Matrix, Strict, Vector, parse_json, validated
+from tbcad_verify.types import Floats, Ints
+
+SCHEMA, NAME = "tbcad-machine/1", "machine.json"
+CALIBRATE = "write it again with `tbcad calibrate`"
+SQUARE = 1e-6  # by which unit vectors and right angles may be off
+MOST = 100_000
+MAX_SIDE_PX = 65536
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Five = Annotated[list[float], Field(min_length=5, max_length=5)]
+
+
+class RealCamera(Strict):
+    """A camera with a lens that distorts as OpenCV's model says.
+
+    Attributes:
+        pinhole: (3,) mm.
+        axes: (3, 3) rows: across the columns, down the rows, forward.
+        focal: pixels, along rows and columns.
+        principal: column and row of the optical axis.
+        distortion: k1, k2, p1, p2, k3.
+        width: columns.
+        height: rows.
+    """
+
+    pinhole: Vector = Field(alias="pinhole_mm")
+    axes: Matrix
+    focal: Pair = Field(alias="focal_px")
+    principal: Pair = Field(alias="principal_px")
+    distortion: Five
+    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)
+    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        mirrored = float(np.linalg.det(self.axes)) < 0
+        if mirrored or np.abs(self.axes @ self.axes.T - np.eye(3)).max() > SQUARE:
+            raise ValueError("has axes that are no unit vectors at right angles")
+        if min(self.focal) <= 0:
+            raise ValueError("has a focal length that is not above 0")
+        return self
+
+    def frame_margin(self, d: Floats) -> Floats:
+        """(N,) distance of what is seen along d (3, N) from the picture's edge, pixels.
+
+        Negative outside, and without limit behind the camera.
+        """
+        x, y, z = self.axes @ d
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x, y = x / z, y / z
+        k1, k2, p1, p2, k3 = self.distortion
+        square = x * x + y * y
+        radial = 1 + square * (k1 + square * (k2 + square * k3))
+        column = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x)
+        row = y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y
+        column = column * self.focal[0] + self.principal[0]
+        row = row * self.focal[1] + self.principal[1]
+        sides = [column, self.width - 1 - column, row, self.height - 1 - row]
+        return np.asarray(np.where(z > 0, np.min(sides, axis=0), -np.inf))
+
+
+class MeasuredBall(Strict):
+    """A reflecting sphere with the base at angle zero."""
+
+    centre: Vector = Field(alias="centre_mm")
+    radius: float = Field(alias="radius_mm", gt=0, le=1e4)
+
+
+class MachineFrame(Strict):
+    """A position of the machine: which of the two runs, and which stop."""
+
+    turn: Literal[0, 180] = Field(alias="object_turn_deg")
+    stop: int = Field(ge=1, le=MOST)
+
+
+class AsBuilt(Strict):
+    """The whole machine.
+
+    Attributes:
+        camera: that takes the photographs.
+        axis: (3,) unit, that the base rotates about.
+        axis_point: (3,) mm, of the axis.
+        frames: positions in which it was measured.
+        angle_deg: of the base in each.
+        shift: of the base in each, mm; None for nowhere.
+        balls: reflecting spheres.
+    """
+
+    camera: RealCamera
+    axis: Vector
+    axis_point: Vector = Field(alias="axis_point_mm")
+    frames: list[MachineFrame] = Field(min_length=1, max_length=MOST)
+    angle_deg: list[float] = Field(max_length=MOST)
+    shift: list[Vector] | None = Field(None, alias="shift_mm", max_length=MOST)
+    balls: list[MeasuredBall] = Field(alias="spheres", min_length=1, max_length=MOST)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if abs(float(np.linalg.norm(self.axis)) - 1) > SQUARE:
+            raise ValueError("has an axis of another length than 1")
+        counts = {len(self.frames), len(self.angle_deg), len(self.shift or self.frames)}
+        if len(counts) > 1:
+            raise ValueError("has another number of angles or shifts than of frames")
+        places = [(frame.turn, frame.stop) for frame in self.frames]
+        if len(set(places)) != len(places):
+            raise ValueError("has a frame twice")
+        return self
+
+    @property
+    def centre(self) -> Floats:
+        """(3, K) of the balls with the base at angle zero, mm."""
+        return np.array([ball.centre for ball in self.balls]).T
+
+    @property
+    def radius(self) -> Floats:
+        """(K,) mm."""
+        return np.array([ball.radius for ball in self.balls])
+
+    def frame_of(self, turn: int, stop: Ints) -> Ints:
+        """(N,) number of the frame at each stop of a run; -1 where it was not measured."""
+        number = {frame.stop: k for k, frame in enumerate(self.frames) if frame.turn == turn}
+        return np.array([number.get(one, -1) for one in stop.tolist()], dtype=np.int64)
+
+    def placed(self, centre: Floats, frame: Ints) -> Floats:
+        """(3, N) where points (3, N) of the base are in frames (N,), mm."""
+        angle = np.radians(np.array(self.angle_deg)[frame])
+        turn = Rotation.from_rotvec(angle[:, None] * self.axis)
+        shift = np.zeros(3) if self.shift is None else np.array(self.shift)[frame]
+        point = self.axis_point
+        return np.asarray((point + turn.apply(centre.T - point) + shift).T)
+
+
+def read_machine(folder: Path) -> AsBuilt:
+    """Read machine.json of a folder that `tbcad calibrate` wrote.
+
+    Raises:
+        BadExport: anything missing, malformed, not finite or absurd.
+    """
+    try:
+        value = parse_json(read(open_folder(folder), NAME, MAX_TEXT_BYTES), SCHEMA)
+        return validated(NAME, AsBuilt, value)
+    except BadExport as error:
+        raise BadExport(str(error).replace(AGAIN, CALIBRATE)) from error

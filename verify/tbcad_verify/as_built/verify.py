@@ -1,0 +1,147 @@
+"""The verification of a calibrated prototype: coverage as built, and what to shim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tbcad_verify.as_built.machine import NAME, AsBuilt, read_machine
+from tbcad_verify.as_built.report import AsBuiltReport, BallRow
+from tbcad_verify.as_built.shims import SeatErrors, error_um, seat_errors
+from tbcad_verify.as_built.views import Half, HalfViews, half_views, halves
+from tbcad_verify.errors import BadExport
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.export import read_export
+from tbcad_verify.report.checks import (
+    Check,
+    at_least,
+    at_most,
+    check_names,
+    short_list,
+    worst_offenders,
+)
+from tbcad_verify.types import Floats, Ints, Progress
+
+CHECKS = {
+    "as built: coverage": "mm",
+    "as built: stops": "mirrors",
+    "as built: windows in the picture": "px",
+    "as built: object clearance": "mm",
+}
+
+
+@dataclass(frozen=True)
+class BuiltViews:
+    """All mirrors of both runs.
+
+    Attributes:
+        ids: of the M mirrors.
+        ball: (M,) that substitutes for each, from 0.
+        views: of all, (M,).
+    """
+
+    ids: tuple[str, ...]
+    ball: Ints
+    views: HalfViews
+
+
+def verify_as_built(
+    folder: Path, calibration: Path, progress: Progress = lambda _: None
+) -> AsBuiltReport:
+    """Verify the prototype of an export as a calibration found it.
+
+    Args:
+        folder: what `tbcad build` wrote.
+        calibration: what `tbcad calibrate` wrote.
+        progress: called with the name of each stage.
+
+    Raises:
+        BadExport: one cannot be read, or they do not belong together. Nothing is written.
+    """
+    progress("record and calibration")
+    machine, export = read_machine(calibration), read_export(folder)
+    if export.prototype is None:
+        raise BadExport(f"{folder} has no prototype; build it, then calibrate it")
+    if export.mirrors.flat.any():
+        raise BadExport(f"{folder} has planar mirrors, for which no ball substitutes")
+    context = PrototypeContext(export, export.prototype)
+    both = halves(context, machine)
+    progress("coverage as built")
+    now = _views(both, lambda half: half_views(context, machine, half, machine.centre))
+    progress("coverage with shims")
+    errors = seat_errors(context, machine)
+    then = _views(both, lambda half: half_views(context, machine, half, errors.placed))
+    return AsBuiltReport(
+        export.target_mm,
+        tuple(_checks(now, export.target_mm)),
+        dict(zip(now.ids, now.views.coverage.tolist(), strict=True)),
+        tuple(_ball_rows(context, machine, errors, now, then)),
+        float(np.degrees(errors.turn)),
+        float(np.degrees(errors.tilt)),
+        errors.shift,
+    )
+
+
+def _views(both: list[Half], work: Callable[[Half], HalfViews]) -> BuiltViews:
+    parts = [work(half) for half in both]
+    ids = tuple(name for half in both for name in half.ids)
+    columns = [
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("coverage", "margin", "clearance")
+    ]
+    return BuiltViews(ids, np.concatenate([half.ball for half in both]), HalfViews(*columns))
+
+
+def _checks(built: BuiltViews, target: float) -> list[Check]:
+    covers, stops, picture, clear = check_names(CHECKS, NAME)
+    views, missing = built.views, np.isnan(built.views.coverage)
+
+    def least(values: Floats) -> float:
+        return float(np.nanmin(values)) if not missing.all() else np.nan
+
+    def worst(values: Floats, unit: str, limit: float) -> str:
+        bad = values < limit
+        return worst_offenders(built.ids, values, unit, bad, badness=-np.nan_to_num(values))
+
+    lost = short_list([built.ids[k] for k in np.flatnonzero(missing).tolist()])
+    return [
+        at_least(covers, least(views.coverage), target, worst(views.coverage, "mm", target)),
+        at_most(stops, float(missing.sum()), 0, f"stops of {lost} are not calibrated"),
+        at_least(picture, least(views.margin), 0, worst(views.margin, "px", 0)),
+        at_least(clear, least(views.clearance), 0, worst(views.clearance, "mm", 0)),
+    ]
+
+
+def _ball_rows(
+    context: PrototypeContext,
+    machine: AsBuilt,
+    errors: SeatErrors,
+    now: BuiltViews,
+    then: BuiltViews,
+) -> list[BallRow]:
+    target, rows = context.export.target_mm, []
+    radius = 1000 * (machine.radius - context.prototype.balls.radius_mm)
+    for k, off in enumerate(error_um(errors).tolist()):
+        mine = now.ball == k
+        before, after = now.views.coverage[mine], then.views.coverage[mine]
+        rows.append(
+            BallRow(
+                number=k + 1,
+                mirrors=int(mine.sum()),
+                short=int((before < target).sum()),
+                coverage_mm=_minimum(before),
+                off_um=off,
+                shim_um=tuple((1000 * errors.shim[:, k]).tolist()),
+                radius_um=float(radius[k]),
+                shimmed_mm=_minimum(after),
+            )
+        )
+    return rows
+
+
+def _minimum(values: Floats) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.min()) if known.size else None

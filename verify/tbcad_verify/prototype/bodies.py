@@ -1,0 +1,120 @@
+"""All bodies of the assembly as rays meet them: those of the base at any angle, and the others.
+
+Their shapes are those of the assembly's GLB, whose bodies are compared with the parts' own files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad_verify.mesh.vectors import unit
+from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.types import Floats, Ints
+
+NOT_BODIES = frozenset({"capture_sphere", "camera_view"})
+SWUNG = ("base", "cap")  # roles of printed parts that turn with the base
+LEAST_ANGLES = 7
+LIFT_MM = 1e-3
+
+
+@dataclass(frozen=True)
+class BodyScene:
+    """Bodies that rays meet.
+
+    Attributes:
+        embree: the committed scene; None without any body.
+        owner: (F,) number of each facet's body.
+        names: of the bodies.
+    """
+
+    embree: object
+    owner: Ints
+    names: tuple[str, ...]
+
+    def first(self, origin: Floats, along: Floats) -> tuple[Ints, Floats]:
+        """Number of the body that rays (N, 3) meet first, -1 for none, and its distance, mm."""
+        body = np.full(len(origin), -1, dtype=np.int64)
+        distance = np.full(len(origin), np.inf)
+        if self.embree is not None and len(origin):
+            found = self.embree.run(  # type: ignore[attr-defined]
+                origin.astype(np.float32), along.astype(np.float32), output=1
+            )
+            hit = found["primID"] >= 0
+            body[hit] = self.owner[found["primID"][hit]]
+            distance[hit] = found["tfar"][hit]
+        return body, distance
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Bodies that turn with the base, and bodies that do not."""
+
+    context: PrototypeContext
+    turning: BodyScene
+    still: BodyScene
+
+    def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
+        """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
+        back = self.context.base_rotation(np.array([-angle])).as_matrix()[0].T
+        one, near = self.turning.first(origin @ back, along @ back)
+        two, far = self.still.first(origin, along)
+        other = np.where(two < 0, -1, two + len(self.turning.names))
+        names = ("", *self.turning.names, *self.still.names)
+        counts = np.bincount(np.where(near < far, one, other) + 1, minlength=len(names))
+        return {name: count for name, count in zip(names, counts.tolist(), strict=True) if count}
+
+    def blocked(self, starts: Floats, ends: Floats, angle: float) -> np.ndarray:
+        """(N,) whether something lies between points (N, 3) at a base angle, rad."""
+        along = unit((ends - starts).T).T
+        length = np.linalg.norm(ends - starts, axis=1)
+        back = self.context.base_rotation(np.array([-angle])).as_matrix()[0].T
+        near = self.turning.first(starts @ back, along @ back)[1]
+        far = self.still.first(starts + LIFT_MM * along, along)[1]
+        return np.asarray(np.minimum(near, far) < length - LIFT_MM)
+
+
+def assembled_bodies(
+    context: PrototypeContext, drawn: Mapping[str, Shape], without: Iterable[str] = ()
+) -> Bodies:
+    """The bodies of an assembly but for some that are named."""
+    swung = {part.name for part in context.prototype.parts if part.role in SWUNG}
+    swung |= {one.name for one in context.prototype.bought if one.turns}
+    swung |= {one.name for one in context.prototype.fasteners if one.turns}
+    left_out = NOT_BODIES | set(without)
+    shapes = {name: shape for name, shape in drawn.items() if name not in left_out}
+    turning = {n: s for n, s in shapes.items() if n in swung or n.startswith("ball_")}
+    still = {n: s for n, s in shapes.items() if n not in turning}
+    return Bodies(context, _scene(turning), _scene(still))
+
+
+def stage_bodies(context: PrototypeContext) -> frozenset[str]:
+    """Names of the stage's parts and of the fasteners in them."""
+    parts = {part.name for part in context.prototype.parts if part.role == "stage"}
+    some = context.prototype.fasteners
+    return frozenset(parts | {one.name for one in some if one.through[0] in parts})
+
+
+def some_angles(context: PrototypeContext) -> Floats:
+    """(s,) base angles of some of the stops, evenly, the outermost included, rad."""
+    angles = np.unique(context.angle)
+    which = np.linspace(0, len(angles) - 1, min(LEAST_ANGLES, len(angles))).round()
+    return np.asarray(angles[which.astype(np.int64)])
+
+
+def _scene(shapes: Mapping[str, Shape]) -> BodyScene:
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    if not shapes:
+        return BodyScene(None, np.zeros(0, dtype=np.int64), ())
+    triangles = [points[faces] for points, faces in shapes.values()]
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, np.concatenate(triangles).astype(np.float32))
+    one = np.ones((1, 3), dtype=np.float32)
+    scene.run(one, one)  # the first call commits
+    owner = np.repeat(np.arange(len(shapes)), [len(some) for some in triangles])
+    return BodyScene(scene, owner, tuple(shapes))

@@ -1,0 +1,172 @@
+"""How far the camera's mount moves it, from holes and faces of the solids in the assembly.
+
+Lengths are behind the pinhole along the optical axis, across, and out from the axis.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.prototype import PARTS_LIST
+from tbcad_verify.record.prototype_sections import CameraPlace
+from tbcad_verify.report.checks import Check, CheckName, at_most, informative, require, short_list
+from tbcad_verify.step.solids_text import TextSolid, holes
+from tbcad_verify.types import Floats
+
+M5_MM, M5_HOLE_MM, M5_INSERT_MM, TRIPOD_HOLE_MM = 5.0, 5.5, 6.4, 6.6
+TWO_NUTS_MM = 2 * 4.7 + 1.0  # with a washer, between plate and bracket
+GRIP_MM, WASHER_MM = 4.0, 1.0
+LIP_MM, LIP_WIDTH_MM = 5.0, 30.0  # least height and width of the fence at the camera's back
+# Least travel to either side: printed brackets are off by half a millimetre and a degree.
+LEAST = {
+    "across_mm": 4.0,
+    "out_mm": 2.5,
+    "along_plate_mm": 4.0,
+    "yaw_deg": 2.0,
+    "roll_deg": 0.9,
+    "pitch_deg": 0.9,
+}
+SAME_MM = 1e-6
+SHARE = 1e-6
+CHECKS = {"camera mount": "faults"}
+
+
+def checks(
+    names: list[CheckName], context: PrototypeContext, solids: Mapping[str, TextSolid]
+) -> list[Check]:
+    """Travel as recorded and as needed; the camera is held where the design has it."""
+    place = context.prototype.camera_place
+    if context.export.spec.prototype.camera_diameter_mm == 0:
+        return [informative(names[0], 0, "no camera")]
+    faults = ["no camera_place"] if place is None else [*_faults(context, place, solids)]
+    return [at_most(names[0], len(faults), 0, short_list(faults))]
+
+
+def _faults(
+    context: PrototypeContext, place: CameraPlace, solids: Mapping[str, TextSolid]
+) -> Iterator[str]:
+    spec, axes = context.export.spec.prototype, _axes(context)
+    bracket, plate, fence = (
+        require(solids.get(name), f"the assembly has no {name}")
+        for name in ("camera_bracket", "camera_plate", "camera_fence")
+    )
+    inserts = _places(context, plate, M5_INSERT_MM, 2)
+    if len(inserts) != 3:
+        yield f"{len(inserts)} screws hold the camera plate"
+        return
+    tripod = _places(context, plate, TRIPOD_HOLE_MM, 2)
+    along = float(np.ptp(tripod[:, 0])) / 2
+    screw = np.array([spec.frame.camera_screw_mm, 0.0])
+    if np.abs(tripod.mean(axis=0)[:2] - screw).max() > SAME_MM:
+        yield "the tripod slot is elsewhere"
+    travel = {"along_axis_mm": along}
+    travel["across_mm"] = _least_reach(inserts, _places(context, bracket, M5_HOLE_MM, 2), 1)
+    near = (bracket.corners - context.pinhole) @ axes[2]
+    outs = (plate.corners - context.pinhole) @ axes[2]
+    face, back = float(outs.min()), float(outs.max())
+    if abs(face - spec.camera_diameter_mm / 2) > SAME_MM:
+        yield f"the camera plate is {face:.3f} mm from the optical axis"
+    gap = float(near[near > back - SAME_MM].min()) - back
+    travel["out_mm"] = gap - TWO_NUTS_MM
+    yield from _fence_faults(context, fence, along)
+    held = _places(context, fence, M5_HOLE_MM, 2)
+    reach = _least_reach(held, _places(context, plate, M5_HOLE_MM, 2), 0)
+    lever = float(np.abs(held[:, 1]).max(initial=SAME_MM))
+    travel["yaw_deg"] = math.degrees(math.atan((reach - along) / lever))
+    flange = spec.frame.flange_mm
+    play = math.degrees(math.atan((M5_HOLE_MM - M5_MM) / flange))
+    for name, axis in (("roll_deg", 1), ("pitch_deg", 0)):
+        half = float(np.ptp(inserts[:, axis])) / 2
+        travel[name] = min(math.degrees(math.atan(place.travel.out_mm / half)), play)
+    travel["along_plate_mm"] = _foot_travel(context, bracket)
+    yield from _travel_faults(place, travel, spec.frame.camera_travel_mm / 2)
+    longest = _longest_m5(context)
+    needed = WASHER_MM + flange + gap + place.travel.out_mm + GRIP_MM
+    if longest < needed - SAME_MM:
+        yield f"M5 screws of {longest:g} mm, {needed:.1f} are needed to tilt the plate"
+
+
+def _axes(context: PrototypeContext) -> Floats:
+    """(3, 3) rows: behind the pinhole, across, and out from the optical axis."""
+    w, back = context.frame[0], -context.camera.forward
+    level = np.array([w[0], w[1], 0.0]) / np.hypot(w[0], w[1])
+    out = level - (level @ back) * back
+    up = np.array([0.0, 0.0, 1.0])
+    return np.stack([back, np.cross(up, level), out / np.linalg.norm(out)])
+
+
+def _places(context: PrototypeContext, solid: TextSolid, diameter: float, along: int) -> Floats:
+    """(n, 3) places of holes along one of the mount's axes, sorted."""
+    axes = _axes(context)
+    found = [
+        axes @ (hole.point - context.pinhole)
+        for hole in holes(solid.faces, diameter / 2, SAME_MM)
+        if abs(hole.axis @ axes[along]) > 1 - SAME_MM
+    ]
+    return np.array(sorted(map(tuple, found))).reshape(-1, 3)
+
+
+def _least_reach(screws: Floats, ends: Floats, along: int) -> float:
+    """Least distance of screws from their slots' ends along an axis, mm; 0 without a slot."""
+    other = 1 - along
+    reach = []
+    for screw in screws:
+        off = (ends - screw)[np.abs(ends[:, other] - screw[other]) < SAME_MM, along]
+        sides = [np.abs(off[sign * off > 0]).min(initial=np.inf) for sign in (1, -1)]
+        reach.append(min(sides) if np.isfinite(sides).all() else 0.0)
+    return float(min(reach, default=0.0))
+
+
+def _foot_travel(context: PrototypeContext, bracket: TextSolid) -> float:
+    """Half of what the bracket's foot can be moved along the base plate, mm."""
+    up, w = np.array([0.0, 0.0, 1.0]), context.frame[0]
+    level = np.array([w[0], w[1], 0.0]) / np.hypot(w[0], w[1])
+    ends = np.array(
+        [
+            [hole.point @ np.cross(up, level), hole.point @ level]
+            for hole in holes(bracket.faces, M5_HOLE_MM / 2, SAME_MM)
+            if abs(hole.axis @ up) > 1 - SAME_MM
+        ]
+    ).reshape(-1, 2)
+    travel = []
+    for side in np.unique(np.round(ends[:, 0], 6)):
+        row = np.sort(ends[np.abs(ends[:, 0] - side) < 1e-5, 1])
+        travel += [(b - a) / 2 for a, b in zip(row[::2], row[1::2], strict=False)]
+    return float(min(travel, default=0.0))
+
+
+def _fence_faults(context: PrototypeContext, fence: TextSolid, along: float) -> Iterator[str]:
+    """The fence lies on the plate, at the camera's back, high and wide enough to hold it."""
+    spec = context.export.spec.prototype
+    corners = (fence.corners - context.pinhole) @ _axes(context).T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    radius = spec.camera_diameter_mm / 2
+    if abs(low[0] - spec.camera_length_mm) > SAME_MM:
+        yield f"the fence is {low[0]:.2f} mm behind the pinhole"
+    if abs(high[2] - radius) > SAME_MM:
+        yield "the fence does not lie on the camera plate"
+    if radius - low[2] < LIP_MM or high[1] - low[1] < LIP_WIDTH_MM:
+        yield "the fence does not keep the camera from turning"
+
+
+def _travel_faults(
+    place: CameraPlace, measured: Mapping[str, float], along: float
+) -> Iterator[str]:
+    least = {**LEAST, "along_axis_mm": along}
+    for name, value in measured.items():
+        recorded = getattr(place.travel, name)
+        if value < recorded - SHARE * max(1.0, recorded):
+            yield f"{name} is {value:.3f}, not {recorded:.3f}"
+        if recorded < least[name] - SHARE:
+            yield f"{name} is {recorded:.2f}, {least[name]:.2f} are needed"
+
+
+def _longest_m5(context: PrototypeContext) -> float:
+    bill = require(context.prototype.parts_list, f"there is no {PARTS_LIST}")
+    found = [re.fullmatch(r"M5x([\d.]+)", name) for name in bill.part.tolist()]
+    return max((float(one[1]) for one in found if one), default=0.0)
