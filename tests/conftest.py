@@ -1,14 +1,22 @@
 """What several test files build once."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.mirrors.record import write_record
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope
 from tbcad.spec.load import load_spec
+from tests.prototype_exports import write_export, write_wind_up
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Designs of many sizes take longest: last, one process would wait for another."""
+    items.sort(key=lambda item: item.get_closest_marker("designs") is None)
 
 
 @pytest.fixture(scope="session")
@@ -50,4 +58,28 @@ def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPat
     """A folder with the record only, as `tbcad build` writes it."""
     folder = tmp_path_factory.mktemp("record")
     write_record(folder, low_resolution_design, shells=False)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
+    return prototype_layout(low_resolution_design.spec, low_resolution_design)
+
+
+@pytest.fixture(scope="session")
+def export_folder(
+    layout: PrototypeLayout,
+    low_resolution_design: MirrorDesign,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    return write_export(tmp_path_factory.mktemp("export"), low_resolution_design, layout)
+
+
+@pytest.fixture(scope="session")
+def export_with_wind_up(
+    export_folder: Path, layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("export") / "exports"
+    shutil.copytree(export_folder, folder)
+    write_wind_up(folder, len(layout.stops.angle))
     return folder

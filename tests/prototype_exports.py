@@ -44,6 +44,16 @@ def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> P
         "picture": little.spec.prototype.picture,
         "frame": {"axis": axis, "zero": zero, "third": third},
         "balls": "balls.csv",
+        "leds": [
+            {"name": f"led_{number}", "position_mm": place, "direction": [0.0, 0.0, 1.0]}
+            for number, place in enumerate(little.spec.prototype.stage.leds_mm, 1)
+        ],
     }
     (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
     return folder
+
+
+def write_wind_up(folder: Path, stops: int) -> None:
+    """A base that gravity turns by another angle at each stop."""
+    rows = [{"stop": stop + 1, "wind_up_deg": 0.01 * stop} for stop in range(stops)]
+    write_table(folder / "stops.csv", ("stop", "wind_up_deg"), rows)

@@ -3,9 +3,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from io import RawIOBase
 from pathlib import Path
+from threading import Thread
 
+import numpy as np
 import pytest
 
 from tbcad.background import at_once, background_process
@@ -15,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def write(path: Path, text: str) -> None:
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
 
 
 def refuse(text: str) -> None:
@@ -26,9 +30,17 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+def joined_cylinders() -> float:
+    """Volume of more cylinders than the kernel joins in one thread."""
+    from tbcad.cad.solids import FEW, cylinder, fused, volume
+
+    up, count = np.array([0.0, 0.0, 1.0]), 2 * FEW
+    return volume(fused([cylinder(np.array([i, 0.0, 0.0]), up, 0.8, 1.0) for i in range(count)]))
+
+
 def wait_and_write(path: Path) -> None:
     time.sleep(3)
-    path.write_text("too late")
+    path.write_text("too late", encoding="utf-8")
 
 
 def in_background(
@@ -94,3 +106,61 @@ def test_it_ends_with_the_process_that_waits(tmp_path: Path) -> None:
     assert (tmp_path / "begun").exists()
     time.sleep(4)
     assert not (tmp_path / "late").exists()
+
+
+def test_a_copy_of_a_process_that_has_joined_solids_joins_solids_too() -> None:
+    """The kernel's threads are not in the copy, which must not wait for them."""
+    volume = joined_cylinders()
+    with background_process() as submit:
+        assert submit(joined_cylinders).result(timeout=60) == volume
+
+
+ON_A_TERMINAL = """
+import time
+from tbcad.background import background_process, may_fork
+from tbcad.screen import stages
+from tests import test_background as here
+
+here.copied = True  # known in a copy of this process only
+with stages({"first": 1.0, "second": 1.0}) as screen:
+    screen.stage("first")
+    time.sleep(0.3)
+    assert may_fork()
+    with background_process() as submit:
+        assert submit(here.is_copied).result()
+        screen.stage("second")
+        time.sleep(0.3)
+print("done")
+"""
+
+copied = False
+
+
+def is_copied() -> bool:
+    return copied
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems copy no processes")
+def test_a_process_that_draws_progress_on_a_terminal_is_copied_too() -> None:
+    """What draws is a thread, which pauses meanwhile, and goes on afterwards."""
+    terminal, screen = os.openpty()
+    drawn: list[bytes] = []
+    with os.fdopen(terminal, "rb", buffering=0) as reader:
+        Thread(target=lambda: drawn.extend(chunks_of(reader)), daemon=True).start()
+        command = [sys.executable, "-c", ON_A_TERMINAL]
+        variables = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=screen, cwd=ROOT, env=variables, check=False
+        )
+        os.close(screen)
+        time.sleep(0.2)
+    assert (done.stdout, done.returncode) == (b"done\n", 0), b"".join(drawn)
+    assert b"first" in b"".join(drawn)
+    assert b"".join(drawn).count(b"second") > 1
+
+
+def chunks_of(reader: RawIOBase) -> Iterator[bytes]:
+    """What can be read, until the other end is closed, which a terminal reports as an error."""
+    with suppress(OSError):
+        while chunk := reader.read(4096):
+            yield chunk

@@ -199,3 +199,12 @@ def test_the_pins_allow_this_python() -> None:
     text = (Path(__file__).parents[1] / "pyproject.toml").read_text()
     wanted = next(line.split('"')[1] for line in text.splitlines() if "requires-python" in line)
     assert Requirement(f"python{wanted}").specifier.contains(platform.python_version())
+
+
+def test_libraries_of_the_machine_are_optional() -> None:
+    found = doctor.machine_libraries([("pyserial", "3.5"), ("numpy", "2.1")])
+    assert found.ok
+    assert found.detail == "pyserial 3.5, no gphoto2, no opencv-python-headless"
+    assert "'tbcad[machine]'" in found.remedy
+    every = [("pyserial", "3.5"), ("gphoto2", "2.6"), ("opencv-python-headless", "4.11")]
+    assert not doctor.machine_libraries(every).remedy

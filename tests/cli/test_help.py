@@ -7,6 +7,7 @@ import pytest
 
 import tbcad.cli  # noqa: F401 - adds all commands
 from tbcad.cli import run
+from tbcad.cli.help_order import HEADINGS
 from tests.cli.commands import Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken
@@ -47,6 +48,16 @@ def test_short_help_is_the_long_one(
     shown = shown_help(words, "-h", monkeypatch, capsys)
     assert shown.startswith(" ".join(["Usage: tbcad", *words]))
     assert shown == shown_help(words, "--help", monkeypatch, capsys)
+
+
+def test_commands_are_under_headings_in_the_order_of_the_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown = shown_help((), "--help", monkeypatch, capsys)
+    places = [shown.index(f"─ {title} ─") for title in HEADINGS]
+    assert places == sorted(places)
+    listed = {name for names in HEADINGS.values() for name in names}
+    assert listed == {words[0] for words in ALL if words}
 
 
 def test_every_out_is_an_o_too() -> None:

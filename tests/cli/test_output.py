@@ -15,7 +15,7 @@ from tbcad_verify.run.stages import SHELL_STAGES
 
 from tbcad.cli import run
 from tbcad.cli.stage_times import build_times, export_times, verify_times
-from tbcad.cli.study import _show
+from tbcad.cli.study_output import _show
 from tbcad.doctor import Finding
 from tbcad.output.parts import PARTS
 from tbcad.screen import WIDTH, TimeLeft, paragraph, stages
@@ -194,7 +194,7 @@ def interrupted(command: list[str], stage: str) -> tuple[str, str, float]:
         [sys.executable, "-m", *command],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
         preexec_fn=_accept_interrupts,  # noqa: PLW1509 - no threads here
     )
     assert process.stderr is not None

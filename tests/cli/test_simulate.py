@@ -93,7 +93,7 @@ def test_view(
     arguments = ["view", str(captured), "--azimuth", "30", "--elevation", "15", "--out", str(out)]
     assert run([*arguments, "--width", "160", "--height", "120", *more]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "view-beside.png", "view-truth.png", "view.png"
+        "view-and-truth.png", "view-truth.png", "view.png"
     ]  # fmt: skip
     assert Image.open(out).size == (160, 120)
     assert "PSNR" in capsys.readouterr().out
@@ -108,8 +108,8 @@ def test_pictures_that_exist_are_replaced_on_force_only(
     sweep = ["--sweep", str(tmp_path / "f.gif"), "--frames", "2", "--truth-samples", "1"]
     refocus = ["refocus", str(captured), "-o", str(tmp_path / "f.png"), *small, *sweep]
     for command, names in (
-        (view, ("view.png", "view-truth.png", "view-beside.png")),
-        (refocus, ("f.png", "f-truth.png", "f-beside.png", "f.gif")),
+        (view, ("view.png", "view-truth.png", "view-and-truth.png")),
+        (refocus, ("f.png", "f-truth.png", "f-and-truth.png", "f.gif")),
     ):
         for name in names:
             (tmp_path / name).write_text("mine")
@@ -217,7 +217,7 @@ def test_refocus_and_sweep(
     arguments += ["--out", str(tmp_path / "f.png"), "--sweep", str(tmp_path / "f.gif")]
     assert run([*arguments, "--frames", "3", "--truth-samples", "16"]) == 0
     assert {p.name for p in tmp_path.iterdir()} == {
-        "f.png", "f-truth.png", "f-beside.png", "f.gif"
+        "f.png", "f-truth.png", "f-and-truth.png", "f.gif"
     }  # fmt: skip
     assert "PSNR" in capsys.readouterr().out
     assert run([*arguments[:2], "--aperture", "-1"]) == 2

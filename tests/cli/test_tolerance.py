@@ -13,7 +13,7 @@ from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.spec.load import load_spec
 from tests.exported_files import contents, read_csv
-from tests.prototype_exports import write_export
+from tests.prototype_exports import write_export, write_wind_up
 
 SMALL = ["camera.width_px=208", "camera.height_px=155"]
 FILES = {
@@ -52,6 +52,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
     little = exported(folder, "n=6", "prototype.k=5")
     made = prototype_layout(little.spec, little)
+    write_wind_up(folder, len(made.stops.angle))
     return write_export(folder, little, made)
 
 
@@ -91,7 +92,7 @@ class TestWritten:
         """Closed forms, and what must be in order."""
         read = json.loads((written / "tolerance.json").read_text())
         alone = {one["kind"]: one for one in read["single_errors"]}
-        assert len(alone) == 11
+        assert len(alone) == 13
         assert not {"seat_um", "ball_radius_um", "rotation_angle_deg"} & set(alone)
         assert alone["facets_mm"]["loss_mm"] == pytest.approx(0.36, abs=1e-9)
         assert alone["facets_mm"]["tolerable_factor"] == pytest.approx(0.6 / 0.36, rel=0.02)

@@ -34,10 +34,11 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     def begun(*_: object, **__: object) -> None:
         raise InputError("all options are allowed")
 
-    for name in ("build", "photograph", "analyse", "verify"):
+    for name in ("build", "photograph", "analyse", "verify", "simulate_run"):
         monkeypatch.setattr(f"tbcad.api.{name}", begun)
-    monkeypatch.setattr("tbcad.tolerance.margin.spec_for_process", begun)
-    monkeypatch.setattr("tbcad.cli.study.stages", begun)
+    monkeypatch.setattr("tbcad.tolerance.process_design.design_for_process", begun)
+    monkeypatch.setattr("tbcad.cli.study_output.stages", begun)
+    monkeypatch.setattr("tbcad.cli.optimize.stages", begun)
     monkeypatch.setattr("tbcad.doctor.diagnose", begun)
     monkeypatch.chdir(tmp_path)
 
@@ -80,7 +81,7 @@ def test_wrong_options_and_arguments(words: Words, capsys: pytest.CaptureFixture
     assert "-Z" in refusal(call(words, "-Z"), capsys)
     assert f"tbcad {' '.join(words)} --help" in refusal(call(words, "a", "b", "c"), capsys)
     if call(words) != [*words]:
-        assert "FOLDER is missing" in refusal([*words], capsys)
+        assert re.search("(FOLDER|RUN) is missing", refusal([*words], capsys))
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_each_program_passes_every_part(
 ) -> None:
     mine = of(program, checks)
     names = [f"{program} {question}" for question in PROGRAMS[program]]
-    assert [check.name for check in mine] == names * len(parts)
+    assert [check.name for check in mine if "listed" not in check.name] == names * len(parts)
     for check in mine:
         assert check.passed is True, check
         assert check.measured is not None, check
@@ -155,7 +155,10 @@ def cut(path: Path) -> None:
 
 
 def rubbish(path: Path) -> None:
-    path.write_text("ISO-10303-21;\nHEADER;\nthis is no STEP file, and no STL file either\n" * 9)
+    path.write_text(
+        "ISO-10303-21;\nHEADER;\nthis is no STEP file, and no STL file either\n" * 9,
+        encoding="utf-8",
+    )
 
 
 def empty(path: Path) -> None:
@@ -177,16 +180,18 @@ def turned_facet(path: Path) -> None:
 
 def without_a_face(path: Path) -> None:
     """The shell lists a face less, and so is open."""
-    head, mark, tail = path.read_text().partition("CLOSED_SHELL('',(")
+    head, mark, tail = path.read_text(encoding="utf-8").partition("CLOSED_SHELL('',(")
     assert mark
-    path.write_text(head + mark + tail.partition(",")[2])
+    path.write_text(head + mark + tail.partition(",")[2], encoding="utf-8")
 
 
 def an_inch(path: Path) -> None:
     """Another unit, all else as it was."""
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert "SI_UNIT(.MILLI.,.METRE.)" in text
-    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)"))
+    path.write_text(
+        text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)"), encoding="utf-8"
+    )
 
 
 @pytest.fixture

@@ -46,6 +46,28 @@ def test_margin_is_added_to_the_target() -> None:
     assert mirror_array("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
 
 
+@pytest.mark.parametrize("n", [4, 9])
+def test_each_mirror_has_a_margin_of_its_own(n: int) -> None:
+    even = mirror_array(f"n={n}", "margin_mm=0.5")
+    own = np.random.default_rng(1).uniform(0.5, 3, len(even)).round(2)
+    array = mirror_array(f"n={n}", "margin_mm=0.5", f"own_margins_mm={own.tolist()}")
+    curved = array.mirrors.radius < 29.9999 * array.half_width
+    gap = array.coverage - (60 + own)
+    assert gap[curved] == pytest.approx(0.0, abs=1e-3)
+    assert gap.min() > -1e-3
+    assert curved.sum() > len(even) / 2
+    same = mirror_array(f"n={n}", "margin_mm=0.2", f"own_margins_mm={[0.5] * len(even)}")
+    assert (same.mirrors.radius == even.mirrors.radius).all()
+
+
+def test_margins_of_other_mirrors_are_refused() -> None:
+    _, message = attempt("n=4", "own_margins_mm=[1, 1]")
+    assert "own_margins_mm has 2 margins" in message
+    assert "49 mirrors" in message
+    _, message = attempt("n=2", "margin_mm=2", "own_margins_mm=[2, 1.5]")
+    assert "less than margin_mm 2" in message
+
+
 def test_coat_is_an_offset_of_the_radius() -> None:
     bare, coated = mirror_array("n=8"), mirror_array("n=8", "coating_um=40")
     assert coated.mirrors.radius == pytest.approx(bare.mirrors.radius, rel=1e-12)
@@ -88,7 +110,7 @@ def test_numbers_run_from_the_zenith_down() -> None:
 
 def test_hopeless_targets_name_the_mirrors() -> None:
     """So long an ellipsoid leaves its outer spheres no radius at which they still meet."""
-    with pytest.raises(SpecError, match=r"a\d{4} \(\d+\.\d+ mm\)") as caught:
+    with pytest.raises(SpecError, match=r"a\d{4} \(\d+\.\d+ of \d+\.\d+ mm\)") as caught:
         mirror_array(
             "n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36"
         )

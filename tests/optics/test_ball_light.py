@@ -13,7 +13,8 @@ CAPTURE = 30.0
 
 @pytest.fixture(scope="module")
 def sampled(paper_array: MirrorArray) -> np.ndarray:
-    return np.arange(0, len(paper_array), 60)
+    """Some mirrors that are whole: those on the seam are aimed beyond it, balls are not."""
+    return np.flatnonzero(~paper_array.cells.halved)[::60]
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,9 @@ def test_poses_turned_are_the_mirrors(paper_array: MirrorArray) -> None:
     at = ball_light.ball_poses(ellipsoid, paper_array.polar)
     frame = ellipsoid.frame()
     assert rotated_about_x(at.apex, paper_array.azimuth) @ frame == pytest.approx(mirrors.apex)
-    assert rotated_about_x(at.normal, paper_array.azimuth) @ frame == pytest.approx(mirrors.normal)
+    whole = ~paper_array.cells.halved  # those on the seam are aimed beyond it
+    turned = rotated_about_x(at.normal, paper_array.azimuth) @ frame
+    assert turned[whole] == pytest.approx(mirrors.normal[whole])
 
 
 def test_rays_off_the_outline_touch_the_capture_sphere(

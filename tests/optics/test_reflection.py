@@ -13,9 +13,17 @@ def test_reflection_at_a_plane() -> None:
 
 
 def test_ray_over_the_apex_passes_the_origin(paper_array: MirrorArray) -> None:
-    mirrors = paper_array.mirrors
+    """On the seam, where a half is aimed beyond it, the x axis at camera b's side instead."""
+    mirrors, halved = paper_array.mirrors, paper_array.cells.halved
     pinhole = paper_array.camera.pinhole
-    assert miss_distances(pinhole, mirrors.apex, mirrors.normal).max() < 1e-9
+    whole = mirrors.subset(np.flatnonzero(~halved))
+    assert miss_distances(pinhole, whole.apex, whole.normal).max() < 1e-9
+    seam = mirrors.subset(np.flatnonzero(halved))
+    ray = reflected_rays(pinhole, seam.apex, seam.normal)
+    across = unit(np.cross(ray, [1.0, 0.0, 0.0]))
+    assert np.abs(np.einsum("md,md->m", across, seam.apex)).max() < 1e-9
+    away = np.linalg.norm(seam.apex[:, 1:], axis=1) / np.linalg.norm(ray[:, 1:], axis=1)
+    assert (seam.apex[:, 0] + away * ray[:, 0]).max() < 1e-9
 
 
 def test_rays_find_their_points_on_the_spheres(paper_array: MirrorArray) -> None:

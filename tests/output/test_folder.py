@@ -41,6 +41,16 @@ def export(out: Path, version: int, *, force: bool = False) -> None:
         fill(new, version)
 
 
+def export_with_folders(
+    out: Path, monkeypatch: pytest.MonkeyPatch, text: str, *, force: bool = False
+) -> None:
+    monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
+    with replacing(out, force) as new:
+        (new / "images" / "deep").mkdir(parents=True)
+        (new / "images" / "deep" / "a.png").write_text(text)
+        write_manifest(new)
+
+
 def version_of(out: Path) -> int:
     """The version of an export that is whole; fails when it is not."""
     version = int((out / "verify.json").read_text())
@@ -125,6 +135,39 @@ class TestReplacing:
         assert (out / "all").is_symlink()
         assert (tmp_path / "far.txt").read_text() == "far"
         assert hidden(out.parent) == []
+
+    def test_folders_of_an_export_are_replaced_with_it(
+        self, out: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        export_with_folders(out, monkeypatch, "first")
+        export_with_folders(out, monkeypatch, "other")
+        assert (out / "images" / "deep" / "a.png").read_text() == "other"
+        assert sorted(path.name for path in out.iterdir()) == ["images", "manifest.json"]
+
+    @pytest.mark.parametrize("content", ["file", "change", "link", "empty folder"])
+    def test_a_folder_with_something_of_the_user_is_the_users(
+        self, out: Path, monkeypatch: pytest.MonkeyPatch, content: str
+    ) -> None:
+        export_with_folders(out, monkeypatch, "first")
+        inner = out / "images" / "deep"
+        {
+            "file": (inner / "mine.txt").touch,
+            "change": lambda: (inner / "a.png").write_text("mine"),
+            "link": lambda: (inner / "mine").symlink_to("a.png"),
+            "empty folder": (inner / "mine").mkdir,
+        }[content]()
+        before = tree(out)
+        with pytest.raises(InputError, match="images"):
+            export_with_folders(out, monkeypatch, "other")
+        assert tree(out) == before
+        export_with_folders(out, monkeypatch, "other", force=True)
+        assert (out / "images" / "deep" / "a.png").read_text() == "other"
+        kept = tree(out / "images.kept")
+        assert kept == {
+            name.removeprefix("images/"): data
+            for name, data in before.items()
+            if name.startswith("images/")
+        }
 
     def test_keeps_what_a_checkout_has_in_its_folder_of_exports(self, out: Path) -> None:
         """Nobody has to ask for it, before the first export or later; as it was, to the byte."""
@@ -230,14 +273,14 @@ def test_a_failed_second_move_puts_the_old_export_back(
 def test_a_checkout_has_a_folder_of_exports() -> None:
     """git keeps these two files and no export."""
     done = subprocess.run(
-        ["git", "ls-files", "exports"], cwd=ROOT, capture_output=True, text=True, check=False
+        ["git", "ls-files", "exports"], cwd=ROOT, capture_output=True, encoding="utf-8", check=False
     )
     if done.returncode:
         pytest.skip("no checkout of git")
     assert done.stdout.split() == [f"exports/{name}" for name in ALWAYS_KEPT]
     ignored = subprocess.run(
         ["git", "check-ignore", *(f"exports/{name}" for name in (*NAMES, *ALWAYS_KEPT))],
-        cwd=ROOT, capture_output=True, text=True, check=False,
+        cwd=ROOT, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert ignored.stdout.split() == [f"exports/{name}" for name in NAMES]
 
@@ -274,12 +317,12 @@ class TestParents:
 @pytest.mark.parametrize("refuse", [check_replaceable, export], ids=["check", "replace"])
 class TestRefused:
     def test_a_file(self, out: Path, refuse: Callable[..., None]) -> None:
-        out.write_text("mine")
+        out.write_text("mine", encoding="utf-8")
         self.refused(out, refuse, "is a file")
-        assert out.read_text() == "mine"
+        assert out.read_text(encoding="utf-8") == "mine"
 
     def test_a_file_above(self, out: Path, refuse: Callable[..., None]) -> None:
-        out.write_text("mine")
+        out.write_text("mine", encoding="utf-8")
         self.refused(out / "deeper" / "still", refuse, "is a file")
 
     def test_where_the_user_is(
@@ -352,6 +395,10 @@ class TestRefused:
             b'{"name": "a web page", "files": {}}',
             b'{"schema": "tbcad-manifest/1", "files": []}',
             b'{"schema": "tbcad-manifest/1", "files": {"../a": {"sha256": "%s", "size": 1}}}'
+            % (b"0" * 64),
+            b'{"schema": "tbcad-manifest/1", "files": {"a/../../b": {"sha256": "%s", "size": 1}}}'
+            % (b"0" * 64),
+            b'{"schema": "tbcad-manifest/1", "files": {"/a": {"sha256": "%s", "size": 1}}}'
             % (b"0" * 64),
             b'{"schema": "tbcad-manifest/1", "files": {"a": {"sha256": "%s", "size": true}}}'
             % (b"0" * 64),
@@ -452,7 +499,11 @@ def test_a_kill_at_any_call_leaves_one_whole_export(
 ) -> None:
     script = KILLED.format(root=str(ROOT), out=str(out), moves=moves, step=11)
     run = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", script],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        check=False,
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.split(maxsplit=1)[1].strip() == str(seen), run.stdout

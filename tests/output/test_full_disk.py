@@ -20,7 +20,9 @@ def build(folder: Path, largest: int) -> subprocess.CompletedProcess[str]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
 
     command = [sys.executable, *WORDS, str(folder), *COARSE]
-    return subprocess.run(command, preexec_fn=limit, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, preexec_fn=limit, capture_output=True, encoding="utf-8", check=False
+    )
 
 
 def slow(*values: int) -> list[object]:

@@ -1,5 +1,7 @@
 """What a build would give, against what it gives."""
 
+from pathlib import Path
+
 import pytest
 import trimesh
 
@@ -32,15 +34,35 @@ def test_shell_volume(small: Overview, small_design: MirrorDesign) -> None:
 
 
 @pytest.mark.slow
-def test_prototype(small: Overview, small_design: MirrorDesign) -> None:
-    model = build_prototype_model(small_design)
-    assert small.spec == model.spec
-    assert small.prototype is not None
-    assert small.prototype.balls + small.prototype.caps == len(model.layout)
+def test_prototype(small_design: MirrorDesign) -> None:
+    few = MirrorDesign(load_spec(None, ["n=6", "prototype.k=2"]), small_design.arrays)
+    found, model = overview(few), build_prototype_model(few)
+    assert found.spec == model.spec
+    assert found.prototype is not None
+    assert found.prototype.balls + found.prototype.caps == len(model.layout)
     printed = [part for part in model.printed if part.role != "tool"]
     exact = sum(part.solid.volume for part in printed) / 1000
-    assert small.prototype.prints.volume_cm3 == pytest.approx(exact, rel=0.15)
-    assert small.prototype.turning_mass_g == pytest.approx(model.balance.mass_g, rel=0.1)
+    assert found.prototype.prints.volume_cm3 == pytest.approx(exact, rel=0.15)
+    assert found.prototype.turning_mass_g == pytest.approx(model.balance.mass_g, rel=0.1)
+
+
+@pytest.mark.slow
+def test_prices_are_those_of_the_spec(tmp_path: Path, small_design: MirrorDesign) -> None:
+    """Each ball at three dollars, filament at ten pounds a kilogram."""
+    mine = tmp_path / "mine.csv"
+    mine.write_text(
+        "part,each,per_kg,currency,date,source\n"
+        "ball *,3,,USD,2026-11,test\nPETG,,10,GBP,2026-11,test\n"
+    )
+    found = overview(replaced_prices(small_design, str(mine))).prototype
+    assert found is not None
+    assert found.ball_price == {"USD": 3.0 * found.balls}
+    assert found.prints.price == {"GBP": pytest.approx(found.prints.mass_g / 100, rel=0.06)}
+
+
+def replaced_prices(some: MirrorDesign, name: str) -> MirrorDesign:
+    prototype = some.spec.prototype.model_copy(update={"prices": (name,)})
+    return MirrorDesign(some.spec.model_copy(update={"prototype": prototype}), some.arrays)
 
 
 class TestWithoutPrototype:

@@ -11,7 +11,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_a_mesh, camera_solid
+from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tbcad.spec.load import load_spec, spec_dict
 from tests.exported_files import contents, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
@@ -147,3 +147,15 @@ def test_pcurves_on_request(tmp_path: Path) -> None:
         assert ("PCURVE" in text) == (pcurves == "true")
         sizes.append(len(text))
     assert sizes[1] > 1.5 * sizes[0]
+
+
+@pytest.mark.parametrize("place", [[], ["camera_mm=[70.0,20.0,-38.8]"]])
+def test_properties_are_those_that_the_kernel_integrates(place: list[str]) -> None:
+    """The slow way is the oracle."""
+    made = design(load_spec(None, ["n=5", *place]))
+    for array in made.arrays:
+        solid = camera_solid(made, array)
+        fast, slow = shell_properties(solid, array), properties(solid.shape)
+        assert fast.volume == pytest.approx(slow.volume, rel=1e-6)
+        assert fast.area == pytest.approx(slow.area, rel=1e-9)
+        assert fast.centroid == pytest.approx(slow.centroid, abs=1e-4)

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
@@ -14,7 +13,6 @@ from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tests.prototype_exports import write_export
 
 CAPTURE_MM = 60.0
 
@@ -43,17 +41,3 @@ def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField
 @pytest.fixture(scope="session")
 def tiles(light_field: LightField) -> MirrorTiles:
     return MirrorTiles(light_field)
-
-
-@pytest.fixture(scope="session")
-def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(low_resolution_design.spec, low_resolution_design)
-
-
-@pytest.fixture(scope="session")
-def export_folder(
-    layout: PrototypeLayout,
-    low_resolution_design: MirrorDesign,
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Path:
-    return write_export(tmp_path_factory.mktemp("export"), low_resolution_design, layout)

@@ -54,7 +54,7 @@ class TestDefaults:
         assert optics.camera_mm == (100, 0, -100)
 
     def test_stay_where_a_section_is_given_in_part(self, file: Path) -> None:
-        file.write_text("[shell.foot_flange]\nwidth_mm = 20\n")
+        file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
         assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
         assert load_spec(file).shell.foot_flange.bolts == 5
         assert load_spec(file).shell.seam_flange.bolts == 6
@@ -80,7 +80,9 @@ class TestPlainDict:
 
 class TestFile:
     def test_is_read(self, file: Path) -> None:
-        file.write_text('name = "x-1"\n[optics]\nn = 4\ncapture_diameter_mm = 20\n')
+        file.write_text(
+            'name = "x-1"\n[optics]\nn = 4\ncapture_diameter_mm = 20\n', encoding="utf-8"
+        )
         spec = load_spec(file)
         assert (spec.name, spec.optics.n, spec.optics.capture_diameter_mm) == ("x-1", 4, 20.0)
 
@@ -274,7 +276,7 @@ class TestTogether:
         assert "structure_error_mm" in refusal(None, "structure_error_mm=1", "wall_mm=1")
 
     def test_options_are_blamed_with_the_file(self, file: Path) -> None:
-        file.write_text("[optics]\nsemi_minor_mm = 100\n")
+        file.write_text("[optics]\nsemi_minor_mm = 100\n", encoding="utf-8")
         message = refusal(file, "capture_diameter_mm=200")
         assert message.startswith(f"{file} with options: ")
 
@@ -312,7 +314,7 @@ class TestOptions:
         assert load_spec(None, [option]).optics.n == 4
 
     def test_go_over_the_file_and_the_later_over_the_earlier(self, file: Path) -> None:
-        file.write_text("[optics]\nn = 5\nsemi_minor_mm = 90\n")
+        file.write_text("[optics]\nn = 5\nsemi_minor_mm = 90\n", encoding="utf-8")
         optics = load_spec(file, ["n=6", "n=7"]).optics
         assert (optics.n, optics.semi_minor_mm) == (7, 90)
 
@@ -349,7 +351,7 @@ class TestOptions:
         assert refusal(None, f"n={value}").startswith("option: optics.n is ")
 
     def test_do_not_hide_a_wrong_file(self, file: Path) -> None:
-        file.write_text("optics = 3")
+        file.write_text("optics = 3", encoding="utf-8")
         assert "optics is 3" in refusal(file, "n=4")
 
     @given(st.text(max_size=40))
@@ -373,6 +375,11 @@ class TestPrototype:
     @pytest.mark.parametrize("value", ["[]", "metric", "[1]", "[['metric']]"])
     def test_catalogues_are_a_list_of_names(self, value: str) -> None:
         assert 'give a list such as ["metric", "my.csv"]' in refusal(None, f"catalogues={value}")
+
+    @pytest.mark.parametrize("value", ["[]", "estimates", "[1]"])
+    def test_prices_are_a_list_of_names(self, value: str) -> None:
+        wanted = 'give a list such as ["my_prices.csv", "estimates"]'
+        assert wanted in refusal(None, f"prototype.prices={value}")
 
     def test_grades_are_those_of_the_table(self) -> None:
         assert "allowed is G3 or G5" in refusal(None, "grade=G11")

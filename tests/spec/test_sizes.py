@@ -16,7 +16,7 @@ def test_the_papers_design_has_the_sizes_it_was_tried_with() -> None:
     assert (prototype.post_diameter_mm, prototype.camera_diameter_mm) == (20, 60)
     assert (prototype.auto_direction_max_deg, prototype.auto_direction_median_deg) == (3.5, 1.5)
     assert (prototype.stage.disc_mm, prototype.stage.top_mm) == (17, -19)
-    assert prototype.stage.leds_mm[0] == (18.8, 14.0, -8.0)
+    assert prototype.stage.leds_mm[0] == (23.1, -4.1, -8.0)
     assert prototype.frame.floor_mm == -230
 
 

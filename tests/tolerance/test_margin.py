@@ -9,11 +9,10 @@ import pytest
 
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import Spec
+from tbcad.spec.design import MAX_MARGIN, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.margin import (
-    LARGEST_MARGIN_MM,
     STEP_MM,
     Margin,
     SolvedDesigns,
@@ -66,7 +65,7 @@ def steady(loss: float | np.ndarray) -> Loss:
 
 def brute(lost: np.ndarray, wanted: float) -> float:
     """The least step with which the share is good, all of them tried."""
-    steps = np.arange(round(LARGEST_MARGIN_MM / STEP_MM) + 1) * STEP_MM
+    steps = np.arange(round(MAX_MARGIN / STEP_MM) + 1) * STEP_MM
     good = (TARGET + steps[:, None] - lost >= TARGET).mean(axis=1) >= wanted
     return float(steps[np.argmax(good)])
 
@@ -121,7 +120,7 @@ class TestMadeUpLosses:
             assert found.share >= wanted
 
     def test_too_much(self, spec: Spec) -> None:
-        found = margin(spec, Errors(), 0.99, losing(steady(LARGEST_MARGIN_MM + 0.001)))
+        found = margin(spec, Errors(), 0.99, losing(steady(MAX_MARGIN + 0.001)))
         assert (found.mm, found.share) == (None, 0)
         assert "more than 20 mm" in found.reason
 

@@ -110,15 +110,24 @@ class TestWords:
         assert f"1 % cover less than {np.quantile(worst, 0.01):.2f})" in said
 
     def test_worst_kind_of_error(self, analysis: Analysis) -> None:
-        """In the unit of the process: 0.375 times the 25 micrometres of sla."""
+        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
         assert (
             "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
-            "of the builds are good above 9.38 micrometres (sla has 25)."
+            "of the builds are good above 1.88 micrometres (sla has 5)."
         ) in summary_text(analysis)
+
+    def test_spread_of_rays_by_waviness(self, analysis: Analysis) -> None:
+        spread = report_dict(analysis)["ray_spread_mm"]
+        assert 0 < spread["median"] <= spread["largest"]
+        said = f"displaces a mirror's rays by {spread['median']:.2g} mm at the object"
+        assert said in summary_text(analysis)
+        smooth = replace(analysis, process=load_process("sla", ["waviness_um=0"]))
+        assert report_dict(smooth)["ray_spread_mm"]["largest"] == 0
+        assert "Waviness" not in summary_text(smooth)
 
     @pytest.mark.parametrize(
         ("factor", "words"),
-        [(1.01, "at 25 micrometres it is at its limit"), (1.5, "above 37.5 micrometres")],
+        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
     )
     def test_how_large_the_worst_may_be(
         self, analysis: Analysis, factor: float, words: str
@@ -303,7 +312,7 @@ class TestTables:
         assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
         # Facets of sla: 0.36 mm in every build and no spread; 1.5 times that is no zero.
         may = [(row["tolerable_magnitude"], row["tolerable_mean"]) for row in rows]
-        assert may == [(str(0.375 * 25), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
+        assert may == [(str(0.375 * 5), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
 
     def test_processes(self, analysis: Analysis) -> None:
         rows = rows_of(analysis, "processes")

@@ -33,6 +33,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
     },
     "base": {"pad_angle_deg": 50.0, "hold": "magnet", "hub_boss_mm": 20.0},
     "stage": {"top_mm": -20.0, "disc_mm": 17.0, "object_diameter_mm": 40.0, "leds_mm": []},
+    "light": {"lamp_z_mm": 0.0, "shroud": False},
     "frame": {"floor_mm": -230.0},
 }
 MANIFEST_SCHEMA = "tbcad-manifest/1"
@@ -56,6 +57,7 @@ class Design:
     target: float = 40.0
     coating: float = 0.0
     flat: bool = False
+    aim: float = 3.0  # of mirrors on the seam, beyond it, mm; planar ones need none
     width: int = 260
     height: int = 194
     hfov: float = 89.0
@@ -102,7 +104,8 @@ def poses(design: Design) -> list[dict[str, Any]]:
     u = u[np.lexsort((u[:, 1], u[:, 0], -u[:, 2]))]
     rho = B**2 / (a - c * (u @ unit(PIN)))
     apex = rho[:, None] * u
-    normal = unit(unit(PIN - apex) - u)
+    beyond = np.where((u[:, 0] == 0) & (not design.flat), design.aim, 0.0)
+    normal = unit(unit(PIN - apex) + unit(beyond[:, None] * [-1.0, 0, 0] - apex))
     r = design.radius * (rho / rho.min()) ** 2
     return [
         {

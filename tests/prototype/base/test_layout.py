@@ -65,7 +65,7 @@ class TestSeats:
 
     def test_magnets_do_not_touch(self, base: BaseLayout) -> None:
         seats = base.seats
-        top = seats.bottom - SPEC.magnet_height_mm
+        top = seats.bottom - seats.magnet_height
         assert top - seats.radius == pytest.approx(np.full(len(seats), SPEC.magnet_gap_mm))
         pads = seats.radius * np.sin(seats.tilt) - seats.pad * np.cos(seats.tilt)
         assert (seats.pocket < pads).all()
@@ -180,6 +180,22 @@ class TestHub:
         assert norm(hub.holes) == pytest.approx(np.full(4, circle / 2))
         assert hub.hole == hole
         assert hub.disc > circle / 2 + hole / 2 + 2
+
+    def test_a_disc_on_a_stage_is_so_thick_that_seats_end_before_its_face(
+        self, small_prototype: PrototypeLayout
+    ) -> None:
+        """The zero disc lies on that face, and is wider than the hub."""
+        thin, thick = (
+            base_layout(
+                changed_spec(drive="stage-60", hold="glue", floor_mm=floor), small_prototype
+            )
+            for floor in (2.0, 20.0)
+        )
+        assert thick.rearmost < thin.hub.face < thin.rearmost
+        assert thick.hub.face < thick.rearmost
+        assert thick.hub.depth == pytest.approx(thick.hub.front - thick.hub.face)
+        below_heads = [base.hub.depth - base.hub.head[1] for base in (thin, thick)]
+        assert below_heads == pytest.approx([6.0, 6.0])
 
     def test_a_shaft_too_thick(self) -> None:
         with pytest.raises(SpecError, match=r"prototype.base.shaft_mm 9 or less"):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from matplotlib.path import Path as Outline
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.Geom import Geom_SphericalSurface
@@ -28,23 +29,40 @@ from tbcad.cad.solids import (
     without_cavities,
 )
 from tbcad.formats.step import write_step
+from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import hub_solids, seat_solids
-from tbcad.prototype.base.cap_solids import cap_parts, cap_pocket, flat_depth
-from tbcad.prototype.base.coupon import _wall_section as seat_section
-from tbcad.prototype.base.coupon import coupon_plates, coupon_rows
+from tbcad.prototype.base.cap_solids import (
+    cap_parts,
+    cap_pocket,
+    cap_spigot,
+    cap_tilt,
+    flat_depth,
+)
+from tbcad.prototype.base.coupon import CouponRow, coupon_plates, coupon_rows, coupon_seats
+from tbcad.prototype.base.coupon_pose import SeatPose, expected_downs, worst_pose
+from tbcad.prototype.base.coupon_seat import (
+    KEEL_MM,
+    core_radius,
+    height,
+    keel_corners,
+    leaning,
+    printed_seat,
+    wall_section,
+)
 from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
-from tbcad.prototype.base.split import downward_directions, split_base
+from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
+from tbcad.types import Floats
 from tests.helpers import as_trimesh, bounds
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -298,6 +316,10 @@ class TestHub:
         assert volume(solid) == pytest.approx(expected)
 
 
+def rotation(angle: float) -> Floats:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
 class TestCaps:
     def test_fronts_and_bodies_are_exact_spheres(
         self, base: BaseLayout, prototype: PrototypeLayout
@@ -330,7 +352,9 @@ class TestCaps:
             lens = np.pi * drop**2 * (3 * front - drop) / 3
             zone = np.pi * (body**2 * (behind + edge) - (behind**3 + edge**3) / 3)
             wide, deep = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
-            assert cap.volume == pytest.approx(lens + zone - np.pi * wide**2 * deep)
+            spigot, end = cap_spigot(base, k)
+            behind_flat = np.pi * spigot**2 * (end - behind)
+            assert cap.volume == pytest.approx(lens + zone + behind_flat - np.pi * wide**2 * deep)
 
     def test_they_are_watertight_and_printed_front_up(
         self, base: BaseLayout, prototype: PrototypeLayout
@@ -343,7 +367,19 @@ class TestCaps:
             assert (norm(whole.vertices - prototype.apices()[k])).min() < 1e-6
             low, high = bounds(cap.on_bed)
             assert low[2] == pytest.approx(0, abs=1e-6)
-            assert high[2] == pytest.approx(flat_depth(base, k) + prototype.balls.body_depth[k])
+            assert high[2] == pytest.approx(cap_spigot(base, k)[1] + prototype.balls.body_depth[k])
+
+    def test_spigots_in_their_pockets_take_up_the_tilt(
+        self, base: BaseLayout, prototype: PrototypeLayout
+    ) -> None:
+        """Tilted by cap_tilt the spigot's edge just touches the pocket, and nothing behind it."""
+        for k in np.flatnonzero(prototype.balls.cap).tolist():
+            spigot, end = cap_spigot(base, k)
+            tilt = cap_tilt(base, k)
+            edge = np.array([spigot, end]) @ rotation(tilt)
+            assert edge[0] == pytest.approx(base.seats.pocket[k], abs=2e-3)
+            assert edge[1] < base.seats.radius[k] + base.spec.magnet_gap_mm
+            assert np.degrees(tilt) < 0.5
 
     def test_they_rest_on_the_pads(self, base: BaseLayout, prototype: PrototypeLayout) -> None:
         for k in np.flatnonzero(prototype.balls.cap).tolist():
@@ -360,8 +396,19 @@ class TestCaps:
 
 
 @pytest.fixture(scope="module")
-def plates(base: BaseLayout) -> list[PlacedSolid]:
-    return coupon_plates(base, PRINTER)
+def plates(base: BaseLayout, part: PlacedSolid) -> list[PlacedSolid]:
+    """Seats as they lie in the carrier as it is printed."""
+    return coupon_plates(base, PRINTER, worst_pose(base, UNCUT, [-part.axes[:, 2]]))
+
+
+def pose_of(base: BaseLayout) -> SeatPose:
+    """Of the seat that is expected to be printed worst in an uncut carrier."""
+    return worst_pose(base, UNCUT, expected_downs(base, UNCUT))
+
+
+def rows_of(base: BaseLayout, spec: BaseSpec = SPEC) -> list[CouponRow]:
+    pose = pose_of(base)
+    return coupon_rows(coupon_seats(base, pose), spec, PRINTER, pose.lean)
 
 
 class TestCoupon:
@@ -370,12 +417,58 @@ class TestCoupon:
             assert as_trimesh(plate.shape).is_watertight
             assert (np.ptp(bounds(plate.shape), axis=0) < 256).all()
 
+    def test_their_files_keep_them(self, plates: list[PlacedSolid]) -> None:
+        for plate in plates:
+            check_read_back(plate.name, plate.shape, plate.properties)
+
+    def test_the_keel_touches_no_edge_of_the_wall(self, base: BaseLayout) -> None:
+        """Its upper corners lie within the section that is revolved; on it, they would graze it."""
+        spec, pose = base.spec, pose_of(base)
+        seats = coupon_seats(base, pose)
+        for k in range(len(seats)):
+            corners = keel_corners(seats, spec, k, pose)[:, 1:]
+            along, across = (corners @ np.linalg.inv(leaning(pose.lean))).T
+            upper = corners[:, 1] > corners[:, 1].min() + 1e-6
+            edges = np.column_stack([along, np.hypot(across, KEEL_MM / 2)])[upper]
+            inside = Outline(wall_section(seats, spec, k)).contains_points(edges)
+            assert len(edges) >= 2
+            assert inside.all()
+
+    def test_a_seat_is_whole_round_its_pads_and_empty_between_them(self, base: BaseLayout) -> None:
+        """Behind each pad is the carrier's wall, as far beside it as it is thick."""
+        spec, pose = base.spec, pose_of(base)
+        seats = coupon_seats(base, pose)
+        for k in (int(seats.radius.argmax()), int(seats.radius.argmin())):
+            solid = as_trimesh(printed_seat(seats, spec, k, 0.0, pose, 0.0))
+            beside = (seats.pad[k] + 0.9 * spec.cup_wall_mm) * np.linspace(-1, 1, 9)
+            deep = float(seats.cup[k]) + spec.cup_wall_mm * np.array([0.1, 0.9])
+            for normal in seats.local_normals[k]:
+                across = np.cross(normal, [0.0, 0.0, 1.0])
+                across /= norm(across)
+                points = [-d * normal + b * across for d in deep for b in beside]
+                points = [at * deep.max() / max(norm(at), deep.max()) for at in points]
+                assert solid.contains(np.array(points) @ pose.axes).all()
+            middle = deep.mean() * -seats.local_normals[k] * [-1, -1, 1]
+            between = norm(middle[:, :2]).min() > core_radius(seats, spec, k)
+            assert solid.contains(middle @ pose.axes).all() != between
+
+    def test_a_seat_lies_on_the_bed(self, base: BaseLayout) -> None:
+        """Its lowest point, without the keel, by its mesh."""
+        spec, pose = base.spec, pose_of(base)
+        seats = coupon_seats(base, pose)
+        for k in range(len(seats)):
+            bed = height(seats, spec, k, pose)
+            solid = as_trimesh(printed_seat(seats, spec, k, 0.0, pose, 0.0))
+            assert solid.bounds[0, 2] == pytest.approx(-bed, abs=1e-6)
+            keel = np.abs(solid.vertices[:, 0]) < KEEL_MM / 2 + 1e-6
+            assert solid.vertices[~keel, 2].min() == pytest.approx(-bed, abs=0.3)
+
     def test_every_size_has_pads_at_every_offset(
         self, base: BaseLayout, plates: list[PlacedSolid]
     ) -> None:
         """A seat's pads are sqrt(3) sin(tilt) times the radius of the sphere in it apart."""
         seats = base.seats
-        rows = coupon_rows(seats, SPEC, PRINTER)
+        rows = rows_of(base)
         assert len(rows) == len(np.unique(np.round(seats.radius, 6)))
         planes = [plane_faces(plate.shape) for plate in plates]
         middle = np.concatenate([one + 1e4 * n for n, (one, _) in enumerate(planes)])
@@ -389,12 +482,33 @@ class TestCoupon:
         sizes = len(rows) * len(SPEC.coupon_offsets_mm)
         assert np.isin(np.round(area, 5), np.round(np.pi * seats.pad**2, 5)).sum() == 3 * sizes
 
+    def test_seats_lie_as_the_carriers_worst(
+        self, base: BaseLayout, plates: list[PlacedSolid], part: PlacedSolid
+    ) -> None:
+        """Every seat's pads are as steep on the bed as those of the carrier's seat that is."""
+        steep = np.sort((base.seats.pad_normals @ part.axes)[..., 2], axis=1)
+        down = (base.seats.axis @ part.axes)[:, 2]  # -1: the seat is upright
+        tied = np.flatnonzero(steep[:, 0] < steep[:, 0].min() + 1e-6)
+        worst = steep[tied[np.argmax(down[tied])]]
+        found = []
+        for plate in plates:
+            mesh = as_trimesh(plate.shape)
+            assert mesh.bounds[0, 2] == pytest.approx(0, abs=1e-9)
+            for facet, area in zip(mesh.facets, mesh.facets_area, strict=True):
+                corners = mesh.triangles[facet].reshape(-1, 3)
+                width = norm(corners[:, None] - corners).max()
+                is_round = np.isclose(width, 2 * base.seats.pad[0], rtol=0.02)
+                if is_round and np.isclose(area, np.pi * base.seats.pad[0] ** 2, rtol=0.02):
+                    found.append(mesh.face_normals[facet[0], 2])
+        found = [one for one in found if np.abs(worst - one).min() < 0.02]
+        assert len(found) == 3 * len(rows_of(base)) * len(SPEC.coupon_offsets_mm)
+
     @pytest.mark.parametrize("count", [1, 2, 3])
     def test_a_few_sizes_reach_from_the_largest_to_the_smallest(
         self, base: BaseLayout, count: int
     ) -> None:
         seats = base.seats
-        rows = coupon_rows(seats, BaseSpec(coupon_sizes=count), PRINTER)
+        rows = rows_of(base, BaseSpec(coupon_sizes=count))
         tried = list(dict.fromkeys(seats.radius[row.seat] for row in rows))
         assert len(tried) == count
         assert tried == sorted(tried, reverse=True)
@@ -405,7 +519,7 @@ class TestCoupon:
         """Nowhere from a cup or pocket outward is there less than on the carrier."""
         seats = base.seats
         for k in range(len(seats)):
-            wall = seat_section(replace(seats, back=seats.bottom + SPEC.floor_mm), SPEC, k)
+            wall = wall_section(replace(seats, back=seats.bottom + SPEC.floor_mm), SPEC, k)
             ends = np.stack([wall, np.roll(wall, -1, axis=0)], axis=1)[:-1]
             outer = ends[(ends[..., 1] > 0).any(axis=1)][1:]
             along = np.linspace(outer[:, 0], outer[:, 1], 50).reshape(-1, 2)
@@ -447,7 +561,7 @@ class TestCoupon:
         """Every offset of a size has one seat, and no row is wider than the bed."""
         offsets = tuple(0.1 * k for k in range(9))
         base = base_layout(BaseSpec(coupon_offsets_mm=offsets), prototype)
-        rows = coupon_rows(base.seats, base.spec, PRINTER)
+        rows = rows_of(base, base.spec)
         assert max(row.size[0] for row in rows) <= usable_size(PRINTER)[0]
         for seat in {row.seat for row in rows}:
             parts = [row.offsets for row in rows if row.seat == seat]
@@ -457,7 +571,7 @@ class TestCoupon:
     def test_a_seat_larger_than_the_bed(self, prototype: PrototypeLayout) -> None:
         base = base_layout(BaseSpec(), prototype)
         with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
-            coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)))
+            coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)), pose_of(base))
 
 
 def test_a_part_comes_back_from_bytes_as_it_was(part: PlacedSolid) -> None:
@@ -465,6 +579,7 @@ def test_a_part_comes_back_from_bytes_as_it_was(part: PlacedSolid) -> None:
     assert np.array_equal(again.axes, part.axes)
     assert properties(again.shape).volume == pytest.approx(part.volume, rel=1e-12)
     assert len(faces(again.shape)) == len(faces(part.shape))
+    assert pickle.dumps(pickle.loads(pickle.dumps(again))) == pickle.dumps(again)
 
 
 class TestCavities:

@@ -44,12 +44,6 @@ def small(small_prototype: PrototypeLayout) -> Cut:
     return cut_up(base_layout(BaseSpec(), small_prototype), PRINTER)
 
 
-@pytest.fixture(scope="module")
-def paper(paper_prototype: PrototypeLayout) -> Cut:
-    printer = PrinterSpec(bed_mm=(180.0, 180.0, 180.0))
-    return cut_up(base_layout(BaseSpec(), paper_prototype), printer)
-
-
 def check_pieces(cut: Cut) -> None:
     """Each is one watertight solid that fits the bed; no two overlap; all pads are there."""
     _, printer, plan, parts, meshes = cut
@@ -89,7 +83,6 @@ class TestSmall:
     def test_pads(self, small: Cut) -> None:
         check_pads(small)
 
-    @pytest.mark.slow
     @pytest.mark.slow
     def test_together_they_are_the_whole_with_flanges_and_without_holes(self, small: Cut) -> None:
         base, _, plan, parts, _ = small
@@ -172,7 +165,6 @@ class TestSmall:
             assert not ((along > 0) & (along < length) & (beside < radius)).any()
 
     @pytest.mark.slow
-    @pytest.mark.slow
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
         base, printer, _, parts, _ = small
         rebuilt = carrier_parts(base, split_base(base, printer), printer)
@@ -182,14 +174,6 @@ class TestSmall:
         for part in parts:
             one, two = (tmp_path / f"{name}_{part.name}" for name in ("one", "two"))
             assert one.read_bytes() == two.read_bytes()
-
-
-@pytest.mark.slow
-class TestPaper:
-    def test_pieces_and_pads(self, paper: Cut) -> None:
-        assert len(paper[3]) == 2
-        check_pieces(paper)
-        check_pads(paper)
 
 
 def piece_at(plan: BaseSplit, joint: Joint, side: int) -> int:

@@ -10,7 +10,8 @@ import pytest
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.drive.drive import Drive, load_drives
+from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_sequence
 from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files.gcode import (
@@ -134,7 +135,7 @@ def layout(small_design: MirrorDesign) -> PrototypeLayout:
 
 @pytest.fixture(scope="module")
 def drive() -> Drive:
-    return choose_drive("nema17-belt", 1000, load_drives(load_parts()))
+    return choose_drive("nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts()))
 
 
 @pytest.fixture(scope="module")

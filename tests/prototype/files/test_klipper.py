@@ -1,6 +1,7 @@
 """The program for Klipper is the same plan in Klipper's words."""
 
-from tbcad.prototype.drive.drive import choose_drive, load_drives
+from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.electronics.outputs import lights
 from tbcad.prototype.files.klipper import klipper_config, klipper_program
@@ -41,7 +42,9 @@ def test_every_command_has_its_translation() -> None:
 
 
 def test_configuration() -> None:
-    drive = choose_drive("nema17-belt", 1000, load_drives(load_parts()))
+    drive = choose_drive(
+        "nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts())
+    )
     lines = list(klipper_config(drive, MOTION, lights(2, MOTION)))
     assert f"gear_ratio: {drive.ratio:g}:1" in lines
     pins = [line for line in lines if line.startswith("[output_pin")]

@@ -1,10 +1,26 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tbcad.formats.csv_table import write_table
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.balance import BaseBalance
+from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.drive.loads import DriveLoads, base_torques
 from tbcad.prototype.files.plan_csv import PICTURE_COLUMNS, STOP_COLUMNS, picture_rows, stop_rows
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, read_csv
+
+FRAME = np.array([[1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [0.0, -(2**0.5), 0.0]]) / 2**0.5
+# A kilogram 80 mm from the axis at azimuth 30 degrees.
+AZIMUTH = np.radians(30)
+BALANCE = BaseBalance(FRAME, 1000.0, 8e4 * np.array([0, np.cos(AZIMUTH), np.sin(AZIMUTH)]), 6.4e6)
+
+
+def loads_of(layout: PrototypeLayout) -> DriveLoads:
+    torques = base_torques(BALANCE, layout.stops.range, load_spec(None).prototype.motion)
+    return DriveLoads(load_drives(load_parts())[0], torques)
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +33,7 @@ def plan(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> R
 @pytest.fixture(scope="module")
 def stops(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("stops") / "stops.csv"
-    write_table(path, STOP_COLUMNS, stop_rows(layout))
+    write_table(path, STOP_COLUMNS, stop_rows(layout, BALANCE, loads_of(layout)))
     return read_csv(path)
 
 
@@ -73,3 +89,15 @@ def test_stops_sum_up_the_plan(plan: Rows, stops: Rows) -> None:
             assert max(float(row["error_deg"]) for row in own) == float(stop["error_deg"])
             worst = max(abs(float(row["azimuth_error_deg"])) for row in own)
             assert worst == float(stop["azimuth_error_deg"])
+
+
+def test_stops_tell_what_gravity_does(layout: PrototypeLayout, stops: Rows) -> None:
+    """The sum of r x F along the axis, and what motor and belt yield beyond angle zero."""
+    angles = np.append(layout.stops.angle, 0.0)
+    turned = Rotation.from_rotvec(np.outer(angles, FRAME[0])).apply(BALANCE.centre)
+    torque = np.cross(turned, [0, 0, -9.80665]) @ FRAME[0]
+    wind_up = np.degrees(loads_of(layout).wind_up_at(torque))
+    assert [float(row["torque_nmm"]) for row in stops] == pytest.approx(torque[:-1])
+    beyond = wind_up[:-1] - wind_up[-1]
+    assert [float(row["wind_up_deg"]) for row in stops] == pytest.approx(beyond, abs=1e-12)
+    assert np.ptp(beyond) > 0.01

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tbcad.prototype.drive.drive import Drive, choose_drive, load_drives
+from tbcad.prototype.drive.drive import Drive, load_drives
+from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.files.settings import settings, settings_lines
 from tbcad.prototype.purchased.parts import load_parts
@@ -13,7 +14,7 @@ ANGLES = HomeAngles(-98.5, -96.5, 191.0)
 
 @pytest.fixture(scope="module")
 def drive() -> Drive:
-    return choose_drive("nema17-belt", 1000, load_drives(load_parts()))
+    return choose_drive("nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts()))
 
 
 def of(drive: Drive, motion: MotionSpec) -> dict[int, float]:
@@ -24,13 +25,23 @@ def test_steps_speed_acceleration_travel(drive: Drive) -> None:
     found = of(drive, MotionSpec())
     assert found[100] == pytest.approx(200 * 16 * drive.ratio / 360)
     assert (found[110], found[120], found[130]) == (900, 50, 191)
-    assert (found[5], found[23], found[44]) == (1, 1, 1)
+    assert (found[23], found[44]) == (1, 1)
 
 
 def test_another_axis_has_its_own_numbers_and_bit(drive: Drive) -> None:
     found = of(drive, MotionSpec(axis="A"))
     assert {103, 113, 123, 133} < set(found)
-    assert (found[5], found[23], found[44]) == (8, 8, 8)
+    assert (found[23], found[44]) == (8, 8)
+
+
+@pytest.mark.parametrize(("axis", "bit"), [("X", 1), ("A", 8)])
+def test_only_the_switch_that_opens_reads_as_pressed_when_high(
+    drive: Drive, axis: str, bit: int
+) -> None:
+    """In grblHAL a high input is a pressed switch unless its bit of $5 is set (core, config.h)."""
+    inverted = int(of(drive, MotionSpec(axis=axis))[5])
+    pressed = {1, 2, 4, bit} - {other for other in (1, 2, 4, 8) if inverted & other}
+    assert pressed == {bit}  # all inputs are high: this switch is open, the others are empty
 
 
 def test_grbl_refuses_soft_limits_before_homing(drive: Drive) -> None:

@@ -1,6 +1,7 @@
 """The prototype's files: read back, and compared with the numbers they are from."""
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.output.build import write_export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
+from tbcad.prototype.assembly_steps.machine import read_machine
+from tbcad.prototype.assembly_steps.steps import assembly_steps
 from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, contents, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
@@ -43,6 +46,14 @@ def balls(folder: Path) -> Rows:
     return read_csv(folder / "balls.csv")
 
 
+def test_steps_of_assembly_take_exactly_the_list_of_parts(folder: Path) -> None:
+    machine = read_machine(folder)
+    sums = Counter[str]()
+    for step in assembly_steps(machine):
+        sums.update({use.part: use.quantity for use in step.parts})
+    assert sums == Counter(machine.quantities)
+
+
 def centre_of(ball: dict[str, str]) -> NDArray[np.float64]:
     """Of the body in the seat, mm."""
     return np.array([float(ball[key]) for key in ("bx", "by", "bz")])
@@ -61,9 +72,13 @@ def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
     tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
     tables |= {"rotation_plan_klipper.gcode"}
+    sheets = [*record["drawings"], *record["caps"]]
+    drawn = {one[kind] for one in sheets for kind in ("pdf", "dxf")}
+    assert drawn >= {f"drawing_{part}.pdf" for part in ("plate", "wheel", "upright")}
+    shroud = {path.name for path in folder.glob("shroud_*.dxf")}
     whole = {"prototype.json", "prototype.step", "prototype.glb"}
     records = {"design.json", "mirrors.csv", "manifest.json", "camera.json"}
-    assert {p.name for p in folder.iterdir()} == own | tables | whole | records
+    assert {p.name for p in folder.iterdir()} == own | tables | drawn | shroud | whole | records
     assert json.loads((folder / "design.json").read_text())["parts"] == []
 
 
@@ -115,9 +130,10 @@ def test_tables_and_record_agree(folder: Path, record: dict[str, Any], balls: Ro
 def test_the_plates_holes_lie_under_the_feet(folder: Path, record: dict[str, Any]) -> None:
     """In the assembly's plate, as drilled, seen from above; and every foot is held by some."""
     rows = read_csv(folder / "plate_holes.csv")
-    assert {row["holds"] for row in rows} == {
-        part["name"] for part in record["parts"] if part["role"] == "frame"
-    } - {"bearing_head", "home_bracket"}
+    frame = {part["name"] for part in record["parts"] if part["role"] == "frame"}
+    elsewhere = {"bearing_head", "home_bracket", "camera_plate", "camera_fence"}
+    elsewhere |= {name for name in frame if name.startswith("lamp_holder")}
+    assert {row["holds"] for row in rows} == frame - elsewhere
     scene = trimesh.load(folder / "prototype.glb")
     matrix, name = scene.graph["plate"]
     points = 1000 * trimesh.transform_points(scene.geometry[name].vertices, matrix)

@@ -12,7 +12,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout
+from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.printing.component_solids import component_solid, placed_component
 from tbcad.prototype.printing.placing import PlacedSolid
@@ -21,6 +21,7 @@ from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import PrototypeSpec
+from tbcad.types import Floats
 from tests.helpers import as_trimesh, cylinders, manifold
 from tests.prototype.conftest import SMALL
 
@@ -41,6 +42,17 @@ def purchased_solids(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
     return {part.name: component_solid(part) for part in frame.purchased}
 
 
+def holes_of(part: PlacedSolid, size: float, way: Floats | None = None) -> list[Floats]:
+    """Points on the axes of round faces of a radius, each axis once, all along a direction."""
+    found: list[Floats] = []
+    for point, axis, radius in cylinders(part.shape):
+        known = any(norm(np.cross(point - one, axis)) < 1e-6 for one in found)
+        along = way is None or abs(axis @ way) > 1 - 1e-9
+        if abs(radius - size) < 1e-9 and along and not known:
+            found.append(point)
+    return found
+
+
 @pytest.fixture(scope="module")
 def solids(frame: FrameLayout) -> dict[str, PlacedSolid]:
     return printed_solids(frame)
@@ -53,7 +65,7 @@ def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
 
 class TestSolids:
     def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
-        assert len(solids) == 6
+        assert len(solids) == 12
         for part in solids.values():
             mesh = as_trimesh(part.shape)
             assert mesh.is_watertight
@@ -98,29 +110,44 @@ class TestSolids:
         ends = [m + s for m in (-15.5, 15.5) for s in (-half, half)]
         assert np.array(along) - DRIVE.centre_mm == pytest.approx(np.array(ends), abs=1e-5)
 
-    def test_the_bracket_puts_the_pinhole_where_the_record_has_it(
+    def test_plate_and_fence_put_the_pinhole_where_the_record_has_it(
         self, small_prototype: PrototypeLayout, solids: dict[str, PlacedSolid]
     ) -> None:
-        """From the bracket alone: its face and slot, and the camera's radius and thread."""
+        """From the solids alone: face, slot and fence, and the camera's radius and lengths."""
         view, own = small_prototype.array.camera, SMALL.prototype
-        slot = [
-            (point, way)
-            for point, way, radius in cylinders(solids["camera_bracket"].shape)
-            if abs(radius - 3.3) < 1e-9
-        ]
-        assert len(slot) >= 2
-        way = slot[0][1] * np.sign(slot[0][1] @ [1, 0, 0])
-        mesh = as_trimesh(solids["camera_bracket"].shape)
-        face = mesh.face_normals @ way < -1 + 1e-9
-        near = (mesh.triangles[face].reshape(-1, 3) @ way).min()
-        up = np.cross(way, [0, 1, 0])
-        up *= np.sign(up[2])
-        ends = sorted((point for point, _ in slot), key=lambda point: float(point @ up))
-        middle = (ends[0] + ends[-1]) / 2
-        thread = middle + (near - middle @ way) * way
-        pinhole = thread - own.camera_diameter_mm / 2 * way + FRAME.camera_screw_mm * up
+        ends = holes_of(solids["camera_plate"], 3.3)
+        assert len(ends) == 2
+        middle = sum(ends) / 2
+        across = np.array([0.0, 1.0, 0.0])
+        out = np.cross(view.forward, across)
+        out *= np.sign(out[0])
+        face = (as_trimesh(solids["camera_plate"].shape).vertices @ out).min()
+        thread = middle + (face - middle @ out) * out
+        pinhole = thread - own.camera_diameter_mm / 2 * out + FRAME.camera_screw_mm * view.forward
         assert norm(pinhole - view.pinhole) < 1e-6
-        assert up == pytest.approx(view.forward, abs=1e-9)
+        behind = as_trimesh(solids["camera_fence"].shape).vertices @ -view.forward
+        length = behind.min() + view.pinhole @ view.forward
+        assert length == pytest.approx(own.camera_length_mm)
+
+    def test_screws_of_the_camera_plate_are_in_the_middle_of_their_slots(
+        self, solids: dict[str, PlacedSolid]
+    ) -> None:
+        """Inserts of the plate before the bracket's slots, the fence's before the plate's."""
+        for one, size, other in (
+            ("camera_plate", 3.2, "camera_bracket"),
+            ("camera_fence", 2.75, "camera_plate"),
+        ):
+            screws = holes_of(solids[one], size)
+            assert len(screws) == {"camera_plate": 3, "camera_fence": 2}[one]
+            out = next(way for _, way, r in cylinders(solids[one].shape) if abs(r - size) < 1e-9)
+            for screw in screws:
+                ends = [
+                    end - screw - (end - screw) @ out * out
+                    for end in holes_of(solids[other], 2.75, out)
+                ]
+                nearest = sorted(ends, key=norm)[:2]
+                assert norm(nearest[0] + nearest[1]) < 1e-6
+                assert norm(nearest[0]) >= 5
 
     def test_the_clamp_holds_the_post(
         self, solids: dict[str, PlacedSolid], stage: StageLayout
@@ -144,7 +171,8 @@ class TestSolids:
         ring = np.pi * (11**2 - 4**2) * 7
         assert volume(purchased["shaft"]) == pytest.approx(shaft, rel=1e-9)
         assert volume(purchased["bearing_front"]) == pytest.approx(ring, rel=1e-9)
-        bar = 20 * 20 * frame.length
+        slots = 4 * frame.upright["slot_mm"] * SLOT_DEPTH_MM
+        bar = (20 * 20 - slots) * frame.length
         assert volume(purchased["upright_left"]) == pytest.approx(bar, rel=1e-9)
         length, width, thick = frame.plate.sizes
         holes = len(frame.holes) * np.pi * 2.1**2 * thick

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm, unit
+from tbcad.optics.highlights import reflection_points
 from tbcad.prototype.stage.calibration import (
     NOISE_PX,
     calibration_estimate,
-    reflection_points,
 )
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tbcad.spec.load import load_spec
@@ -16,20 +15,6 @@ from tests.mirror_arrays import mirror_array
 STAGE = load_spec(None).prototype.stage
 LEDS = np.array(STAGE.leds_mm)
 CAPTURE = 30.0
-
-
-@pytest.mark.parametrize("radius", [1.0, 20.0, 300.0, 5000.0])
-def test_light_of_the_led_is_reflected_to_the_pinhole(radius: float) -> None:
-    """Angles of incidence and of reflection are equal, also on spheres much larger than the rig."""
-    rng = np.random.default_rng(1)
-    pinhole, place = np.array([100.0, 0.0, -100.0]), np.array([5.0, 20.0, -3.0])
-    apex = unit(rng.normal(loc=(0, 0, 1.5), size=(200, 3))) * 150
-    normal = unit(unit(place - apex) + unit(pinhole - apex) + 0.05 * rng.normal(size=(200, 3)))
-    centre = apex - radius * normal
-    point = reflection_points(centre, np.full(200, radius), place, pinhole)
-    assert norm(point - centre) == pytest.approx(np.full(200, radius))
-    to_led, to_pinhole = unit(place - point), unit(pinhole - point)
-    assert norm(np.cross(unit(to_led + to_pinhole), unit(point - centre))).max() < 1e-9
 
 
 def test_the_covariance_is_that_of_centres_solved_from_noisy_highlights() -> None:

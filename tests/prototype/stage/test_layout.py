@@ -139,7 +139,7 @@ class TestStage:
             (1, (20.0, 17.5, -15.0), "LED 1 with its pillar reaches"),
             (1, (10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
             (3, (-3.4, 8.0, -13.5), "LED 3 is in the object's room: move it outward to 23.3 mm"),
-            (4, (-11.4, -21.9, -3.0), "LED 4 collides with LED 3"),
+            (4, (5.1, 22.9, -3.0), "LED 4 collides with LED 3"),
         ],
     )
     def test_unusable_leds_are_refused(
@@ -222,6 +222,16 @@ class TestKeepOut:
             for other in ends:
                 share = rng.uniform(size=(len(rim), 1))
                 assert (keep_out.to_light(other + share * (rim - other)) < 1e-6).all()
+
+    @pytest.mark.parametrize("count", [0, 1, 6, 7, 50])
+    def test_points_are_measured_alike_however_many_at_a_time(
+        self, keep_out: KeepOut, monkeypatch: pytest.MonkeyPatch, count: int
+    ) -> None:
+        points = np.random.default_rng(1).normal(size=(count, 3)) * 60
+        whole = keep_out.to_light(points)
+        monkeypatch.setattr("tbcad.prototype.keepout.CHUNK", 6)
+        assert whole.shape == (count,)
+        assert np.array_equal(keep_out.to_light(points), whole)
 
     def test_light_hull_is_no_larger_than_its_spheres(self, keep_out: KeepOut) -> None:
         """Distances by many spheres between both ends, at many azimuths."""

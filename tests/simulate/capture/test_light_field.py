@@ -1,13 +1,15 @@
 """The light field's file: what is written is read, in parts too; other files are refused."""
 
+from io import BytesIO
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.simulate.capture.light_field import PIXEL_ARRAYS, SCHEMA, LightField
+from tbcad.simulate.capture.light_field import PIXEL_ARRAYS, SCHEMA, SHOWN_PX, LightField
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.ray_casting import Scene
@@ -142,7 +144,7 @@ def _changed(store: h5py.File, change: str) -> None:
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is no file"), LightField.open(tmp_path):
+    with pytest.raises(InputError, match="give a light field"), LightField.open(tmp_path):
         pass
 
 
@@ -154,3 +156,12 @@ def test_the_reader_is_found_where_the_documentation_has_it(file: Path) -> None:
     assert part["origin"].shape == (20, 40, 3)
     with pytest.raises(AttributeError, match="Nothing"):
         tbcad.Nothing  # noqa: B018
+
+
+def test_notebooks_show_both_photographs(light_field: LightField) -> None:
+    with Image.open(BytesIO(light_field._repr_png_())) as shown:
+        pixels = np.asarray(shown)
+    whole = np.concatenate([frame.image() for frame in light_field.frames.values()], axis=1)
+    step = -(-whole.shape[1] // SHOWN_PX)
+    assert pixels.shape[1] <= SHOWN_PX
+    np.testing.assert_array_equal(pixels, whole[::step, ::step])

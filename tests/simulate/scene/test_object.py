@@ -156,9 +156,9 @@ def test_bad_meshes(tmp_path: Path, name: str, text: str, wrong: str) -> None:
 
 
 def test_no_such_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is no file"):
+    with pytest.raises(InputError, match="no such file; give a triangle mesh"):
         load_object(tmp_path / "absent.ply", CAPTURE_MM)
-    with pytest.raises(InputError, match="is no file"):
+    with pytest.raises(InputError, match="no such file; give a triangle mesh"):
         load_object(tmp_path, CAPTURE_MM)
 
 

@@ -11,14 +11,20 @@ import pytest
 from tbcad import schedule
 from tbcad.cli import run
 from tbcad.errors import InputError
+from tbcad.figure_files import PlotFormat
 from tbcad.mirrors import radii
 from tbcad.simulate import parallel
 from tbcad.simulate.study.capture_area import capture_area
 from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 from tbcad.simulate.study.elevation import correlation, elevation
-from tbcad.simulate.study.paper import balanced_sensors, claims, is_table_i
+from tbcad.simulate.study.paper import (
+    balanced_sensors,
+    claims,
+    is_table_i,
+    with_lens_of_table_i,
+)
 from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.plots import Panel, Series, plot_png
+from tbcad.simulate.study.plots import Panel, Series, plot_file
 from tbcad.simulate.study.resolution import COUNTED, Ratio, resolution
 from tbcad.simulate.study.study import (
     SUMMARY_COLUMNS,
@@ -29,6 +35,7 @@ from tbcad.simulate.study.study import (
 )
 from tbcad.simulate.study.sweep import n_range
 from tbcad.simulate.study.tables import Table, csv_text
+from tbcad.spec.design import FIT
 from tbcad.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
 
@@ -155,14 +162,17 @@ def test_csv_keeps_every_digit() -> None:
     assert table.numbers("b") == pytest.approx([math.nan, 3], nan_ok=True)
 
 
-def test_pictures_repeat_whatever_the_user_has_set() -> None:
+@pytest.mark.parametrize(
+    ("kind", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
+def test_pictures_repeat_whatever_the_user_has_set(kind: PlotFormat, begin: bytes) -> None:
     line = Series("line", np.arange(1.0, 5), np.array([1, 2, np.nan, 400.0]))
     panels = (Panel("one", "x", "y", (line,), "y"), Panel("two", "x", "y", (line,)))
-    first = plot_png(panels)
+    first = plot_file(panels, kind)
     with matplotlib.rc_context({"figure.facecolor": "red", "font.size": 20.0}):
-        assert plot_png(panels) == first
-    assert plot_png(panels[:1]) != first
-    assert first.startswith(b"\x89PNG")
+        assert plot_file(panels, kind) == first
+    assert plot_file(panels[:1], kind) != first
+    assert first.startswith(begin)
 
 
 def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
@@ -212,6 +222,14 @@ def test_which_designs_are_the_papers() -> None:
         assert not is_table_i(load_spec(None, [setting]))
 
 
+def test_lens_of_table_i_is_for_its_geometry_only() -> None:
+    """Elsewhere it would be too wide or too narrow for the mirrors."""
+    assert with_lens_of_table_i(load_spec(None, ["n=5"])).camera.hfov_deg == 89
+    for setting in ("camera_mm=[130, 0, -220]", "semi_minor_mm=110", "capture_diameter_mm=50"):
+        assert with_lens_of_table_i(load_spec(None, [setting])).camera.hfov_deg == FIT
+    assert with_lens_of_table_i(load_spec(None, ["hfov_deg=70"])).camera.hfov_deg == 70
+
+
 def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "studies"
     arguments = ["study", "capture-area", "--from", "4", "--to", "4", "--out", str(out)]
@@ -230,7 +248,9 @@ def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[
         ["resolution", "--from", "9", "--to", "3"],
         ["capture-area", "--to", "61"],
         ["elevation", "--set", "optics.m=3"],
+        ["elevation", "missing.toml"],
         ["elevation", "--design", "missing.toml"],
+        ["elevation", "turtleback", "--design", "turtleback"],
         ["depth-of-field", "--blur-px", "0"],
         ["depth-of-field", "--pixel-um", "nan"],
         ["low-pass", "missing", "--filter-px", "0"],

@@ -41,7 +41,7 @@ def test_sensors_of_table_ii_have_its_n() -> None:
 
 
 def test_n_proportionate_to_the_sensor() -> None:
-    """Four times the sides: sixteen times the pixels, twice the n (designs/sensor-10mp.toml)."""
+    """Four times the sides: sixteen times the pixels, twice the n (design sensor-10mp)."""
     sensors = (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
     assert [proportionate_n(load_spec(None), sensor) for sensor in sensors] == [18, 36, 24]
     assert proportionate_n(load_spec(None, SMALL), Sensor(16, 16)) == 2
@@ -137,7 +137,6 @@ def test_interval_of_the_mean_difference() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_prototype_against_the_shell(export_folder: Path) -> None:
     """Fewer pixels and other virtual cameras: views that are slightly worse."""
     export = read_export(export_folder)
@@ -158,7 +157,6 @@ def test_prototype_against_the_shell(export_folder: Path) -> None:
     assert rows["at 95 % the difference is"] == verdict
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
     """Section 5.3: the wider the filter, the lower the contrast, and the blurrier every view."""

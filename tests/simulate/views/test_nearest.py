@@ -15,6 +15,7 @@ from tbcad.simulate.views.synthesis import Rays, nearby_rays, search_radius
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 
 CAPTURE_MM = 60.0
+EXACT = 0.9995
 
 
 def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -44,6 +45,15 @@ def targets_of(view: Camera) -> tuple[TwoPlane, Rays]:
 def test_equals_a_k_d_tree_over_all_rays(
     light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
 ) -> None:
+    # The descent may end beside the nearest where a mirror's pixels have a notch: 2 of the
+    # 2,950,000 rays of a grid of 288 views.
+    assert exact_share(light_field, tiles, azimuth, elevation, distance) > EXACT
+
+
+def exact_share(
+    light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
+) -> float:
+    """Share of a view's rays whose nearest captured ray, if within the limit, is found."""
     view = camera_around_object(
         np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, (160, 120)
     )
@@ -51,17 +61,24 @@ def test_equals_a_k_d_tree_over_all_rays(
     targets = two_plane.coordinates(*rays)
     origin, direction, _ = every_ray(light_field)
     points = two_plane.coordinates(origin, direction)
-    distance, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(targets)
+    nearest, _ = cKDTree(points[~np.isnan(points[:, 0])]).query(targets)
     bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
     assert bundle is not None
     found = nearest_rays(bundle, targets)
-    # At the limit itself a mirror may be left out: one target in a few says which are near.
-    within = found >= 0
-    assert (distance[within] <= bundle.limit).all()
-    assert within[distance < 0.9 * bundle.limit].all()
-    found_distance = np.linalg.norm(bundle.points[found[within]] - targets[within], axis=1)
-    # Walking may end beside the nearest where a mirror's pixels have a notch; it is rare.
-    assert (found_distance <= distance[within] * (1 + 1e-9)).mean() > 0.9995
+    found_distance = np.linalg.norm(bundle.points[found] - targets, axis=1)
+    exact = found_distance <= nearest * (1 + 1e-9)
+    beyond = nearest > bundle.limit
+    assert (found[beyond] < 0).all()
+    return float(np.where(beyond, True, exact & (found >= 0)).mean())
+
+
+@pytest.mark.parametrize(("azimuth", "distance"), [(92, 120), (90, 60), (-90, 120)])
+def test_halved_mirrors_of_the_seam_do_not_hide_nearer_rays(
+    light_field: LightField, tiles: MirrorTiles, azimuth: float, distance: float
+) -> None:
+    """These views along the seam have the most rays whose descent ends at the edge of a mirror."""
+    share = exact_share(light_field, tiles, azimuth, 40, distance)
+    assert share > EXACT
 
 
 def test_distance_in_two_plane_coordinates_is_that_of_the_rays_in_the_capture_sphere() -> None:

@@ -3,17 +3,28 @@
 import numpy as np
 from numba import njit
 
-from tbcad.tolerance.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, ROUNDS
+from tbcad.tolerance.montecarlo.cell_edges import (
+    AREA,
+    CROSSINGS,
+    MISS_SQUARED,
+    ROUNDS,
+    _reflect,
+    _sample,
+)
 from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.edge_model import CURVATURE, EdgeModel, surface_tables, view_tables
+from tbcad.tolerance.montecarlo.edge_model import (
+    CURVATURE,
+    EdgeModel,
+    form_tables,
+    surface_tables,
+    view_tables,
+)
 from tbcad.tolerance.montecarlo.edge_samples import (
     PLACES,
     SAMPLES,
     least_sample,
     parabola_minimum,
     picture_area,
-    reflect_samples,
-    sample_points,
     screen_crossings,
 )
 from tbcad.tolerance.montecarlo.visible_edges import (
@@ -30,18 +41,21 @@ def every_edge(half: EdgeModel, draws: ShellDraws) -> np.ndarray:
     """What `trace_cell_edges` finds in s builds, (s, m, 3)."""
     return np.array(
         [
-            _trace(surfaces, half.pairs.arrays, half.halved, view, half.screen)
-            for surfaces, view in zip(
-                surface_tables(half, draws), view_tables(half, draws), strict=True
+            _trace(surfaces, forms, half.pairs.arrays, half.halved, view, half.screen)
+            for surfaces, forms, view in zip(
+                surface_tables(half, draws),
+                form_tables(half, draws),
+                view_tables(half, draws),
+                strict=True,
             )
         ]
     )
 
 
 @njit
-def _trace(surfaces, pairs, halved, view, screen):  # type: ignore[no-untyped-def]
+def _trace(surfaces, forms, pairs, halved, view, screen):  # type: ignore[no-untyped-def]
     pair, offset, face, reach = pairs
-    result, samples = np.zeros((len(surfaces) - 2, 3)), np.empty(PLACES)
+    result, samples = np.zeros((len(halved), 3)), np.empty(PLACES)
     result[:, MISS_SQUARED] = np.inf
     edge, spans, spare = np.empty(EDGE_COLUMNS), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
@@ -59,11 +73,11 @@ def _trace(surfaces, pairs, halved, view, screen):  # type: ignore[no-untyped-de
             if i < len(result):
                 for s in range(count):
                     low, high = spans[s]
-                    sample_points(edge, low, high, view, samples)
+                    _sample(edge, (low, high), view, surfaces, forms, (p, q), samples)
                     result[i, AREA] += sign * picture_area(view, samples)
                     if halved[i] and other == len(result):
                         continue
-                    reflect_samples(surfaces[i], view, samples)
+                    _reflect(surfaces, forms, i, view, samples)
                     result[i, CROSSINGS] += screen_crossings(screen[i], samples)
                     for _ in range(ROUNDS - 1):
                         best, step = least_sample(samples), (high - low) / (SAMPLES - 1)
@@ -71,8 +85,8 @@ def _trace(surfaces, pairs, halved, view, screen):  # type: ignore[no-untyped-de
                             max(low, low + (best - 1) * step),
                             min(high, low + (best + 1) * step),
                         )
-                        sample_points(edge, low, high, view, samples)
-                        reflect_samples(surfaces[i], view, samples)
+                        _sample(edge, (low, high), view, surfaces, forms, (i, other), samples)
+                        _reflect(surfaces, forms, i, view, samples)
                     result[i, MISS_SQUARED] = min(
                         result[i, MISS_SQUARED], parabola_minimum(samples)
                     )

@@ -8,7 +8,8 @@ from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 
 M = 4
 ALL = Errors(**{field.name: Error(0.001) for field in fields(Errors)})
-NAMES = [field.name for field in fields(ShellDraws)]
+# The foot moves where neighbours share a warp, see test_warp.
+NAMES = [field.name for field in fields(ShellDraws) if field.name != "foot"]
 
 
 def test_a_build_is_the_same_alone_or_among_others() -> None:

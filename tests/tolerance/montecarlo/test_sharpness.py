@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.optics.camera import Camera
+from tbcad.optics.reflection import reflected_rays
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
@@ -158,7 +159,10 @@ class TestActual:
             way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
             mirror = np.arange(1, m + 1, dtype=np.int32)[None]
             rays = reflect_pixels(built.camera.pinhole, way[None], built.mirrors, mirror)
-            missed = np.linalg.norm(np.cross(rays.origin[0], rays.direction[0]), axis=1)
+            designed = reflected_rays(at.camera.pinhole, at.mirrors.apex, at.mirrors.normal)
+            along = np.einsum("mx,mx->m", at.mirrors.apex, designed)
+            aim = at.mirrors.apex - along[:, None] * designed
+            missed = np.linalg.norm(np.cross(rays.origin[0] - aim, rays.direction[0]), axis=1)
             offset = pointing(edge_model(at), drawn)[1][0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
             assert missed.min() > 0.01

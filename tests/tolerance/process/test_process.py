@@ -52,7 +52,9 @@ def table(magnitude: float, mean: float, **others: str) -> str:
     """A whole file whose kinds have the same figures."""
     head = 'name = "even"\ntitle = "All the same"\nschema = 1\nball_grade = "G3"\n'
     body = f'magnitude = {magnitude}\nmean = {mean}\nsource = "tests"\n'
-    return head + "".join(f"[{kind}]\n{others.get(kind, body)}" for kind in KINDS)
+    form = f'magnitude = {magnitude}\nsource = "tests"\n'
+    bodies = {"warp_um": f"{form}length_mm = 50\n", "waviness_um": form} | others
+    return head + "".join(f"[{kind}]\n{bodies.get(kind, body)}" for kind in KINDS)
 
 
 class TestBuiltIn:
@@ -89,10 +91,14 @@ class TestBuiltIn:
     def test_centres_follow_from_the_tolerance_of_short_lengths(
         self, name: str, limit_mm: float
     ) -> None:
-        """Of a length between two mirrors the maker's limit is two standard deviations."""
+        """Of a length between two mirrors the maker's limit is two standard deviations.
+
+        Farther apart than the correlation length, they share no warp.
+        """
         got, drawing = process_errors(load_process(name)), np.random.default_rng(7)
         centres = got.sphere_centre.sample(drawing, 2, 400_000)
         ends = centres + got.sphere_radius.sample(drawing, 2, 400_000)
+        ends += got.warp.sample(drawing, 2, 400_000)
         assert 2 * np.std(ends[0] - ends[1]) == pytest.approx(limit_mm, rel=0.01)
 
     @pytest.mark.parametrize("name", BUILT_IN)
@@ -117,16 +123,46 @@ class TestErrors:
         assert made == {field.name for field in fields(Errors)}
 
     def test_units(self, file: Path) -> None:
-        file.write_text(table(2, 1))
+        file.write_text(table(2, 1), encoding="utf-8")
         got = process_errors(load_process(str(file)))
         thousandth, degree = Error(0.002, 0.001), math.pi / 180
         per_thousand = ("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis")
         per_thousand += ("shell_shift", "shell_tilt", "camera_shift", "camera_tilt")
-        per_thousand += ("camera_focal", "coating", "axis_runout", "axis_tilt", "seat")
+        per_thousand += ("camera_focal", "coating", "axis_runout", "axis_tilt", "seat", "cap_tilt")
         for name in per_thousand:
             assert getattr(got, name) == thousandth, name
         assert got.facets == Error(2, 1)
+        assert got.warp == Error(0.002, length=50)
+        assert got.waviness == Error(0.002)
         assert got.rotation_angle == Error(2 * degree, degree)
+        assert got.wind_up == Error(0.02, 0.01)
+
+    @pytest.mark.parametrize(
+        ("options", "said"),
+        [
+            (["warp_um.length_mm=5"], "warp_um.length_mm is 5"),
+            (["warp_um.mean=1"], "warp_um.mean is 1"),
+            (["warp_um.distribution=uniform"], "warp_um.distribution is 'uniform'"),
+            (["waviness_um=-1"], "waviness_um.magnitude is -1"),
+            (["waviness_um.mean=0.1"], "waviness_um.mean is 0.1"),
+        ],
+    )
+    def test_what_fields_cannot_have(self, options: list[str], said: str) -> None:
+        assert said in refusal("cnc", *options)
+
+    @pytest.mark.parametrize("kind", ["warp_um", "waviness_um"])
+    def test_a_file_without_a_field_is_refused_in_a_line(self, file: Path, kind: str) -> None:
+        whole = table(2, 1)
+        start = whole.index(f"[{kind}]")
+        end = whole.index("[", start + 1)
+        assert kind in refused(file, whole[:start] + whole[end:])
+
+    @pytest.mark.parametrize("name", BUILT_IN)
+    def test_a_part_of_one_mirror_keeps_its_share_of_the_limit(self, name: str) -> None:
+        """A quarter of the limit for its radius, as before neighbours shared errors (0007)."""
+        limit = {"fdm": 0.2, "sls": 0.3, "sla": 0.1, "cnc": 0.02, "diamond": 0.005}[name]
+        radius = process_errors(load_process(name)).whole_radius
+        assert radius.spread == pytest.approx(limit / 4, rel=0.01)
 
     def test_distribution_is_kept(self) -> None:
         changed = load_process("cnc", ["seat_um.distribution=uniform", "seat_um=10"])
@@ -149,14 +185,18 @@ class TestErrors:
 
 class TestOwnFile:
     def test_may_rest_on_a_built_in_one(self, file: Path) -> None:
-        file.write_text('based_on = "sla"\n[seat_um]\nmagnitude = 9\nsource = "measured"\n')
+        file.write_text(
+            'based_on = "sla"\n[seat_um]\nmagnitude = 9\nsource = "measured"\n', encoding="utf-8"
+        )
         process = load_process(str(file))
         assert (process.name, process.seat_um.magnitude, process.seat_um.mean) == ("own", 9, 0)
         assert process.sphere_centre_um == load_process("sla").sphere_centre_um
 
     def test_replaces_a_whole_kind(self, file: Path) -> None:
         """A figure must not inherit the mean, nor the source, of another."""
-        file.write_text('based_on = "fdm"\n[coating_um]\nmagnitude = 1\nsource = "measured"\n')
+        file.write_text(
+            'based_on = "fdm"\n[coating_um]\nmagnitude = 1\nsource = "measured"\n', encoding="utf-8"
+        )
         assert load_process(str(file)).coating_um.mean == 0
         said = refused(file, 'based_on = "fdm"\n[coating_um]\nmagnitude = 1\n')
         assert said.startswith("coating_um.source is missing, allowed is text")

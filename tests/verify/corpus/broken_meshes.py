@@ -83,7 +83,7 @@ MESHES: tuple[Mutation, ...] = (
     fails("in inches", BOTH, mesh(lambda c, _: c / INCH, 0, HALVES), "mirrors found", SIZE),
     fails("scaled by 25.4", BOTH, mesh(lambda c, _: c * INCH, 0, HALVES), "mirrors found", SIZE),
     fails("shrunk by 0.05 %", BOTH, mesh(stretched), "centre error"),
-    fails("shifted by 20 um", BOTH, mesh(shifted(0, 0, 0.02)), "centre error", "0.0200 mm"),
+    fails("shifted by 20 um", BOTH, mesh(shifted(0, 0, 0.02)), "centre error", "0.020"),
     fails("one half turned by 0.1 mrad", BOTH, mesh(rotated), "centre error"),
     fails("one half its own mirror image", BOTH, mesh(mirrored), "mirrors found", "missing"),
     fails("the halves exchanged", BOTH, exchanged, "mirrors found"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.verify.corpus.copies import put
 from tests.verify.corpus.mutation import Mutation, fails, refused
 from tests.verify.corpus.prototype_changes import (
     BALLS,
@@ -9,41 +10,78 @@ from tests.verify.corpus.prototype_changes import (
     GLB,
     HOLES,
     KLIPPER,
+    LAMP,
+    PLATE,
     PROGRAM,
     RECORD,
     SETTINGS,
     STEP,
+    STOPS,
+    UPRIGHT,
+    WHEEL,
     WIRING,
     better_calibration,
+    cap_record,
     compact,
+    drawn_away,
     drive,
     empty_step,
     exchange,
+    fastener,
+    fastener_off,
+    fewer_circles,
+    flat_fold,
+    frame_key,
     glb,
+    held,
+    in_place,
+    lamp_aside,
+    lamps,
+    lamps_on_their_sides,
     led,
     leds_on_one_side,
+    listed,
+    longer_outline,
+    mark_aside,
+    mounted_in,
     moved_part,
     moved_point,
+    no_fastener,
+    no_lamps,
     no_led,
+    no_panel,
     no_spec_led,
     not_bought,
+    not_printed,
     nudged,
+    origin_of,
+    other_words,
+    picture,
     program,
     record,
+    redrawn,
     row,
     scaled,
     shifted,
+    shifted_circle,
+    shiny_card,
+    spigot,
     stage_key,
     step_text,
     table,
     text_of,
     together,
+    total,
     undrawn,
     unlisted,
+    unpainted,
+    upside_down,
+    wider_circle,
     without_part,
 )
 
-LIST, PLAN = "parts list", "plan program"
+LIST, PLAN, FIGURES = "parts list", "plan program", "list figures"
+DRAWING_OF_CAP = "drawing_cap_1.dxf"
 DWELL = r"G4 P0\.500\n"
 WORDS = (
     *("G28", "G2 X1.0000", "Y5000", "G93", "G10 L2 P1 X5.0000", "G55", "M7", "G20", "G91", "M30"),
@@ -122,6 +160,58 @@ PARTS: tuple[Mutation, ...] = (
         record(lambda r: None, lambda d: d["spec"]["prototype"].update(k=3)),
         "inventory",
         "the spec asks for 3",
+    ),
+    fails(
+        "a screw not recorded", RECORD, no_fastener("M5x16"), "fastener holes", "without a fastener"
+    ),
+    fails(
+        "a screw beside its hole",
+        RECORD,
+        fastener_off("M5x16", 0.1),
+        "fasteners",
+        "drawn elsewhere",
+    ),
+    fails(
+        "a screw through another part",
+        RECORD,
+        fastener("M5x16", through=["stage_disc", "plate"]),
+        "fasteners",
+        "has no hole in stage_disc",
+    ),
+    fails(
+        "a screw of the plate that turns",
+        RECORD,
+        fastener("M5x16", turns=True),
+        "fasteners",
+        "turns otherwise than",
+    ),
+    fails("a screw too few listed", BILL, unlisted("M5x16"), "fasteners", "M5x16: 16 are drawn, 0"),
+    fails(
+        "a screw not drawn", "STEP, GLB", undrawn("M5x16_1"), "fasteners", "M5x16_1 in the assembly"
+    ),
+    fails(
+        "screws of the wheel once the base is on its shaft",
+        RECORD,
+        mounted_in("wheel", "shaft"),
+        "key access",
+        "behind bearing_head at every base angle",
+    ),
+    fails(
+        "a screw before what it holds",
+        RECORD,
+        mounted_in("stage_foot", "coupon"),
+        "key access",
+        "is mounted before stage_foot",
+    ),
+    fails(
+        "a screw in no step", RECORD, mounted_in("stage_foot", None), "key access", "is in no step"
+    ),
+    fails(
+        "a fall of half the energy",
+        RECORD,
+        record(lambda r: r["power_off"].update(fall_energy_j=r["power_off"]["fall_energy_j"] / 2)),
+        "power off",
+        "fall_energy_j is 0.",
     ),
     fails("an LED elsewhere", RECORD, led(2.0, spec=False), "leds as designed", "led_1 is not"),
     fails(
@@ -212,10 +302,12 @@ PURCHASES: tuple[Mutation, ...] = (
         )
     ),
     fails("no key of the zero disc", BILL, unlisted("DOWEL-3x10"), LIST, "DOWEL"),
-    fails("a magnet more", BILL, row(BILL, 0, quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
-    fails("another volume", BILL, row(BILL, 0, print_volume_mm3=1.0), LIST, "its volume"),
-    fails("another mass", BILL, row(BILL, 6, mass_g=1.0), LIST, "its mass"),
-    fails("another description", BILL, row(BILL, 6, what="a motor"), LIST, "its description"),
+    fails("a cap more", BILL, listed("cap 1", quantity=2, total_mass_g=1.0), LIST, "1 are needed"),
+    fails("another volume", BILL, listed("cap 1", print_volume_mm3=1.0), LIST, "its volume"),
+    fails("another mass", BILL, listed("NEMA17-40", mass_g=1.0), LIST, "its mass"),
+    fails(
+        "another description", BILL, listed("NEMA17-40", what="a motor"), LIST, "its description"
+    ),
     fails(
         "screws that are too short",
         BILL,
@@ -231,7 +323,7 @@ PURCHASES: tuple[Mutation, ...] = (
         HOLES,
         table(HOLES, lambda rows: rows.pop()),
         "plate holes",
-        "the plate has 12",
+        "the plate has 16",
     ),
     fails(
         "holes 10 mm aside", HOLES, table(HOLES, shifted("x_mm", 10.0)), "plate holes", "elsewhere"
@@ -272,6 +364,81 @@ PURCHASES: tuple[Mutation, ...] = (
     fails("an error of direction", BALLS, row(BALLS, 0, error_deg=0.0), "ball labels", "deg off"),
 )
 
+LISTED: tuple[Mutation, ...] = (
+    *(
+        fails(f"list: {part} {column}", BILL, listed(part, **{column: value}), FIGURES, words)
+        for part, column, value, words in (
+            ("NEMA17-40", "total_price", 16.0, "NEMA17-40: its total price"),
+            ("NEMA17-40", "unit_price", "", "no price, but what belongs to one"),
+            ("NEMA17-40", "price_date", "lately", "date or source"),
+            ("NEMA17-40", "currency", "euro", "currency, date"),
+            ("NEMA17-40", "price_source", "", "source of its price"),
+            ("M5x12", "standard", "", "M5x12: its standard"),
+            ("M5x12", "standard", "ISO 7380", "M5x12: its standard"),
+            ("RELAY", "standard", "ISO 4762", "names another standard"),
+            ("carrier", "filament_g", 10.0, "do not fill it"),
+            ("carrier", "print_hours", 0.5, "carrier: 0.5 h for"),
+            ("RELAY", "print_hours", 1.0, "a print of what is bought"),
+        )
+    ),
+    *(
+        fails(
+            f"totals: {key}",
+            RECORD,
+            total(key, new),
+            FIGURES,
+            f"totals: {key}",
+        )
+        for key, new in (
+            ("mass_g", 1.0),
+            ("bought_price", {}),
+            ("filament_price", {"USD": 20.0}),
+            ("without_price", 1),
+            ("filament_g", 1.0),
+            ("print_hours", 1.0),
+        )
+    ),
+)
+
+DRAWINGS: tuple[Mutation, ...] = (
+    *(
+        fails(f"drawing: {name} of {file}", file, redrawn(file, how), "drawings", words)
+        for name, file, how, words in (
+            ("a hole 10 um aside", PLATE, shifted_circle, "plate: no circle of 2.1 mm radius"),
+            ("a wider hole", PLATE, wider_circle, "plate: no circle of 2.1 mm radius"),
+            ("a hole less", WHEEL, fewer_circles, "circles for 6 holes"),
+            ("a hole 10 um aside", WHEEL, shifted_circle, "wheel: no circle of 1.7 mm radius"),
+            ("a longer outline", PLATE, longer_outline, "plate: its outline"),
+            ("a longer outline", UPRIGHT, longer_outline, "upright_left: its outline"),
+            ("a longer strip", LAMP, longer_outline, "lamp_1: its outlines are not"),
+            ("other words", UPRIGHT, other_words, "does not say what"),
+        )
+    ),
+    fails(
+        "drawing: no PDF",
+        "drawing_plate.pdf",
+        lambda folder: put(folder, "drawing_plate.pdf", b"GIF89a") or (),
+        "drawings",
+        "is no PDF",
+    ),
+    Mutation(
+        "drawing: no DXF",
+        PLATE,
+        lambda folder: put(folder, PLATE, b"plate") or (),
+        1,
+        ("drawings",),
+        ("is no DXF",),
+        unknown=True,
+    ),
+    fails(
+        "no drawing of the plate",
+        RECORD,
+        record(lambda value: value["drawings"].pop(0)),
+        "drawings",
+        "no drawing",
+    ),
+)
+
 WIRES: tuple[Mutation, ...] = (
     *(
         fails(f"wiring: {column}", WIRING, row(WIRING, 1, **{column: value}), "wiring", words)
@@ -301,6 +468,15 @@ WIRES: tuple[Mutation, ...] = (
         row(WIRING, 1, resistor="R-0.6W-2150", resistor_ohm=2150.0),
         "wiring",
         "2150 ohm is not in the series",
+    ),
+    *(
+        fails(f"wiring: {name}", WIRING, row(WIRING, number, **change), "wiring", words)
+        for name, number, change, words in (
+            ("no fuse", 8, {"connector": "board"}, "by board"),
+            ("another supply", 8, {"supply_v": 12.0}, "at 12 V"),
+            ("the motor on another driver", 7, {"output": "driver Y"}, "on driver Y"),
+            ("too much for the motor", 7, {"current_ma": 3000.0}, "takes 3000 mA"),
+        )
     ),
     fails(
         "phases without the dark",
@@ -338,7 +514,8 @@ HOMING: tuple[Mutation, ...] = (
             ("too long a travel", r"\$130=.*", "$130=360", "above the program"),
             ("no travel", r"\$130=.*\n", "", "do not hold the program"),
             ("homing upward", r"\$23=.*", "$23=0", "$23 is 0"),
-            ("a switch that closes", r"\$5=.*", "$5=0", "$5 is 0"),
+            ("a switch that closes", r"\$5=.*", "$5=7", "$5 is 7"),
+            ("empty inputs that read as pressed", r"\$5=.*", "$5=0", "$5 is 0"),
             ("no soft limits", r"\$20=.*", "$20=0", "$20 is 0"),
             ("the motor turned off", r"\$1=.*", "$1=25", "$1 is 25"),
             ("homing of all axes", r"\$45=.*", "$45=3", "$45 is 3"),
@@ -412,16 +589,221 @@ HOMING: tuple[Mutation, ...] = (
     refused("no home", RECORD, record(lambda r: r.pop("home")), RECORD, "home is missing"),
 )
 
+CAMERA: tuple[Mutation, ...] = (
+    fails("no fence", "all", without_part("camera_fence"), "inventory", "part camera_fence"),
+    fails("no gauge", RECORD, record(not_printed("camera_gauge")), "inventory", "gauge is missing"),
+    fails("no nuts", BILL, unlisted("NUT-M5"), LIST, "NUT-M5"),
+    fails("no inserts of the camera plate", BILL, unlisted("INSERT-M5"), LIST, "INSERT-M5"),
+    fails(
+        "screws too short to tilt the camera",
+        BILL,
+        table(
+            BILL, lambda rows: [one.update(part="M5x26") for one in rows if one["part"] == "M5x30"]
+        ),
+        "camera mount",
+        "30.0 are needed to tilt",
+    ),
+    fails(
+        "a camera without a place",
+        RECORD,
+        record(lambda r: r.update(camera_place=None)),
+        "camera mount",
+        "no camera_place",
+    ),
+    *(
+        fails(f"camera: {key}", RECORD, in_place("travel", key, value), "camera mount", key)
+        for key, value in (
+            *(("along_axis_mm", 12.0), ("across_mm", 8.0), ("out_mm", 6.0)),
+            *(("along_plate_mm", 9.0), ("yaw_deg", 9.0), ("roll_deg", 9.0), ("across_mm", 1.0)),
+        )
+    ),
+    fails(
+        "camera: another place of its thread",
+        "design.json",
+        frame_key(camera_screw_mm=55.0),
+        "camera mount",
+        "the tripod slot is elsewhere",
+    ),
+    fails(
+        "camera: another length",
+        "design.json",
+        record(lambda _: None, lambda d: d["spec"]["prototype"].update(camera_length_mm=120.0)),
+        "camera mount",
+        "the fence is 100.00 mm behind",
+    ),
+    fails("gauge: a mark aside", RECORD, mark_aside(0.1), "camera gauge", "a mark is no corner"),
+    fails(
+        "gauge: another length",
+        RECORD,
+        in_place("lengths_mm", "near_width", 60.0),
+        "camera gauge",
+        "near_width is 60.000",
+    ),
+    fails(
+        "gauge: better than it is",
+        RECORD,
+        in_place("error", "along_mm", 0.05),
+        "camera gauge",
+        "other errors",
+    ),
+    fails(
+        "gauge: another pixel",
+        RECORD,
+        picture(0, column_px=100.0),
+        "camera gauge",
+        "appears elsewhere",
+    ),
+    fails(
+        "gauge: a small turn",
+        RECORD,
+        picture(0, base_angle_deg=-30.0),
+        "camera gauge",
+        "not turned far enough",
+    ),
+    fails(
+        "gauge: no picture of a side",
+        RECORD,
+        record(lambda r: r["camera_place"]["pictures"].pop(0)),
+        "camera gauge",
+        "to either side are missing",
+    ),
+    fails(
+        "gauge: printed elsewhere",
+        RECORD,
+        origin_of("camera_gauge", 0.1),
+        "camera gauge",
+        "a mark is no corner",
+    ),
+    refused(
+        "gauge: three marks",
+        RECORD,
+        record(lambda r: r["camera_place"]["marks_mm"][0].pop()),
+        RECORD,
+        "a near and a far one",
+    ),
+)
+
+CAPS: tuple[Mutation, ...] = (
+    *(
+        fails(f"cap: {key}", RECORD, cap_record(key, by), "cap drawings", key)
+        for key, by in (
+            *(("spigot_mm", 0.9), ("socket_mm", 1.1), ("spigot_end_mm", 1.1), ("tilt_deg", 0.5)),
+            *(("centre_shift_mm", 0.5), ("aperture_mm", 0.5), ("radius_tolerance_mm", 3.0)),
+            *(("body_tolerance_mm", 3.0), ("irregularity_fringes", 3.0), ("roughness_ra_um", 5.0)),
+            *(("incidence_deg", 0.5), ("reflectance_min", 0.1)),
+        )
+    ),
+    fails(
+        "cap: no record",
+        RECORD,
+        record(lambda r: r["caps"].pop()),
+        "cap drawings",
+        "are not those of the balls",
+    ),
+    fails(
+        "cap: no pole",
+        RECORD,
+        record(lambda r: r["caps"][0].update(polarity="any")),
+        "cap drawings",
+        "where north is",
+    ),
+    fails(
+        "cap: no finish",
+        RECORD,
+        record(lambda r: r["caps"][0].update(finish=" ")),
+        "cap drawings",
+        "has no finish",
+    ),
+    fails(
+        "cap: another radius in its drawing",
+        DRAWING_OF_CAP,
+        text_of(DRAWING_OF_CAP, r"R [0-9.]+ \+-", "R 10.0 +-"),
+        "cap drawings",
+        "lacks R ",
+    ),
+    fails(
+        "cap: no drawing",
+        RECORD,
+        record(lambda r: r["caps"][0].update(pdf="drawing.pdf")),
+        "cap drawings",
+        "there is no drawing.pdf",
+    ),
+    fails(
+        "cap: a spigot that is too thin",
+        "STEP",
+        spigot("cap_1", 1.0),
+        "cap tilt",
+        "tilts",
+    ),
+)
+
 DRIVES: tuple[Mutation, ...] = (
     *(
         fails(f"drive: {key}", RECORD, scaled(key, 1.1), "drive", key)
         for key in (
             *("mass_g", "moment_g_mm", "azimuth_deg", "inertia_g_mm2", "worst_torque_nmm"),
-            *("required_torque_nmm", "holding_torque_nmm", "ratio", "steps_per_deg", "wind_up_deg"),
-            *("belt_pull_n", "belt_centre_mm", "counterweight_g", "safety"),
+            *("required_torque_nmm", "holding_torque_nmm", "ratio", "steps_per_deg", "hold_margin"),
+            *("belt_pull_n", "belt_centre_mm", "peak_torque_nmm", "safety", "teeth_in_mesh"),
+            *("belt_rating_n", "belt_tension_n", "belt_tone_hz", "motor_wind_up_deg"),
+            *("belt_wind_up_deg", "wind_up_limit_deg", "hold_current_a", "hold_loss_w"),
+            *("motor_rise_k", "motor_rise_limit_k", "motor_radial_n", "motor_radial_limit_n"),
         )
     ),
+    fails(
+        "the carrier printed upside down",
+        RECORD,
+        upside_down("carrier"),
+        "pads printed up",
+        "of 15 pads",
+    ),
+    *(
+        fails(f"holding: {key}", RECORD, held(3, **{key: by}), "holding", f"ball 3: {words}")
+        for key, by, words in (
+            ("force_needed_n", 0.5, "force_needed_n is"),
+            ("force_available_n", 1.05, "force_available_n is"),
+            ("ratio", 2.0, "ratio is"),
+            ("wider_gap_n", 1.1, "wider_gap_n is"),
+        )
+    ),
+    fails(
+        "holding: another limit",
+        RECORD,
+        record(lambda r: r["holding"].update(min_ratio=1.0)),
+        "holding",
+        "min_ratio is 1, not 2",
+    ),
+    fails(
+        "holding: stronger magnets than are sold",
+        RECORD,
+        record(lambda r: r["holding"].update(remanence_t=1.48)),
+        "holding",
+        "remanence_t is 1.48",
+    ),
+    fails(
+        "holding: another magnet",
+        RECORD,
+        record(lambda r: r["holding"]["balls"][0].update(magnet="MAGNET-4x3")),
+        "holding",
+        "ball 1: magnet MAGNET-4x3, its pocket is for",
+    ),
+    fails(
+        "holding: glue where a magnet is",
+        RECORD,
+        record(lambda r: r["holding"]["balls"][0].update(by="glue")),
+        "holding",
+        "ball 1: held by glue",
+    ),
+    fails(
+        "holding: a heavy ball",
+        BALLS,
+        row(BALLS, -1, mass_g=20_000.0),
+        "hold ratio",
+        "ball",
+    ),
     fails("drive: centre", RECORD, drive(centre_mm=[0.0, 0.0, 0.0]), "drive", "centre_mm"),
+    fails("drive: a torque", STOPS, row(STOPS, 1, torque_nmm=5.0), "drive", "stop 2: torque_nmm"),
+    fails("drive: a turn", STOPS, row(STOPS, 1, wind_up_deg=0.3), "drive", "stop 2: wind_up_deg"),
+    fails("drive: a hard pull", RECORD, scaled("peak_torque_nmm", 9.0), "motor bearing", "N are"),
     fails("drive: another motor", RECORD, drive(motor="NEMA17-60"), "drive", "motor is NEMA17-60"),
     fails("drive: another kind", RECORD, drive(drive="stage-60"), "drive", "drive is stage-60"),
     refused("drive: less than nothing", RECORD, drive(mass_g=-1.0), RECORD, "drive.mass_g is -1.0"),
@@ -435,6 +817,52 @@ DRIVES: tuple[Mutation, ...] = (
     ),
 )
 
+PATTERN = "shroud_front.dxf"
+SHROUD_AND_LAMPS: tuple[Mutation, ...] = (
+    fails("lamps: brighter", RECORD, lamps(lumen_each=900.0), "lamps", "lumen_each is 900"),
+    fails("lamps: no current", RECORD, lamps(current_ma=1.0), "lamps", "current_ma is 1,"),
+    fails("lamps: another strip", RECORD, lamps(strip="STRIP"), "lamps", "2 strips STRIP"),
+    fails("lamps: on their sides", RECORD, lamps_on_their_sides, "lamps", "is drawn elsewhere"),
+    fails("lamps: one aside", RECORD, lamp_aside(0, 30.0), "lamps", "no images of one another"),
+    fails("lamps: light from one", RECORD, lamp_aside(0, 30.0), "light before and after", "turn"),
+    fails("lamps: not listed", RECORD, record(no_lamps), "lamps", "the record has none"),
+    fails(
+        "lamps: one behind an upright",
+        GLB,
+        drawn_away("upright_left", 60.0),
+        "light before and after",
+        "half turn",
+    ),
+    fails("wiring: lamps of 1 mA", WIRING, row(WIRING, 0, current_ma=1.0), "wiring", "lamps take"),
+    fails(
+        "a lamp before the pinhole",
+        GLB,
+        drawn_away("lamp_1", -23.0, -52.0, 35.0),
+        "light past lamps and card",
+        "by lamp_1",
+    ),
+    fails(
+        "a carrier that is not black",
+        RECORD,
+        unpainted("carrier"),
+        "dark background",
+        "end on carrier",
+    ),
+    fails("card that is white", RECORD, record(shiny_card), "dark background", "shroud_lid"),
+    fails("no lid", "STEP, GLB", undrawn("shroud_lid"), "inventory", "shroud_lid is missing"),
+    fails("a panel too few", RECORD, record(no_panel), "inventory", "panel shroud_right"),
+    fails("a lid 5 mm aside", GLB, drawn_away("shroud_lid", 5.0), "assembly step", "shroud_lid"),
+    fails("a wider pattern", PATTERN, redrawn(PATTERN, longer_outline), "shroud", "its outline"),
+    fails("a fold too few", PATTERN, redrawn(PATTERN, flat_fold), "shroud", "2 folds"),
+    fails(
+        "a motor outside the shroud",
+        GLB,
+        drawn_away("motor", -400.0),
+        "shroud",
+        "motor is -",
+    ),
+)
+
 GOOD: tuple[Mutation, ...] = (
     Mutation("as it is", "none", lambda _: (), 0),
     Mutation("prototype.json in one line", RECORD, compact, 0),
@@ -445,7 +873,12 @@ PROTOTYPES: tuple[Mutation, ...] = (
     *PARTS,
     *ASSEMBLIES,
     *PURCHASES,
+    *LISTED,
+    *DRAWINGS,
     *WIRES,
     *HOMING,
+    *CAMERA,
+    *CAPS,
     *DRIVES,
+    *SHROUD_AND_LAMPS,
 )

@@ -50,6 +50,7 @@ from tests.verify.corpus.record_changes import (
     without,
     word,
 )
+from tests.verify.corpus.seam_designs import not_aimed
 
 RECORDS: tuple[Mutation, ...] = (
     fails("two ids exchanged", TABLE, exchange, "step surfaces"),
@@ -88,7 +89,7 @@ RECORDS: tuple[Mutation, ...] = (
     fails("another view angle", JSON, design(angle(0.99, False)), "requirements", "hfov"),
     fails("a view angle half as wide, spec too", JSON, design(angle(0.5, True)), "frame margin"),
     fails("a sensor of 16 x 16 pixels, spec too", JSON, design(pixels), "pixels, minimum"),
-    fails("a coat that is not there", JSON, design(coat), "radius error", "0.0200 mm"),
+    fails("a coat that is not there", JSON, design(coat), "radius error", "0.020"),
     fails("a coat that is not there, by STEP", JSON, design(coat), "step surfaces", "0.02 mm"),
     fails("a target not met", JSON, target(beyond_the_worst, True), "coverage, spheres"),
     fails("a target not met on facets", JSON, target(beyond_the_worst, True), "coverage, facets"),
@@ -131,6 +132,9 @@ RECORDS: tuple[Mutation, ...] = (
             ("paper", {"radius_rule": "paper"}),
             ("flat", {"radius_rule": "flat"}),
             ("another margin", {"margin_mm": 1.0}),
+            ("a larger margin of one mirror", {"own_margins_mm": [2.0] * 48 + [2.01]}),
+            ("margins of fewer mirrors", {"own_margins_mm": [2.0] * 48}),
+            ("margins below that of all", {"margin_mm": 2.1, "own_margins_mm": [2.0] * 49}),
             ("larger mirrors", {"max_radius_widths": 100.0}),
         )
     ),
@@ -170,6 +174,8 @@ RECORDS: tuple[Mutation, ...] = (
     fails("no STEP in the record", JSON, design(without("step")), "manifest", "shell_a.step"),
     fails("no 3MF in the record", JSON, design(without("3mf")), "manifest", "shell_a.3mf"),
     fails("a part for the other camera", JSON, first_part(camera="b"), "mirrors found", "missing"),
+    fails("seam mirrors with the old radii", "all", not_aimed, "seam gap", "neither half sees"),
+    fails("seam mirrors with the old radii, by coverage", "all", not_aimed, "coverage, spheres"),
     fails("one half of another design", "STL, 3MF, STEP", other_design, "centre error"),
     fails("one half of another design, by STEP", "STL, 3MF, STEP", other_design, "step surfaces"),
     refused(

@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import ezdxf
+
 from tests.verify.synthetic_export import FACET
 
 NUMBERED = re.compile(r"(?<=[a-z])_[0-9]+")
 ENTITY = re.compile(r"#\d+\s*=\s*\(?\s*([A-Z][A-Z_0-9]*)\s*\(")
-MAPS = {"files", "versions"}  # objects whose keys are data
+# Objects whose keys are data.
+MAPS = {"files", "versions", "totals.bought_price", "totals.filament_price"}
 
 
 def json_fields(value: Any, path: str = "") -> Iterator[str]:
@@ -87,6 +90,19 @@ def scene(path: Path) -> set[str]:
     return set(json_fields(json.loads(data[20 : 20 + size])))
 
 
+def drawn(path: Path) -> set[str]:
+    """Kinds of entities of a DXF, each with its layers."""
+    entities = ezdxf.filemanagement.readfile(path).modelspace()
+    return {f"{one.dxftype()} {one.dxf.layer}" for one in entities}
+
+
+def operators(path: Path) -> set[str]:
+    """Kinds of objects and of operators in a PDF's page."""
+    data = path.read_bytes()
+    texts = {"Tj"} if b") Tj" in data else set()
+    return {match.decode() for match in re.findall(rb"/Type(/[A-Za-z]+)", data)} | texts
+
+
 READERS: dict[str, Callable[[Path], Any]] = {
     ".json": read_json_fields,
     ".csv": columns,
@@ -98,16 +114,20 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".gcode": forms,
     ".cfg": forms,
     ".glb": scene,
+    ".dxf": drawn,
+    ".pdf": operators,
 }
 # Files that are unlike others of their kind.
 NAMED = {".json", ".csv", ".nc", ".txt", ".gcode", ".cfg", ".glb"}
+# The verification's own figures, and the page that shows them.
+WRITTEN_AFTERWARDS = {"verify.json", "report.html"}
 
 
 def fields(folder: Path) -> dict[str, set[str]]:
     """Fields of all files of an export; files that are alike count as one, such as *.stl."""
     found: dict[str, set[str]] = {}
     for path in sorted(folder.iterdir()):
-        if path.name != "verify.json":
+        if path.name not in WRITTEN_AFTERWARDS:
             kind = path.suffix
             name = path.name if kind in NAMED or path.name == "prototype.step" else f"*{kind}"
             found.setdefault(name, set()).update(READERS[kind](path))

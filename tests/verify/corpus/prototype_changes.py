@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
 import trimesh
 
@@ -20,7 +21,11 @@ Record = dict[str, Any]
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
+STOPS = "stops.csv"
 WIRING, SETTINGS = "wiring.csv", "grbl_settings.txt"
+PLATE, WHEEL, UPRIGHT, LAMP = (
+    f"drawing_{name}.dxf" for name in ("plate", "wheel", "upright", "lamp")
+)
 KLIPPER = "rotation_plan_klipper.gcode"
 
 
@@ -54,6 +59,64 @@ def table(name: str, how: Callable[[Rows], object]) -> Job:
 def row(name: str, number: int, **cells: object) -> Job:
     """Other cells in one row of a table."""
     return table(name, lambda rows: rows[number].update({k: str(v) for k, v in cells.items()}))
+
+
+def redrawn(name: str, how: Callable[[Any], object]) -> Job:
+    """Change the entities of a DXF."""
+
+    def job(folder: Path) -> Sequence[str]:
+        document = ezdxf.filemanagement.readfile(folder / name)
+        how(document.modelspace())
+        text = io.StringIO()
+        document.write(text)
+        put(folder, name, text.getvalue().encode())
+        return ()
+
+    return job
+
+
+def circles(space: Any) -> list[Any]:
+    """Circles to be cut, the smallest first."""
+    found = [one for one in space.query("CIRCLE") if one.dxf.layer == "cut"]
+    return sorted(found, key=lambda one: one.dxf.radius)
+
+
+def shifted_circle(space: Any) -> None:
+    x, y, _ = circles(space)[0].dxf.center
+    circles(space)[0].dxf.center = (x + 0.01, y)
+
+
+def wider_circle(space: Any) -> None:
+    circles(space)[0].dxf.radius += 0.1
+
+
+def fewer_circles(space: Any) -> None:
+    space.delete_entity(circles(space)[0])
+
+
+def longer_outline(space: Any) -> None:
+    for line in space.query("LWPOLYLINE"):
+        if line.dxf.layer == "cut":
+            line.set_points([(1.001 * x, y, *rest) for x, y, *rest in line.get_points()])
+
+
+def other_words(space: Any) -> None:
+    space.query("TEXT")[0].dxf.text = "something else"
+
+
+def listed(part: str, **cells: object) -> Job:
+    """Other cells in a part's row of the parts list."""
+
+    def how(rows: Rows) -> None:
+        (found,) = (one for one in rows if one["part"] == part)
+        found.update({key: str(value) for key, value in cells.items()})
+
+    return table(BILL, how)
+
+
+def total(key: str, new: object) -> Job:
+    """Another sum of the parts list in the record."""
+    return record(lambda value: value["totals"].update({key: new}))
 
 
 def program(pattern: str, new: str, count: int = 0) -> Job:
@@ -145,6 +208,68 @@ def scaled(key: str, by: float) -> Job:
     return record(lambda value: value["drive"].update({key: value["drive"][key] * by}))
 
 
+def upside_down(name: str) -> Job:
+    """A part that is recorded as printed upside down."""
+
+    def how(value: Record) -> None:
+        part = next(one for one in value["parts"] if one["name"] == name)
+        part["axes"] = [[x, -y, -z] for x, y, z in part["axes"]]
+
+    return record(how)
+
+
+def held(ball: int, **factors: float) -> Job:
+    """What holds a ball, by its number, with figures multiplied."""
+
+    def how(value: Record) -> None:
+        one = value["holding"]["balls"][ball - 1]
+        one.update({key: one[key] * by for key, by in factors.items()})
+
+    return record(how)
+
+
+def fastener(part: str, **values: object) -> Job:
+    """Other values of the first fastener of a part."""
+
+    def how(value: Record) -> None:
+        next(one for one in value["fasteners"] if one["part"] == part).update(values)
+
+    return record(how)
+
+
+def fastener_off(part: str, by: float) -> Job:
+    """The first fastener of a part recorded elsewhere."""
+
+    def how(value: Record) -> None:
+        one = next(one for one in value["fasteners"] if one["part"] == part)
+        one["position_mm"][0] += by
+
+    return record(how)
+
+
+def no_fastener(part: str) -> Job:
+    """The first fastener of a part is not in the record."""
+
+    def how(value: Record) -> None:
+        some = value["fasteners"]
+        some.remove(next(one for one in some if one["part"] == part))
+
+    return record(how)
+
+
+def mounted_in(body: str, key: str | None) -> Job:
+    """The first fastener that presses on a body is mounted in another step, or in none."""
+
+    def how(value: Record) -> None:
+        name = next(one["name"] for one in value["fasteners"] if one["through"][0] == body)
+        for step in value["assembly_steps"]:
+            step["mounts"] = [one for one in step["mounts"] if one != name]
+            if step["key"] == key:
+                step["mounts"].append(name)
+
+    return record(how)
+
+
 def led(by: float, *, spec: bool) -> Job:
     """An LED elsewhere in the record, and in the spec too."""
 
@@ -160,6 +285,121 @@ def led(by: float, *, spec: bool) -> Job:
 def stage_key(**values: object) -> Job:
     """Other keys of the stage in the spec."""
     return record(lambda _: None, lambda d: d["spec"]["prototype"]["stage"].update(values))
+
+
+def cap_record(key: str, by: float) -> Job:
+    """Scale a figure of the first cap."""
+
+    def how(value: Record) -> None:
+        value["caps"][0][key] *= by
+
+    return record(how)
+
+
+def spigot(cap: str, by: float) -> Job:
+    """Make the widest cylinder of a cap's own STEP file thinner, mm."""
+    name, pattern = f"{cap}.step", re.compile(r"(CYLINDRICAL_SURFACE\('[^']*',#\d+,)([-+\d.E]+)")
+
+    def job(folder: Path) -> Sequence[str]:
+        def how(data: bytes) -> bytes:
+            text = data.decode()
+            widest = max(float(found[2]) for found in pattern.finditer(text))
+            return pattern.sub(
+                lambda m: f"{m[1]}{widest - by}" if float(m[2]) == widest else m[0], text
+            ).encode()
+
+        return change(folder, name, how) or ()
+
+    return job
+
+
+def frame_key(**values: object) -> Job:
+    """Change keys of the section of the frame in design.json."""
+    return record(lambda _: None, lambda d: d["spec"]["prototype"]["frame"].update(values))
+
+
+def lamps(**values: object) -> Job:
+    """Change what the record has of the lamps."""
+    return record(lambda r: r["lamps"].update(values))
+
+
+def lamp_aside(number: int, by: float) -> Job:
+    """Move a lamp along x in the record, mm."""
+
+    def how(value: Record) -> None:
+        value["lamps"]["places"][number]["position_mm"][0] += by
+
+    return record(how)
+
+
+def unpainted(name: str) -> Job:
+    """Take a printed part's finish out of the record."""
+
+    def how(value: Record) -> None:
+        next(part for part in value["parts"] if part["name"] == name)["finish"] = None
+
+    return record(how)
+
+
+def _on_their_sides(value: Record) -> None:
+    value["lamps"]["level"] = not value["lamps"]["level"]
+
+
+lamps_on_their_sides = record(_on_their_sides)
+
+
+def no_lamps(value: Record) -> None:
+    value["lamps"] = None
+
+
+def no_panel(value: Record) -> None:
+    value["shroud"]["panels"].pop()
+
+
+def shiny_card(value: Record) -> None:
+    value["shroud"]["finish"] = "white"
+
+
+def flat_fold(space: Any) -> None:
+    space.delete_entity(next(one for one in space.query("LINE") if one.dxf.layer == "fold"))
+
+
+def drawn_away(name: str, x: float, y: float = 0.0, z: float = 0.0) -> Job:
+    """Draw a body of the GLB elsewhere, mm."""
+
+    def how(scene: trimesh.Scene) -> None:
+        scene.geometry[scene.graph[name][1]].apply_translation([x, y, z])
+
+    return glb(how)
+
+
+def in_place(section: str, key: str, value: float) -> Job:
+    """Change a figure of how the camera is put in its place."""
+    return record(lambda r: r["camera_place"][section].update({key: value}))
+
+
+def picture(number: int, **values: float) -> Job:
+    """Change a picture of the gauge's marks."""
+    return record(lambda r: r["camera_place"]["pictures"][number].update(values))
+
+
+def mark_aside(by: float) -> Job:
+    """Move a near mark across the arm, mm."""
+
+    def how(value: Record) -> None:
+        value["camera_place"]["marks_mm"][0][0][1] += by
+
+    return record(how)
+
+
+def origin_of(name: str, by: float) -> Job:
+    """Move a printed part on the bed without its mesh, mm."""
+
+    def how(value: Record) -> None:
+        part = next(one for one in value["parts"] if one["name"] == name)
+        part["origin_mm"][0] += by
+
+    return record(how)
 
 
 def leds_on_one_side(value: Record) -> None:
@@ -182,6 +422,15 @@ def no_spec_led(value: Record) -> None:
 def not_bought(name: str) -> Callable[[Record], None]:
     def how(value: Record) -> None:
         value["bought"] = [one for one in value["bought"] if one["name"] != name]
+
+    return how
+
+
+def not_printed(name: str) -> Callable[[Record], None]:
+    """Leave a printed part out of the record."""
+
+    def how(value: Record) -> None:
+        value["parts"] = [one for one in value["parts"] if one["name"] != name]
 
     return how
 

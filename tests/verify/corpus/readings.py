@@ -1,62 +1,201 @@
-"""What a verification derives from the bytes of one file alone, shared by many verifications."""
+"""What a verification derives from the same bytes or numbers, shared by many verifications.
+
+A mutation changes what it breaks: only what does not depend on that is taken from before.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import io
+import pickle
+import stat
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import manifold3d
 import numpy as np
-from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.prototype import (
+    assembly,
+    bodies,
+    calibration,
+    camera_gauge_checks,
+    caps,
+    drawing_checks,
+    fastener_checks,
+    gcode_checks,
+    homing_checks,
+    klipper_checks,
+    lamp_light,
+    lamp_views,
+    leds,
+    measured_prototype,
+    seats,
+)
 from tbcad_verify.prototype import stages as prototype_stages
+from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.bodies import Bodies
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.lamp_light import EdgedBodies
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
+from tbcad_verify.prototype.pinhole_cells import MirrorSpheres
+from tbcad_verify.prototype.ray_transfer import RayTransfer
 from tbcad_verify.prototype.swing import AxialSolid
+from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
+from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.run import stages
+from tbcad_verify.run import verify as verification
 from tbcad_verify.run.child import Limits
-from tbcad_verify.step import step_file
+from tbcad_verify.step import shell_checks, step_file
 from tbcad_verify.step.step_file import StepFile
+from tbcad_verify.types import Floats
+
+MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
+# Of an export, what no result depends on that is kept by the export.
+NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
+# Functions of their arguments alone, by module.
+PURE: dict[Any, tuple[str, ...]] = {
+    stages: (
+        *("mesh_from_facets", "examine_topology", "mass_properties", "measure_edges", "recover"),
+        *("same_check", "measure", "assess", "_set_up", "casing_checks"),
+    ),
+    stages.coverage: ("measure",),
+    stages.pixels: ("checks",),
+    stages.mirrors_found: ("checks",),
+    verification: ("area_checks",),
+    shell_checks: ("wall", "cells_of_export"),
+    prototype_stages: ("measure_part", "joined_meshes"),
+    prototype_stages.inventory: ("read_solids",),
+    prototype_stages.swing: ("manifold", "_parts_apart"),
+    assembly: ("manifold",),
+    bodies: ("_scene",),
+    calibration: ("manifold", "joined_meshes", "build_scene", "highlights"),
+    camera_gauge_checks: ("manifold", "joined_meshes", "build_scene"),
+    caps: ("fit_sphere",),
+    drawing_checks: ("dxf_entities",),
+    fastener_checks: ("_hole_spans",),
+    gcode_checks: ("run_program",),
+    homing_checks: ("run_program",),
+    klipper_checks: ("run_program", "_run"),
+    leds: ("manifold", "joined_meshes"),
+    measured_prototype: ("joined_meshes", "build_scene"),
+    seats: ("_facets_near", "_pad", "distance_to_facets"),
+}
 
 
 @contextmanager
 def remembered() -> Iterator[None]:
     """Within, nothing slow is done twice on the same input; what fails is.
 
-    No STEP file is read twice and no mesh put on printers; no balls are traced, no parts swept.
+    No file is read twice and no mesh put on printers; no balls are traced, no parts swept.
     """
-    places = (
-        (stages, "measure", _corners),
-        (prototype_stages.ball_views, "ball_views", _traced),
-        (prototype_stages.swing, "axial_solid", _measured),
-        (prototype_stages.swing, "sweep", _measured),
+    keyed: tuple[tuple[Any, str, Callable[..., object]], ...] = (
+        (stages, "read_facets", _file_key),
+        (stages, "read_3mf", _file_key),
+        (assembly, "assembly_meshes", _drawn_key),
+        (assembly, "fastener_solids", _fasteners_key),
+        (prototype_stages.ball_views, "ball_views", _traced_key),
+        (prototype_stages.swing, "axial_solid", _solid_key),
+        (prototype_stages.swing, "sweep", _sweep_key),
+        (lamp_views, "pixel_rays", _rays_key),
+        (lamp_light, "irradiance", _light_key),
+        *((module, name, _given) for module, names in PURE.items() for name in names),
     )
+    kept = _Kept()
     with ExitStack() as stack:
-        for module, name, key in places:
-            once = _Once(getattr(module, name), key)
+        for module, name, key in keyed:
+            once = _Once(getattr(module, name), key, kept)
             stack.enter_context(mock.patch.object(module, name, once))
         each = _EachOnce(step_file.examine_all)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
 
 
+class _Kept:
+    """Results that are kept, with the arrays and records in them: none changes any more.
+
+    A digest has them by their identity, and all else by its content.
+    """
+
+    def __init__(self) -> None:
+        self._objects: dict[int, object] = {}
+
+    def __contains__(self, one: object) -> bool:
+        return id(one) in self._objects
+
+    def add(self, result: object, given: object) -> None:
+        """Keep a result, but what it was given: that is compared by its content."""
+        new = self._parts(result)
+        for part in self._parts(given):
+            new.pop(part, None)
+        self._objects |= new
+
+    def _parts(self, whole: object) -> dict[int, object]:
+        """All arrays, solids and records in a value that are not kept yet, by identity."""
+        found: dict[int, object] = {}
+        waiting = [whole]
+        while waiting:
+            one = waiting.pop()
+            if isinstance(one, list | tuple):
+                waiting += one
+            elif isinstance(one, dict):
+                waiting += one.values()
+            elif one in self or id(one) in found:
+                continue
+            elif isinstance(one, np.ndarray | manifold3d.Manifold):
+                found[id(one)] = one
+            elif is_dataclass(one):
+                found[id(one)] = one
+                waiting += vars(one).values()
+        return found
+
+    def digest(self, value: object) -> str:
+        stream = io.BytesIO()
+        _Pickler(stream, self).dump(value)
+        return hashlib.sha256(stream.getbuffer()).hexdigest()
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, stream: io.BytesIO, kept: _Kept) -> None:
+        super().__init__(stream, pickle.HIGHEST_PROTOCOL)
+        self._kept = kept
+
+    def persistent_id(self, one: object) -> int | None:
+        return id(one) if one in self._kept else None
+
+    def reducer_override(self, one: object) -> Any:
+        if isinstance(one, Export):
+            names = {field.name for field in fields(one)} - NOT_DERIVED_FROM
+            return tuple, ([getattr(one, name) for name in sorted(names)],)
+        if isinstance(one, manifold3d.Manifold):
+            mesh = one.to_mesh64()
+            return tuple, ([mesh.vert_properties, mesh.tri_verts],)
+        return NotImplemented
+
+
 class _Once:
-    """A function that keeps what it returned, by a key of its first argument, and the others."""
+    """A function that keeps what it returned, by a key of its arguments; None: it is called."""
 
-    def __init__(self, work: Callable[..., Any], key: Callable[[Any], str]) -> None:
-        self._work, self._key = work, key
-        self._found: dict[object, Any] = {}
-        self._busy: defaultdict[object, threading.Lock] = defaultdict(threading.Lock)
+    def __init__(self, work: Callable[..., Any], key: Callable[..., object], kept: _Kept) -> None:
+        self._work, self._key, self._kept = work, key, kept
+        self._found: dict[str, Any] = {}
+        self._busy: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 
-    def __call__(self, first: Any, *rest: Any) -> Any:
-        key = self._key(first), repr([_shown(one) for one in rest])
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        value = self._key(*given, **named)
+        if value is None:
+            return self._work(*given, **named)
+        key = self._kept.digest(value)
         with self._busy[key]:
             if key not in self._found:
-                self._found[key] = self._work(first, *rest)
+                self._found[key] = self._work(*given, **named)
+                self._kept.add(self._found[key], (given, named))
             return self._found[key]
 
 
@@ -76,38 +215,58 @@ class _EachOnce:
         return [answers[k] if k in answers else self._found[key] for k, key in enumerate(keys)]
 
 
-def _shown(value: Any) -> object:
-    """A solid by its corners, limits by their time; all else as it is."""
-    if isinstance(value, AxialSolid):
-        return value.name, hashlib.sha256(value.profile.tobytes()).hexdigest()
-    if isinstance(value, Limits):
-        return value.seconds
-    if isinstance(value, manifold3d.Manifold):
-        return hashlib.sha256(value.to_mesh64().vert_properties.tobytes()).hexdigest()
-    return value
+def _given(*values: object, **named: object) -> object:
+    return values, named
 
 
-def _traced(measured: MeasuredPrototype) -> str:
+def _file_key(folder: Path, name: str) -> object:
+    """None for what may be refused without being read."""
+    path = folder / name
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    if not stat.S_ISREG(found.st_mode) or found.st_size > MAX_BYTES:
+        return None
+    return name, path.read_bytes()
+
+
+def _drawn_key(context: PrototypeContext) -> object:
+    """The file of the assembly's shapes."""
+    return _file_key(context.export.folder, context.prototype.assembly.glb)
+
+
+def _solid_key(measured: MeasuredPrototype, name: str, solid: manifold3d.Manifold) -> object:
+    return measured.context.frame, name, solid
+
+
+def _sweep_key(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> object:
+    return measured.context.prototype.swing, measured.context.frame, moving, still
+
+
+def _fasteners_key(context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool) -> object:
+    return context.prototype.fasteners, drawn, turns
+
+
+def _traced_key(measured: MeasuredPrototype) -> object:
     """All that the light of the balls depends on."""
-    context, found = measured.context, hashlib.sha256()
-    arrays = [measured.centre, measured.radius, measured.body, context.angle, context.ball]
-    arrays += [
-        measured.rotating.owner,
-        measured.fixed.owner,
-        context.export.mirrors.columns("ux", 15),
-    ]
-    for array in arrays:
-        found.update(np.ascontiguousarray(array).tobytes())
-    found.update(
-        repr((context.camera, context.export.target_mm, context.export.foot_z_mm)).encode()
+    context = measured.context
+    return (
+        *(measured.centre, measured.radius, measured.body, context.angle, context.ball),
+        *(measured.rotating.owner, measured.fixed.owner),
+        *(context.export.mirrors.columns("ux", 15), context.camera),
+        *(context.export.target_mm, context.export.foot_z_mm),
     )
-    return found.hexdigest()
 
 
-def _measured(measured: MeasuredPrototype) -> str:
-    """The swing; parts are told apart by what follows."""
-    return repr((measured.context.prototype.swing, measured.context.frame.tolist()))
+def _rays_key(transfer: RayTransfer, shell: MirrorSpheres) -> object:
+    arrays = transfer.merged, transfer.on_base, transfer.ball
+    return _traced_key(transfer.measured), arrays, shell
 
 
-def _corners(mesh: Mesh) -> str:
-    return hashlib.sha256(mesh.points.tobytes() + mesh.faces.tobytes()).hexdigest()
+def _light_key(
+    lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
+) -> object:
+    edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
+    bodies = all_of.turning, all_of.still, all_of.context.frame
+    return lamps, points, normals, edges, *bodies, angle

@@ -91,7 +91,7 @@ BAD = [
 @pytest.mark.parametrize(("old", "new", "message"), BAD)
 def test_broken_files_are_refused_in_one_line(file: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
-    file.write_text(GOOD.replace(old, new))
+    file.write_text(GOOD.replace(old, new), encoding="utf-8")
     with pytest.raises(BadProfile, match=message) as caught:
         load(str(file))
     line = str(caught.value)
@@ -132,9 +132,9 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_too_large(file: Path) -> None:
-    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD)))
+    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD)), encoding="utf-8")
     assert load(str(file)).name == "mine"
-    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD) + 1))
+    file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD) + 1), encoding="utf-8")
     with pytest.raises(BadProfile, match=f"larger than the {MAX_BYTES} bytes"):
         load(str(file))
 

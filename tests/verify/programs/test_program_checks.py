@@ -14,14 +14,15 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify import BadExport
-from tbcad_verify.programs import ExpectedPart, check_with_programs, is_skipped
+from tbcad_verify.programs import ExpectedPart, ListedPrint, check_with_programs, is_skipped
 from tbcad_verify.programs.program_checks import QUERIES
 from tbcad_verify.report.checks import Check
 
 from tests.verify.programs.fake_programs import ADMESH, BAD, GOOD, INFO, SEEN, install, install_good
 
 FILES = {"step": "part.step", "stl": "part.stl", "3mf": "part.3mf"}
-PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
+LISTED = ListedPrint(filament_mm3=1111.0, hours=13.25)
+PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0, listed=LISTED)
 NAMES = [(name, PART.files[e.kind], unit) for e in QUERIES for name, unit in e.questions.items()]
 
 
@@ -65,12 +66,23 @@ def test_good_programs_pass(export: Path, programs: Path) -> None:
         "gmsh spheres",
         "prusa filament",
         "prusa time",
+        "prusa listed filament",
+        "prusa listed hours",
     ]
     assert figure(checks, "gmsh volume") == 0.5
     assert figure(checks, "admesh volume") == 0.25
     assert figure(checks, "prusa slices") == pytest.approx(42 * math.pi * 1.75**2 / 4 - 100)
     assert figure(checks, "prusa filament") == 0.42
     assert figure(checks, "prusa time") == 26.5
+    assert figure(checks, "prusa listed filament") == 10  # of 420 mm, 1010 mm^3
+    assert figure(checks, "prusa listed hours") == -50
+
+
+def test_a_part_without_an_estimate_is_not_asked_for_it(export: Path, programs: Path) -> None:
+    install_good(programs)
+    checks = ask(export, replace(PART, listed=None))
+    assert not [check for check in checks if "listed" in check.name]
+    assert all(check.passed for check in checks)
 
 
 @pytest.mark.parametrize("program", GOOD)
@@ -180,7 +192,7 @@ def gmsh_alone(export: Path) -> list[Check]:
 
 @pytest.mark.parametrize(("solids", "wrong"), [(1, []), (2, ["gmsh solids", "gmsh volume"])])
 def test_gmsh_as_a_package(export: Path, package: Path, solids: int, wrong: list[str]) -> None:
-    package.write_text(PACKAGE.replace("{solids}", str(solids)))
+    package.write_text(PACKAGE.replace("{solids}", str(solids)), encoding="utf-8")
     checks = gmsh_alone(export)
     assert failed(checks) == wrong
     assert [check.measured for check in checks[:2]] == [solids, 7]
@@ -195,7 +207,7 @@ def test_gmsh_as_a_package(export: Path, package: Path, solids: int, wrong: list
     ],
 )
 def test_a_package_that_breaks(export: Path, package: Path, body: str, detail: str) -> None:
-    package.write_text(body)
+    package.write_text(body, encoding="utf-8")
     for check in gmsh_alone(export):
         assert check.passed is None
         assert check.detail.endswith(detail)

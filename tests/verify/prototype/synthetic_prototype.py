@@ -40,13 +40,22 @@ POLAR = (55.0, 80.0, 100.0, 122.0)
 AZIMUTH = (30.0, 0.0, -35.0, 40.0)
 CAP, EDGE = 3, 5.0  # the last of them, from 0; radius of its front's edge
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how parts lie on the bed
-# What is not made: no STEP assembly, no parts list, names and balls of its own, no weight;
+# What is not made: no STEP assembly, no parts list, names and balls of its own, no weight, seats
+# that are printed with their pads down;
 # and its only LED stands where the object is.
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
+    *("list figures", "drawings", "fasteners", "fastener holes", "key access", "power off"),
     *("wiring", "homing", "controller settings", "klipper"),
-    *("drive", "ball labels", "radius rule", "object room", "leds seen", "calibration"),
+    *("camera mount", "camera gauge", "camera place", "cap tilt", "cap drawings"),
+    *("light past lamps and card", "lamps seen", "shroud"),
+    *("lamps", "light before and after", "light of the lamps", "light from above"),
+    "light in the stage's shadow",
+    *("holding", "hold ratio", "drive", "motor bearing", "ball labels", "radius rule"),
+    *("object room", "leds seen", "calibration", "pads printed up"),
 }
+POWER_OFF = ("fall_energy_j", "fall_speed_deg_s", "pin_force_n", "pin_shear_mpa")
+POWER_OFF += ("pin_shear_limit_mpa", "pin_pressure_mpa", "pin_pressure_limit_mpa")
 STEPS = 200 * 16 * 3 / 360
 DRIVE = {
     "mass_g": 500.0,
@@ -62,11 +71,23 @@ DRIVE = {
     "motor": "NEMA17-40",
     "ratio": 3.0,
     "steps_per_deg": STEPS,
-    "wind_up_deg": 0.0,
+    "motor_wind_up_deg": 0.0,
+    "belt_wind_up_deg": 0.0,
+    "wind_up_limit_deg": 1.0,
+    "teeth_in_mesh": 9.0,
     "belt_pull_n": 0.0,
+    "belt_rating_n": 26.22,
+    "belt_tension_n": 0.0,
+    "belt_tone_hz": 0.0,
+    "motor_radial_n": 0.0,
+    "motor_radial_limit_n": 86.0,
+    "hold_margin": 1.4,
+    "hold_current_a": 0.0,
+    "hold_loss_w": 0.0,
+    "motor_rise_k": 0.0,
+    "motor_rise_limit_k": 40.0,
+    "peak_torque_nmm": 0.0,
     "belt_centre_mm": 78.97134949670655,
-    "counterweight_g": 0.0,
-    "counterweight_radius_mm": 30.0,
 }
 BALL_COLUMNS = (
     "number,kind,size,diameter_mm,grade,standard,mass_g,radius_mm,body_radius_mm,polar_deg,"
@@ -267,7 +288,7 @@ def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
         here = [row for row in plan if row[2] == stop and row[1] == 0]
         which = " ".join(str(k) for k in sorted({row[4] for row in here}))
         worst = [max(abs(row[j]) for row in here) for j in (7, 8)]
-        out.append([stop, here[0][3], len(here), which, *worst])
+        out.append([stop, here[0][3], len(here), which, *worst, 0.0, 0.0])
     return out
 
 
@@ -361,7 +382,8 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             plan,
         ),
         "stops.csv": csv_bytes(
-            "stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg", stops
+            "stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg,torque_nmm,wind_up_deg",
+            stops,
         ),
         "rotation_plan.nc": program(stops).encode(),
         "grbl_settings.txt": b"($1)\n",
@@ -380,6 +402,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
                 "what": name,
                 "stl": f"{name}.stl",
                 "role": role,
+                "finish": None,
                 "ball": ball,
                 "quantity": 1,
                 "axes": TURN.tolist(),
@@ -410,6 +433,25 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             }
             for k, ball in enumerate(balls)
         ],
+        "holding": {
+            "min_ratio": 2.0,
+            "remanence_t": 1.29,
+            "derating": 0.75,
+            "glue_mpa": 0.35,
+            "wider_gap_mm": 0.5,
+            "balls": [
+                {
+                    "ball": k + 1,
+                    "by": "glue",
+                    "magnet": None,
+                    "force_needed_n": 1.0,
+                    "force_available_n": 2.0,
+                    "ratio": 2.0,
+                    "wider_gap_n": 2.0,
+                }
+                for k in range(len(balls))
+            ],
+        },
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
         "controller": {
@@ -428,8 +470,27 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             "zero_error_deg": 0.3,
         },
         "drive": DRIVE,
-        "bought": [{"name": "motor", "what": "a box", "part": "NEMA17-40", "turns": False}],
+        "fasteners": [],
+        "assembly_steps": [],
+        "power_off": dict.fromkeys(POWER_OFF, 0.0),
+        "bought": [
+            {
+                "name": "motor",
+                "what": "a box",
+                "part": "NEMA17-40",
+                "turns": False,
+                "finish": None,
+            }
+        ],
+        "lamps": None,
+        "shroud": None,
         "frame_stock": {"plate": "none", "upright": "none", "uprights_cut_to_mm": 0.0},
+        "caps": [],
+        "drawings": [],
+        "totals": {
+            **{"mass_g": 0.0, "bought_price": {}, "without_price": 0},
+            **{"filament_g": 0.0, "filament_price": {}, "print_hours": 0.0},
+        },
         "assembly": {"glb": "whole.glb"},
     }
     return found, files

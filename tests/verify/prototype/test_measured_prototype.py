@@ -300,6 +300,55 @@ def test_one_look_does_where_nothing_can_ever_meet(measured: MeasuredPrototype) 
     assert inside.samples > 1
 
 
+@pytest.mark.parametrize("hollow", [0.0, 30.0])
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("along", [0.0, 70.0])
+def test_volume_inside_is_the_booleans(
+    measured: MeasuredPrototype, hollow: float, swapped: bool, along: float
+) -> None:
+    """A ball inside of a cylinder about the axis, in its bore, and beside it."""
+    import manifold3d
+
+    cylinder = manifold3d.Manifold.cylinder(60.0, 40.0, center=True)
+    if hollow:
+        cylinder -= manifold3d.Manifold.cylinder(70.0, hollow, center=True)
+    place = np.hstack([measured.context.frame[[1, 2, 0]].T, np.zeros((3, 1))])
+    ball = manifold3d.Manifold.sphere(5.0).translate([0, 0, along])
+    one, two = (
+        swing.axial_solid(measured, "solid", solid.transform(place)) for solid in (cylinder, ball)
+    )
+    moving, still = (two, one) if swapped else (one, two)
+    shared = swing._volume_inside(measured, moving, still, 0.3)
+    assert shared == pytest.approx((one.solid ^ two.solid).volume(), rel=1e-9)
+    assert (shared > 0) == (along == 0 and not hollow)
+
+
+@pytest.mark.parametrize("apart", [0.5, 6.0, 9.0, 11.0, 25.0])
+def test_quick_looks_at_the_swing_change_nothing(
+    measured: MeasuredPrototype, monkeypatch: pytest.MonkeyPatch, apart: float
+) -> None:
+    """Boxes, few points and short searches give what many points and long searches give."""
+    import manifold3d
+
+    place = np.hstack([measured.context.frame.T, np.zeros((3, 1))])
+    cubes = [manifold3d.Manifold.cube([20.0] * 3).translate([x, 30, 0]) for x in (0, 20 + apart)]
+    # Slanted, so that its box tells little.
+    cubes[1] = cubes[1] + manifold3d.Manifold.cube([80.0, 1, 1]).rotate([0, 0, 45]).translate(
+        [20 + apart, 50, 0]
+    )
+
+    def swept() -> swing.PairSweep:
+        solids = (swing.axial_solid(measured, "cube", one.transform(place)) for one in cubes)
+        return swing.sweep(measured, *solids)
+
+    quick = swept()
+    monkeypatch.setattr(swing, "_boxes_apart", lambda one, two: False)
+    monkeypatch.setattr(swing, "COARSE_MM", swing.GRAIN_MM)
+    monkeypatch.setattr(swing, "GROWTH", np.inf)
+    assert swept() == quick
+    assert quick.gap < swing.SEARCH_MM or apart > swing.SEARCH_MM
+
+
 def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
     """Give the stage a STEP file of a box."""
     STEPControl_Controller.Init_s()

@@ -16,8 +16,8 @@ from tbcad.output.manifest import write_manifest
 from tbcad.spec.load import load_spec
 
 
-def record(folder: Path, rule: str) -> Export:
-    options = ["n=4", f"radius_rule={rule}", "camera.width_px=416", "camera.height_px=310"]
+def record(folder: Path, rule: str, *more: str) -> Export:
+    options = ["n=4", f"radius_rule={rule}", "camera.width_px=416", "camera.height_px=310", *more]
     write_record(folder, design(load_spec(None, options)), shells=True)
     write_manifest(folder)
     return read_export(folder)
@@ -58,3 +58,12 @@ def test_one_mirror_that_is_off_is_named(export: Export, key: str, share: float)
     assert check.passed == (key != matters)
     if key == matters:
         assert export.mirrors.ids[k] in check.detail
+
+
+def test_margins_of_single_mirrors(tmp_path: Path) -> None:
+    own = [0.6 + 0.01 * k for k in range(49)]
+    export = record(tmp_path, "traced", f"own_margins_mm={own}")
+    assert rule_check(export).passed
+    for wrong in ([], own[:-1], own[::-1], [*own[:30], own[30] + 0.01, *own[31:]]):
+        assert not rule_check(with_spec(export, own_margins_mm=wrong)).passed
+    assert not rule_check(with_spec(export, margin_mm=0.7)).passed

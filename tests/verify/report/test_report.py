@@ -82,14 +82,12 @@ def test_a_good_export_passes(export_folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_same_export_same_bytes(export_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     verify(export_folder, options=IN_PROCESS)
     before = (export_folder / "verify.json").read_bytes()
-    for threads in (1, 3):
-        monkeypatch.setattr(rays, "THREADS", threads)
-        verify(export_folder, options=IN_PROCESS)
-        assert (export_folder / "verify.json").read_bytes() == before
+    monkeypatch.setattr(rays, "THREADS", rays.THREADS + 1)
+    verify(export_folder, options=IN_PROCESS)
+    assert (export_folder / "verify.json").read_bytes() == before
     assert [path.name for path in export_folder.iterdir() if "verify" in path.name] == [
         "verify.json"
     ]
@@ -111,7 +109,7 @@ def test_command_line(export_folder: Path) -> None:
     run = subprocess.run(
         [sys.executable, "-m", "tbcad_verify", str(export_folder)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         env={"PYTHONPATH": str(Path(tbcad_verify.__file__).parents[1])},
     )
@@ -128,7 +126,6 @@ def test_quiet_is_one_line(export_folder: Path, capsys: pytest.CaptureFixture[st
     assert len(out.out.splitlines()) == 1
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_too_little_coverage_names_the_worst(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -20,7 +20,10 @@ def python(folder: Path, body: str, limits: Limits | None = None) -> Outcome:
 def is_alive(pid: int) -> bool:
     """False for what has gone and for what nobody has waited for yet."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return (
+            Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+            != "Z"
+        )
     except OSError:
         return False
 

@@ -208,7 +208,10 @@ def test_flat_mirrors_are_recovered_and_covered(tmp_path: Path) -> None:
     assert (optical_setup.match.radius_error == 0).all()
     found = coverage.measure(optical_setup)
     check_fitted(
-        optical_setup, found, oracle(Cells(Design(flat=True, arc=80), poses(Design()))), 0.05
+        optical_setup,
+        found,
+        oracle(Cells(Design(flat=True, arc=80), poses(Design(flat=True)))),
+        0.05,
     )
     # DESIGN.md section 3 has 21.0 mm at n = 4, there as 2 d sin theta_0, on the whole sphere.
     assert found.facet.min() == pytest.approx(21.0, abs=1.0)
@@ -267,12 +270,9 @@ def test_the_coat_matters(tmp_path: Path) -> None:
     assert radius.max() == pytest.approx(0.05, abs=1e-3)
 
 
-def test_seam_gap_against_brute_force(
-    optical_setup: OpticalSetup, found: coverage.Coverage
-) -> None:
-    """Where each half's cut is imaged, from exact circles, and the room between the two."""
-    gaps, cells = found.gap, FINE
-    radius = optical_setup.radius
+def brute_force_gaps(cells: Cells, radius: float) -> dict[str, float]:
+    """Where each half's cut is imaged, from exact circles, and the room between the two, mm."""
+    gaps = {}
     for k, m in enumerate(cells.mirrors):
         if m["u"][0] > 1e-9:
             continue
@@ -287,13 +287,44 @@ def test_seam_gap_against_brute_force(
         curve = np.interp(height, s[order], at[order, 0])
         # Camera a looks at x > curve, camera b, its mirror image, at x < -curve.
         chord = np.sqrt(radius**2 - height**2)
-        expected = np.clip(2 * np.minimum(np.abs(curve), chord) * np.sign(curve), 0, None).max()
-        v = optical_setup.virtual_ids.index(f"a{m['number']:04d}")
-        assert gaps[v] == pytest.approx(expected, abs=0.04)  # chords for arcs
-    assert gaps.max() > 1
-    whole = [
-        v
-        for v in range(optical_setup.virtual.count)
-        if (optical_setup.virtual.index == v).sum() == 1
-    ]
-    assert (gaps[whole] == 0).all()
+        gap = np.clip(2 * np.minimum(np.abs(curve), chord) * np.sign(curve), 0, None).max()
+        gaps[f"a{m['number']:04d}"] = gap
+    return gaps
+
+
+def test_seam_gap_against_brute_force(tmp_path: Path) -> None:
+    design = Design(aim=0.0)
+    setup = optical_setup_of(export(tmp_path / "x", design)[0])
+    found, radius = coverage.measure(setup), setup.radius
+    gaps = dict(zip(setup.virtual_ids, found.gap, strict=True))
+    for name, expected in brute_force_gaps(Cells(Design(arc=80), poses(design)), radius).items():
+        assert gaps.pop(name) == pytest.approx(expected, abs=0.04)  # chords for arcs
+    assert set(gaps.values()) == {0.0}  # of whole mirrors
+    assert found.gap.max() > 1
+    wide = found.gap > 0
+    assert (found.fitted[wide] <= 2 * radius - found.gap[wide]).all()
+    lines = {c.name: c for c in coverage.checks(setup, found, "x")}
+    assert lines["seam gap"].passed is False
+    assert setup.virtual_ids[int(found.gap.argmax())] in lines["seam gap"].detail
+    assert lines["coverage, spheres"].passed is False
+
+
+def test_halves_aimed_beyond_the_seam_leave_no_gap(
+    optical_setup: OpticalSetup, found: coverage.Coverage
+) -> None:
+    assert max(brute_force_gaps(FINE, optical_setup.radius).values()) == 0
+    assert (found.gap == 0).all()
+    lines = {c.name: c for c in coverage.checks(optical_setup, found, "x")}
+    assert lines["seam gap"].passed is True
+    assert lines["seam gap"].limit == 0
+
+
+def test_a_gap_is_unknown_without_both_halves(optical_setup: OpticalSetup) -> None:
+    half = int(np.flatnonzero(optical_setup.virtual.halved)[0])
+    segment = optical_setup.match.segment.copy()
+    segment[half] = -1
+    lost = replace(optical_setup, match=replace(optical_setup.match, segment=segment))
+    lines = {c.name: c for c in coverage.checks(lost, coverage.measure(lost), "x")}
+    assert lines["seam gap"].passed is False
+    name = optical_setup.virtual_ids[optical_setup.virtual.index[half]]
+    assert f"a half is missing: {name}" in lines["seam gap"].detail

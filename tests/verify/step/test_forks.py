@@ -19,7 +19,7 @@ def work(file: Path, answer: Path) -> None:
             os._exit(3)
         case "hang":
             time.sleep(60)
-    answer.write_text(file.name)
+    answer.write_text(file.name, encoding="utf-8")
 
 
 @pytest.mark.parametrize("processes", [1, 3])

@@ -28,7 +28,7 @@ from tbcad_verify.step.kernel.arcs import between_arcs
 from tbcad_verify.step.kernel.box import OUTWARD, box, reach_of_face
 from tbcad_verify.step.kernel.measures import measure_face, moments_of
 from tbcad_verify.step.kernel.reading import read_solid
-from tbcad_verify.step.kernel.topology import each, faces_of, triple
+from tbcad_verify.step.kernel.topology import corners_of, each, faces_of, triple
 
 PLACE = gp_Ax2(gp_Pnt(30, -20, 10), gp_Dir(0, 0, 1))
 
@@ -81,7 +81,7 @@ def shape(request: pytest.FixtureRequest) -> TopoDS_Shape:
 def test_the_box_is_that_of_far_walls(shape: TopoDS_Shape) -> None:
     """No wall reaches deeper than the box, and most touch it: walls miss some tops of balls."""
     reach = np.array([reach_of_face(shape, axis) for axis in OUTWARD])
-    low, high = box(shape)
+    low, high = box(shape, corners_of(shape))
     more = np.concatenate([np.negative(low), high]) - reach
     assert more.min() > -1e-6
     assert np.median(more) < 1e-6

@@ -1,0 +1,96 @@
+"""tbcad optimize: its files, its refusals, and that it goes on where it was stopped."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tbcad.cli import run
+from tbcad.optimize import search as search_module
+from tbcad.optimize.candidate import Candidate, Figures, Place
+from tbcad.spec.design import Spec
+from tests.exported_files import read_csv
+
+
+def closed_form(spec: Spec, place: Place) -> Candidate:
+    """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
+    axis = place[2]
+    return Candidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search_module, "evaluate", closed_form)
+
+
+def words(tmp_path: Path, *more: str) -> list[str]:
+    out = str(tmp_path / "found" / "better.toml")
+    return ["optimize", "--set", "n=4", "--candidates", "48", "--out", out, *more]
+
+
+def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(words(tmp_path)) == 0
+    folder = tmp_path / "found"
+    names = {"better.toml", "better-candidates.csv", "better-candidates.jsonl", "better.png"}
+    assert {file.name for file in folder.iterdir()} == names
+    table = tomllib.loads((folder / "better.toml").read_text(encoding="utf-8"))
+    rows = read_csv(folder / "better-candidates.csv")
+    best = max(float(row["semi_minor_mm"]) for row in rows)
+    assert table["optics"]["semi_minor_mm"] == best > 100
+    assert float(rows[0]["semi_minor_mm"]) == 100
+    printed = capsys.readouterr().out
+    assert "pixels, minimum                    100" in printed
+    assert len(printed.splitlines()) <= 12
+
+
+def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(words(tmp_path, "--json", "--for", "minimum")) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["before"]["place"] == [100, -100, 100]
+    assert result["after"]["figures"]["minimum_px"] > 100
+    assert result["after"] in result["front"]
+
+
+def test_a_search_that_was_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(spec: Spec, place: Place) -> Candidate:
+        if place[2] > 130:
+            raise KeyboardInterrupt
+        return closed_form(spec, place)
+
+    monkeypatch.setattr(search_module, "evaluate", stopped)
+    assert run(words(tmp_path)) == 130
+    monkeypatch.setattr(search_module, "evaluate", closed_form)
+    assert run(words(tmp_path)) == 2
+    assert "go on with --resume, or begin anew with --force" in capsys.readouterr().err
+    assert run(words(tmp_path, "--resume")) == 0
+
+
+def test_what_exists_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "found" / "better.toml"
+    file.parent.mkdir()
+    file.write_text("mine", encoding="utf-8")
+    assert run(words(tmp_path)) == 2
+    assert file.read_text(encoding="utf-8") == "mine"
+    assert "better.toml exists" in capsys.readouterr().err
+    assert run(words(tmp_path, "--force")) == 0
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("--candidates", "3"), "--candidates is 3, allowed is 48 to 100000: change it"),
+        (("--for", "ssim"), "--for is 'ssim', allowed is one of minimum"),
+        (("--set", "n=1"), "optics.n"),
+        (("--max-size-mm", "-1"), "--max-size-mm is -1, allowed is more than 0: change it"),
+        (("--max-view-angle-deg", "nan"), "--max-view-angle-deg is nan"),
+    ],
+)
+def test_refused(
+    tmp_path: Path, option: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(words(tmp_path, *option)) == 2
+    assert message in capsys.readouterr().err
+    assert not list((tmp_path).rglob("*.*"))

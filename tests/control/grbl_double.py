@@ -1,0 +1,407 @@
+"""A controller on a pseudo-terminal that follows GRBL's protocol, with a base and lights.
+
+It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, 128 bytes of receive buffer, a
+planner of 15 motions, soft reset, homing, soft limits, G92, and the outputs of M64, M65, M8 and M9.
+Its time runs faster than the clock. Faults are injected by a function that sees each line.
+Sources: doc/markdown/interface.md, commands.md and settings.md of GRBL 1.1h; grbl/gcode.c and
+protocol.c there; report.c and gcode.c of grblHAL core for its banner, M64 and M65.
+"""
+
+import math
+import os
+import pty
+import re
+import select
+import threading
+import tty
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import monotonic
+
+RX_BYTES, PLANNER, LINE = 128, 15, 79
+BANNERS = {
+    "grblhal": "GrblHAL 1.1f ['$' or '$HELP' for help]",
+    "grbl": "Grbl 1.1h ['$' for help]",
+}
+WORD = re.compile(r"([A-Z])\s*(-?\d+\.?\d*)")
+KNOWN = {
+    *("G0", "G1", "G4", "G21", "G54", "G90", "G92", "G92.1", "G94"),
+    *("M2", "M8", "M9", "M64", "M65"),
+}
+OUTPUTS = 8
+TICK_S = 0.0005
+Fault = Callable[[int, str], str | None]
+"""By a line's number and text: drop_ok, drop_line, reset, power, error, alarm, silence."""
+
+
+@dataclass
+class Machine:
+    """What the controller moves and switches.
+
+    Attributes:
+        angle: of the base, degrees, as it truly is.
+        lights: outputs that are on.
+        relay: whether the camera's release is closed.
+    """
+
+    angle: float
+    lights: set[int] = field(default_factory=set)
+    relay: bool = False
+
+
+@dataclass
+class _Motion:
+    begin: float
+    end: float
+    start_s: float
+    seconds: float
+
+    def at(self, now: float) -> float:
+        share = min(1.0, (now - self.start_s) / self.seconds) if self.seconds else 1.0
+        return self.begin + share * (self.end - self.begin)
+
+
+class GrblDouble(threading.Thread):
+    """A controller; `name` is the port to open."""
+
+    def __init__(
+        self,
+        settings: dict[int, float],
+        switch_deg: float,
+        firmware: str = "grblhal",
+        speed: float = 2000.0,
+        angle: float = 3.7,
+        see: Callable[[Machine], None] = lambda _: None,
+        released: Callable[[Machine], None] = lambda _: None,
+    ) -> None:
+        """Control a machine whose switch is at an angle.
+
+        Args:
+            settings: by number.
+            switch_deg: angle at which the home switch is pressed.
+            firmware: grblhal or grbl.
+            speed: how much faster than the clock its time runs.
+            angle: of the base at the start, degrees.
+            see: shown the machine whenever it rests and a line is done.
+            released: shown the machine when the relay closes.
+        """
+        super().__init__(daemon=True)
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._master)
+        tty.setraw(self._slave)
+        self.port = os.ttyname(self._slave)
+        self.firmware, self.switch_deg = firmware, switch_deg
+        self._speed, self._since, self._until_then = speed, monotonic(), 0.0
+        self.settings = dict(settings)
+        self.machine = Machine(angle)
+        self.see, self.released = see, released
+        self.fault: Fault = lambda number, line: None
+        self.lines: list[str] = []
+        self.asked: list[float] = []
+        self.overflows = 0
+        self.homed = False
+        self.held = 0
+        self.deaf = False  # to a feed hold
+        self.boots = False  # whether opening its port lets it begin anew, as many boards do
+        self.on_line: Callable[[int], None] = lambda number: None
+        self._closing, self._silent = False, False
+        self._mpos, self._zero = 0.0, self.machine.angle
+        self._reports = 0
+        self._clear()
+        self.state = "Alarm" if self.settings.get(22) else "Idle"
+
+    def _clear(self) -> None:
+        self._rx, self._planner = bytearray(), deque[_Motion]()
+        self._motion: _Motion | None = None
+        self._wait: Callable[[], bool] | None = None
+        self._done: Callable[[], None] = lambda: None
+        self._reply = True
+        self._offset, self._feed, self._checking = 0.0, 0.0, False
+
+    @property
+    def now(self) -> float:
+        return self._until_then + (monotonic() - self._since) * self._speed
+
+    @property
+    def moving(self) -> bool:
+        return self._motion is not None
+
+    @property
+    def speed(self) -> float:
+        return self._speed
+
+    def run_at(self, speed: float) -> None:
+        """Let its time run at another speed from now on."""
+        self._until_then, self._since, self._speed = self.now, monotonic(), speed
+
+    def run(self) -> None:
+        while not self._closing:
+            if select.select([self._master], [], [], TICK_S)[0]:
+                self._receive(os.read(self._master, 4096))
+            self._advance()
+
+    def close(self) -> None:
+        self._closing = True
+        self.join()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def _say(self, text: str) -> None:
+        if not self._silent:
+            os.write(self._master, text.encode() + b"\r\n")
+
+    def _receive(self, data: bytes) -> None:
+        if self.boots:
+            self.boots = False
+            self.power_cycle()
+            return
+        for byte in data:
+            match byte:
+                case 0x18:
+                    self.reset()
+                case 0x3F:
+                    self.asked.append(monotonic())
+                    self._report()
+                case 0x21:
+                    self._hold()
+                case 0x7E:
+                    if self.state == "Hold:0":
+                        self.state = "Idle"
+                case 0x0D:
+                    pass
+                case _ if len(self._rx) >= RX_BYTES:
+                    self.overflows += 1
+                case _:
+                    self._rx.append(byte)
+
+    def _hold(self) -> None:
+        if self._motion is None or self.deaf:
+            return
+        self.held += 1
+        self._mpos = self._motion.at(self.now)
+        self._follow()
+        self._motion = None
+        self._planner.clear()  # a resume is not needed here
+        self.state = "Hold:0"
+
+    def reset(self) -> None:
+        """Soft reset: what moved is lost; digital outputs stay as they are."""
+        moving = self._motion is not None
+        if moving:
+            self._mpos = self._motion.at(self.now)
+            self._follow()
+        self._clear()
+        self.machine.relay = False
+        self._say("")
+        self._say(BANNERS[self.firmware])
+        self.state = "Alarm" if moving or self.state == "Alarm" else "Idle"
+        if self.state == "Alarm":
+            self._say("ALARM:3" if moving else "ALARM:11")
+
+    def unplug(self) -> None:
+        """Answer nothing any more."""
+        self._silent = True
+
+    def plug_in(self) -> None:
+        """Answer again after a silence."""
+        self._silent = False
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Switched off and on: all outputs off."""
+        self._clear()
+        self.machine.lights.clear()
+        self.machine.relay = False
+        self.homed = False
+        self._say("")
+        self._say(BANNERS[self.firmware])
+        self.state = "Alarm" if self.settings.get(22) else "Idle"
+        if self.state == "Alarm":
+            self._say("ALARM:11")
+
+    def _report(self) -> None:
+        if self.state == "Home" and self.firmware == "grbl":
+            return
+        place = self._motion.at(self.now) if self._motion else self._mpos
+        state = "Run" if self._motion else self.state
+        self._reports += 1
+        work = f"|WCO:{self._offset:.3f},0.000,0.000" if self._reports % 10 == 1 else ""
+        self._say(f"<{state}|MPos:{place:.3f},0.000,0.000|FS:0,0{work}>")
+
+    def _follow(self) -> None:
+        """Turn the base to the controller's place."""
+        self.machine.angle = self._mpos + self._zero
+
+    def _advance(self) -> None:
+        if self._motion and self.now >= self._motion.start_s + self._motion.seconds:
+            self._mpos, self._motion = self._motion.end, None
+            self._follow()
+        if self._motion is None and self._planner:
+            self._motion = self._planner.popleft()
+            self._motion.start_s = self.now
+        if self._wait is not None:
+            if not self._wait():
+                return
+            self._wait = None
+            self._done()
+            self._ok()
+        if self.state.startswith("Hold") or b"\n" not in self._rx:
+            return
+        end = self._rx.index(b"\n")
+        line = self._rx[:end].decode("ascii")
+        del self._rx[: end + 1]
+        self._line(line)
+
+    def _line(self, line: str) -> None:
+        self.lines.append(line)
+        number = len(self.lines)
+        self.on_line(number)
+        fault = self.fault(number, line)
+        self._reply = fault != "drop_ok"
+        if fault == "drop_line":
+            return
+        if fault == "reset":
+            self.reset()
+        elif fault == "power":
+            self.power_cycle()
+        elif fault == "silence":
+            self._silent = True
+        elif fault == "error":
+            self._say("error:1")
+        elif fault == "alarm":
+            self.state = "Alarm"
+            self._say("ALARM:1")
+        elif (error := self._run_line(line)) is not None:
+            self._say(f"error:{error}")
+        elif self._wait is None:
+            self._ok()
+
+    def _ok(self) -> None:
+        if self._motion is None and not self._planner:
+            self.see(self.machine)
+        if self._reply:
+            self._say("ok")
+
+    def _at_rest(self) -> bool:
+        return self._motion is None and not self._planner
+
+    def _when(self, ready: Callable[[], bool], done: Callable[[], None] = lambda: None) -> None:
+        self._wait, self._done = ready, done
+
+    def _run_line(self, line: str) -> int | None:
+        if len(line) > LINE:
+            return 11
+        if line.startswith("$"):
+            return self._system(line)
+        if self.state == "Alarm":
+            return 9
+        if self._checking:
+            return None
+        words = WORD.findall(re.sub(r"\(.*?\)", "", line))
+        codes = {f"{letter}{float(number):g}" for letter, number in words if letter in "GM"}
+        return self._gcode(codes, words)
+
+    def _system(self, line: str) -> int | None:
+        if line == "$H":
+            return self._home()
+        if line in ("$$", "$X", "$C"):
+            {"$$": self._list, "$X": self._unlock, "$C": self._check}[line]()
+            return None
+        if match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", line):
+            if self.state not in ("Idle", "Alarm") or self._motion:
+                return 8
+            self.settings[int(match[1])] = float(match[2])
+            return None
+        return 3
+
+    def _list(self) -> None:
+        for number, value in sorted(self.settings.items()):
+            self._say(f"${number}={value:.3f}")
+
+    def _unlock(self) -> None:
+        self.state = "Idle"
+
+    def _check(self) -> None:
+        if self._checking:
+            self.reset()
+        else:
+            self._checking = True
+
+    def _home(self) -> int | None:
+        if not self.settings.get(22):
+            return 5
+        self.state = "Home"
+        seconds = abs(self.machine.angle - self.switch_deg) / self.settings[25] * 60
+        end = self.now + seconds
+
+        def found() -> None:
+            pull_off = self.settings[27]
+            self._mpos = -self.settings[130] + pull_off
+            self._zero = self.switch_deg + pull_off - self._mpos
+            self._follow()
+            self.state, self.homed = "Idle", True
+
+        self._when(lambda: self.now >= end, found)
+        return None
+
+    def _gcode(self, codes: set[str], words: list[tuple[str, str]]) -> int | None:
+        values = {letter: float(number) for letter, number in words if letter in "XAFP"}
+        if "F" in values:
+            self._feed = values["F"]
+        if not codes <= KNOWN:
+            return 20
+        if "G92.1" in codes:
+            self._offset = 0.0
+        elif "G92" in codes:
+            self._offset = self._mpos - values["X"]
+        elif "G4" in codes:
+            self._dwell(values.get("P", 0.0))
+        elif codes & {"M64", "M65"}:
+            return self._output(int(values["P"]), on="M64" in codes)
+        elif codes & {"M8", "M9"}:
+            self._when(self._at_rest, lambda: self._relay("M8" in codes))
+        elif "X" in values:
+            return self._move(values["X"] + self._offset)
+        return None
+
+    def _dwell(self, seconds: float) -> None:
+        ends: list[float] = []
+
+        def ready() -> bool:
+            if self._at_rest() and not ends:
+                ends.append(self.now + seconds)
+            return bool(ends) and self.now >= ends[0]
+
+        self._when(ready)
+
+    def _output(self, output: int, *, on: bool) -> int | None:
+        if self.firmware == "grbl":
+            return 20
+        if output >= OUTPUTS:
+            return 39
+        (self.machine.lights.add if on else self.machine.lights.discard)(output)
+        return None
+
+    def _relay(self, on: bool) -> None:
+        if on and not self.machine.relay:
+            self.released(self.machine)
+        self.machine.relay = on
+
+    def _move(self, target: float) -> int | None:
+        if not self._feed:
+            return 22
+        if self.settings.get(20) and not -self.settings[130] <= target <= 0:
+            self.state = "Alarm"
+            self._say("ALARM:2")
+            self._planner.clear()
+            return None
+        begin = self._planner[-1].end if self._planner else self._mpos
+        begin = self._motion.end if self._motion and not self._planner else begin
+        speed = min(self._feed, self.settings[110]) / 60
+        seconds = abs(target - begin) / speed + speed / self.settings[120]
+        self._when(
+            lambda: len(self._planner) < PLANNER,
+            lambda: self._planner.append(_Motion(begin, target, math.inf, seconds)),
+        )
+        return None

@@ -1,0 +1,30 @@
+"""`tbcad` with shorter waits: the double answers at once, and its silence is noticed earlier.
+
+python -m tests.control.impatient WORDS... is the command in a process of its own.
+"""
+
+from importlib import import_module
+
+WAITS_S = {
+    "grbl.STATUS_S": 0.02,
+    "grbl.LOST_OK_S": 0.3,
+    "grbl.SILENCE_S": 1.0,
+    "grbl.BANNER_S": 1.0,
+    "grbl.LATE_S": 0.05,
+    "cameras.watched_folder.POLL_S": 0.01,
+    "cameras.watched_folder.QUIET_S": 0.05,
+}
+"""By name below `tbcad.control`."""
+
+
+def main() -> None:
+    from tbcad.cli import main as tbcad
+
+    for name, seconds in WAITS_S.items():
+        module, _, constant = name.rpartition(".")
+        setattr(import_module(f"tbcad.control.{module}"), constant, seconds)
+    tbcad()
+
+
+if __name__ == "__main__":
+    main()

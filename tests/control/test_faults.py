@@ -1,0 +1,239 @@
+"""Faults in mid-run: what can go on goes on, what cannot stops with lights off, nothing is lost."""
+
+import errno
+import signal
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from tbcad.cli import run as tbcad
+from tbcad.runs import writing
+from tests.control.rig import Rig, until
+from tests.control.run_checks import check_every_photograph, events
+
+ALL = 24
+FAST = 2000.0  # of the controller's time
+LATER = 40  # lines after which faults come: the base is homed, some photographs are taken
+
+
+def at_first(start: str, what: str, after: int = LATER) -> Callable[[int, str], str | None]:
+    """A fault of the first line after some that begins so."""
+    done: list[int] = []
+
+    def fault(number: int, line: str) -> str | None:
+        if done or number < after or not line.startswith(start):
+            return None
+        done.append(number)
+        return what
+
+    return fault
+
+
+@pytest.mark.parametrize("what", ["drop_ok", "drop_line"])
+def test_lost_ok_or_line(rig: Rig, what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """One of each kind of line: a motion, a dwell, a light on, a light off."""
+    faults = [at_first(start, what, LATER) for start in ("G1 ", "G4 ", "M64 ", "M65 ")]
+    rig.controller.fault = lambda number, line: next(
+        (found for fault in faults if (found := fault(number, line))), None
+    )
+    assert tbcad(rig.words("--phases", "dark,led_1,lit", "--runs", "a", stops="1-8")) == 0
+    check_every_photograph(rig.out, 24)
+    assert capsys.readouterr().err.count("no ok came; once more") == len(faults)
+
+
+def test_no_ok_at_all_stops(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    rig.controller.fault = lambda number, line: "drop_ok" if line == "M64 P2" else None
+    assert tbcad(rig.words()) == 1
+    assert "'M64 P2': the controller is idle but sends no ok" in capsys.readouterr().out
+    assert not rig.controller.machine.lights
+
+
+@pytest.mark.parametrize(
+    ("what", "says"),
+    [
+        ("reset", "the controller began anew at 'M64 P3'"),
+        ("power", "the controller began anew at 'M64 P3'"),
+        ("alarm", "stopped at 'M64 P3': ALARM:1: a limit switch was pressed in mid-motion"),
+    ],
+)
+def test_controller_stops(
+    rig: Rig, what: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig.controller.fault = at_first("M64 P3", what)
+    assert tbcad(rig.words()) == 1
+    out = capsys.readouterr().out
+    assert out.startswith("NOT COMPLETE: ")
+    assert says in out
+    assert "LOOK AT THE MACHINE" not in out
+    assert not rig.controller.machine.lights
+    assert events(rig.out)[-1] == "stopped"
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, ALL)
+    assert rig.controller.lines.count("$H") == 2
+
+
+def test_reset_in_mid_motion(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """The program is told by the banner, before its `ok` would come."""
+    rig.controller.run_at(20.0)
+    moves: list[str] = []
+
+    def fault(number: int, line: str) -> str | None:
+        moves.extend([line] if line.startswith("G1 ") else [])
+        return "reset" if len(moves) == 2 and line.startswith("G4") else None
+
+    rig.controller.fault = fault
+    assert tbcad(rig.words("--phases", "dark", "--runs", "a", stops="1,9")) == 1
+    assert "began anew" in capsys.readouterr().out
+    rig.controller.fault = lambda number, line: None
+    rig.controller.run_at(FAST)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, 2)
+
+
+def test_unplugged(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    rig.controller.fault = at_first("M64 P3", "silence")
+    assert tbcad(rig.words()) == 1
+    out = capsys.readouterr().out
+    assert "stopped: 'M64 P3': the controller does not answer" in out
+    assert "LOOK AT THE MACHINE: the controller does not answer: lights may be on" in out
+    assert len(out.splitlines()) <= 12
+    rig.controller.plug_in()
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, ALL)
+
+
+def test_refused_line_names_line_code_and_meaning(
+    rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig.controller.firmware = "grbl"  # a board without outputs
+    assert tbcad(rig.words()) == 1
+    assert "refuses 'M65 P1': error:20: the command is not supported" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_holds_base_and_switches_lights_off(rig: Rig, kind: signal.Signals) -> None:
+    controller = rig.controller
+
+    def slow(number: int, line: str) -> None:
+        if sum(line.startswith("G1 X") for line in controller.lines) == 3:
+            controller.run_at(4.0)
+
+    controller.fault = slow
+    process = rig.start(rig.words("--phases", "lit", "--runs", "a", stops="1,30"))
+    until(lambda: controller.moving and controller.speed < FAST)
+    process.send_signal(kind)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "stopped by the operator" in out
+    assert "LOOK AT THE MACHINE" not in out
+    assert not rig.controller.machine.lights
+    assert rig.controller.held == 1
+    assert rig.controller.state == "Idle"
+    rig.controller.fault = lambda number, line: None
+    rig.controller.run_at(FAST)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, 2)
+
+
+def test_base_that_does_not_stop_is_not_let_fall(
+    rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A reset in mid-motion would switch the motor off."""
+    controller = rig.controller
+    controller.deaf = True
+
+    def fault(number: int, line: str) -> str | None:
+        if sum(one.startswith("G1 X") for one in controller.lines) == 3 and line.startswith("G4"):
+            controller.run_at(0.1)
+            return "error"
+        return None
+
+    controller.fault = fault
+    assert tbcad(rig.words("--phases", "lit", "--runs", "a", stops="1,30")) == 1
+    assert "LOOK AT THE MACHINE: the base did not stop (Run)" in capsys.readouterr().out
+    assert controller.state != "Alarm"
+
+
+def test_complete_run_needs_no_more(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    assert tbcad(rig.words("--phases", "dark", stops="1")) == 0
+    homed = rig.controller.lines.count("$H")
+    assert tbcad(rig.resume()) == 0
+    assert rig.controller.lines.count("$H") == homed
+    assert "COMPLETE: 2 of 2 photographs" in capsys.readouterr().out
+
+
+def failing_camera(rig: Rig, calls: set[int]) -> str:
+    """A camera that gives no photograph when it is called for the n-th time."""
+    script = rig.folder / "camera.sh"
+    faulty = "|".join(map(str, sorted(calls)))
+    script.write_text(
+        f"n=$(cat {rig.folder}/n 2>/dev/null || echo 0); n=$((n + 1)); echo $n > {rig.folder}/n\n"
+        f'case $n in {faulty}) echo "no focus" >&2; exit 3;; esac\ncp {rig.picture} "$1.jpg"\n'
+    )
+    return f"command:sh {script} {{output}}"
+
+
+def test_missed_photograph_is_taken_again(rig: Rig) -> None:
+    assert tbcad(rig.words(camera=failing_camera(rig, {4, 9}))) == 0
+    check_every_photograph(rig.out, ALL)
+
+
+def test_photograph_missed_twice_is_named_and_the_rest_goes_on(
+    rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first call is for the trial; the fourth and fifth are for the third photograph."""
+    camera = failing_camera(rig, {4, 5})
+    assert tbcad(rig.words(camera=camera)) == 1
+    out = capsys.readouterr().out
+    assert out.startswith(f"NOT COMPLETE: {ALL - 1} of {ALL} photographs")
+    assert "missing: a_0001_led_2: the camera's command ended with 3: no focus" in out
+    assert events(rig.out).count("missed") == 1
+    assert tbcad(rig.words("--resume", camera=camera, stops=None)) == 0
+    check_every_photograph(rig.out, ALL)
+
+
+def test_dead_camera_stops_the_run(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    assert tbcad(rig.words(camera=failing_camera(rig, set(range(6, 200))))) == 1
+    out = capsys.readouterr().out
+    assert "12 photographs in a row are missing" in out
+    assert "missing: 7 more, in journal.jsonl" in out
+    assert len(out.splitlines()) <= 12
+
+
+def test_full_disk(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole, writes = writing.write_safely, list[Path]()
+
+    def full(path: Path, data: bytes) -> None:
+        writes.append(path)
+        if len(writes) > 20:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        whole(path, data)
+
+    monkeypatch.setattr(writing, "write_safely", full)
+    assert tbcad(rig.words()) == 1
+    out = capsys.readouterr().out
+    assert "cannot be written: No space left on device" in out
+    assert not rig.controller.machine.lights
+    monkeypatch.setattr(writing, "write_safely", whole)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, ALL)
+
+
+@pytest.mark.skipif(find_spec("gphoto2") is None, reason="the extra `machine` is not installed")
+def test_file_that_the_system_refuses(rig: Rig) -> None:
+    """A limit of the system on the size of files, between those of record and photograph."""
+    limited = ["sh", "-c", 'ulimit -f 24; exec "$@"', "-"]
+    words = rig.words(camera="gphoto2")
+    done = rig.start(words, before=limited)
+    out, _ = done.communicate(timeout=60)
+    assert done.returncode == 1
+    assert "cannot be written: File too large" in out
+    assert not list((rig.out / "photographs").iterdir())
+    again = rig.start(rig.words("--resume", camera="gphoto2", stops=None))
+    again.communicate(timeout=60)
+    assert again.returncode == 0
+    check_every_photograph(rig.out, ALL)

@@ -1,0 +1,61 @@
+"""States of a machine for tests: as designed, and with errors such as printed parts give."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tbcad.geometry.rotations import rotated
+from tbcad.geometry.vectors import unit
+from tbcad.machine.designed import designed_prototype
+from tbcad.machine.machine import Machine
+from tbcad.runs.exposure import Frame
+from tbcad.simulate.prototype.plan import Plan
+from tbcad.simulate.scene.exported import ExportedDesign
+
+# Standard deviations, about those of tbcad/tolerance/process/fdm.toml.
+SEAT_MM, RADIUS_MM, CAMERA_MM, RUNOUT_MM = 0.15, 0.005, 0.14, 0.05
+CAMERA_RAD, AXIS_RAD, ANGLE_RAD = 2.4e-3, 1.5e-3, 0.5e-3
+
+
+def machine_of(export: ExportedDesign, plan: Plan) -> Machine:
+    """As designed."""
+    return designed_prototype(export, plan)
+
+
+def frames_of(plan: Plan) -> tuple[Frame, ...]:
+    """All stops of the first run, then of the second."""
+    degrees = np.degrees(plan.angle).tolist()
+    return tuple(
+        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
+        for turn in (0, 180)
+        for stop, angle in enumerate(degrees, 1)
+    )
+
+
+def perturbed(machine: Machine, seed: int) -> Machine:
+    """With random errors."""
+    rng = np.random.default_rng(seed)
+    k, f = len(machine.radius), len(machine.angle)
+    tilt = rng.normal(0, CAMERA_RAD, 3)
+    camera = replace(
+        machine.camera,
+        pinhole=machine.camera.pinhole + rng.normal(0, CAMERA_MM, 3),
+        axes=rotated(
+            machine.camera.axes,
+            np.tile(unit(tilt), (3, 1)),
+            np.full(3, np.linalg.norm(tilt)),
+        ),
+        focal=machine.camera.focal * 1.003,
+        principal=machine.camera.principal + np.array([1.5, -1.0]),
+        distortion=np.array([-0.01, 0.002, 1e-4, -1e-4, 0.0]),
+    )
+    return replace(
+        machine,
+        camera=camera,
+        axis=unit(machine.axis + rng.normal(0, AXIS_RAD, 3)),
+        axis_point=machine.axis_point + rng.normal(0, RUNOUT_MM, 3),
+        angle=machine.angle + rng.normal(0, ANGLE_RAD, f),
+        centre=machine.centre + rng.normal(0, SEAT_MM, (k, 3)),
+        radius=machine.radius + rng.normal(0, RADIUS_MM, k),
+        shift=rng.normal(0, RUNOUT_MM, (f, 3)),
+    )

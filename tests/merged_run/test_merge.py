@@ -1,0 +1,403 @@
+"""Merged photographs against the merge that is simulated, and what a real run may lack."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.api import merge
+from tbcad.errors import InputError
+from tbcad.machine.machine import Machine
+from tbcad.machine.record import write_machine
+from tbcad.merged_run.corrections import Options
+from tbcad.optics.camera import Camera
+from tbcad.runs.exposure import DARK, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.simulate.capture.light_field import Frame as LightFrame
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.prototype.plan import Plan, read_plan
+from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
+from tbcad.simulate.prototype.simulated_merge import merge_run
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tests.machine_states import frames_of, machine_of, perturbed
+from tests.photographed_runs import photographs_of, write_exposure, write_run
+
+CAPTURE_MM = 60.0
+EVEN = Options("off")
+"""The photographs of these tests have no loss of light toward the edge, unless they say so."""
+# All round: of two views only, the sampling alone changes the mean SSIM by 0.02.
+VIEWS_DEG = tuple((a + 7 * e, e) for e in (12.0, 30.0, 50.0, 72.0) for a in range(0, 360, 45))
+Photographs = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def export(export_folder: Path) -> ExportedDesign:
+    return read_export(export_folder)
+
+
+@pytest.fixture(scope="module")
+def plan(export: ExportedDesign) -> Plan:
+    return read_plan(export)
+
+
+@pytest.fixture(scope="module")
+def frames(plan: Plan) -> tuple[Frame, ...]:
+    return frames_of(plan)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return prepared_scene(built_in_object(CAPTURE_MM))
+
+
+@pytest.fixture(scope="module")
+def designed(export: ExportedDesign, plan: Plan) -> Machine:
+    return machine_of(export, plan)
+
+
+@pytest.fixture(scope="module")
+def built(designed: Machine) -> Machine:
+    return perturbed(designed, seed=7)
+
+
+@pytest.fixture(scope="module")
+def simulated(export: ExportedDesign, plan: Plan, scene: Scene) -> LightField:
+    runs = prototype_runs(export.reflectors, plan)
+    bands = ((ball_reflector(run), merge_run(run, scene)) for run in runs)
+    return light_field_in_memory(bands, CAPTURE_MM)
+
+
+@pytest.fixture(scope="module")
+def perfect(
+    export: ExportedDesign,
+    plan: Plan,
+    designed: Machine,
+    frames: tuple[Frame, ...],
+    scene: Scene,
+) -> Photographs:
+    return photographs_of(export, plan, designed, frames, scene)
+
+
+@pytest.fixture
+def calibration(designed: Machine, frames: tuple[Frame, ...], tmp_path: Path) -> Path:
+    return calibrated(tmp_path / "calibration", designed, frames)
+
+
+def calibrated(folder: Path, machine: Machine, frames: tuple[Frame, ...]) -> Path:
+    folder.mkdir()
+    write_machine(folder / "machine.json", machine, frames)
+    return folder
+
+
+def on_mirrors(frame: LightFrame) -> np.ndarray:
+    return np.asarray(frame.planes["mirror"]) > 0
+
+
+def apart(one: LightField, other: LightField) -> list[np.ndarray]:
+    """Largest difference of colours at pixels on mirrors of both, for each camera."""
+    result = []
+    for camera, frame in one.frames.items():
+        both = on_mirrors(frame) & on_mirrors(other.frames[camera])
+        difference = frame.image().astype(int) - other.frames[camera].image()
+        result.append(np.abs(difference).max(axis=2)[both])
+    return result
+
+
+class TestPerfectMachine:
+    @pytest.mark.parametrize(("suffix", "factor"), [("png", 1), ("png", 257), ("tif", 257)])
+    def test_same_as_the_simulated_capture(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        simulated: LightField,
+        calibration: Path,
+        tmp_path: Path,
+        suffix: str,
+        factor: int,
+    ) -> None:
+        def deeper(image: np.ndarray, _frame: Frame, _phase: str) -> np.ndarray:
+            return image if factor == 1 else image.astype(np.uint16) * factor
+
+        run = write_run(tmp_path / "run", export, frames, perfect, change=deeper, suffix=suffix)
+        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        found = LightField.read(tmp_path / "merged")
+        for camera, frame in simulated.frames.items():
+            same = found.frames[camera]
+            assert (same.planes["mirror"] == frame.planes["mirror"]).mean() > 1 - 1e-4
+            both = on_mirrors(frame) & on_mirrors(same)
+            for name in ("origin", "direction"):
+                assert np.abs(same.planes[name] - frame.planes[name])[both].max() < 1e-4
+            half = record["based_on"][camera]
+            assert half["mirrors_with_rays"] == half["mirrors"] == len(frame.u)
+            assert not half["mirrors_missing"]
+            assert not half["photographs_not_used"]
+        off = np.concatenate(apart(found, simulated))
+        assert off.max() <= 1
+        assert (off > 0).mean() < 1e-4
+
+    def test_corrections_restore_what_a_camera_does(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        simulated: LightField,
+        calibration: Path,
+        designed: Machine,
+        tmp_path: Path,
+    ) -> None:
+        """Stray light, other exposures at some stops, and cos^4; in 16 bits, so little is lost."""
+        camera = designed.camera
+        pixels = np.stack(np.meshgrid(np.arange(416.0), np.arange(310.0)), axis=-1)
+        fall = (camera.directions(pixels) @ camera.axes[2])[..., None] ** 4
+        stray = np.linspace(1000, 3000, 416)[:, None]
+
+        def taken(image: np.ndarray, frame: Frame, phase: str) -> np.ndarray:
+            light = 100.0 * image * fall if phase == LIT else 0.0 * image
+            return np.rint(light * exposure_of(frame) + stray).astype(np.uint16)
+
+        def exposure_of(frame: Frame) -> float:
+            return 2.0 if frame.stop == 5 else 1.0
+
+        run = write_run(tmp_path / "run", export, frames, perfect, (DARK, LIT), taken)
+        for frame in frames:
+            for phase in (DARK, LIT):
+                set_exposure(run, frame, phase, exposure_of(frame))
+        options = Options("cos4", brightness=2.57)
+        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        off = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
+        assert off.max() <= 1
+
+    def test_srgb_and_flat_field(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        simulated: LightField,
+        calibration: Path,
+        tmp_path: Path,
+    ) -> None:
+        shade = np.linspace(1, 0.5, 416)[:, None]
+
+        def taken(image: np.ndarray, _frame: Frame, _phase: str) -> np.ndarray:
+            light = np.where(
+                image <= 10, image / 255 / 12.92, ((image / 255 + 0.055) / 1.055) ** 2.4
+            )
+            dimmed = light * shade
+            encoded = np.where(
+                dimmed <= 0.0031308, 12.92 * dimmed, 1.055 * dimmed ** (1 / 2.4) - 0.055
+            )
+            return np.rint(65535 * encoded).astype(np.uint16)
+
+        run = write_run(tmp_path / "run", export, frames, perfect, change=taken)
+        flat = tmp_path / "a_0001_lit.png"
+        white = np.full((310, 416, 3), 255, dtype=np.uint8)
+        write_exposure(tmp_path, frames[0], LIT, taken(white, frames[0], LIT), flat.name)
+        options = Options(flat=(flat,), encoding="srgb")
+        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        dark = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
+        # Between pixels light is interpolated instead of its code.
+        assert np.median(dark) <= 1
+
+
+def set_exposure(run: Path, frame: Frame, phase: str, seconds: float) -> None:
+    path = run / PHOTOGRAPHS / f"{exposure_name(frame, phase)}.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "exposure_s": seconds}))
+
+
+class TestBuiltMachine:
+    @pytest.mark.slow
+    def test_a_known_machines_views_are_as_good_as_a_perfect_ones(
+        self,
+        export: ExportedDesign,
+        plan: Plan,
+        frames: tuple[Frame, ...],
+        scene: Scene,
+        built: Machine,
+        designed: Machine,
+        simulated: LightField,
+        tmp_path: Path,
+    ) -> None:
+        photographs = photographs_of(export, plan, built, frames, scene)
+        run = write_run(tmp_path / "run", export, frames, photographs)
+        quality = {}
+        for name, machine in (("known", built), ("designed", designed)):
+            calibration = calibrated(tmp_path / name, machine, frames)
+            merge(run, calibration, export.folder, EVEN, out=tmp_path / f"merged-{name}")
+            quality[name] = mean_ssim(LightField.read(tmp_path / f"merged-{name}"), scene)
+        perfect = mean_ssim(simulated, scene)
+        assert quality["known"] > perfect - 0.01
+        assert quality["designed"] < perfect - 0.05
+
+
+def mean_ssim(field: LightField, scene: Scene) -> float:
+    tiles = MirrorTiles(field)
+    found = []
+    for azimuth, elevation in VIEWS_DEG:
+        at: Camera = camera_around_object(
+            np.radians(azimuth), np.radians(elevation), 640.0, CAPTURE_MM, (160, 160), None
+        )
+        truth = np.rint(pinhole_picture(scene, at)).astype(np.uint8)
+        found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
+    return float(np.mean(found))
+
+
+@pytest.fixture
+def run(
+    export: ExportedDesign, frames: tuple[Frame, ...], perfect: Photographs, tmp_path: Path
+) -> Path:
+    return write_run(tmp_path / "run", export, frames, perfect)
+
+
+class TestIncomplete:
+    def test_missing_and_damaged_photographs(
+        self, export: ExportedDesign, plan: Plan, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        """Their mirrors have no rays; the rest goes on."""
+        images = run / PHOTOGRAPHS
+        lost, damaged = (int(np.bincount(plan.stop[0]).argsort()[-i]) for i in (1, 2))
+        (images / f"a_{lost + 1:04d}_lit.png").unlink()
+        (images / f"a_{lost + 1:04d}_lit.json").unlink()
+        (images / f"a_{damaged + 1:04d}_lit.png").write_bytes(b"no picture")
+        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        half = record["based_on"]["a"]
+        expected = {f"a{m + 1:04d}" for m in np.flatnonzero(np.isin(plan.stop[0], [lost, damaged]))}
+        named = {name for names in half["mirrors_missing"].values() for name in names}
+        assert named == expected
+        assert half["stops_used"] == len(plan.angle) - 2
+        assert set(half["photographs_not_used"]) == {
+            f"a_{lost + 1:04d}_lit",
+            f"a_{damaged + 1:04d}_lit",
+        }
+        found = LightField.read(tmp_path / "merged").frames["a"]
+        mirror = np.asarray(found.planes["mirror"])
+        absent = np.flatnonzero(np.isin(plan.stop[0], [lost, damaged])) + 1
+        assert not np.isin(mirror, absent).any()
+        assert len(np.unique(mirror[mirror > 0])) == len(found.u) - len(absent)
+        assert record["based_on"]["b"]["mirrors_with_rays"] == len(found.u)
+
+    def test_a_stop_that_the_calibration_does_not_know(
+        self,
+        export: ExportedDesign,
+        plan: Plan,
+        run: Path,
+        designed: Machine,
+        frames: tuple[Frame, ...],
+        tmp_path: Path,
+    ) -> None:
+        stop = int(np.bincount(plan.stop[0]).argmax())
+        machine = Machine(**{**vars(designed), "angle": np.delete(designed.angle, stop)})
+        few = tuple(frame for at, frame in enumerate(frames) if at != stop)
+        calibration = calibrated(tmp_path / "few", machine, few)
+        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        (reason,) = record["based_on"]["a"]["mirrors_missing"]
+        assert reason == "the calibration has no angle of this stop"
+
+    def test_a_dark_photograph_that_is_missing(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        calibration: Path,
+        tmp_path: Path,
+    ) -> None:
+        run = write_run(tmp_path / "dark", export, frames, perfect, (DARK, LIT))
+        (run / PHOTOGRAPHS / "a_0003_dark.png").write_bytes(b"")
+        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        assert record["based_on"]["a"]["without_dark"] == ["a_0003_lit"]
+
+    def test_one_run_of_two(
+        self,
+        export: ExportedDesign,
+        plan: Plan,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        calibration: Path,
+        tmp_path: Path,
+    ) -> None:
+        first = frames[: len(plan.angle)]
+        run = write_run(tmp_path / "half", export, first, perfect)
+        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        assert list(record["based_on"]) == ["a"]
+        field = LightField.read(tmp_path / "merged")
+        assert list(field.frames) == ["a"]
+        at = camera_around_object(0.0, 0.6, 640.0, CAPTURE_MM, (64, 64), None)
+        assert synthesise(MirrorTiles(field), at, "nearest", None).image.any()
+
+    def test_nothing_in_the_run_is_changed(
+        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+        merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+def edit(path: Path, change: Callable[[dict], object]) -> None:
+    record = json.loads(path.read_text(encoding="utf-8"))
+    change(record)
+    path.write_text(json.dumps(record), encoding="utf-8")
+
+
+class TestRefused:
+    def test_photographs_of_another_size_than_the_cameras(
+        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        edit(calibration / "machine.json", lambda record: record["camera"].update(width_px=417))
+        refused(run, calibration, export, tmp_path, "416 x 310 pixels, the camera of .* 417 x 310")
+
+    def test_another_export(
+        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        edit(run / "run.json", lambda record: record["export_sha256"].update({"balls.csv": "0"}))
+        refused(run, calibration, export, tmp_path, "balls.csv is not the file that")
+
+    def test_no_photograph_of_the_object(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        calibration: Path,
+        tmp_path: Path,
+    ) -> None:
+        dark = write_run(tmp_path / "dark", export, frames, perfect, (DARK,))
+        refused(dark, calibration, export, tmp_path, "no photograph of the lit object")
+
+    def test_a_calibration_that_names_no_export(
+        self, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        with pytest.raises(InputError, match="name it with --exports"):
+            merge(run, calibration, out=tmp_path / "merged")
+
+    def test_a_flat_field_of_another_size(
+        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
+    ) -> None:
+        frame = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
+        image = np.full((100, 200, 3), 255, dtype=np.uint8)
+        write_exposure(tmp_path, frame, LIT, image, "a_0001_lit.png")
+        options = Options(flat=(tmp_path / "a_0001_lit.png",))
+        message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
+        refused(run, calibration, export, tmp_path, message, options)
+
+
+def refused(
+    run: Path,
+    calibration: Path,
+    export: ExportedDesign,
+    tmp_path: Path,
+    message: str,
+    options: Options | None = None,
+) -> None:
+    with pytest.raises(InputError) as caught:
+        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+    assert re.search(message, str(caught.value))
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "merged").exists()

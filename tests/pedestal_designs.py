@@ -1,0 +1,19 @@
+"""Designs whose mirrors stand on pedestals, for tests."""
+
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.optics.pedestals import PedestalCells, flattened, pedestal_cells
+from tbcad.spec.load import load_spec
+
+GROOVE = 0.1
+
+
+def pedestals(array: MirrorArray, groove: float = GROOVE) -> PedestalCells:
+    """Pedestals below mirrors whose radii were found without grooves."""
+    pinhole = array.camera.pinhole
+    flat = flattened(array.cells.surfaces, array.cells.triangles, pinhole)
+    return pedestal_cells(flat, array.mirrors, pinhole, groove)
+
+
+def pedestal_design(*settings: str) -> MirrorDesign:
+    """The paper's design with other settings ("key=value"), its mirrors on pedestals."""
+    return design(load_spec(None, ["shell.edges=pedestal", *settings]))

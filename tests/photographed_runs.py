@@ -1,0 +1,108 @@
+"""Folders of runs whose photographs are simulated without noise."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tbcad.machine.machine import Machine
+from tbcad.machine.photographed import machine_runs
+from tbcad.runs.exposure import EXPOSURE_SCHEMA, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.runs.record import RECORD, RUN_SCHEMA
+from tbcad.simulate.prototype.ball_rays import stop_photograph
+from tbcad.simulate.prototype.plan import Plan
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.simulate.scene.ray_casting import Scene
+
+Change = Callable[[np.ndarray, Frame, str], np.ndarray]
+TAKEN = datetime(2026, 1, 1, tzinfo=UTC)
+EXPOSURE_S = 0.5
+DEPENDS_ON = ("design.json", "mirrors.csv", "balls.csv", "prototype.json", "rotation_plan.csv")
+
+
+def photographs_of(
+    export: ExportedDesign,
+    plan: Plan,
+    machine: Machine,
+    frames: tuple[Frame, ...],
+    scene: Scene,
+) -> dict[str, np.ndarray]:
+    """Photographs of the lit object, by name."""
+    runs = machine_runs(export, plan, machine, frames)
+    return {
+        exposure_name(frame, LIT): stop_photograph(
+            runs[frame.object_turn_deg // 180], scene, frame.stop - 1
+        )
+        for frame in frames
+    }
+
+
+def write_run(
+    folder: Path,
+    export: ExportedDesign,
+    frames: tuple[Frame, ...],
+    photographs: dict[str, np.ndarray],
+    phases: tuple[str, ...] = (LIT,),
+    change: Change = lambda image, _frame, _phase: image,
+    suffix: str = "png",
+) -> Path:
+    """A run as tbcad run leaves it; `change` may alter each image, before it is written."""
+    images = folder / PHOTOGRAPHS
+    images.mkdir(parents=True)
+    camera = export.reflectors[0].camera
+    for frame in frames:
+        for phase in phases:
+            name = exposure_name(frame, phase)
+            lit = photographs[exposure_name(frame, LIT)]
+            image = change(lit if phase == LIT else np.zeros_like(lit), frame, phase)
+            write_exposure(images, frame, phase, image, f"{name}.{suffix}")
+    record = {
+        "schema": RUN_SCHEMA,
+        "export_sha256": {name: digest(export.folder / name) for name in DEPENDS_ON},
+        "source": "simulated",
+        "camera": "test",
+        "width_px": camera.width_px,
+        "height_px": camera.height_px,
+        "phases": phases,
+        "frames": [frame.model_dump() for frame in frames],
+        "locked": {},
+        "seconds": 0.0,
+    }
+    (folder / RECORD).write_text(json.dumps(record), encoding="utf-8")
+    return folder
+
+
+def write_exposure(
+    images: Path,
+    frame: Frame,
+    phase: str,
+    image: np.ndarray,
+    file: str,
+    exposure_s: float | None = EXPOSURE_S,
+) -> None:
+    """A photograph with its sidecar."""
+    written, data = cv2.imencode(Path(file).suffix, image[..., ::-1])
+    assert written
+    (images / file).write_bytes(data.tobytes())
+    sidecar = {
+        "schema": EXPOSURE_SCHEMA,
+        "frame": frame.model_dump(),
+        "phase": phase,
+        "file": file,
+        "sha256": digest(images / file),
+        "width_px": image.shape[1],
+        "height_px": image.shape[0],
+        "exposure_s": exposure_s,
+        "taken": TAKEN.isoformat(),
+        "settings": {},
+    }
+    (images / file).with_suffix(".json").write_text(json.dumps(sidecar), encoding="utf-8")
+
+
+def digest(path: Path) -> str:
+    """sha256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

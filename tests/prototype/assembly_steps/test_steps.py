@@ -1,0 +1,381 @@
+"""Steps of assembly: each part of the list is in exactly one, in an order that can be done."""
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.prototype.assembly_steps.machine import SCHEMA, Machine, read_machine
+from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
+from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
+from tbcad.prototype.electronics.wiring import HOME
+from tbcad.prototype.files.bom_csv import COLUMNS
+from tbcad.report.assembly_page import page
+
+Record = dict[str, Any]
+PRINTED = ("carrier", "zero_disc", "bearing_head", "stage_foot", "coupon_1")
+AXIS = [0.0, 0.0, 1.0]
+
+
+def fastener(part: str, number: int, *through: str, at: float = 0.0, x: float = 0.0) -> Record:
+    name, place = f"{part.replace('-', '_')}_{number}", [x, 0.0, at]
+    return {"name": name, "part": part, "position_mm": place, "along": AXIS, "through": [*through]}
+
+
+def bought(name: str, part: str | None) -> Record:
+    return {"name": name, "part": part, "what": name}
+
+
+def belt_design() -> Record:
+    """A machine of few parts, with one of each kind of joint."""
+    return {
+        "schema": SCHEMA,
+        "balls": "balls.csv",
+        "frame": {"axis": AXIS},
+        "parts": [
+            {"name": name, "role": "tool" if name == "coupon_1" else "frame", "ball": None}
+            for name in PRINTED
+        ],
+        "bought": [
+            *(bought("plate", "PLATE-400x150x8"), bought("shaft", "SHAFT-8x100")),
+            *(bought("wheel", "GT2-60"), bought("pinion", "GT2-20")),
+            *(bought("motor", "NEMA17-40"), bought("camera", None)),
+        ],
+        "fasteners": [
+            fastener("INSERT-M3", 1, "carrier", at=20.0),
+            fastener("SET-M3x12", 1, "carrier"),
+            fastener("M3x16", 1, "wheel", "zero_disc", "carrier"),
+            fastener("M5x16", 1, "stage_foot", "plate", x=50.0, at=1.0),
+            fastener("WASHER-5", 1, "stage_foot", x=50.0),
+            fastener("M3x12", 1, "bearing_head", "motor"),
+        ],
+        "holding": {"balls": [{"ball": 1, "by": "glue"}]},
+        "home": {
+            "pin": "ROD-4x40",
+            "switch_deg": -100.0,
+            "homed_deg": -98.0,
+            "zero_error_deg": 0.7,
+        },
+        "drive": {
+            **{"belt_centre_mm": 79.0, "belt_tone_hz": 165.0, "belt_tension_n": 5.0, "ratio": 3.0},
+            **{"mass_g": 500.0, "hold_current_a": 0.3},
+        },
+        "controller": {"firmware": "grblhal", "phases": [{"name": "dark", "output": None}]},
+        "frame_stock": {
+            "plate": "PLATE-400x150x8",
+            "upright": "2020-350",
+            "uprights_cut_to_mm": 310.0,
+        },
+        "leds": [],
+        "swing_deg": [-100.0, 90.0],
+    }
+
+
+LOOSE = {"GT2-240-6": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "CABLE-2x0.25": 3, "ball 10 mm": 1}
+
+
+def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
+    """The files of an export that steps are worked out from."""
+    counts = Counter(one["part"] for one in design["fasteners"])
+    counts.update(one["part"] for one in design["bought"] if one["part"])
+    counts.update(one["name"] for one in design["parts"])
+    counts.update(more)
+    with (folder / "bom.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        for item, (part, count) in enumerate(sorted(counts.items()), 1):
+            source = "printed" if part in PRINTED else "bought"
+            row = {"item": item, "quantity": count, "part": part, "what": part, "from": source}
+            table.writerow(row)
+    (folder / "balls.csv").write_text("number,kind,size,diameter_mm\n1,ball,10 mm,10\n")
+    with (folder / "wiring.csv").open("w", newline="") as file:
+        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
+        lines.writeheader()
+        lines.writerow({"line": 1, "signal": "lamp", "part": "lamp", "output": "digital 0"})
+    (folder / "prototype.json").write_text(json.dumps(design))
+    return folder
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return read_machine(write(tmp_path, belt_design(), LOOSE))
+
+
+def of(steps: tuple[Step, ...], key: str) -> Step:
+    return next(step for step in steps if step.key == key)
+
+
+def taken(steps: tuple[Step, ...]) -> Counter[str]:
+    sums = Counter[str]()
+    for step in steps:
+        sums.update({use.part: use.quantity for use in step.parts})
+    return sums
+
+
+def test_steps_take_exactly_the_parts_of_the_list(machine: Machine) -> None:
+    steps = assembly_steps(machine)
+    assert taken(steps) == Counter(machine.quantities)
+    assert [step.number for step in steps] == [*range(1, len(steps) + 1)]
+    assert all(step.does and step.checks for step in steps)
+
+
+def test_every_body_and_fastener_is_mounted_once_for_the_record(machine: Machine) -> None:
+    steps = mounting_record(machine)
+    mounted = [name for step in steps for name in step["mounts"]]
+    fasteners = [one["name"] for one in machine.fasteners]
+    assert sorted(mounted) == sorted([*machine.bodies, *fasteners])
+    assert [step["key"] for step in steps] == [step.key for step in assembly_steps(machine)]
+
+
+def test_a_fastener_waits_for_the_last_body_that_it_goes_through(machine: Machine) -> None:
+    steps = assembly_steps(machine)
+    bodies = {body: step.number for step in steps for use in step.parts for body in use.bodies}
+    for one in machine.fasteners:
+        mounted = max(bodies[body] for body in one["through"])
+        assert bodies[one["name"]] == mounted or one["part"] == "SET-M3x12"
+    assert bodies["SET_M3x12_1"] == bodies["shaft"]
+
+
+def test_a_design_gets_the_steps_that_it_needs(machine: Machine) -> None:
+    keys = [step.key for step in assembly_steps(machine)]
+    assert not {"lamps", "shroud", "gauge", "table", "caps"} & {*keys}
+    assert keys.index("hub") < keys.index("shaft") < keys.index("motor") < keys.index("wiring")
+
+
+def test_wiring_names_output_of_each_line(machine: Machine) -> None:
+    does = of(assembly_steps(machine), "wiring").does
+    assert "Line 1, lamp: lamp, at digital 0 by a switch module." in does
+
+
+def test_no_sentence_is_cut_off(machine: Machine) -> None:
+    texts = [text for step in assembly_steps(machine) for text in (*step.does, *step.checks)]
+    assert all(text == text.strip() and text.endswith(".") for text in texts)
+
+
+def test_the_belt_is_on_the_wheel_before_the_shaft_is_in_the_bearings(machine: Machine) -> None:
+    steps = assembly_steps(machine)
+    (belt,) = [step for step in steps if "GT2-240-6" in {use.part for use in step.parts}]
+    does = " ".join(belt.does)
+    assert belt.key == "shaft"
+    assert 0 <= does.index("the belt round the wheel") < does.index("through both bearings")
+
+
+def test_the_wheel_is_centred_by_the_shaft(machine: Machine) -> None:
+    assert any("through wheel, disc and hub centres" in text for text in of_hub(machine))
+
+
+def of_hub(machine: Machine) -> tuple[str, ...]:
+    return of(assembly_steps(machine), "hub").does
+
+
+def test_where_the_pinion_is_on_the_motors_shaft(machine: Machine) -> None:
+    """9 mm of plate, a gap of 5 and 7 mm of teeth: a shaft of 24 mm looks out by 3."""
+    (pinion,) = [text for text in of(assembly_steps(machine), "motor").does if "Pinion" in text]
+    assert "21 mm from the motor's face" in pinion
+    assert "24 mm ends 3 mm beyond" in pinion
+
+
+@pytest.mark.parametrize("lamps", [None, {"strip": "STRIP-COB-24V"}])
+def test_a_design_without_lamps_says_where_its_light_comes_from(
+    tmp_path: Path, lamps: Record | None
+) -> None:
+    folder = write(tmp_path, belt_design() | {"lamps": lamps}, LOOSE)
+    does = of(assembly_steps(read_machine(folder)), "wiring").does
+    assert any("no place for lamps of its own" in text for text in does) == (lamps is None)
+
+
+def test_nuts_are_counted_by_slot(tmp_path: Path) -> None:
+    design = belt_design() | {"frame": {"axis": [0.7, 0.0, -0.7]}}
+    design["bought"] += [bought("upright_left", "2020-350"), bought("upright_right", "2020-350")]
+    for number, (upright, way) in enumerate(
+        (upright, way) for upright in ("left", "right") for way in (-1.0, -1.0, 1.0)
+    ):
+        nut = fastener("TNUT-M5-6", number, f"upright_{upright}", at=float(number))
+        design["fasteners"].append(nut | {"along": [way, 0.0, 0.0]})
+    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
+    assert "2 in the front one (toward the camera) of each and 1 in" in of(steps, "frame").does[0]
+
+
+def test_motor_and_supply_are_told_with_their_wires(tmp_path: Path) -> None:
+    folder = write(tmp_path, belt_design(), LOOSE)
+    with (folder / "wiring.csv").open("a", newline="") as file:
+        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
+        own = {
+            "line": 2,
+            "signal": "motor",
+            "part": "NEMA17-40",
+            "current_ma": 2000,
+            "path": "four",
+        }
+        lines.writerow(own)
+    steps = assembly_steps(read_machine(folder))
+    item = read_machine(folder).items["NEMA17-40"]
+    assert f"Line 2, motor: NEMA17-40 ({item}), 2000 mA RMS; four." in of(steps, "wiring").does
+    assert any("rated current, 2.0 A," in text for text in of(steps, "zero").does)
+
+
+def test_the_switch_is_tried_before_homing_and_told_by_its_contacts(tmp_path: Path) -> None:
+    folder = write(tmp_path, belt_design(), LOOSE)
+    with (folder / "wiring.csv").open("a", newline="") as file:
+        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
+        lines.writerow(HOME | {"line": 2, "output": "limit X"})
+    steps = assembly_steps(read_machine(folder))
+    (line,) = [text for text in of(steps, "wiring").does if "Line 2" in text]
+    assert "at limit X; common and normally closed contact" in line
+    assert "Before $H" in of(steps, "zero").checks[0]
+
+
+def test_the_base_is_held_by_pin_or_motor_once_it_is_up(machine: Machine) -> None:
+    """Hanging down, it would strike the stage's post."""
+    steps = assembly_steps(machine)
+    zero = of(steps, "zero").does
+    holds, out = (text_with(zero, words) for words in ("the motor holds", "Before the supply"))
+    assert holds < out
+    assert "pin in" in zero[out]
+    assert "pin in, before the supply" in of(steps, "first").checks[-1]
+
+
+def text_with(texts: tuple[str, ...], words: str) -> int:
+    """Number of the only text that has some words."""
+    (number,) = [k for k, text in enumerate(texts) if words in text]
+    return number
+
+
+def test_the_page_says_why_parts_are_not_drawn(machine: Machine) -> None:
+    text = page(machine, assembly_steps(machine), {})
+    missing = text[text.index("Not drawn") :]
+    drawn = {*machine.bodies.values()} | {one["part"] for one in machine.fasteners}
+    for part in machine.items:
+        assert (machine.ref(part) in missing) == (part not in drawn)
+
+
+def test_tools_follow_the_list(machine: Machine, tmp_path: Path) -> None:
+    text = page(machine, assembly_steps(machine), {})
+    assert "spanner" not in text
+    design = belt_design()
+    design["fasteners"].append(fastener("NUT-M5", 1, "stage_foot", x=50.0))
+    other = read_machine(write(tmp_path, design, LOOSE))
+    assert "spanner" in page(other, assembly_steps(other), {})
+
+
+def direct(design: Record) -> None:
+    """A motor with a coupling, without shaft and belt."""
+    gone = ("shaft", "wheel", "pinion")
+    design["bought"] = [one for one in design["bought"] if one["name"] not in gone]
+    design["bought"].append(bought("coupling", "FLANGE-5"))
+    design["fasteners"][2]["through"][0] = "coupling"
+
+
+def cut(design: Record) -> None:
+    """A carrier of two pieces."""
+    design["parts"][0]["name"] = "carrier_1"
+    design["parts"].append({"name": "carrier_2", "role": "base", "ball": None})
+    for one in design["fasteners"]:
+        one["through"] = ["carrier_1" if body == "carrier" else body for body in one["through"]]
+    pieces = ("carrier_1", "carrier_2")
+    design["fasteners"].append(fastener("DOWEL-4x16", 1, *pieces))
+    design["fasteners"].append(fastener("M3x12", 2, *pieces, x=30.0))
+
+
+@pytest.mark.parametrize(("change", "locked"), [(direct, "motor"), (cut, "shaft")])
+def test_other_designs_have_steps_of_their_own(
+    tmp_path: Path, change: Callable[[Record], None], locked: str
+) -> None:
+    design, more = belt_design(), dict(LOOSE)
+    change(design)
+    if change is direct:
+        del more["GT2-240-6"]
+    machine = read_machine(write(tmp_path, design, more))
+    steps = assembly_steps(machine)
+    assert taken(steps) == Counter(machine.quantities)
+    assert all(step.does and step.checks for step in steps)
+    assert "SET-M3x12" in {use.part for use in of(steps, locked).parts}
+    joints = {use.part for use in of(steps, "carrier").parts} & {"DOWEL-4x16", "M3x12"}
+    assert bool(joints) == (change is cut)
+
+
+def test_torques_follow_what_yields_first(machine: Machine) -> None:
+    steps = assembly_steps(machine)
+    torques = [line for step in steps for line in step.fits if "N m" in line]
+    by_screw = {line.split()[2]: float(line.split(": ")[1].split()[0]) for line in torques}
+    # A bare head on plastic; in an insert; on a washer; 8.8 in steel would bear 5.5 N m.
+    assert 0 < by_screw["M3x12"] < by_screw["M3x16"] < by_screw["M5x16"] < 5.5
+
+
+def test_hand_tight_where_no_torque_is_honest(tmp_path: Path) -> None:
+    design = belt_design()
+    design["fasteners"].append(fastener("M2x12", 1, "bearing_head", x=80.0))
+    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
+    (line,) = [one for one in of(steps, "head").fits if "M2x12" in one]
+    assert "hand tight, in the printed hole" in line
+
+
+def fewer_listed(design: Record, more: dict[str, int]) -> None:
+    more["GT2-60"] = -1
+
+
+def unknown_part(design: Record, more: dict[str, int]) -> None:
+    more["THING"] = 1
+
+
+def unknown_body(design: Record, more: dict[str, int]) -> None:
+    design["parts"].append({"name": "wing", "role": "frame", "ball": None})
+
+
+def other_schema(design: Record, more: dict[str, int]) -> None:
+    design["schema"] = "tbcad-prototype/1"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (fewer_listed, "the list has 0 GT2-60 for 1 bodies"),
+        (unknown_part, "THING is in no step"),
+        (unknown_body, "wing is in no step"),
+        (other_schema, "another schema"),
+    ],
+)
+def test_what_does_not_add_up_is_refused(
+    tmp_path: Path, spoil: Callable[[Record, dict[str, int]], None], words: str
+) -> None:
+    design, more = belt_design(), dict(LOOSE)
+    spoil(design, more)
+    with pytest.raises(InputError, match=words):
+        assembly_steps(read_machine(write(tmp_path, design, more)))
+
+
+def test_an_export_of_an_earlier_version_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, design = write(tmp_path, belt_design(), LOOSE), belt_design()
+    del design["fasteners"]
+    (folder / "prototype.json").write_text(json.dumps(design))
+    assert run(["assembly", str(folder), "--out", str(tmp_path / "page")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "has no fasteners: build again" in line
+    assert not (tmp_path / "page").exists()
+
+
+def test_json_has_the_same_steps(
+    machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["assembly", str(tmp_path), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)["steps"]
+    assert printed == json.loads(json.dumps(record(assembly_steps(machine))))
+
+
+def test_the_page_has_all_steps_and_escapes_names(
+    machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "page"
+    assert run(["assembly", str(tmp_path), "--out", str(out), "--no-pictures"]) == 0
+    text = (out / "assembly.html").read_text()
+    assert all(f'id="{step.key}"' in text for step in assembly_steps(machine))
+    assert run(["assembly", str(tmp_path), "--out", str(out), "--no-pictures"]) == 2
+    assert "--force" in capsys.readouterr().err

@@ -1,0 +1,171 @@
+"""Sheets: true places, nothing outside the border, no text over another."""
+
+import math
+from collections import defaultdict
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from tbcad.drafting.dimensions import labels
+from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet, choose_scale, scale_text
+from tbcad.formats.entities import Circle, Layer, Line, Polyline, Text
+from tbcad.formats.pdf import text_width
+from tbcad.geometry.primitives import Cylinder, Prism
+from tbcad.prototype.base.hub import SCREW_MM
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drawings.lamps import LAMP, lamp_sheet
+from tbcad.prototype.drawings.parts import PLATE, UPRIGHT, WHEEL, Listed, sheets
+from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.purchased.parts import load_parts
+
+DRIVES = load_drives(load_parts())
+BILL = Listed("turtleback, n = 18", defaultdict(lambda: 41), defaultdict(lambda: 1))
+
+
+@pytest.fixture(scope="module")
+def drawn(frame: FrameLayout, carrier: BaseLayout) -> dict[str, Sheet]:
+    assert frame.lamps is not None
+    lamps = lamp_sheet(frame.lamps, BILL)
+    return {sheet.name: sheet for sheet in (*sheets(frame, carrier, DRIVES[0], BILL), lamps)}
+
+
+def cut_circles(sheet: Sheet) -> list[Circle]:
+    entities = sheet.full_size()
+    return [one for one in entities if isinstance(one, Circle) and one.layer == Layer.CUT]
+
+
+def box(text: Text) -> tuple[float, float, float, float]:
+    """What a text covers on paper: left, bottom, right, top."""
+    width, turn = text_width(text.text, text.height), math.radians(text.turn_deg)
+    back = {"left": 0.0, "centre": 0.5, "right": 1.0}[text.align] * width
+    along, up = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
+    corners = [
+        [text.place[k] + s * along[k] + t * up[k] for k in (0, 1)]
+        for s in (-back, width - back)
+        for t in (0.0, text.height)
+    ]
+    (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
+    return left, low, right, high
+
+
+def test_what_is_drawn(drawn: dict[str, Sheet]) -> None:
+    assert drawn.keys() == {PLATE, WHEEL, UPRIGHT, LAMP}
+
+
+def test_without_a_wheel_none_is_drawn(frame: FrameLayout, carrier: BaseLayout) -> None:
+    (direct,) = [one for one in DRIVES if one.coupling][:1]
+    assert len(sheets(frame, carrier, direct, BILL)) == 2
+
+
+def test_the_plates_holes_are_at_full_size(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+    centres = [one.centre for one in cut_circles(drawn[PLATE])]
+    assert np.array(centres) == pytest.approx(frame.holes - frame.corner)
+    assert {round(one.radius, 9) for one in cut_circles(drawn[PLATE])} == {2.1}
+
+
+def test_the_table_has_every_hole(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+    texts = [one.text for one in drawn[PLATE].entities if isinstance(one, Text)]
+    for place in (frame.holes - frame.corner).tolist():
+        for value in place:
+            assert f"{value:.2f}" in texts
+
+
+def test_the_wheels_holes_are_on_the_hubs(drawn: dict[str, Sheet], carrier: BaseLayout) -> None:
+    outline, bore, *holes = cut_circles(drawn[WHEEL])
+    assert outline.radius > bore.radius
+    assert np.array([one.centre for one in holes]) == pytest.approx(carrier.hub.holes)
+    assert {round(2 * one.radius, 9) for one in holes} == {SCREW_MM}
+
+
+def test_a_hub_of_the_wheel_is_turned_off(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+    """Screws' heads are in the gap, and a hub would rub on the head's plate."""
+    wheel = next(part for part in frame.purchased if part.name == "wheel").added[0]
+    assert isinstance(wheel, Cylinder)  # along the axis from the hub to the plate
+    back = -float((wheel.start + wheel.length * wheel.axis) @ wheel.axis)
+    gap = back - frame.head.plate.front
+    texts = [one.text for one in drawn[WHEEL].entities if isinstance(one, Text)]
+    assert f"Turn off a hub: the head's plate is {gap:g} mm behind." in texts
+
+
+def test_the_uprights_length(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+    outlines = [
+        one
+        for one in drawn[UPRIGHT].full_size()
+        if isinstance(one, Polyline) and one.layer == Layer.CUT
+    ]
+    (outline,) = outlines
+    assert np.ptp(outline.corners, axis=0) == pytest.approx([frame.length, 20])
+
+
+def test_every_strip_of_a_lamp_is_drawn(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+    lamps = frame.lamps
+    assert lamps is not None
+    outlines = [
+        np.array(one.corners)
+        for one in drawn[LAMP].full_size()
+        if isinstance(one, Polyline) and one.layer == Layer.CUT
+    ]
+    assert [np.ptp(one, axis=0).tolist() for one in outlines] == [pytest.approx([50, 8])] * 2
+    assert np.ptp(np.vstack(outlines), axis=0) == pytest.approx([lamps.length, lamps.width])
+    words = [one.text for one in drawn[LAMP].entities if isinstance(one, Text)]
+    assert any(text.startswith("Cut 8 pieces of 50 ± 0.5, 2 for each of 4 lamps") for text in words)
+
+
+def test_heights_of_the_lamps_screws_are_on_the_upright(
+    drawn: dict[str, Sheet], frame: FrameLayout
+) -> None:
+    """Those of the bodies that go through the holders, above the plate's face."""
+    plate = next(one for one in frame.purchased if one.name == "plate")
+    (body,) = plate.added
+    assert isinstance(body, Prism)
+    top = np.vstack([body.corners, body.corners + body.along])[:, 2].max()
+    words = [one.text for one in drawn[UPRIGHT].entities if isinstance(one, Text)]
+    screws = [one for one in frame.fasteners if "lamp_holder_3" in one.through]
+    assert screws
+    for screw in screws:
+        assert f"{screw.place[2] - top:.1f}" in words
+
+
+@pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
+def test_no_text_meets_another_or_the_border(drawn: dict[str, Sheet], name: str) -> None:
+    sheet = drawn[name]
+    boxes = [(one.text, box(one)) for one in sheet.entities if isinstance(one, Text)]
+    for (text, one), (word, two) in combinations(boxes, 2):
+        apart = one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
+        assert apart, (text, word)
+    for text, (left, low, right, high) in boxes:
+        assert left > LEFT_MM, text
+        assert right < sheet.paper[0] - BORDER_MM, text
+        assert BORDER_MM < low < high < sheet.paper[1] - BORDER_MM, text
+
+
+@pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
+def test_no_line_leaves_the_border(drawn: dict[str, Sheet], name: str) -> None:
+    sheet = drawn[name]
+    ends = [end for one in sheet.entities if isinstance(one, Line) for end in (one.start, one.end)]
+    assert np.min(ends, axis=0)[0] > LEFT_MM
+    assert np.max(ends, axis=0)[0] < sheet.paper[0] - BORDER_MM
+
+
+def test_labels_of_near_holes_keep_apart() -> None:
+    """Four holes of 4 mm on a square of 6 mm: on one side there is no room."""
+    circles = [Circle(Layer.CUT, (x, y), 2.0) for x in (0.0, 6.0) for y in (0.0, 6.0)]
+    texts = [one for one in labels(circles, ["1", "2", "3", "4"]) if isinstance(one, Text)]
+    for one, two in combinations(map(box, texts), 2):
+        assert one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
+    for text in texts:
+        left, low, right, high = box(text)
+        for circle in circles:
+            near = np.clip(circle.centre, (left, low), (right, high))
+            assert math.dist(near, circle.centre) >= circle.radius
+
+
+@pytest.mark.parametrize(
+    ("size", "scale", "text"),
+    [((500, 200), 0.5, "1:2"), ((60, 40), 2, "2:1"), ((9e3, 1), 0.1, "1:10")],
+)
+def test_scales(size: tuple[float, float], scale: float, text: str) -> None:
+    assert choose_scale(size, (260, 200)) == scale
+    assert scale_text(scale) == text

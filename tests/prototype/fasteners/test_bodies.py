@@ -1,0 +1,52 @@
+"""Bodies of fasteners: sizes of standards, in their places."""
+
+import numpy as np
+import pytest
+
+from tbcad.cad.solids import volume as solid_volume
+from tbcad.geometry.primitives import enclosing_triangles, volume
+from tbcad.prototype.fasteners.bodies import PITCH_MM, PROFILES, core_radius, fastener_component
+from tbcad.prototype.fasteners.fastener import Fastener, numbered
+from tbcad.prototype.printing.component_solids import component_solid
+from tbcad.prototype.purchased.parts import load_parts, of_kind
+
+PARTS = load_parts()
+PLACE, ALONG = np.array([1.0, 2.0, 3.0]), np.array([0.6, 0.0, -0.8])
+LEVEL = np.array([0.6, 0.8, 0.0])
+DRAWN = [one for kind in (*PROFILES, "tnuts") for one in of_kind(PARTS, kind)]
+
+
+@pytest.mark.parametrize(
+    ("thread", "core"), [(2.0, 1.509), (3.0, 2.387), (4.0, 3.141), (5.0, 4.019), (6.0, 4.773)]
+)
+def test_core_diameters_are_those_of_iso_724(thread: float, core: float) -> None:
+    """d3 of coarse threads, as the standard lists it."""
+    assert 2 * core_radius(thread) == pytest.approx(core, abs=1e-3)
+
+
+def test_every_screw_on_sale_has_a_pitch() -> None:
+    threads = {one["thread_mm"] for kind in ("screws", "setscrews") for one in of_kind(PARTS, kind)}
+    assert threads <= set(PITCH_MM)
+
+
+@pytest.mark.parametrize("part", DRAWN, ids=lambda part: part.name)
+def test_bodies_are_in_their_places(part: object) -> None:
+    (one,) = numbered([Fastener(part, PLACE, LEVEL, ("plate",))])  # type: ignore[arg-type]
+    body = fastener_component(one)
+    along = (enclosing_triangles(body.added[0]).reshape(-1, 3) - PLACE) @ LEVEL
+    head = one.part["head_height_mm"] if one.part.kind == "screws" else 0.0
+    thickness = one.part["thickness_mm"] if one.part.kind == "washers" else 0.0
+    assert along.min() == pytest.approx(0.5 if one.part.kind == "tnuts" else -head - thickness)
+    assert body.part == one.part.name
+    if not body.removed:
+        assert solid_volume(component_solid(body)) == pytest.approx(volume(body.added[0]), rel=1e-9)
+
+
+def test_names_are_unique_and_of_letters_and_digits() -> None:
+    some = [Fastener(PARTS[name], PLACE, ALONG, ("plate",)) for name in ("UNC1/4-20x12.7", "M3x8")]
+    assert [one.name for one in numbered([*some, *some])] == [
+        "UNC1_4_20x12_7_1",
+        "M3x8_1",
+        "UNC1_4_20x12_7_2",
+        "M3x8_2",
+    ]

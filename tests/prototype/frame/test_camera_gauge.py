@@ -1,0 +1,96 @@
+"""The gauge for the camera's place: its marks, and how well they tell the pinhole's place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tbcad.camera.requirements import camera_requirements
+from tbcad.geometry.vectors import norm, unit
+from tbcad.optics.camera import Camera
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge, marks_seen
+from tbcad.prototype.printing.component_solids import component_solid
+from tests.helpers import as_trimesh
+from tests.prototype.conftest import CAPTURE_RADIUS
+
+DIAMETER_MM = 60.0
+TRIALS = 20_000
+
+
+@pytest.fixture(scope="module")
+def gauge(small_prototype: PrototypeLayout, carrier: BaseLayout) -> CameraGauge:
+    array, swing = small_prototype.array, small_prototype.stops.range
+    needed = camera_requirements(array, CAPTURE_RADIUS)
+    return camera_gauge(carrier, array.camera, DIAMETER_MM, needed, swing)
+
+
+@pytest.fixture(scope="module")
+def camera(small_prototype: PrototypeLayout) -> Camera:
+    return small_prototype.array.camera
+
+
+def test_near_and_far_marks_are_in_line_with_the_pinhole(
+    gauge: CameraGauge, camera: Camera
+) -> None:
+    rays = unit(gauge.marks - camera.pinhole)
+    assert norm(rays[:, 0] - rays[:, 1]).max() < 1e-12
+
+
+def test_marks_are_corners_of_the_solid(gauge: CameraGauge) -> None:
+    corners = as_trimesh(component_solid(gauge.component)).vertices
+    for mark in gauge.marks.reshape(-1, 3):
+        assert norm(corners - mark).min() < 1e-9
+
+
+def test_pictures_are_those_of_the_turned_marks(
+    gauge: CameraGauge, camera: Camera, carrier: BaseLayout
+) -> None:
+    """A quarter turn brings the arm into the frame's plane: the middle column."""
+    low, left, right, high = marks_seen(gauge, carrier, camera)
+    middle = (camera.width_px - 1) / 2
+    turn = abs(gauge.angles[0])
+    assert abs(low["column_px"] - middle) < 0.05 * camera.width_px * (90.5 - turn)
+    assert abs(high["column_px"] - middle) < 0.05 * camera.width_px * (90.5 - turn)
+    assert left["column_px"] + right["column_px"] == pytest.approx(2 * middle)
+    expected = camera.project(gauge.marks[0, 0])
+    assert [left["column_px"], left["row_px"]] == pytest.approx(expected.tolist())
+
+
+def test_the_pinhole_found_is_as_near_as_stated(gauge: CameraGauge, camera: Camera) -> None:
+    """Simulated alignments: lengths and readings with errors, the apex of both lines found."""
+    rng, sizes = np.random.default_rng(5), gauge.sizes
+    place = float(norm(camera.pinhole))
+    near, far = (
+        place - along + 0.03 * rng.standard_normal(TRIALS) for along in (sizes.near, sizes.far)
+    )
+    near_half, far_half = (
+        half + 0.015 * rng.standard_normal(TRIALS) for half in (sizes.near_half, sizes.far_half)
+    )
+    # Where lines through near and far marks of both sides meet the axis, before the pinhole.
+    apex = (near_half * far - far_half * near) / (near_half - far_half)
+    from_lengths = float(np.std(apex))
+    assert 0.3 * gauge.errors["along_mm"] < from_lengths < gauge.errors["along_mm"]
+    assert max(gauge.errors.values()) < 0.2
+
+
+def test_coarser_pixels_and_a_wider_pupil_tell_less(
+    gauge: CameraGauge, small_prototype: PrototypeLayout, carrier: BaseLayout
+) -> None:
+    array, swing = small_prototype.array, small_prototype.stops.range
+    needed = camera_requirements(array, CAPTURE_RADIUS)
+    wide = replace(needed, pupil_mm=4 * needed.pupil_mm)
+    worse = camera_gauge(carrier, array.camera, DIAMETER_MM, wide, swing)
+    for name, value in gauge.errors.items():
+        assert worse.errors[name] > value
+
+
+def test_near_marks_are_before_a_larger_lens(
+    gauge: CameraGauge, small_prototype: PrototypeLayout, carrier: BaseLayout
+) -> None:
+    array, swing = small_prototype.array, small_prototype.stops.range
+    needed = camera_requirements(array, CAPTURE_RADIUS)
+    large = camera_gauge(carrier, array.camera, 2 * DIAMETER_MM, needed, swing)
+    assert large.sizes.near < gauge.sizes.near
+    assert large.errors["along_mm"] > gauge.errors["along_mm"]

@@ -1,0 +1,134 @@
+"""Lamps: images of one another, out of light, swing and view, refused where they cannot be."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.keepout import KeepOut
+from tbcad.prototype.light import lamps as searched
+from tbcad.prototype.light.lamp import SHORT_STRIP, LampLayout
+from tbcad.prototype.light.lamp_sight import hidden_by_base
+from tbcad.prototype.light.lamps import SIGNS, lamp_layout
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.spec.errors import SpecError
+from tbcad.spec.prototype import PrototypeSpec, StageSpec
+
+PARTS = load_parts()
+
+
+def lit(
+    spec: PrototypeSpec,
+    frame: FrameLayout,
+    prototype: PrototypeLayout,
+    keep_out: KeepOut,
+    **values: object,
+) -> LampLayout | None:
+    chosen = spec.model_copy(update={"light": spec.light.model_copy(update=values)})
+    return lamp_layout(chosen, frame.head.face, prototype.array.camera, keep_out, PARTS)
+
+
+def test_lamps_are_images_of_one_another(frame: FrameLayout) -> None:
+    lamps = frame.lamps
+    assert lamps is not None
+    assert lamps.places == pytest.approx(lamps.places[0] * SIGNS)
+    assert (lamps.places * lamps.inward).sum(axis=1).max() < 0
+    assert [body.part for body in lamps.bodies] == ["STRIP-COB-24V"] * 4
+    assert (lamps.watt, lamps.lumen) == (pytest.approx(4.0), pytest.approx(90.0))
+    assert lamps.current_ma == pytest.approx(4000 / 24)
+
+
+def test_higher_lamps_have_no_room(
+    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> None:
+    assert frame.lamps is not None
+    around = (spec, frame, small_prototype, keep_out)
+    z = float(frame.lamps.places[0, 2])
+    again = lit(*around, lamp_z_mm=z)
+    assert again is not None
+    assert np.array_equal(again.places, frame.lamps.places)
+    with pytest.raises(SpecError, match=r"lamp_z_mm -5: .* set it to auto, or to 0 for no lamps"):
+        lit(*around, lamp_z_mm=-5.0)
+    with pytest.raises(SpecError, match="reach down to the base plate"):
+        lit(*around, lamp_z_mm=spec.frame.floor_mm + 20)
+    assert lit(*around, lamp_z_mm=0.0) is None
+
+
+def test_lamps_beyond_the_supply_are_refused(
+    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> None:
+    with pytest.raises(SpecError, match="lamps take 3000 mA, more than the 1000"):
+        lit(spec, frame, small_prototype, keep_out, strips=6, segments=6)
+
+
+def test_the_camera_sees_no_lamp(frame: FrameLayout, small_prototype: PrototypeLayout) -> None:
+    lamps, camera = frame.lamps, small_prototype.array.camera
+    assert lamps is not None
+    corners = np.array(
+        [
+            np.add(place, [0, side * lamps.width / 2, high * lamps.length / 2])
+            for place in lamps.places
+            for side in (-1, 1)
+            for high in (-1, 1)
+        ]
+    )
+    assert camera.fill(corners[corners[:, 2] > camera.pinhole[2]]) > 1
+    x, y, depth = ((corners - camera.pinhole) @ camera.axes.T).T
+    half = camera.half_sizes
+    assert not ((np.abs(x) < half[0] * depth) & (np.abs(y) < half[1] * depth)).any()
+
+
+@contextmanager
+def hiding(condition: Callable[[LampLayout], bool]) -> Iterator[None]:
+    """A base that hides the lamps of some layouts, besides those that it hides; fewer tried."""
+
+    def hidden(layout: LampLayout, stage: StageSpec, keep_out: KeepOut) -> bool:
+        return condition(layout) or hidden_by_base(layout, stage, keep_out)
+
+    with mock.patch.multiple(searched, hidden_by_base=hidden, ASIDE_MM=(0.0, -10.0), STEP_MM=5.0):
+        yield
+
+
+def test_two_level_lamps_where_four_have_no_room(
+    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> None:
+    with hiding(lambda layout: not layout.level):
+        lamps = lit(spec, frame, small_prototype, keep_out)
+    assert lamps is not None
+    assert lamps.level
+    assert lamps.places[1] == pytest.approx(lamps.places[0] * [-1, -1, 1])
+    assert lamps.sides == (lamps.length, lamps.width)
+    assert [part.name for part in lamps.holders] == ["lamp_holder_2"]
+    (bridge,) = lamps.stands
+    assert len(bridge.holes) == 4
+    assert len(lamps.fasteners) == 4  # a screw and a nut on each upright
+    assert lamps.screws == (lamps.places[0, 2],)
+
+
+def test_short_strips_where_long_ones_have_no_room(
+    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> None:
+    with hiding(lambda layout: layout.length > 30 or layout.places[0, 1] == 0):
+        lamps = lit(spec, frame, small_prototype, keep_out)
+    assert lamps is not None
+    assert lamps.strip.name == SHORT_STRIP
+    assert lamps.places[0, 1] != 0
+    assert lamps.places[1] == pytest.approx(lamps.places[0] * [-1, -1, 1])
+
+
+def test_level_lamps_keep_clear_of_other_parts(
+    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
+) -> None:
+    """A part that is where they were found leaves no place at that height."""
+    around = (spec, frame.head.face, small_prototype.array.camera, keep_out, PARTS)
+    with hiding(lambda layout: not layout.level):
+        lamps = lamp_layout(*around)
+        assert lamps is not None
+        z = float(lamps.places[0, 2])
+        again = spec.model_copy(update={"light": spec.light.model_copy(update={"lamp_z_mm": z})})
+        with pytest.raises(SpecError, match="meets the lamp stand 1"):
+            lamp_layout(again, *around[1:], beside=[lamps.stands[0].component])

@@ -1,0 +1,153 @@
+"""The folder of a simulated run, and what is refused."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.machine.record import TRUTH, read_machine
+from tbcad.runs.photographs import read_photograph, read_run
+from tbcad.simulate.prototype.plan import read_plan
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulated_run import simulate
+from tbcad.simulated_run.options import RunOptions
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerance.prototype.wind_up import read_wind_up
+from tests.simulated_runs import Small, fdm_errors, small_run
+
+PHASES = ("dark", "led_1", "lit")
+
+
+@pytest.fixture(scope="module")
+def small(export_folder: Path) -> Small:
+    return small_run(export_folder, (3, 6))
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_a_folder_that_is_read_back(small: Small, export_folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    steps: list[str] = []
+    simulate.write_run((small.run,), PHASES, export_folder, out, steps.append)
+    run = read_run(out)
+    assert not run.faults
+    assert run.record.frames == small.run.frames
+    assert len(run.exposures) == len(small.run.frames) * len(PHASES)
+    frame = run.record.frames[1]
+    exposure = run.exposure(frame, "led_1")
+    assert exposure is not None
+    image = read_photograph(run, exposure)
+    assert (image == small.run.frame_photographs(1, ("led_1",))["led_1"]).all()
+    truth, frames = read_machine(out / TRUTH)
+    assert frames == small.run.frames
+    assert truth.centre == pytest.approx(small.machine.centre, abs=0)
+    assert steps[-1] == "frame 4 of 4, 0 s left"
+    digest = hashlib.sha256((export_folder / "balls.csv").read_bytes()).hexdigest()
+    assert run.record.export_sha256["balls.csv"] == digest
+
+
+def test_the_same_bytes_with_any_number_of_threads(
+    small: Small, export_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for threads in (1, 3):
+        monkeypatch.setattr(simulate, "THREADS", threads)
+        out = tmp_path / str(threads)
+        simulate.write_run((small.run,), PHASES, export_folder, out, lambda _: None)
+    assert digests(tmp_path / "1") == digests(tmp_path / "3")
+
+
+def test_photographs_are_not_replaced(small: Small, export_folder: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "mine.txt"
+    kept.write_text("precious")
+    with pytest.raises(InputError, match="holds files, and photographs are not replaced"):
+        simulate.write_run((small.run,), PHASES, export_folder, tmp_path, lambda _: None)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_nothing_is_left_of_a_run_that_fails(
+    small: Small, export_folder: Path, tmp_path: Path
+) -> None:
+    def fail(_: str) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(InputError, match="No space left"):
+        simulate.write_run((small.run,), PHASES, export_folder, tmp_path / "run", fail)
+    assert not list(tmp_path.iterdir())
+
+
+def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    options = RunOptions(seed=1, stops=(2, 3), phases=("led_2", "dark"), perfect=True)
+    (run,), phases = simulate.prepare_run(export, fdm_errors(), subject, options)
+    assert phases == ("dark", "led_2")
+    assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
+    assert not run.built.machine.camera.distortion.any()
+    assert subject.radius <= export.spec.prototype.stage.object_diameter_mm / 2
+
+
+def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    one, two, again = (
+        simulate.prepare_run(export, fdm_errors(), subject, RunOptions(seed=seed, stops=(1,)))[0][0]
+        for seed in (1, 2, 1)
+    )
+    assert (one.built.machine.centre == again.built.machine.centre).all()
+    assert np.abs(one.built.machine.centre - two.built.machine.centre).max() > 0.01
+
+
+def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    plan, subject = read_plan(export), simulate.run_object(export, None)
+    whole = Errors(wind_up=Error(mean=1.0))
+    (run,), _ = simulate.prepare_run(export, whole, subject, RunOptions())
+    wind_up = read_wind_up(export, plan)
+    assert wind_up.max() > 0
+    assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (RunOptions(stops=(500,)), "stop 500 is not in the plan: allowed is 1 to"),
+        (RunOptions(phases=("led_9",)), "phase led_9 is not photographed: allowed is dark, led_1"),
+    ],
+)
+def test_refused(export_with_wind_up: Path, options: RunOptions, message: str) -> None:
+    export = read_export(export_with_wind_up)
+    with pytest.raises(InputError, match=message):
+        simulate.prepare_run(export, fdm_errors(), simulate.run_object(export, None), options)
+
+
+def test_the_stage_hides_leds_as_it_stands(export_folder: Path, tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((4.0, 6.0, 8.0))
+    axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    origin, middle = np.array([1.0, 2.0, 3.0]), np.array([30.0, -10.0, 5.0])
+    # A point x of the prototype is x @ axes + origin on the printer's bed.
+    box.vertices = (box.vertices + middle) @ axes + origin
+    box.export(tmp_path / "post.stl")
+    document = json.loads((export_folder / "prototype.json").read_text())
+    part = {"role": "stage", "stl": "post.stl", "axes": axes.tolist()}
+    document["parts"] = [{**part, "origin_mm": origin.tolist()}]
+    (tmp_path / "prototype.json").write_text(json.dumps(document))
+    stage = simulate.stage_scene(tmp_path)
+    way = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    hits = stage.run(
+        np.tile(middle + np.array([10.0, 0.0, 0.0]), (2, 1)).astype(np.float32),
+        way.astype(np.float32),
+        output=1,
+    )
+    assert hits["tfar"][0] == pytest.approx(8.0)  # ten less half of four
+    assert hits["primID"][1] < 0

@@ -1,0 +1,117 @@
+"""Small simulated runs: five balls, four LEDs, a few stops, and a camera with larger pixels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.calibration.estimate.parameters import Prior
+from tbcad.calibration.priors import Fitted, prototype_prior
+from tbcad.machine.built import BuiltPrototype, designed_build, is_cap, random_build
+from tbcad.machine.designed import designed_prototype
+from tbcad.machine.machine import Machine
+from tbcad.simulate.prototype.plan import Plan, read_plan
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.photographs import Chain, SimulatedRun, frames_of
+from tbcad.tolerance.montecarlo.error_kinds import Errors
+from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.types import Floats
+
+FINER = 2  # pixels for one of the export's: highlights of few pixels are hard to see
+BRIGHT = 3.0  # LEDs: the picture is still smaller than a real one
+
+
+@dataclass(frozen=True)
+class Small:
+    """A small run, and what is known of it before.
+
+    Attributes:
+        run: that is photographed.
+        prior: of its machine.
+    """
+
+    run: SimulatedRun
+    prior: Prior
+
+    @property
+    def machine(self) -> Machine:
+        """As it was simulated."""
+        return self.run.built.machine
+
+
+def fdm_errors() -> Errors:
+    return process_errors(load_process("fdm"))
+
+
+def finer(machine: Machine) -> Machine:
+    """The same before a camera with more pixels."""
+    camera = machine.camera
+    return replace(
+        machine,
+        camera=replace(
+            camera,
+            focal=FINER * camera.focal,
+            principal=FINER * (camera.principal + 0.5) - 0.5,
+            width_px=FINER * camera.width_px,
+            height_px=FINER * camera.height_px,
+        ),
+    )
+
+
+def small_run(
+    folder: Path,
+    stops: Sequence[int],
+    seed: int = 3,
+    errors: Errors | None = None,
+    chain: Chain | None = None,
+    subject_mm: float = 0.0,
+) -> Small:
+    """A run of an export through some stops, twice.
+
+    Args:
+        folder: of the export.
+        stops: from 1.
+        seed: of build and noise.
+        errors: of the process; by default those of fdm.
+        chain: from light to numbers; by default with bright LEDs.
+        subject_mm: size of the object that hides LEDs; none where it is zero.
+    """
+    export = read_export(folder)
+    plan = read_plan(export)
+    designed = finer(designed_prototype(export, plan))
+    kinds = fdm_errors() if errors is None else errors
+    built = random_build(designed, plan, kinds, seed, wind_up=np.zeros(len(plan.angle)))
+    every = frames_of(np.degrees(plan.angle))
+    kept = np.array([k for k, frame in enumerate(every) if frame.stop in stops])
+    frames = tuple(every[k] for k in kept)
+    scene = prepared_scene(built_in_object(subject_mm or 30.0))
+    run = SimulatedRun(
+        replace(built, machine=built.machine.of_frames(kept)),
+        frames,
+        scene,
+        Occluders(scene.embree if subject_mm else None, None),
+        chain or Chain(led_light=BRIGHT),
+        seed,
+    )
+    series = np.array([frame.object_turn_deg // 180 for frame in frames])
+    known = Fitted(plan.body_centre, is_cap(plan), series)
+    return Small(run, prototype_prior(designed.of_frames(kept), kinds, known))
+
+
+def perfect_build(folder: Path) -> tuple[BuiltPrototype, Plan]:
+    """The designed prototype of an export."""
+    export = read_export(folder)
+    plan = read_plan(export)
+    return designed_build(designed_prototype(export, plan), plan), plan
+
+
+def photograph_centroid(image: Floats, place: Floats, radius: int) -> Floats:
+    """Centroid (2,) of an image's light within a square about a place."""
+    x, y = np.rint(place).astype(int)
+    rows, columns = np.mgrid[y - radius : y + radius + 1, x - radius : x + radius + 1]
+    light = image[rows, columns].astype(np.float64)
+    return np.array([(light * columns).sum(), (light * rows).sum()]) / light.sum()

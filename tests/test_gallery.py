@@ -1,0 +1,38 @@
+"""The gallery of designs: all of them, as `python docs/gallery.py` writes it from its figures."""
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import tbcad
+from tbcad.output.overview import overview
+from tbcad.spec.shipped import shipped_designs
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@pytest.fixture(scope="module")
+def gallery() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("gallery", DOCS / "gallery.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_page_has_every_design_and_the_figures_that_were_found(gallery: ModuleType) -> None:
+    results = json.loads(gallery.RESULTS.read_text(encoding="utf-8"))
+    assert set(results) == set(shipped_designs())
+    assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page(results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["mukaigawa-flat", "afternoon-print"])
+def test_figures_are_those_of_the_present_code(gallery: ModuleType, name: str) -> None:
+    results = json.loads(gallery.RESULTS.read_text(encoding="utf-8"))
+    found = overview(tbcad.design(name), optional_prototype=True)
+    assert results[name] == gallery.figures(found)

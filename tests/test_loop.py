@@ -1,0 +1,94 @@
+"""The whole loop: photographs of a random build, its calibration, their merge, and views."""
+
+from pathlib import Path
+from shutil import copy
+
+import numpy as np
+import pytest
+
+from tbcad.api import build, calibrate, merge, simulate_run
+from tbcad.machine.record import read_machine
+from tbcad.merged_run.corrections import Options
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulated_run.options import RunOptions
+from tbcad.simulated_run.photographs import OBJECT_LIGHT
+from tbcad.simulated_run.simulate import run_object
+
+pytestmark = pytest.mark.slow
+
+VIEWS_DEG = ((10.0, 25.0), (130.0, 40.0), (250.0, 55.0))
+CAPTURE_MM = 60.0
+LOST = "a_0007_lit"
+ALLOWED = 0.01  # of SSIM, between a calibrated and a perfect machine
+
+
+class Loop:
+    """Two runs of one export: of a random build, and of a perfect one."""
+
+    def __init__(self, export: Path, folder: Path) -> None:
+        self.export, self.folder = export, folder
+        simulate_run(export, folder / "run", "fdm", options=RunOptions(seed=3))
+        simulate_run(export, folder / "perfect", options=RunOptions(perfect=True))
+        calibrate(folder / "run", export, out=folder / "calibration")
+        for name, run in (("truth", "run"), ("drawing", "perfect")):
+            (folder / name).mkdir()
+            copy(folder / run / "truth.json", folder / name / "machine.json")
+        subject = run_object(read_export(export), None)
+        self.scene = prepared_scene(subject)
+
+    def quality(self, run: str, calibration: str) -> float:
+        """Mean SSIM of the views of a run merged by a machine."""
+        out = self.folder / f"{run}-{calibration}"
+        options = Options(brightness=1 / OBJECT_LIGHT)
+        merge(self.folder / run, self.folder / calibration, self.export, options, out=out)
+        tiles, found = MirrorTiles(LightField.read(out)), []
+        for azimuth, elevation in VIEWS_DEG:
+            at = camera_around_object(
+                np.radians(azimuth), np.radians(elevation), 640.0, CAPTURE_MM, (160, 120), None
+            )
+            truth = np.rint(pinhole_picture(self.scene, at)).astype(np.uint8)
+            found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
+        return float(np.mean(found))
+
+
+@pytest.fixture(scope="module")
+def loop(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Loop:
+    folder = tmp_path_factory.mktemp("loop")
+    build(low_resolution_design.spec, folder / "exports", parts=["prototype"], verify=False)
+    return Loop(folder / "exports", folder)
+
+
+def test_calibrated_photographs_give_the_views_of_a_perfect_machine(loop: Loop) -> None:
+    perfect = loop.quality("perfect", "drawing")
+    assert abs(loop.quality("run", "calibration") - perfect) < ALLOWED
+    assert abs(loop.quality("run", "truth") - perfect) < ALLOWED
+    assert loop.quality("run", "drawing") < perfect - 2 * ALLOWED
+
+
+def test_the_calibration_finds_the_balls(loop: Loop) -> None:
+    found, frames = read_machine(loop.folder / "calibration" / "machine.json")
+    truth, expected = read_machine(loop.folder / "truth" / "machine.json")
+    drawing, _ = read_machine(loop.folder / "drawing" / "machine.json")
+    assert frames == expected
+    before = np.linalg.norm(drawing.centre - truth.centre, axis=1)
+    after = np.linalg.norm(found.centre - truth.centre, axis=1)
+    assert np.median(after) < np.median(before)
+
+
+def test_the_merge_finds_the_export_by_itself_and_names_what_is_lost(loop: Loop) -> None:
+    photographs = loop.folder / "run" / "photographs"
+    kept = (photographs / f"{LOST}.png").read_bytes()
+    (photographs / f"{LOST}.png").write_bytes(kept[:1000])
+    record = merge(loop.folder / "run", loop.folder / "calibration", out=loop.folder / "less")
+    (photographs / f"{LOST}.png").write_bytes(kept)
+    assert list(record["based_on"]["a"]["photographs_not_used"]) == [LOST]
+    assert record["based_on"]["a"]["mirrors_missing"]
+    assert not record["based_on"]["b"]["mirrors_missing"]

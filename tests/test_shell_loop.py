@@ -1,0 +1,107 @@
+"""The whole loop of a shell: both photographs of a random build, calibration, merge, views."""
+
+from pathlib import Path
+from shutil import copy
+
+import numpy as np
+import pytest
+
+from tbcad.api import calibrate, merge, simulate_run
+from tbcad.calibration.options import CalibrationOptions
+from tbcad.geometry.vectors import norm
+from tbcad.machine.record import read_machine
+from tbcad.merged_run.corrections import Options
+from tbcad.mirrors.array import design
+from tbcad.mirrors.record import write_record
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulated_run.options import RunOptions
+from tbcad.simulated_run.photographs import OBJECT_LIGHT
+from tbcad.simulated_run.simulate import run_object
+from tbcad.spec.load import load_spec
+
+pytestmark = pytest.mark.slow
+
+DESIGN = ("n=5", "camera.width_px=832", "camera.height_px=620")
+PROCESS = "fdm"
+VIEWS_DEG = ((10.0, 25.0), (130.0, 40.0), (250.0, 55.0))
+CAPTURE_MM = 60.0
+ALLOWED = 0.01  # of SSIM, between a calibrated and the true machine
+CAMERAS = ("a", "b")
+
+
+class ShellLoop:
+    """A run of a random build, and the machines that its photographs may be merged by."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.export = folder, folder / "exports"
+        self.export.mkdir()
+        write_record(self.export, design(load_spec(None, list(DESIGN))), shells=False)
+        simulate_run(self.export, folder / "run", PROCESS, options=RunOptions(seed=3, shell=True))
+        drawn = RunOptions(perfect=True, shell=True, phases=("dark",))
+        simulate_run(self.export, folder / "drawn", options=drawn)
+        self.written = calibrate(
+            folder / "run", self.export, CalibrationOptions(PROCESS), out=folder / "calibration"
+        )
+        for name, run in (("truth", "run"), ("drawing", "drawn")):
+            for camera in CAMERAS:
+                (folder / name / camera).mkdir(parents=True)
+                truth = folder / run / f"truth_{camera}.json"
+                copy(truth, folder / name / camera / "machine.json")
+        self.scene = prepared_scene(run_object(read_export(self.export), None))
+
+    def quality(self, calibration: str) -> float:
+        """Mean SSIM of views of the photographs merged by a machine."""
+        out, options = self.folder / f"by-{calibration}", Options(brightness=1 / OBJECT_LIGHT)
+        run = self.folder / "run"
+        record = merge(run, self.folder / calibration, self.export, options, out=out)
+        assert set(record["based_on"]) == {*CAMERAS}
+        assert not any(half["mirrors_missing"] for half in record["based_on"].values())
+        tiles, found = MirrorTiles(LightField.read(out)), []
+        for azimuth, elevation in VIEWS_DEG:
+            at = camera_around_object(
+                np.radians(azimuth), np.radians(elevation), 640.0, CAPTURE_MM, (160, 120), None
+            )
+            truth = np.rint(pinhole_picture(self.scene, at)).astype(np.uint8)
+            found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
+        return float(np.mean(found))
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> ShellLoop:
+    return ShellLoop(tmp_path_factory.mktemp("shell"))
+
+
+def test_each_camera_has_its_calibration(loop: ShellLoop) -> None:
+    assert [one.folder.name for one in loop.written.every] == [*CAMERAS]
+    for one in loop.written.every:
+        assert one.verdict.answer != "not good"
+        assert one.record["rays"]["mirrors_without_frame"] == []
+        assert {name[0] for name in one.result.rays.ids} == {one.folder.name}
+
+
+def test_the_calibration_tells_where_highlights_are(loop: ShellLoop) -> None:
+    for camera in CAMERAS:
+        truth, found, drawn = (
+            read_machine(loop.folder / name / camera / "machine.json")[0]
+            for name in ("truth", "calibration", "drawing")
+        )
+        counts = 1, len(truth.radius), len(truth.leds)
+        places = [index.ravel() for index in np.indices(counts)]
+        after, before = (
+            np.median(norm(one.highlights(*places) - truth.highlights(*places)))
+            for one in (found, drawn)
+        )
+        assert after < before / 10
+
+
+def test_calibrated_photographs_give_the_views_of_the_true_machine(loop: ShellLoop) -> None:
+    truth = loop.quality("truth")
+    assert abs(loop.quality("calibration") - truth) < ALLOWED
+    assert loop.quality("drawing") < truth - ALLOWED

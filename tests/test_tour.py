@@ -1,0 +1,119 @@
+"""The tour of the documentation: its commands print what the page shows."""
+
+import math
+import os
+import re
+import subprocess
+import sys
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TOUR = ROOT / "docs" / "tour.md"
+BLOCKS = re.compile(r"```sh\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
+LEFT_OUT = "..."
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+class Step(NamedTuple):
+    """A block of commands, the lines that the page shows of what they print, and the status."""
+
+    commands: str
+    shown: list[str]
+    status: int
+
+
+def steps() -> list[Step]:
+    found = []
+    for commands, shown in BLOCKS.findall(TOUR.read_text(encoding="utf-8")):
+        status = re.search(r"# .*exit (\d)", commands)
+        found.append(Step(commands, shown.splitlines(), int(status[1]) if status else 0))
+    return found
+
+
+def test_it_shows_successes_and_failures() -> None:
+    assert {step.status for step in steps()} == {0, 1, 2}
+    assert sum(bool(step.shown) for step in steps()) > 8
+
+
+@pytest.mark.slow
+def test_commands_print_what_the_page_shows(tmp_path: Path) -> None:
+    """Lines in their order; between those that the page leaves out there is nothing else."""
+    tbcad = tmp_path / "bin" / "tbcad"
+    tbcad.parent.mkdir()
+    tbcad.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m tbcad "$@"\n', encoding="utf-8")
+    tbcad.chmod(0o755)
+    places = os.pathsep.join([str(ROOT), str(ROOT / "verify")])
+    path = f"{tbcad.parent}{os.pathsep}{os.environ['PATH']}"
+    environment = os.environ | {"PATH": path, "PYTHONPATH": places}
+    for step in steps():
+        done = subprocess.run(
+            ["bash", "-c", step.commands],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
+        )
+        printed = done.stdout if step.status != 2 else done.stderr
+        assert done.returncode == step.status, done.stderr
+        assert follows(step.shown, printed.splitlines()), (step.shown, printed)
+
+
+def follows(shown: list[str], printed: list[str]) -> bool:
+    """Whether what is shown is what was printed, but for lines left out where it says so."""
+    start = 0
+    for left_out, group in groupby(shown, lambda line: line == LEFT_OUT):
+        lines = list(group)
+        if left_out:
+            continue
+        places = range(start, len(printed) - len(lines) + 1)
+        found = [k for k in places if all(map(same, lines, printed[k : k + len(lines)]))]
+        if not found:
+            return False
+        start = found[0] + len(lines)
+    return True
+
+
+def same(shown: str, printed: str) -> bool:
+    """Whether two lines have the same words, and figures that differ by rounding at most.
+
+    Processors round differently: by 1 %, or one unit of the last decimal.
+    """
+    words = [" ".join(NUMBER.sub("#", line).split()) for line in (shown, printed)]
+    figures = [NUMBER.findall(line) for line in (shown, printed)]
+    return words[0] == words[1] and all(map(near, *figures))
+
+
+def near(shown: str, printed: str) -> bool:
+    """Whether two figures are the same but for rounding; numbers of things are not rounded."""
+    decimals = len(shown.partition(".")[2])
+    unit = 1.001 * 10.0**-decimals if decimals else 0.0
+    return math.isclose(float(shown), float(printed), rel_tol=0.01, abs_tol=unit)
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "alike"),
+    [
+        ("0.078 mm (median)", "0.079 mm  (median)", True),
+        ("0.078 mm (median)", "0.080 mm (median)", False),
+        ("1585 highlights", "1586 highlights", True),
+        ("1585 highlights", "1485 highlights", False),
+        ("PASS: 193 cameras", "FAIL: 193 cameras", False),
+        ("5 balls", "5 balls, 2 caps", False),
+        ("5 balls", "6 balls", False),
+    ],
+)
+def test_rounding_is_no_difference(shown: str, printed: str, alike: bool) -> None:
+    assert same(shown, printed) == alike
+
+
+def test_what_is_left_out_is_said() -> None:
+    printed = ["a", "b", "c"]
+    assert follows(["a", "b"], printed)
+    assert follows(["a", LEFT_OUT, "c"], printed)
+    assert not follows(["a", "c"], printed)
+    assert not follows(["b", LEFT_OUT, "a"], printed)
