@@ -1,31 +1,16 @@
-"""The commands `tbcad capture` and `tbcad view`, cold, and with a sensor of 52 million pixels."""
+"""The commands `tbcad capture` and `tbcad view` with a sensor of 52 million pixels."""
 
 from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from pathlib import Path
 
 from builds import Build, run
 from timing import Figure, Row, at_most, measured
 
-FOLDER = "capture"
 FINER = 4  # 8320 x 6208 instead of 2080 x 1552
 PLACE = ("--azimuth", "30", "--elevation", "30", "--distance", "640")
-
-
-def captures(export: Path, folder: Path, rounds: int, subject: Path | None) -> list[Row]:
-    """Both cameras, with all files; the last one's stay in `folder`/capture."""
-    with tempfile.TemporaryDirectory(dir=folder) as cache:
-        where = {"NUMBA_CACHE_DIR": cache}
-        first = run(folder, *_capture(export, folder / FOLDER, subject), environment=where)
-    runs = [run(folder, *_capture(export, folder / FOLDER, subject)) for _ in range(rounds)]
-    return [
-        at_most("tbcad capture", Figure(tuple(one.seconds for one in runs)), 5, "s"),
-        *_beside(runs),
-        measured("- the first ever, with numba's compilation", Figure((first.seconds,)), "s"),
-    ]
 
 
 def sharper(export: Path, folder: Path, subject: Path | None) -> list[Row]:
@@ -33,7 +18,7 @@ def sharper(export: Path, folder: Path, subject: Path | None) -> list[Row]:
     record = folder / "finer"
     with_sensor(export, record, FINER)
     out = folder / "finer-capture"
-    capture = run(folder, *_capture(record, out, subject))
+    capture = run(folder, *arguments(record, out, subject))
     view = run(folder, "view", str(out), *PLACE, "--out", str(folder / "view.png"))
     return [
         measured("tbcad capture, 8320 x 6208", Figure((capture.seconds,)), "s"),
@@ -54,7 +39,8 @@ def with_sensor(export: Path, folder: Path, times: int) -> None:
     shutil.copy(export / "mirrors.csv", folder)
 
 
-def _capture(export: Path, out: Path, subject: Path | None) -> list[str]:
+def arguments(export: Path, out: Path, subject: Path | None) -> list[str]:
+    """Of the command that photographs a subject, or the built-in knot."""
     chosen = ["--object", str(subject)] if subject else []
     return ["capture", str(export), "--out", str(out), *chosen]
 

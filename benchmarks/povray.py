@@ -57,7 +57,9 @@ def render(scene: Path, view: Camera) -> None:
     """Write the picture beside the scene, in as many threads as ours."""
     command = [PROGRAM, f"+I{scene.name}", f"+O{scene.stem}.png", "+FN", "-D", "-V", "-A", "-GA"]
     command += [f"+W{view.width_px}", f"+H{view.height_px}", f"+WT{THREADS}", "File_Gamma=1.0"]
-    done = subprocess.run(command, cwd=scene.parent, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=scene.parent, capture_output=True, encoding="utf-8", check=False
+    )
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(command)}: exit code {done.returncode}\n{done.stderr}")
 

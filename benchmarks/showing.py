@@ -1,0 +1,140 @@
+"""Views a second of `tbcad show`: python benchmarks/showing.py captures/knot."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict
+from http.client import HTTPConnection
+from pathlib import Path
+
+from circumstances import RESULTS, circumstances
+from timing import Figure, Row, at_least, measured
+
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.viewer.query import Query
+from tbcad.viewer.render import Renderer
+from tbcad.viewer.server import HOST, ViewServer
+
+VIEWS = 90  # once around, in steps of 4 degrees
+IN_FLIGHT = 2  # as the page
+BROWSER_S = 5.0
+
+
+def showing(capture: Path, rounds: int) -> list[Row]:
+    """Views while the viewpoint moves: made alone, over HTTP, and on a page in Chromium."""
+    with LightField.open(capture) as source:
+        renderer = Renderer(source)
+        around(renderer.picture)  # reads every mirror from the file
+        alone = [rates(lambda: around(renderer.picture)) for _ in range(rounds)]
+        packed = [rates(lambda: around(renderer.jpeg)) for _ in range(rounds)]
+        with running(renderer) as server:
+            sent = [rates(lambda: fetched(server)) for _ in range(rounds)]
+            drawn = in_chromium(server, rounds)
+    return [
+        *_rows("views a second, 640 x 480, nearest rays, while the viewpoint moves", alone),
+        *_rows("- as JPEG", packed),
+        *_rows(f"- as JPEG over HTTP, {IN_FLIGHT} requests at a time", sent),
+        *(_rows("- drawn by the page in headless Chromium, on the same cores", drawn, 30)),
+    ]
+
+
+def _rows(what: str, rates: list[tuple[float, float]], limit: float | None = None) -> list[Row]:
+    if not rates:
+        return [Row(what, (), note="chromium is not installed")]
+    views, cpu = (Figure(values) for values in zip(*rates, strict=True))
+    first = measured(what, views, "/s") if limit is None else at_least(what, views, limit, "/s")
+    return [first, measured("- - processor time of tbcad for each, all cores", cpu, "ms")]
+
+
+def around(show: Callable[[Query], object]) -> int:
+    """All views of a turn, one after the other; their number."""
+    for k in range(VIEWS):
+        show(Query(azimuth=360 * k / VIEWS))
+    return VIEWS
+
+
+def rates(work: Callable[[], int]) -> tuple[float, float]:
+    """Views a second, and processor milliseconds of this process for each."""
+    start, used = time.perf_counter(), time.process_time()
+    count = work()
+    taken, cpu = time.perf_counter() - start, time.process_time() - used
+    return count / taken, 1000 * cpu / count
+
+
+@contextmanager
+def running(renderer: Renderer) -> Iterator[ViewServer]:
+    with ViewServer(renderer, "knot", Query()) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def fetched(server: ViewServer) -> int:
+    """Views of a turn as a page asks for them."""
+
+    def every(first: int) -> None:
+        connection = HTTPConnection(HOST, server.server_port)
+        for k in range(first, VIEWS, IN_FLIGHT):
+            connection.request("GET", f"/{server.token}/view?azimuth={360 * k / VIEWS}")
+            answer = connection.getresponse()
+            assert answer.status == 200, answer.read()
+            answer.read()
+        connection.close()
+
+    with ThreadPoolExecutor(IN_FLIGHT) as pool:
+        list(pool.map(every, range(IN_FLIGHT)))
+    return VIEWS
+
+
+def in_chromium(server: ViewServer, rounds: int) -> list[tuple[float, float]]:
+    """As `rates`, of pictures that the turning page has drawn, all of them at full size."""
+    program = shutil.which("chromium")
+    if program is None:
+        return []
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from tests.clients.browser import chromium
+
+    with tempfile.TemporaryDirectory() as profile, chromium(program, Path(profile)) as browser:
+        browser.open(server.address)
+        browser.value(
+            "viewer.smaller = false; window.drawn = 0; const plain = draw;"
+            "draw = (...given) => { window.drawn++; plain(...given); }; turn(true)"
+        )
+        time.sleep(1)
+
+        def turned() -> int:
+            before = int(browser.value("window.drawn"))
+            time.sleep(BROWSER_S)
+            return int(browser.value("window.drawn")) - before
+
+        return [rates(turned) for _ in range(rounds)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Measure tbcad show and write a JSON file.")
+    parser.add_argument("capture", type=Path, help="folder written by tbcad capture, n = 18")
+    parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
+    parser.add_argument("--out", type=Path, default=RESULTS / "showing.json")
+    options = parser.parse_args()
+    about = {**circumstances(), "rounds": options.rounds}
+    rows = showing(options.capture, options.rounds)
+    sys.stdout.writelines(f"{row}\n" for row in rows)
+    print(f"load after: {os.getloadavg()[0]:.1f}")
+    record = {**about, "rows": [asdict(row) for row in rows]}
+    options.out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
