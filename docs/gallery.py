@@ -1,0 +1,145 @@
+"""Write docs/gallery.md: each design that comes with tbcad, with its figures and a picture.
+
+    python docs/gallery.py                    # all of them: minutes
+    python docs/gallery.py afternoon-print    # renews one
+
+Nothing is built: figures are those of `tbcad build NAME --dry-run`, and the pictures are simulated
+photographs off the mirrors as designed. Figures are kept in docs/gallery.json.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+import tbcad
+from tbcad.output.overview import Overview, overview
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.shipped import shipped_designs
+
+DOCS = Path(__file__).parent
+RESULTS, PAGE, PICTURES = DOCS / "gallery.json", DOCS / "gallery.md", DOCS / "pictures"
+EVERY_N = json.loads((DOCS / "every-n.json").read_text(encoding="utf-8"))
+PHOTOGRAPH_PX = (640, 480)
+VIEW_DEG = (30.0, 30.0)  # azimuth and elevation
+PAPER_SENSORS = {12: "1040 x 776", 18: "2080 x 1552", 26: "4160 x 3104", 36: "8320 x 6208"}
+HEAD = """\
+# Gallery of designs
+
+Every design that comes with tbcad, with the figures of a dry run. Left: what camera a photographs
+of a knot that fills the capture sphere. Right: a view from azimuth 30, elevation 30 degrees,
+synthesised from the photographs of both cameras. `python docs/gallery.py` writes this page.
+
+Begin from one of them: `tbcad init my.toml --from afternoon-print`. With other numbers of mirrors:
+[every subdivision n](every-n.md).
+"""
+
+
+def figures(found: Overview) -> dict[str, str]:
+    """What the table of a design shows."""
+    spec, shells, prototype = found.spec, found.shell_prints, found.prototype
+    assert shells is not None
+    radius = found.radius_mm
+    rows = {
+        "object": f"{spec.optics.capture_diameter_mm:g} mm",
+        "mirrors": f"{found.mirrors}, n = {spec.optics.n}; {found.virtual_cameras} virtual cameras",
+        "radius": "planar" if radius is None else f"{radius[0]:.1f} to {radius[1]:.1f} mm",
+        "minimum coverage": f"{found.minimum_coverage_mm:.2f} mm",
+        "camera": f"{spec.camera.width_px} x {spec.camera.height_px} pixels, "
+        f"{found.view_angle_deg:g} degrees",
+        "both shells, by FDM": f"{shells.volume_cm3:.0f} cm3, about {shells.mass_g:.0f} g, "
+        f"{shells.hours:.0f} h",
+        "prototype": found.note.replace("no prototype", "none").rpartition(":")[0],
+    }
+    if prototype is not None:
+        rows["prototype"] = (
+            f"{prototype.balls} balls and {prototype.caps} caps, {prototype.stops} stops; "
+            f"{prototype.kept_share:.0%} of the shell's pixels"
+        )
+    return {name: value for name, value in rows.items() if value}
+
+
+def light_field(design: tbcad.Design) -> LightField:
+    """Both photographs of a knot that fills the capture sphere."""
+    size_mm = design.spec.optics.capture_diameter_mm
+    scene = prepared_scene(built_in_object(size_mm))
+    taken = [(at, photograph(at.camera, exact_tracer(at), scene)) for at in reflectors(design)]
+    return light_field_in_memory(taken, size_mm)
+
+
+def draw(design: tbcad.Design, name: str) -> None:
+    """Write the picture of a design: photograph and view side by side."""
+    field = light_field(design)
+    photo = Image.fromarray(field.frames["a"].image()).resize(PHOTOGRAPH_PX)
+    view = tbcad.view(field, *VIEW_DEG, size=PHOTOGRAPH_PX).image
+    both = Image.fromarray(np.concatenate([np.asarray(photo), view], axis=1))
+    both.quantize(128).save(PICTURES / f"gallery-{name}.png", optimize=True)
+
+
+def purpose(name: str) -> str:
+    """The first paragraph of a design file's comment."""
+    text = shipped_designs()[name].read_text(encoding="utf-8")
+    lines = re.match(r"(?:#.*\n)+", text)
+    assert lines is not None
+    first = re.sub(r"(?m)^# ?", "", lines[0]).split("\n\n")[0]
+    return " ".join(first.split())
+
+
+def section(name: str, row: dict[str, str]) -> str:
+    """A design's part of the page."""
+    table = "\n".join(f"| {key} | {value} |" for key, value in row.items())
+    return (
+        f"## {name}\n\n{purpose(name)} [{name}.toml](../designs/{name}.toml)\n\n"
+        f"![Photograph of camera a, and a view](pictures/gallery-{name}.png)\n\n"
+        f"| | |\n|---|---|\n{table}\n"
+    )
+
+
+def paper_sensors() -> str:
+    """The paper's four sensors with its n (Table II), from docs/every-n.json."""
+    rows = []
+    for n, sensor in PAPER_SENSORS.items():
+        row = EVERY_N[str(n)]
+        balls = f"{row['balls']} + {row['caps']}" if "balls" in row else "none"
+        rows.append(
+            f"| {sensor} | {n} | {row['mirrors']} | {row['minimum_coverage_mm']:.2f} mm | {balls} |"
+        )
+    return (
+        "## The paper's sensors\n\nTable II of the paper has these numbers of pixels and n. Build "
+        "one with `tbcad build --n 26 --set camera.width_px=4160 --set camera.height_px=3104`. "
+        "What the table says besides, and what we find: "
+        "[reproduction](reproduction.md#virtual-cameras-and-pixels-fig-5b-table-ii).\n\n"
+        "| sensor | n | mirrors of both halves | minimum coverage | balls + caps of a prototype |\n"
+        "|---|---|---|---|---|\n" + "\n".join(rows) + "\n"
+    )
+
+
+def page(results: dict[str, Any]) -> str:
+    """The page of the results."""
+    parts = [section(name, results[name]) for name in shipped_designs() if name in results]
+    return "\n".join([HEAD, *parts, paper_sensors()])
+
+
+def main(names: list[str]) -> None:
+    """Renew these designs, keep the others."""
+    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    for name in names or shipped_designs():
+        design = tbcad.design(name)
+        results[name] = figures(overview(design, optional_prototype=True))
+        draw(design, name)
+        RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+        PAGE.write_text(page(results), encoding="utf-8")
+        print(name, results[name], flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
