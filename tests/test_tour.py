@@ -1,6 +1,5 @@
 """The tour of the documentation: its commands print what the page shows."""
 
-import math
 import os
 import re
 import subprocess
@@ -11,11 +10,12 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.printed_lines import same
+
 ROOT = Path(__file__).parents[1]
 TOUR = ROOT / "docs" / "tour.md"
 BLOCKS = re.compile(r"```sh\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
 LEFT_OUT = "..."
-NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Step(NamedTuple):
@@ -76,39 +76,6 @@ def follows(shown: list[str], printed: list[str]) -> bool:
             return False
         start = found[0] + len(lines)
     return True
-
-
-def same(shown: str, printed: str) -> bool:
-    """Whether two lines have the same words, and figures that differ by rounding at most.
-
-    Processors round differently: by 1 %, or one unit of the last decimal.
-    """
-    words = [" ".join(NUMBER.sub("#", line).split()) for line in (shown, printed)]
-    figures = [NUMBER.findall(line) for line in (shown, printed)]
-    return words[0] == words[1] and all(map(near, *figures))
-
-
-def near(shown: str, printed: str) -> bool:
-    """Whether two figures are the same but for rounding; numbers of things are not rounded."""
-    decimals = len(shown.partition(".")[2])
-    unit = 1.001 * 10.0**-decimals if decimals else 0.0
-    return math.isclose(float(shown), float(printed), rel_tol=0.01, abs_tol=unit)
-
-
-@pytest.mark.parametrize(
-    ("shown", "printed", "alike"),
-    [
-        ("0.078 mm (median)", "0.079 mm  (median)", True),
-        ("0.078 mm (median)", "0.080 mm (median)", False),
-        ("1585 highlights", "1586 highlights", True),
-        ("1585 highlights", "1485 highlights", False),
-        ("PASS: 193 cameras", "FAIL: 193 cameras", False),
-        ("5 balls", "5 balls, 2 caps", False),
-        ("5 balls", "6 balls", False),
-    ],
-)
-def test_rounding_is_no_difference(shown: str, printed: str, alike: bool) -> None:
-    assert same(shown, printed) == alike
 
 
 def test_what_is_left_out_is_said() -> None:
