@@ -2,12 +2,15 @@
 
 import csv
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
+from tbcad.types import Floats
 
 REBUILD = "build it again with tbcad build"
 MAX_BYTES = 200_000_000  # n = 60 takes 12 million
@@ -72,6 +75,13 @@ def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:
         raise _refused(path, error) from None
     except csv.Error as error:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+
+
+def columns(rows: Sequence[Record], names: str) -> Floats:
+    """Columns of numbers of a table, by their names with spaces between, (rows, columns)."""
+    wanted = names.split()
+    numbers = [[getattr(row, name) for name in wanted] for row in rows]
+    return np.array(numbers, dtype=np.float64).reshape(len(rows), len(wanted))
 
 
 def _refused(path: Path, error: ValidationError) -> InputError:

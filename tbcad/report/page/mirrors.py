@@ -6,32 +6,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.formats.checked_files import Finite, read_csv
+from tbcad.formats.checked_files import Finite, columns, read_csv
 from tbcad.formats.checked_files import Record as Row
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.verdict import Verdict
-from tbcad.simulate.scene.exported import MISSING, Radius
+from tbcad.simulate.scene.exported import MISSING, MirrorColumns, PoseColumns
 from tbcad.types import Floats
 
 UM_PER_MM = 1000.0
 PLAN, BALLS = "rotation_plan.csv", "balls.csv"
 
 
-class MirrorRow(Row):
+class MirrorRow(MirrorColumns):
     """A row of mirrors.csv."""
 
     id: str
-    camera: str
-    ux: Finite
-    uy: Finite
-    uz: Finite
-    px: Finite
-    py: Finite
-    pz: Finite
-    nx: Finite
-    ny: Finite
-    nz: Finite
-    radius_mm: Radius
     size_mm: Finite
     polar_deg: Finite
     azimuth_deg: Finite
@@ -50,19 +39,13 @@ class PlanRow(Row):
     error_deg: Finite
 
 
-class BallRow(Row):
+class BallRow(PoseColumns):
     """A row of balls.csv."""
 
     number: int
     kind: str
     size: str
     radius_mm: Finite
-    px: Finite
-    py: Finite
-    pz: Finite
-    nx: Finite
-    ny: Finite
-    nz: Finite
 
 
 class Quantity(NamedTuple):
@@ -92,14 +75,12 @@ def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) 
     rows = read_csv(folder / "mirrors.csv", MirrorRow, MISSING)
     plan = _plan(folder)
     quantities = [*_verified(rows, verdict), *_designed(rows), *_pointing(rows, plan)]
-    poses = [[*(row.ux, row.uy, row.uz), *(row.px, row.py, row.pz)] for row in rows]
-    normals = [[row.nx, row.ny, row.nz] for row in rows]
     known = [one for one in quantities if np.isfinite(one.values).any()]
     return {
         "ids": [row.id for row in rows],
-        "pose": arrays.add(np.hstack([poses, normals]), "Float32Array"),
+        "pose": arrays.add(columns(rows, "ux uy uz px py pz nx ny nz"), "Float32Array"),
         "radius": arrays.add(np.array([row.radius_mm or np.inf for row in rows]), "Float32Array"),
-        "size": arrays.add(np.array([row.size_mm for row in rows]), "Float32Array"),
+        "size": arrays.add(columns(rows, "size_mm")[:, 0], "Float32Array"),
         "quantities": [_packed(one, arrays) for one in known],
         "plan": [_photograph(plan.get(row.id)) for row in rows] if plan else [],
         "balls": _balls(folder) if plan else [],
@@ -136,7 +117,7 @@ def _verified(rows: Sequence[MirrorRow], verdict: Verdict | None) -> Iterator[Qu
 
 def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
     def column(name: str) -> Floats:
-        return np.array([getattr(row, name) for row in rows], dtype=np.float64)
+        return columns(rows, name)[:, 0]
 
     yield Quantity("designed", "Coverage, as computed", "mm", 2, column("coverage_mm"))
     yield Quantity("radius", "Radius", "mm", 2, column("radius_mm"))

@@ -8,10 +8,18 @@ import numpy as np
 from pydantic import Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD, Finite, Record, Vector, read_csv, read_json
+from tbcad.formats.checked_files import (
+    REBUILD,
+    Finite,
+    Record,
+    Vector,
+    columns,
+    read_csv,
+    read_json,
+)
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign
+from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign, PoseColumns
 from tbcad.types import Floats, Ints
 
 SCHEMA = "tbcad-prototype/2"
@@ -19,6 +27,7 @@ RECORD, BALLS, PLAN = "prototype.json", "balls.csv", "rotation_plan.csv"
 MISSING = "build the prototype too, tbcad build"
 # Of lengths in mm after rounding in a text file.
 ROUNDING_MM = 1e-6
+APEX, NORMAL = "px py pz", "nx ny nz"
 ERROR_DEG = 1e-6
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 """Factors that turn points and vectors by 180 degrees about z."""
@@ -32,16 +41,10 @@ class _Frame(Record):
     third: Vector
 
 
-class _Ball(Record):
+class _Ball(PoseColumns):
     number: int
     radius_mm: Length
     body_radius_mm: Length
-    px: Finite
-    py: Finite
-    pz: Finite
-    nx: Finite
-    ny: Finite
-    nz: Finite
     cx: Finite
     cy: Finite
     cz: Finite
@@ -115,7 +118,7 @@ def read_plan(exported: ExportedDesign) -> Plan:
     """
     record, table, plan_file = (exported.folder / name for name in (RECORD, BALLS, PLAN))
     document = read_json(record, _Document, SCHEMA, MISSING)
-    balls = np.array([[*one.model_dump().values()] for one in read_csv(table, _Ball, MISSING)])
+    balls = read_csv(table, _Ball, MISSING)
     pictures = read_csv(plan_file, _Picture, MISSING)
     frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
     _check_frame(record, exported, frame)
@@ -125,11 +128,11 @@ def read_plan(exported: ExportedDesign) -> Plan:
     ball, stop = _served(plan_file, pictures, len(exported.reflectors[0]))
     plan = Plan(
         frame=frame,
-        apex=balls[:, 3:6],
-        normal=balls[:, 6:9],
-        radius=balls[:, 1],
-        body_centre=balls[:, 12:15],
-        body_radius=balls[:, 2],
+        apex=columns(balls, APEX),
+        normal=columns(balls, NORMAL),
+        radius=columns(balls, "radius_mm")[:, 0],
+        body_centre=columns(balls, "bx by bz"),
+        body_radius=columns(balls, "body_radius_mm")[:, 0],
         moved=document.picture == "moved",
         angle=np.radians(angle),
         ball=ball,
@@ -154,15 +157,16 @@ def _check_frame(path: Path, exported: ExportedDesign, frame: Floats) -> None:
         )
 
 
-def _check_balls(path: Path, balls: Floats) -> None:
-    if not balls.size:
+def _check_balls(path: Path, balls: list[_Ball]) -> None:
+    if not balls:
         raise InputError(f"{path}: no balls, at least one is needed: {REBUILD}")
-    number, radius, normal = balls[:, 0], balls[:, 1], balls[:, 6:9]
+    number, radius = columns(balls, "number radius_mm").T
+    apex, normal, centre = (columns(balls, names) for names in (APEX, NORMAL, "cx cy cz"))
     faults = (
         (number != np.arange(1, len(balls) + 1), "is out of order"),
         (np.abs(norm(normal) - 1) > ROUNDING, "has a normal of another length than 1"),
         (
-            norm(balls[:, 3:6] - radius[:, None] * normal - balls[:, 9:12]) > ROUNDING_MM,
+            norm(apex - radius[:, None] * normal - centre) > ROUNDING_MM,
             "has a centre that is not its radius behind its apex",
         ),
     )

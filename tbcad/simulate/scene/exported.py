@@ -7,7 +7,15 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD, Finite, Record, Vector, read_csv, read_json
+from tbcad.formats.checked_files import (
+    REBUILD,
+    Finite,
+    Record,
+    Vector,
+    columns,
+    read_csv,
+    read_json,
+)
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import numbered_directions
 from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE, SCHEMA
@@ -41,17 +49,24 @@ class _Camera(Record):
     hfov_deg: float = Field(ge=1, le=170)
 
 
-class _Mirror(Record):
-    camera: Literal["a", "b"]
-    ux: Finite
-    uy: Finite
-    uz: Finite
+class PoseColumns(Record):
+    """Columns of mirrors.csv and balls.csv: a mirror's apex and its normal."""
+
     px: Finite
     py: Finite
     pz: Finite
     nx: Finite
     ny: Finite
     nz: Finite
+
+
+class MirrorColumns(PoseColumns):
+    """Columns of mirrors.csv: a mirror with its direction and its camera."""
+
+    camera: Literal["a", "b"]
+    ux: Finite
+    uy: Finite
+    uz: Finite
     radius_mm: Radius
 
 
@@ -92,7 +107,7 @@ def read_export(folder: Path) -> ExportedDesign:
     if tuple(camera.id for camera in document.cameras) != ("a", "b"):
         raise InputError(f"{path}: cameras are not a and b: {REBUILD}")
     table = folder / MIRRORS_FILE
-    mirrors = read_csv(table, _Mirror, MISSING)
+    mirrors = read_csv(table, MirrorColumns, MISSING)
     a, b = (
         _reflector(table, document, camera, [one for one in mirrors if one.camera == camera.id])
         for camera in document.cameras
@@ -103,7 +118,7 @@ def read_export(folder: Path) -> ExportedDesign:
 
 
 def _reflector(
-    path: Path, document: _Document, camera: _Camera, mirrors: list[_Mirror]
+    path: Path, document: _Document, camera: _Camera, mirrors: list[MirrorColumns]
 ) -> Reflector:
     n = document.spec.optics.n
     every, faces = numbered_directions(n)
@@ -135,9 +150,9 @@ def _reflector(
     return Reflector(camera.id, _view(path.with_name(DESIGN_FILE), camera), u, cells)
 
 
-def _surfaces(path: Path, mirrors: list[_Mirror]) -> tuple[Floats, Surfaces]:
-    numbers = [one.model_dump(exclude={"camera", "radius_mm"}).values() for one in mirrors]
-    u, apex, normal = np.split(np.array([[*row] for row in numbers]), 3, axis=1)
+def _surfaces(path: Path, mirrors: list[MirrorColumns]) -> tuple[Floats, Surfaces]:
+    names = "ux uy uz", "px py pz", "nx ny nz"
+    u, apex, normal = (columns(mirrors, three) for three in names)
     curvature = np.array([1 / one.radius_mm if one.radius_mm else 0.0 for one in mirrors])
     for name, vectors in (("u", u), ("n", normal)):
         if np.abs(norm(vectors) - 1).max() > ROUNDING:
