@@ -22,7 +22,6 @@ from tbcad.cli.options import (
     Settings,
 )
 from tbcad.cli.study_output import run_study
-from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from tbcad.spec.design import Spec
@@ -34,8 +33,6 @@ study = typer.Typer(
 )
 app.add_typer(study, name="study")
 
-# As the argument DESIGN was given once.
-OldDesign = Annotated[Path | None, typer.Option("--design", hidden=True)]
 First = Annotated[int, typer.Option("--from", metavar="N", help="Smallest n, 1 or more.")]
 Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n, up to 60.")]
 Sensors = Annotated[
@@ -54,7 +51,6 @@ STUDIES = Path("studies")
 @study.command("resolution")
 def resolution_command(
     design: Design = None,
-    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
     json: JsonResult = False,
@@ -80,7 +76,7 @@ def resolution_command(
     ns = n_range(first, last)
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
-    spec = _spec(design, old_design, settings)
+    spec = _spec(design, settings)
     counted = given or default_sensors(spec)
     return run_study(
         out, json, plot, partial(resolution, spec, ns, counted, wanted, scheduler=scheduler)
@@ -90,7 +86,6 @@ def resolution_command(
 @study.command("capture-area")
 def capture_area_command(
     design: Design = None,
-    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
     json: JsonResult = False,
@@ -104,14 +99,13 @@ def capture_area_command(
     from tbcad.simulate.study.sweep import n_range
 
     ns = n_range(first, last)
-    spec = _spec(design, old_design, settings)
+    spec = _spec(design, settings)
     return run_study(out, json, plot, partial(capture_area, spec, ns, scheduler=scheduler))
 
 
 @study.command("elevation")
 def elevation_command(
     design: Design = None,
-    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
     json: JsonResult = False,
@@ -120,13 +114,12 @@ def elevation_command(
     """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
     from tbcad.simulate.study.elevation import elevation
 
-    return run_study(out, json, plot, partial(elevation, _spec(design, old_design, settings)))
+    return run_study(out, json, plot, partial(elevation, _spec(design, settings)))
 
 
 @study.command("depth-of-field")
 def depth_command(
     design: Design = None,
-    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
     json: JsonResult = False,
@@ -139,15 +132,12 @@ def depth_command(
     from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 
     optics = LensOptions(blur_px, pixel_um, wide_open).checked()
-    return run_study(
-        out, json, plot, partial(depth_of_field, _spec(design, old_design, settings), optics)
-    )
+    return run_study(out, json, plot, partial(depth_of_field, _spec(design, settings), optics))
 
 
 @study.command("ssim")
 def ssim_command(
     design: Design = None,
-    old_design: OldDesign = None,
     settings: Settings = None,
     out: Out = STUDIES,
     json: JsonResult = False,
@@ -169,7 +159,7 @@ def ssim_command(
 
     given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
-    spec = _spec(design, old_design, settings)
+    spec = _spec(design, settings)
     subject = load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint)
     simulated = given or default_sensors(spec)
     return run_study(out, json, plot, partial(ssim, spec, subject, simulated, places, method))
@@ -270,9 +260,7 @@ def calibration_command(
     return run_study(out, json, plot, partial(calibration_study, export))
 
 
-def _spec(design: Path | None, old_design: Path | None, settings: list[str] | None) -> "Spec":
+def _spec(design: Path | None, settings: list[str] | None) -> "Spec":
     from tbcad.spec.load import load_spec
 
-    if design is not None and old_design is not None:
-        raise InputError(f"there are two designs, {design} and {old_design}: name one")
-    return load_spec(design or old_design, settings or ())
+    return load_spec(design, settings or ())

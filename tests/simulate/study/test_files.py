@@ -249,8 +249,6 @@ def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[
         ["capture-area", "--to", "61"],
         ["elevation", "--set", "optics.m=3"],
         ["elevation", "missing.toml"],
-        ["elevation", "--design", "missing.toml"],
-        ["elevation", "turtleback", "--design", "turtleback"],
         ["depth-of-field", "--blur-px", "0"],
         ["depth-of-field", "--pixel-um", "nan"],
         ["low-pass", "missing", "--filter-px", "0"],
