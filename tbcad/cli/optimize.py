@@ -70,7 +70,7 @@ def optimize(
     exact rays, and pixels counted one by one. Object, sensor, number of mirrors and all else stay.
     """
     from tbcad.optimize.files import search_files
-    from tbcad.optimize.search import Limits, Search, parse_objectives, search
+    from tbcad.optimize.search import Search, parse_objectives, search
     from tbcad.spec.load import load_spec
 
     store = _store(out)
@@ -78,10 +78,9 @@ def optimize(
     _check_numbers(candidates, max_size_mm, max_view_angle_deg)
     spec = load_spec(Path(design) if design else None, settings or ())
     _check_files(out, store, resume, force)
-    limits = Limits(max_size_mm, max_view_angle_deg)
     with stages(2) as screen:
         screen.stage("optimize: candidates")
-        asked = Search(spec, wanted, limits, candidates)
+        asked = Search(spec, wanted, candidates, max_size_mm, max_view_angle_deg)
         result = search(asked, store, scheduler, screen.detail)
         screen.stage("optimize: files")
         files = replace_files(out.parent, search_files(result, spec, out, plot))

@@ -1,6 +1,5 @@
 """The files of a search: the better design, all candidates, and a plot."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.figure_files import PlotFormat
+from tbcad.formats.toml import toml_text
 from tbcad.optimize.candidate import Candidate, Figures, placed
 from tbcad.optimize.search import SearchResult
 from tbcad.simulate.study.plots import Panel, Series, plot_file
@@ -129,4 +129,4 @@ def _assignments(values: dict[str, Any], defaults: dict[str, Any], name: str = "
         if isinstance(value, dict) and isinstance(default, dict):
             yield from _assignments(value, default, f"{name}{key}.")
         elif value != default:
-            yield f"{name}{key} = {json.dumps(value)}"
+            yield f"{name}{key} = {toml_text(value)}"

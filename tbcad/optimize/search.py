@@ -32,27 +32,7 @@ Record: TypeAlias = dict[str, object]
 
 @dataclass(frozen=True)
 class Limits:
-    """What a candidate may need at most; None: what the first design needs.
-
-    Attributes:
-        size_mm: longest side of the machine.
-        view_angle_deg: of the lens.
-    """
-
-    size_mm: float | None = None
-    view_angle_deg: float | None = None
-
-    def filled(self, start: Figures) -> "FilledLimits":
-        """With those of the first design where none is given."""
-        return FilledLimits(
-            start.size_mm if self.size_mm is None else self.size_mm,
-            start.view_angle_deg if self.view_angle_deg is None else self.view_angle_deg,
-        )
-
-
-@dataclass(frozen=True)
-class FilledLimits:
-    """Limits as numbers.
+    """What a candidate may need at most.
 
     Attributes:
         size_mm: longest side of the machine.
@@ -76,14 +56,22 @@ class Search:
     Attributes:
         spec: the design that it begins from.
         objectives: what is made better; all count alike, as ratios to the first design.
-        limits: that candidates must keep.
         budget: number of places that are judged at most.
+        max_size_mm: longest side of the machine; None: of the first design's.
+        max_view_angle_deg: of the lens; None: what the first design needs.
     """
 
     spec: Spec
     objectives: tuple[Objective, ...]
-    limits: Limits
     budget: int
+    max_size_mm: float | None = None
+    max_view_angle_deg: float | None = None
+
+    def limits(self, start: Figures) -> Limits:
+        """What candidates must keep, by the figures of the first design."""
+        return Limits(
+            self.max_size_mm or start.size_mm, self.max_view_angle_deg or start.view_angle_deg
+        )
 
     def key(self) -> str:
         """What judgements depend on: those of another design are of no use."""
@@ -104,7 +92,7 @@ class SearchResult:
     """
 
     start: Candidate
-    limits: FilledLimits
+    limits: Limits
     best: Candidate
     candidates: tuple[Candidate, ...]
     on_front: tuple[bool, ...]
@@ -146,7 +134,7 @@ def search(
     start = judge([place_of(asked.spec)])[0]
     if start.figures is None:
         raise InputError(f"the design to begin from cannot be made: {start.reason}")
-    limits = asked.limits.filled(start.figures)
+    limits = asked.limits(start.figures)
     value = partial(_value, asked.objectives, limits, start.figures)
     differential_evolution(
         _never_called,
@@ -171,7 +159,7 @@ def _never_called(place: Floats) -> float:
 
 
 def _value(
-    objectives: Sequence[Objective], limits: FilledLimits, start: Figures, one: Candidate
+    objectives: Sequence[Objective], limits: Limits, start: Figures, one: Candidate
 ) -> float:
     """What is minimised: the mean of all objectives, relative to the first design."""
     if one.figures is None:
@@ -211,7 +199,7 @@ def _judge(
 
 def _losses(
     objectives: Sequence[Objective],
-    limits: FilledLimits,
+    limits: Limits,
     start: Figures,
     candidates: Sequence[Candidate],
 ) -> Floats:

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from tbcad.formats.toml import toml_text
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import allowed_text, section_of
 
@@ -68,16 +69,6 @@ class KeySection:
 def key_sections() -> tuple[KeySection, ...]:
     """All sections of a design, in its order, the top first."""
     return tuple(_sections(Spec, "", inspect.cleandoc(Spec.__doc__ or "")))
-
-
-def toml_text(value: object) -> str:
-    """A value as TOML, whose lists are tuples here."""
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(map(toml_text, value)) + "]"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
-    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _sections(model: type[BaseModel], name: str, description: str) -> Iterator[KeySection]:

@@ -5,7 +5,8 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from tbcad.reference.keys import Key, KeySection, key_sections, toml_text
+from tbcad.formats.toml import toml_text
+from tbcad.reference.keys import Key, KeySection, key_sections
 from tbcad.spec.files import Table, read_text, read_toml
 from tbcad.spec.shipped import PAPER, shipped_designs
 

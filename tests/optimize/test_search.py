@@ -14,7 +14,6 @@ from tbcad.optimize import search as search_module
 from tbcad.optimize.candidate import STEP_MM, Candidate, Figures, Place
 from tbcad.optimize.files import design_text, search_files
 from tbcad.optimize.search import (
-    Limits,
     Search,
     SearchResult,
     _front,
@@ -43,7 +42,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def asked(budget: int = 720, size_mm: float | None = 400.0) -> Search:
-    return Search(SPEC, ("minimum", "evenness"), Limits(size_mm=size_mm), budget)
+    return Search(SPEC, ("minimum", "evenness"), budget, size_mm)
 
 
 def test_the_best_place_is_found() -> None:
@@ -64,7 +63,7 @@ def test_limits_hold() -> None:
 
 def test_the_start_where_none_is_better() -> None:
     spec = load_spec(None, ["n=4", "camera_mm=[123, 0, -140]", "semi_minor_mm=111.5"])
-    result = search(Search(spec, ("minimum",), Limits(), 48))
+    result = search(Search(spec, ("minimum",), 48))
     assert result.best == result.start
 
 
@@ -94,7 +93,7 @@ def test_a_store_of_another_design_is_refused(tmp_path: Path) -> None:
     store = tmp_path / "store.jsonl"
     search(asked(48), store)
     before = store.read_bytes()
-    other = Search(load_spec(None, ["n=5"]), ("minimum",), Limits(), 48)
+    other = Search(load_spec(None, ["n=5"]), ("minimum",), 48)
     with pytest.raises(InputError, match="another design"):
         search(other, store)
     assert store.read_bytes() == before
@@ -114,7 +113,7 @@ def test_a_broken_store_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_first_design_that_cannot_be_made() -> None:
     spec = load_spec(None, ["n=4", "capture_diameter_mm=10", "semi_minor_mm=50"])
     with pytest.raises(InputError, match="cannot be made: the ellipsoid is too small"):
-        search(Search(spec, ("size",), Limits(), 48))
+        search(Search(spec, ("size",), 48))
 
 
 def test_objectives_by_name() -> None:

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from tbcad.reference.keys import Key, key_sections, toml_text, unit_of
+from tbcad.reference.keys import Key, key_sections, unit_of
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of
 
@@ -42,9 +42,3 @@ def test_units() -> None:
     assert unit_of("mirrors.margin_mm") == "mm"
     assert unit_of("prototype.motion.feed_deg_min") == "degrees per minute"
     assert unit_of("optics.n") == unit_of("prototype.motion.safety") == ""
-
-
-@pytest.mark.parametrize("value", [1, 2.5, True, 'a "b" \\', (1.0, (2.0, -3.0)), ("a", "b"), ()])
-def test_toml_text_is_read_back(value: object) -> None:
-    read = tomllib.loads(f"x = {toml_text(value)}")["x"]
-    assert toml_text(read) == toml_text(value)
