@@ -10,6 +10,8 @@ from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope
+from tbcad.simulate.prototype.plan import Plan, read_plan
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.spec.load import load_spec
 from tests.prototype_exports import write_export, write_wind_up
 
@@ -73,6 +75,16 @@ def export_folder(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
     return write_export(tmp_path_factory.mktemp("export"), low_resolution_design, layout)
+
+
+@pytest.fixture(scope="session")
+def export(export_folder: Path) -> ExportedDesign:
+    return read_export(export_folder)
+
+
+@pytest.fixture(scope="session")
+def plan(export: ExportedDesign) -> Plan:
+    return read_plan(export)
 
 
 @pytest.fixture(scope="session")

@@ -11,21 +11,16 @@ from tbcad.machine.record import read_machine
 from tbcad.merged_run.corrections import Options
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
 from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.simulated_run.simulate import run_object
+from tests.view_quality import mean_ssim
 
 pytestmark = pytest.mark.slow
 
-VIEWS_DEG = ((10.0, 25.0), (130.0, 40.0), (250.0, 55.0))
-CAPTURE_MM = 60.0
 LOST = "a_0007_lit"
 ALLOWED = 0.01  # of SSIM, between a calibrated and a perfect machine
 
@@ -49,14 +44,7 @@ class Loop:
         out = self.folder / f"{run}-{calibration}"
         options = Options(brightness=1 / OBJECT_LIGHT)
         merge(self.folder / run, self.folder / calibration, self.export, options, out=out)
-        tiles, found = MirrorTiles(LightField.read(out)), []
-        for azimuth, elevation in VIEWS_DEG:
-            at = camera_around_object(
-                np.radians(azimuth), np.radians(elevation), 640.0, CAPTURE_MM, (160, 120), None
-            )
-            truth = np.rint(pinhole_picture(self.scene, at)).astype(np.uint8)
-            found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
-        return float(np.mean(found))
+        return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)
 
 
 @pytest.fixture(scope="module")

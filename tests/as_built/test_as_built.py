@@ -19,22 +19,12 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.runs.images import read_image
-from tbcad.simulate.prototype.plan import Plan, read_plan
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.prototype.plan import Plan
+from tbcad.simulate.scene.exported import ExportedDesign
 from tests.machine_states import frames_of, machine_of, perturbed
 
 CENTRE = re.compile(r"CARTESIAN_POINT\('',\(([^)]*)\)\)")
 SPHERE = re.compile(r"SPHERICAL_SURFACE\('',#\d+,([0-9.E+-]+)\)")
-
-
-@pytest.fixture(scope="module")
-def export(export_folder: Path) -> ExportedDesign:
-    return read_export(export_folder)
-
-
-@pytest.fixture(scope="module")
-def plan(export: ExportedDesign) -> Plan:
-    return read_plan(export)
 
 
 @pytest.fixture(scope="module")

@@ -11,19 +11,9 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.simulate.prototype.plan import Plan, read_plan
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.prototype.plan import Plan
+from tbcad.simulate.scene.exported import ExportedDesign
 from tests.machine_states import frames_of, machine_of, perturbed
-
-
-@pytest.fixture(scope="module")
-def export(export_folder: Path) -> ExportedDesign:
-    return read_export(export_folder)
-
-
-@pytest.fixture(scope="module")
-def plan(export: ExportedDesign) -> Plan:
-    return read_plan(export)
 
 
 def calibrated(

@@ -1,6 +1,5 @@
 """The report in Chromium: it draws, asks for nothing, says no error, follows clicks and keys."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,11 +8,10 @@ import pytest
 from PIL import Image
 
 from tbcad.cli import run
-from tests.clients.browser import Browser, chromium
+from tests.clients.browser import Browser
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
-PROGRAM = shutil.which("chromium")
 SMALL = ("--set", "camera.width_px=416", "--set", "camera.height_px=310")
 TEXT = "document.getElementById('{}').textContent"
 # Middle of an element in the window, which is moved so that it is in sight.
@@ -49,14 +47,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = folder.parent / "with_capture.html"
     assert run(["report", str(folder), "--capture", str(capture), "--out", str(page)]) == 0
     return folder
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if PROGRAM is None:
-        pytest.skip("chromium is not installed")
-    with chromium(PROGRAM, tmp_path_factory.mktemp("profile")) as opened:
-        yield opened
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The viewer and a turntable in Chromium: they draw, drags turn them, nobody else is asked."""
 
-import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -15,11 +14,10 @@ from tbcad.simulate.capture.light_field import LightField
 from tbcad.viewer.query import Query
 from tbcad.viewer.render import Renderer
 from tbcad.viewer.server import ViewServer
-from tests.clients.browser import Browser, chromium
+from tests.clients.browser import Browser
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
-PROGRAM = shutil.which("chromium")
 MIDDLE = """(() => {
   const box = document.getElementById("canvas").getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
@@ -62,14 +60,6 @@ def server(captured: Path) -> Iterator[ViewServer]:
         yield running
         running.shutdown()
         thread.join()
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if PROGRAM is None:
-        pytest.skip("chromium is not installed")
-    with chromium(PROGRAM, tmp_path_factory.mktemp("profile")) as opened:
-        yield opened
 
 
 @pytest.fixture

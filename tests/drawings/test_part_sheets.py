@@ -1,7 +1,6 @@
 """Sheets of parts: sizes and holes of the solid, read back from the DXF by ezdxf."""
 
 import math
-from itertools import combinations
 from pathlib import Path
 
 import ezdxf
@@ -13,15 +12,14 @@ from tbcad.cad.brep import Solid
 from tbcad.cad.features import bounds, cylinders, plane_levels
 from tbcad.cad.projection import Round, Segment, project, section
 from tbcad.cad.solids import cut, cylinder, faces, one_solid, polygon, prism
-from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, TITLE_MM, Sheet, TitleBlock
+from tbcad.drafting.sheet import BORDER_MM, TITLE_MM, Sheet, TitleBlock
 from tbcad.drafting.views import ABOVE, FRONT
 from tbcad.drawings.holes import numbered_holes
 from tbcad.drawings.part_sheet import PartText, part_sheets
 from tbcad.drawings.printed_parts import PartJob, draw_part
 from tbcad.drawings.write import Job, draw
-from tbcad.formats.entities import Text
-from tbcad.formats.pdf import text_width
 from tbcad.formats.step import write_step
+from tests.sheet_texts import check_texts, covered, texts
 
 SIZE = np.array([60.0, 40.0, 8.0])
 THROUGH, BLIND, DEEP, TILT = (10.0, 10.0), (50.0, 30.0), 5.0, math.radians(30)
@@ -61,19 +59,6 @@ def sheet(bracket: Solid) -> Sheet:
     screw = ("M5x16", np.array([*THROUGH, 12.0]), -Z)
     (only,) = part_sheets(bracket.shape, [screw], TEXT)
     return only
-
-
-def texts(sheet: Sheet) -> list[Text]:
-    return [one for one in sheet.entities if isinstance(one, Text)]
-
-
-def box(text: Text) -> tuple[float, float, float, float]:
-    width = text_width(text.text, text.height)
-    back = {"left": 0.0, "centre": 0.5, "right": 1.0}[text.align] * width
-    x, y = text.place
-    if text.turn_deg == 90.0:
-        return x - text.height, y - back, x, y + width - back
-    return x - back, y, x + width - back, y + text.height
 
 
 def test_bounds_and_levels(bracket: Solid) -> None:
@@ -147,14 +132,7 @@ def test_the_title_block_is_whole(sheet: Sheet) -> None:
 
 
 def test_no_text_meets_another_or_the_border(sheet: Sheet) -> None:
-    boxes = [(one.text, box(one)) for one in texts(sheet)]
-    for (text, one), (word, two) in combinations(boxes, 2):
-        apart = one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
-        assert apart, (text, word)
-    for text, (left, low, right, high) in boxes:
-        assert left > LEFT_MM, text
-        assert right < sheet.paper[0] - BORDER_MM, text
-        assert BORDER_MM < low < high < sheet.paper[1] - BORDER_MM, text
+    check_texts(sheet)
 
 
 def test_the_table_goes_on_on_other_sheets() -> None:
@@ -168,7 +146,7 @@ def test_the_table_goes_on_on_other_sheets() -> None:
     assert [one.name for one in sheets] == ["bracket", "bracket_2"]
     numbers = {text.text for one in sheets for text in texts(one)}
     assert {f"B{k}" for k in range(1, 101)} <= numbers
-    assert min(box(one)[1] for one in texts(sheets[1]) if one.text[:1] == "B") > (
+    assert min(covered(one)[1] for one in texts(sheets[1]) if one.text[:1] == "B") > (
         BORDER_MM + TITLE_MM[1]
     )
 

@@ -1,7 +1,6 @@
 """Runs of a machine: those of the plan for the designed one, and where a real one is."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,20 +12,10 @@ from tbcad.machine.photographed import machine_runs, stops_known
 from tbcad.optics.lens_camera import without_distortion
 from tbcad.runs.exposure import Frame
 from tbcad.simulate.prototype.ball_rays import trace_balls
-from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
+from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import prototype_runs
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.scene.exported import ExportedDesign
 from tests.machine_states import frames_of, machine_of, perturbed
-
-
-@pytest.fixture(scope="module")
-def export(export_folder: Path) -> ExportedDesign:
-    return read_export(export_folder)
-
-
-@pytest.fixture(scope="module")
-def plan(export: ExportedDesign) -> Plan:
-    return read_plan(export)
 
 
 def test_the_designed_machine_has_the_plans_runs(export: ExportedDesign, plan: Plan) -> None:

@@ -13,16 +13,13 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.merged_run.corrections import Options
-from tbcad.optics.camera import Camera
 from tbcad.runs.exposure import DARK, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.prototype.plan import Plan, read_plan
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
 from tbcad.simulate.prototype.simulated_merge import merge_run
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
@@ -30,6 +27,7 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
 from tests.machine_states import frames_of, machine_of, perturbed
 from tests.photographed_runs import photographs_of, write_exposure, write_run
+from tests.view_quality import mean_ssim
 
 CAPTURE_MM = 60.0
 EVEN = Options("off")
@@ -37,16 +35,6 @@ EVEN = Options("off")
 # All round: of two views only, the sampling alone changes the mean SSIM by 0.02.
 VIEWS_DEG = tuple((a + 7 * e, e) for e in (12.0, 30.0, 50.0, 72.0) for a in range(0, 360, 45))
 Photographs = dict[str, np.ndarray]
-
-
-@pytest.fixture(scope="module")
-def export(export_folder: Path) -> ExportedDesign:
-    return read_export(export_folder)
-
-
-@pytest.fixture(scope="module")
-def plan(export: ExportedDesign) -> Plan:
-    return read_plan(export)
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +88,10 @@ def calibrated(folder: Path, machine: Machine, frames: tuple[Frame, ...]) -> Pat
 
 def on_mirrors(frame: LightFrame) -> np.ndarray:
     return np.asarray(frame.planes["mirror"]) > 0
+
+
+def quality_of(field: LightField, scene: Scene) -> float:
+    return mean_ssim(MirrorTiles(field), scene, places_deg=VIEWS_DEG, size_px=(160, 160))
 
 
 def apart(one: LightField, other: LightField) -> list[np.ndarray]:
@@ -233,22 +225,10 @@ class TestBuiltMachine:
         for name, machine in (("known", built), ("designed", designed)):
             calibration = calibrated(tmp_path / name, machine, frames)
             merge(run, calibration, export.folder, EVEN, out=tmp_path / f"merged-{name}")
-            quality[name] = mean_ssim(LightField.read(tmp_path / f"merged-{name}"), scene)
-        perfect = mean_ssim(simulated, scene)
+            quality[name] = quality_of(LightField.read(tmp_path / f"merged-{name}"), scene)
+        perfect = quality_of(simulated, scene)
         assert quality["known"] > perfect - 0.01
         assert quality["designed"] < perfect - 0.05
-
-
-def mean_ssim(field: LightField, scene: Scene) -> float:
-    tiles = MirrorTiles(field)
-    found = []
-    for azimuth, elevation in VIEWS_DEG:
-        at: Camera = camera_around_object(
-            np.radians(azimuth), np.radians(elevation), 640.0, CAPTURE_MM, (160, 160), None
-        )
-        truth = np.rint(pinhole_picture(scene, at)).astype(np.uint8)
-        found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
-    return float(np.mean(found))
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ import pytest
 from tbcad.drafting.dimensions import labels
 from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet, choose_scale, scale_text
 from tbcad.formats.entities import Circle, Layer, Line, Polyline, Text
-from tbcad.formats.pdf import text_width
 from tbcad.geometry.primitives import Cylinder, Prism
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
@@ -19,6 +18,7 @@ from tbcad.prototype.drawings.parts import PLATE, UPRIGHT, WHEEL, Listed, sheets
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.purchased.parts import load_parts
+from tests.sheet_texts import check_texts, covered
 
 DRIVES = load_drives(load_parts())
 BILL = Listed("turtleback, n = 18", defaultdict(lambda: 41), defaultdict(lambda: 1))
@@ -34,20 +34,6 @@ def drawn(frame: FrameLayout, carrier: BaseLayout) -> dict[str, Sheet]:
 def cut_circles(sheet: Sheet) -> list[Circle]:
     entities = sheet.full_size()
     return [one for one in entities if isinstance(one, Circle) and one.layer == Layer.CUT]
-
-
-def box(text: Text) -> tuple[float, float, float, float]:
-    """What a text covers on paper: left, bottom, right, top."""
-    width, turn = text_width(text.text, text.height), math.radians(text.turn_deg)
-    back = {"left": 0.0, "centre": 0.5, "right": 1.0}[text.align] * width
-    along, up = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
-    corners = [
-        [text.place[k] + s * along[k] + t * up[k] for k in (0, 1)]
-        for s in (-back, width - back)
-        for t in (0.0, text.height)
-    ]
-    (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
-    return left, low, right, high
 
 
 def test_what_is_drawn(drawn: dict[str, Sheet]) -> None:
@@ -130,15 +116,7 @@ def test_heights_of_the_lamps_screws_are_on_the_upright(
 
 @pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
 def test_no_text_meets_another_or_the_border(drawn: dict[str, Sheet], name: str) -> None:
-    sheet = drawn[name]
-    boxes = [(one.text, box(one)) for one in sheet.entities if isinstance(one, Text)]
-    for (text, one), (word, two) in combinations(boxes, 2):
-        apart = one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
-        assert apart, (text, word)
-    for text, (left, low, right, high) in boxes:
-        assert left > LEFT_MM, text
-        assert right < sheet.paper[0] - BORDER_MM, text
-        assert BORDER_MM < low < high < sheet.paper[1] - BORDER_MM, text
+    check_texts(drawn[name])
 
 
 @pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
@@ -153,10 +131,10 @@ def test_labels_of_near_holes_keep_apart() -> None:
     """Four holes of 4 mm on a square of 6 mm: on one side there is no room."""
     circles = [Circle(Layer.CUT, (x, y), 2.0) for x in (0.0, 6.0) for y in (0.0, 6.0)]
     texts = [one for one in labels(circles, ["1", "2", "3", "4"]) if isinstance(one, Text)]
-    for one, two in combinations(map(box, texts), 2):
+    for one, two in combinations(map(covered, texts), 2):
         assert one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
     for text in texts:
-        left, low, right, high = box(text)
+        left, low, right, high = covered(text)
         for circle in circles:
             near = np.clip(circle.centre, (left, low), (right, high))
             assert math.dist(near, circle.centre) >= circle.radius

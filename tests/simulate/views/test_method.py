@@ -1,21 +1,18 @@
 """The method that is chosen for a light field makes the better views of it."""
 
-import numpy as np
 import pytest
 
 from tbcad.mirrors.array import design
 from tbcad.simulate.capture.light_field import light_field_in_memory
-from tbcad.simulate.capture.photograph import photograph, to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.method import suitable_method
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.simulate.views.synthesis import Method
 from tbcad.spec.load import load_spec
+from tests.view_quality import mean_ssim
 
 VIEWPOINTS_DEG = ((30, 20), (120, 45), (250, 70))
 
@@ -25,15 +22,6 @@ def tiles_of(n: int, width_px: int, height_px: int, scene: Scene) -> MirrorTiles
     cameras = reflectors(design(load_spec(None, options)))
     photographs = [(at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras]
     return MirrorTiles(light_field_in_memory(photographs, 60.0))
-
-
-def mean_ssim(tiles: MirrorTiles, scene: Scene, method: Method) -> float:
-    found = []
-    for azimuth, elevation in np.radians(VIEWPOINTS_DEG):
-        view = camera_around_object(azimuth, elevation, 640.0, 60.0, (320, 240))
-        truth = to_bytes(pinhole_picture(scene, view))
-        found.append(image_quality(truth, synthesise(tiles, view, method).image).ssim)
-    return float(np.mean(found))
 
 
 @pytest.mark.parametrize(
@@ -46,6 +34,9 @@ def test_the_better_method_is_chosen(
     tiles = tiles_of(n, *size, knot)
     chosen = suitable_method(tiles)
     other: Method = "blend" if better == "nearest" else "nearest"
+    quality = {
+        one: mean_ssim(tiles, knot, one, VIEWPOINTS_DEG, (320, 240)) for one in (better, other)
+    }
     assert chosen.method == better
-    assert mean_ssim(tiles, knot, better) > mean_ssim(tiles, knot, other)
+    assert quality[better] > quality[other]
     assert "pixels apart" in chosen.reason
