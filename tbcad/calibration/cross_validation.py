@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.calibration.estimate.parameters import ANGLES, RUNOUT
+from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.estimate.solve import Estimate, estimate
 from tbcad.calibration.uncertainty import ray_slopes
 from tbcad.machine.machine import Highlights
@@ -88,7 +88,7 @@ def _static(found: Estimate) -> Ints:
     """Free parameters that are not of single frames, of which a half sees every other one."""
     prior = found.prior
     single = np.zeros(len(prior.flat_sigma), dtype=bool)
-    for block in (ANGLES, RUNOUT):
+    for block in (Block.ANGLES, Block.RUNOUT):
         single[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
     return np.flatnonzero(~single[prior.free])
 

@@ -9,23 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.calibration.estimate.parameters import (
-    ANGLES,
-    AXIS_POINT,
-    CAMERA_TURN,
-    CARRIER,
-    CENTRES,
-    DISTORTION,
-    FOCAL,
-    LEDS,
-    OFFSET,
-    PINHOLE,
-    PRINCIPAL,
-    RADII,
-    RUNOUT,
-    TILT,
-    Prior,
-)
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Machine
 from tbcad.machine.other_errors import LED_MM
@@ -80,17 +64,17 @@ def prototype_prior(machine: Machine, errors: Errors, fitted: Fitted) -> Prior:
     growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
     frames, offset = len(machine.angle), fitted.zero_error / UNIFORM
     sigma = _camera(machine, errors, fitted.lens_known) | {
-        TILT: np.full(2, deviation(errors.axis_tilt)),
-        AXIS_POINT: np.full(2, deviation(errors.shell_shift)),
-        OFFSET: np.full(
+        Block.TILT: np.full(2, deviation(errors.axis_tilt)),
+        Block.AXIS_POINT: np.full(2, deviation(errors.shell_shift)),
+        Block.OFFSET: np.full(
             int(fitted.series.max()) + 1, math.hypot(offset, deviation(errors.rotation_angle))
         ),
-        CARRIER: np.array([growth, deviation(errors.shell_shift)]),
-        LEDS: np.full(machine.leds.shape, _led(errors)),
-        CENTRES: np.repeat(centres[:, None], 3, axis=1),
-        RADII: radii,
-        ANGLES: np.full(frames, deviation(errors.rotation_angle)),
-        RUNOUT: np.full((frames, 2), deviation(errors.axis_runout)),
+        Block.CARRIER: np.array([growth, deviation(errors.shell_shift)]),
+        Block.LEDS: np.full(machine.leds.shape, _led(errors)),
+        Block.CENTRES: np.repeat(centres[:, None], 3, axis=1),
+        Block.RADII: radii,
+        Block.ANGLES: np.full(frames, deviation(errors.rotation_angle)),
+        Block.RUNOUT: np.full((frames, 2), deviation(errors.axis_runout)),
     }
     return Prior(_with_radii(machine, radius), fitted.series, sigma)
 
@@ -107,19 +91,19 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
     """
     spheres, shift = len(machine.radius), deviation(errors.shell_shift)
     camera = _camera(machine, errors, lens_known)
-    camera[CAMERA_TURN] = np.hypot(camera[CAMERA_TURN], deviation(errors.shell_tilt))
-    camera[PINHOLE] = np.hypot(camera[PINHOLE], shift)
+    camera[Block.CAMERA_TURN] = np.hypot(camera[Block.CAMERA_TURN], deviation(errors.shell_tilt))
+    camera[Block.PINHOLE] = np.hypot(camera[Block.PINHOLE], shift)
     growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
     sigma = camera | {
-        TILT: np.zeros(2),
-        AXIS_POINT: np.zeros(2),
-        OFFSET: np.zeros(1),
-        CARRIER: np.array([growth, 0.0]),
-        LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
-        CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
-        RADII: np.full(spheres, deviation(errors.whole_radius)),
-        ANGLES: np.zeros(1),
-        RUNOUT: np.zeros((1, 2)),
+        Block.TILT: np.zeros(2),
+        Block.AXIS_POINT: np.zeros(2),
+        Block.OFFSET: np.zeros(1),
+        Block.CARRIER: np.array([growth, 0.0]),
+        Block.LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
+        Block.CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
+        Block.RADII: np.full(spheres, deviation(errors.whole_radius)),
+        Block.ANGLES: np.zeros(1),
+        Block.RUNOUT: np.zeros((1, 2)),
     }
     return Prior(machine, np.zeros(1, dtype=np.int64), sigma)
 
@@ -146,11 +130,11 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Flo
     aimed = math.hypot(tilt, principal / float(machine.camera.focal.mean()))
     known = 0.0 if lens_known else 1.0
     return {
-        CAMERA_TURN: np.array([aimed, aimed, tilt]),
-        PINHOLE: np.full(3, deviation(errors.camera_shift)),
-        FOCAL: known * np.array([deviation(errors.camera_focal), OBLONG]),
-        PRINCIPAL: np.full(2, principal),
-        DISTORTION: known * np.array(DISTORTIONS),
+        Block.CAMERA_TURN: np.array([aimed, aimed, tilt]),
+        Block.PINHOLE: np.full(3, deviation(errors.camera_shift)),
+        Block.FOCAL: known * np.array([deviation(errors.camera_focal), OBLONG]),
+        Block.PRINCIPAL: np.full(2, principal),
+        Block.DISTORTION: known * np.array(DISTORTIONS),
     }
 
 

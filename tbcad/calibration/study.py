@@ -13,7 +13,7 @@ from scipy.sparse import csc_array, diags_array
 from tbcad.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.calibration.estimate.parameters import CENTRES, LEDS, RADII, Prior
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.calibration.led_layout import LedRoom, best_layout, with_partners
 from tbcad.calibration.single_spheres import SphereInformation, ray_errors, sphere_information
 from tbcad.calibration.study_plots import panels
@@ -168,8 +168,10 @@ def _one_ball(setup: Setup, layout: Layout) -> Record:
     centres, radii = (np.full(one.shape, LARGE_MM) for one in (machine.centre, machine.radius))
     prior = setup.prior(process_errors(load_process(USUAL_PROCESS)))
     fixed = {block: np.zeros_like(sigma) for block, sigma in prior.sigma.items()}
-    leds = {LEDS: np.zeros(machine.leds.shape)}
-    alone = replace(prior, mean=machine, sigma=fixed | leds | {CENTRES: centres, RADII: radii})
+    leds = {Block.LEDS: np.zeros(machine.leds.shape)}
+    alone = replace(
+        prior, mean=machine, sigma=fixed | leds | {Block.CENTRES: centres, Block.RADII: radii}
+    )
     stops = np.linspace(0, len(setup.plan.angle) - 1, STOPS_OF_ONE).round().astype(np.int64)
     frame, sphere, led = _seen(setup, machine, stops)
     known = _bound(alone, USUAL_PX, (frame, sphere, led))

@@ -9,7 +9,7 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_capture
 from tbcad.cli.options import Capture, Force, JsonResult, OutReplaced
-from tbcad.cli.output_mode import print_json
+from tbcad.cli.output_mode import print_result
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
@@ -82,12 +82,8 @@ def export(
             progress=screen.stage,
             detail=screen.detail,
         )
-    if json:
-        print_json(record)
-        return 0
-    for line in _lines(record):
-        typer.echo(line)
-    typer.echo(f"{out}: {WRITTEN[to]}; dataset.json, cameras.csv with these figures")
+    files = f"{out}: {WRITTEN[to]}; dataset.json, cameras.csv with these figures"
+    print_result(record, [*_lines(record), files], json)
     return 0
 
 

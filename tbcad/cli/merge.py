@@ -15,7 +15,7 @@ from tbcad.cli.options import (
     OutReplaced,
     RunFolder,
 )
-from tbcad.cli.output_mode import print_json
+from tbcad.cli.output_mode import print_result
 from tbcad.screen import stages
 
 FEW_NAMES = 6  # of missing mirrors in a line
@@ -82,12 +82,8 @@ def merge(
             progress=screen.stage,
             detail=screen.detail,
         )
-    if json:
-        print_json(record)
-        return 0
-    for line in _lines(record):
-        typer.echo(line)
-    typer.echo(f"{out}: the light field as lightfield.h5, pictures, capture.json with all of this")
+    files = f"{out}: the light field as lightfield.h5, pictures, capture.json with all of this"
+    print_result(record, [*_lines(record), files], json)
     return 0
 
 

@@ -1,5 +1,6 @@
 """How much of a result a command prints: options that exclude each other."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -28,6 +29,15 @@ def output_mode(full: bool, quiet: bool, json: bool) -> "Output":
         given = " and ".join(f"--{name}" for name in chosen)
         raise InputError(f"{given} exclude each other: give only one of them")
     return chosen[0] if chosen else "summary"
+
+
+def print_result(record: object, lines: Iterable[str], json: bool) -> None:
+    """Print what was found, for other programs or in words."""
+    if json:
+        print_json(record)
+        return
+    for line in lines:
+        typer.echo(line)
 
 
 def print_json(record: object) -> None:

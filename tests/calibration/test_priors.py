@@ -7,16 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.calibration.estimate.parameters import (
-    ANGLES,
-    CENTRES,
-    DISTORTION,
-    FOCAL,
-    OFFSET,
-    PRINCIPAL,
-    RADII,
-    RUNOUT,
-)
+from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.priors import UNIFORM, Fitted, prototype_prior, shell_prior
 from tbcad.calibration.setup_files import MEASURED_MM, parse_measured, read_zero_error
 from tbcad.errors import InputError
@@ -37,21 +28,23 @@ FITTED = Fitted(
 
 def test_figures_are_those_of_the_process() -> None:
     sigma = prototype_prior(MACHINE, ERRORS, FITTED).sigma
-    assert sigma[CENTRES][0] == pytest.approx(np.full(3, ERRORS.seat.spread))
+    assert sigma[Block.CENTRES][0] == pytest.approx(np.full(3, ERRORS.seat.spread))
     tilted = np.hypot(ERRORS.seat.spread, ARM * ERRORS.cap_tilt.spread / UNIFORM)
-    assert sigma[CENTRES][CAP] == pytest.approx(np.full(3, tilted))
-    assert sigma[RADII][CAP] == pytest.approx(ERRORS.whole_radius.spread)
-    assert sigma[RADII][0] == pytest.approx(ERRORS.ball_radius.spread / UNIFORM)
-    assert sigma[ANGLES] == pytest.approx(np.full(len(MACHINE.angle), ERRORS.rotation_angle.spread))
-    assert sigma[RUNOUT].shape == (len(MACHINE.angle), 2)
+    assert sigma[Block.CENTRES][CAP] == pytest.approx(np.full(3, tilted))
+    assert sigma[Block.RADII][CAP] == pytest.approx(ERRORS.whole_radius.spread)
+    assert sigma[Block.RADII][0] == pytest.approx(ERRORS.ball_radius.spread / UNIFORM)
+    assert sigma[Block.ANGLES] == pytest.approx(
+        np.full(len(MACHINE.angle), ERRORS.rotation_angle.spread)
+    )
+    assert sigma[Block.RUNOUT].shape == (len(MACHINE.angle), 2)
     expected = np.hypot(0.01 / UNIFORM, ERRORS.rotation_angle.spread)
-    assert sigma[OFFSET] == pytest.approx(np.full(2, expected))
+    assert sigma[Block.OFFSET] == pytest.approx(np.full(2, expected))
 
 
 def test_a_measured_radius_replaces_the_drawing() -> None:
     fitted = replace(FITTED, measured=((CAP, 17.61, 0.004),))
     prior = prototype_prior(MACHINE, ERRORS, fitted)
-    assert (prior.mean.radius[CAP], prior.sigma[RADII][CAP]) == (17.61, 0.004)
+    assert (prior.mean.radius[CAP], prior.sigma[Block.RADII][CAP]) == (17.61, 0.004)
     assert np.delete(prior.mean.radius, CAP) == pytest.approx(np.delete(MACHINE.radius, CAP))
     assert MACHINE.radius[CAP] != 17.61
 
@@ -64,7 +57,7 @@ def test_a_known_lens_is_fixed(of_shell: bool) -> None:
         if of_shell
         else prototype_prior(MACHINE, ERRORS, replace(FITTED, lens_known=True))
     )
-    for block in (FOCAL, PRINCIPAL, DISTORTION):
+    for block in (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION):
         assert not known.sigma[block].any()
 
 

@@ -7,7 +7,7 @@ from scipy.sparse import csc_array, diags_array
 from tbcad.calibration.calibrate import Setup
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.calibration.estimate.parameters import CENTRES, RADII
+from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.led_layout import best_layout, with_partners
 from tbcad.calibration.priors import shell_prior
 from tbcad.calibration.single_spheres import ray_errors, sphere_information
@@ -30,7 +30,7 @@ def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: Exported
     mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, SIGMA_MM))
     prior = shell_prior(machine, process_errors(load_process("sla")))
     for block, sigma in prior.sigma.items():
-        sigma[:] = SIGMA_MM if block in (CENTRES, RADII) else 0
+        sigma[:] = SIGMA_MM if block in (Block.CENTRES, Block.RADII) else 0
     seen = [one.ravel() for one in np.indices((1, count, len(leds)))]
     values = np.zeros(len(prior.free))
     _, slopes = highlights_with_slopes(prior, values, *seen)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from tbcad.calibration.estimate.parameters import ANGLES, CENTRES, RADII, RUNOUT, Prior
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.types import Floats, Ints
 
 
@@ -90,7 +90,7 @@ def covariance(prior: Prior, information: csc_array) -> Covariance:
 
 def _is_inner(prior: Prior) -> np.ndarray:
     """Whether free parameters are of one frame, or of one sphere where these are more."""
-    of_frames, of_spheres = (ANGLES, RUNOUT), (CENTRES, RADII)
+    of_frames, of_spheres = (Block.ANGLES, Block.RUNOUT), (Block.CENTRES, Block.RADII)
     free = [sum(int((prior.sigma[b] > 0).sum()) for b in two) for two in (of_frames, of_spheres)]
     blocks = of_frames if free[0] > free[1] else of_spheres
     result = np.zeros(len(prior.flat_sigma), dtype=bool)

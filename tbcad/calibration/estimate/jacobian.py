@@ -6,23 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tbcad.calibration.estimate.lens import LENS, projection
-from tbcad.calibration.estimate.parameters import (
-    ANGLES,
-    AXIS_POINT,
-    CAMERA_TURN,
-    CARRIER,
-    CENTRES,
-    DISTORTION,
-    FOCAL,
-    LEDS,
-    OFFSET,
-    PINHOLE,
-    PRINCIPAL,
-    RADII,
-    RUNOUT,
-    TILT,
-    Prior,
-)
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.calibration.estimate.reflection import reflections
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
@@ -69,7 +53,7 @@ def highlights_with_slopes(
     machine = prior.machine(values)
     image = light_images(prior, values, machine, frame, sphere, machine.leds[led])
     slopes = Slopes(
-        columns=(prior.first[LEDS] + 3 * led[:, None] + np.arange(3), *image.slopes.columns),
+        columns=(prior.first[Block.LEDS] + 3 * led[:, None] + np.arange(3), *image.slopes.columns),
         values=(image.by_light, *image.slopes.values),
     )
     return image.pixel, slopes.matrix(prior)
@@ -101,9 +85,9 @@ def light_images(
     pixel, by_image, by_lens = projection(camera, image)
     by_point = by_image @ camera.axes
     moved = sphere_slopes(prior, values, machine, frame, sphere)
-    columns = (*camera_columns(prior), prior.first[RADII] + sphere[:, None], *moved.columns)
+    columns = (*camera_columns(prior), prior.first[Block.RADII] + sphere[:, None], *moved.columns)
     derivatives = (
-        by_image @ turn_slopes(prior.blocks(values)[CAMERA_TURN], image),
+        by_image @ turn_slopes(prior.blocks(values)[Block.CAMERA_TURN], image),
         by_point @ (seen.by_pinhole - np.eye(3)),
         lens_slopes(by_lens, machine),
         by_point @ seen.by_radius[..., None],
@@ -114,10 +98,10 @@ def light_images(
 
 def camera_columns(prior: Prior) -> tuple[Ints, Ints, Ints]:
     """Numbers of the parameters of the camera's rotation, place and lens."""
-    lens = [(FOCAL, 2), (PRINCIPAL, 2), (DISTORTION, 5)]
+    lens = [(Block.FOCAL, 2), (Block.PRINCIPAL, 2), (Block.DISTORTION, 5)]
     return (
-        prior.first[CAMERA_TURN] + np.arange(3),
-        prior.first[PINHOLE] + np.arange(3),
+        prior.first[Block.CAMERA_TURN] + np.arange(3),
+        prior.first[Block.PINHOLE] + np.arange(3),
         np.concatenate([prior.first[block] + np.arange(size) for block, size in lens]),
     )
 
@@ -155,13 +139,13 @@ def sphere_slopes(
     ]
     return Slopes(
         columns=(
-            first[CARRIER] + np.arange(2),
-            first[CENTRES] + 3 * sphere[:, None] + np.arange(3),
-            first[TILT] + np.arange(2),
-            first[AXIS_POINT] + np.arange(2),
-            first[OFFSET] + prior.series[frame][:, None],
-            first[ANGLES] + frame[:, None],
-            first[RUNOUT] + 2 * frame[:, None] + np.arange(2),
+            first[Block.CARRIER] + np.arange(2),
+            first[Block.CENTRES] + 3 * sphere[:, None] + np.arange(3),
+            first[Block.TILT] + np.arange(2),
+            first[Block.AXIS_POINT] + np.arange(2),
+            first[Block.OFFSET] + prior.series[frame][:, None],
+            first[Block.ANGLES] + frame[:, None],
+            first[Block.RUNOUT] + 2 * frame[:, None] + np.arange(2),
         ),
         values=(
             on_base @ carried,
@@ -191,10 +175,10 @@ def base_slopes(prior: Prior, values: Floats) -> Slopes:
     radius[:, 3] = 1
     return Slopes(
         columns=(
-            prior.first[CENTRES] + 3 * every[:, None] + np.arange(3),
-            prior.first[CARRIER] + np.arange(2),
-            prior.first[TILT] + np.arange(2),
-            prior.first[RADII] + every[:, None],
+            prior.first[Block.CENTRES] + 3 * every[:, None] + np.arange(3),
+            prior.first[Block.CARRIER] + np.arange(2),
+            prior.first[Block.TILT] + np.arange(2),
+            prior.first[Block.RADII] + every[:, None],
         ),
         values=(*(np.pad(one, ((0, 0), (0, 1), (0, 0))) for one in of_centres), radius),
     )

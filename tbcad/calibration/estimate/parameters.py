@@ -1,6 +1,6 @@
 """The unknowns of a machine as one vector, in units of their prior standard deviations.
 
-Zero is the prior mean. Blocks follow each other in the order of BLOCKS; what is fixed has no place
+Zero is the prior mean. Blocks follow each other in the order of Block; what is fixed has no place
 in the vector.
 
 Gauge: photographs do not change when camera, axis, spheres and LEDs are moved or rotated together,
@@ -10,6 +10,7 @@ alone fixes these; the point slides not at all, and run-out is across the axis o
 """
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -19,13 +20,27 @@ from tbcad.geometry.vectors import perpendicular_axes
 from tbcad.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
-CAMERA_TURN, PINHOLE, FOCAL = "camera_turn", "pinhole", "focal"
-PRINCIPAL, DISTORTION = "principal", "distortion"
-TILT, AXIS_POINT, OFFSET, CARRIER = "axis_tilt", "axis_point", "angle_offset", "carrier"
-LEDS, CENTRES, RADII = "leds", "centres", "radii"
-ANGLES, RUNOUT = "angles", "runout"
-CAMERA = (CAMERA_TURN, PINHOLE, FOCAL, PRINCIPAL, DISTORTION)
-BLOCKS = (*CAMERA, TILT, AXIS_POINT, OFFSET, CARRIER, LEDS, CENTRES, RADII, ANGLES, RUNOUT)
+
+class Block(StrEnum):
+    """Blocks of the vector, in their order."""
+
+    CAMERA_TURN = "camera_turn"
+    PINHOLE = "pinhole"
+    FOCAL = "focal"
+    PRINCIPAL = "principal"
+    DISTORTION = "distortion"
+    TILT = "axis_tilt"
+    AXIS_POINT = "axis_point"
+    OFFSET = "angle_offset"
+    CARRIER = "carrier"
+    LEDS = "leds"
+    CENTRES = "centres"
+    RADII = "radii"
+    ANGLES = "angles"
+    RUNOUT = "runout"
+
+
+CAMERA = (Block.CAMERA_TURN, Block.PINHOLE, Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION)
 
 
 @dataclass(frozen=True)
@@ -54,7 +69,7 @@ class Prior:
     @cached_property
     def flat_sigma(self) -> Floats:
         """Standard deviations of all parameters, fixed ones too, (p,)."""
-        return np.concatenate([self.sigma[block].ravel() for block in BLOCKS])
+        return np.concatenate([self.sigma[block].ravel() for block in Block])
 
     @cached_property
     def free(self) -> Ints:
@@ -64,8 +79,8 @@ class Prior:
     @cached_property
     def first(self) -> dict[str, int]:
         """Number of each block's first parameter."""
-        sizes = [self.sigma[block].size for block in BLOCKS]
-        return dict(zip(BLOCKS, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        sizes = [self.sigma[block].size for block in Block]
+        return dict(zip(Block, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
 
     @cached_property
     def across(self) -> Floats:
@@ -83,29 +98,29 @@ class Prior:
 
     def tilt(self, values: Floats) -> Rotation:
         """By which the axis is tilted about the origin, with the base and its spheres."""
-        return Rotation.from_rotvec(self.blocks(values)[TILT] @ self.across)
+        return Rotation.from_rotvec(self.blocks(values)[Block.TILT] @ self.across)
 
     def machine(self, values: Floats) -> Machine:
         """The machine of free parameters (q,) in prior standard deviations."""
         x, mean = self.blocks(values), self.mean
-        growth, slide = x[CARRIER]
+        growth, slide = x[Block.CARRIER]
         tilt = self.tilt(values)
-        ratio = x[FOCAL][0] + np.array([0.5, -0.5]) * x[FOCAL][1]
+        ratio = x[Block.FOCAL][0] + np.array([0.5, -0.5]) * x[Block.FOCAL][1]
         camera = replace(
             mean.camera,
-            pinhole=mean.camera.pinhole + x[PINHOLE],
-            axes=Rotation.from_rotvec(x[CAMERA_TURN]).apply(mean.camera.axes.T).T,
+            pinhole=mean.camera.pinhole + x[Block.PINHOLE],
+            axes=Rotation.from_rotvec(x[Block.CAMERA_TURN]).apply(mean.camera.axes.T).T,
             focal=mean.camera.focal * np.exp(ratio),
-            principal=mean.camera.principal + x[PRINCIPAL],
-            distortion=mean.camera.distortion + x[DISTORTION],
+            principal=mean.camera.principal + x[Block.PRINCIPAL],
+            distortion=mean.camera.distortion + x[Block.DISTORTION],
         )
         return Machine(
             camera=camera,
             axis=tilt.apply(mean.axis),
-            axis_point=mean.axis_point + x[AXIS_POINT] @ self.across,
-            angle=mean.angle + x[OFFSET][self.series] + x[ANGLES],
-            centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + x[CENTRES]),
-            radius=mean.radius + x[RADII],
-            leds=mean.leds + x[LEDS],
-            shift=x[RUNOUT] @ self.across,
+            axis_point=mean.axis_point + x[Block.AXIS_POINT] @ self.across,
+            angle=mean.angle + x[Block.OFFSET][self.series] + x[Block.ANGLES],
+            centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + x[Block.CENTRES]),
+            radius=mean.radius + x[Block.RADII],
+            leds=mean.leds + x[Block.LEDS],
+            shift=x[Block.RUNOUT] @ self.across,
         )

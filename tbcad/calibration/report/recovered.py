@@ -9,17 +9,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.calibration.estimate.parameters import (
-    AXIS_POINT,
-    CAMERA_TURN,
-    DISTORTION,
-    FOCAL,
-    LEDS,
-    PINHOLE,
-    PRINCIPAL,
-    RUNOUT,
-    TILT,
-)
+from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.report.tables import angle_deviations
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
@@ -140,7 +130,7 @@ def _of_base(result: Calibration, known: Covariance, truth: Machine) -> list[Kin
     places = [_base_places(one, prior.across) for one in machines]
     return [
         _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_deviations(prior, known))),
-        _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, TILT)),
+        _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, Block.TILT)),
         _kind("base in each frame", "um", MICROMETRES, *places, _place_deviations(result, known)),
     ]
 
@@ -166,8 +156,8 @@ def _place_deviations(result: Calibration, known: Covariance) -> Floats:
     )
     by_point = np.eye(2) - prior.across @ turned
     columns = (
-        prior.first[AXIS_POINT] + np.arange(2),
-        prior.first[RUNOUT] + 2 * frames[:, None] + np.arange(2),
+        prior.first[Block.AXIS_POINT] + np.arange(2),
+        prior.first[Block.RUNOUT] + 2 * frames[:, None] + np.arange(2),
     )
     values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
     covariance = known.of(Slopes(columns, values).matrix(prior), 2)
@@ -179,17 +169,25 @@ def _of_camera(result: Calibration, known: Covariance, truth: Machine) -> list[K
     designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
     machines = designed, truth, found
     turns = [_turn(designed, one) for one in machines]
-    lens = FOCAL, PRINCIPAL, DISTORTION
+    lens = Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION
     width = np.concatenate([prior.sigma[block] for block in lens])
     unit = np.where(width > 0, width, 1.0)
     lenses = [_lens(one) / unit for one in machines]
     sigma = np.concatenate([_sigma(result, known, block) for block in lens]) / unit
     places = [one.camera.pinhole for one in machines]
     return [
-        _kind("camera's place", "um", MICROMETRES, *places, _sigma(result, known, PINHOLE)),
-        _kind("camera's direction", "mrad", MILLI, *turns, _sigma(result, known, CAMERA_TURN)),
+        _kind("camera's place", "um", MICROMETRES, *places, _sigma(result, known, Block.PINHOLE)),
+        _kind(
+            "camera's direction", "mrad", MILLI, *turns, _sigma(result, known, Block.CAMERA_TURN)
+        ),
         _kind("lens", "deviations of the prior", 1.0, *lenses, sigma),
-        _kind("LEDs", "um", MICROMETRES, *(m.leds for m in machines), _sigma(result, known, LEDS)),
+        _kind(
+            "LEDs",
+            "um",
+            MICROMETRES,
+            *(m.leds for m in machines),
+            _sigma(result, known, Block.LEDS),
+        ),
     ]
 
 

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.calibration.estimate.parameters import ANGLES, OFFSET, RUNOUT, Prior
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.runs.exposure import exposure_name
 from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats, Ints
@@ -109,14 +109,16 @@ def residuals_table(result: Calibration) -> Table:
 def angle_deviations(prior: Prior, known: Covariance) -> Floats:
     """Of each frame's angle, with the offset of its series, radians, (f,)."""
     frames = np.arange(len(prior.mean.angle))
-    columns = np.stack([prior.first[OFFSET] + prior.series, prior.first[ANGLES] + frames], axis=1)
+    columns = np.stack(
+        [prior.first[Block.OFFSET] + prior.series, prior.first[Block.ANGLES] + frames], axis=1
+    )
     return _deviations(prior, known, columns)
 
 
 def _runout_deviations(prior: Prior, known: Covariance) -> Floats:
     """Root mean square of each frame's shift, mm, (f,)."""
     frames = np.arange(len(prior.mean.angle))
-    ways = [(prior.first[RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
+    ways = [(prior.first[Block.RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
     return np.asarray(np.hypot(*(_deviations(prior, known, columns) for columns in ways)))
 
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from tbcad.calibration.calibrate import Calibration
-from tbcad.calibration.estimate.parameters import BLOCKS, Prior
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.runs.exposure import exposure_name
 from tbcad.screen import WIDTH
 from tbcad.types import Floats
@@ -136,7 +136,7 @@ def outliers(result: Calibration) -> list[tuple[str, int, int, float]]:
 def parameter_names(prior: Prior) -> list[str]:
     """Names of all parameters, fixed ones too, numbers from 1."""
     names = []
-    for block in BLOCKS:
+    for block in Block:
         shape = prior.sigma[block].shape
         for index in np.ndindex(shape):
             names.append(" ".join([block, *(str(i + 1) for i in index)]))
