@@ -1,5 +1,8 @@
 """3MF: vertices and triangles in a zip, millimetres, the same bytes for the same mesh."""
 
+import locale
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
@@ -35,10 +38,21 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(DECIMALS)
     try:
-        writer.WriteToFile(str(path))
+        with _same_locale():
+            writer.WriteToFile(str(path))
     except lib3mf.ELib3MFException as error:
         raise incomplete(path) from error
     check_complete(path, ZIP_END)
+
+
+@contextmanager
+def _same_locale() -> Iterator[None]:
+    """The library leaves the process in the locale C, in which Python opens texts as ASCII."""
+    before = locale.setlocale(locale.LC_ALL)
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_ALL, before)
 
 
 def _set_geometry(wrapper: Any, part: Any, mesh: Mesh) -> None:
