@@ -34,14 +34,14 @@ def showing(capture: Path, rounds: int) -> list[Row]:
     """Views while the viewpoint moves: made alone, over HTTP, and on a page in Chromium."""
     with LightField.open(capture) as source:
         renderer = Renderer(source)
-        around(renderer.picture)  # reads every mirror from the file
+        around(renderer.picture)  # compiles
         alone = [rates(lambda: around(renderer.picture)) for _ in range(rounds)]
         packed = [rates(lambda: around(renderer.jpeg)) for _ in range(rounds)]
         with running(renderer) as server:
             sent = [rates(lambda: fetched(server)) for _ in range(rounds)]
             drawn = in_chromium(server, rounds)
     return [
-        *_rows("views a second, 640 x 480, nearest rays, while the viewpoint moves", alone),
+        *_rows("views a second, 640 x 480, while the viewpoint moves", alone),
         *_rows("- as JPEG", packed),
         *_rows(f"- as JPEG over HTTP, {IN_FLIGHT} requests at a time", sent),
         *(_rows("- drawn by the page in headless Chromium, on the same cores", drawn, 30)),

@@ -128,7 +128,9 @@ def _show_light_field(
 
     with LightField.open(file) as source:
         start.check(source.capture_mm)
-        renderer = Renderer(source, method)
+        with stages(1) as screen:
+            screen.stage("pictures of the virtual cameras")
+            renderer = Renderer(source, method, screen.detail)
         with ViewServer(renderer, _title(file), start, port) as server:
             if json:
                 print_json({"address": server.address})

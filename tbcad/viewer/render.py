@@ -13,8 +13,14 @@ from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.views.method import suitable_method
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
-from tbcad.simulate.views.synthesis import Method, synthesise
-from tbcad.types import Bytes
+from tbcad.simulate.views.synthesis import (
+    Method,
+    horizon_search_radius,
+    search_radius,
+    synthesise,
+)
+from tbcad.types import Bytes, Progress
+from tbcad.viewer.moving import moving_view, pinhole_pictures
 from tbcad.viewer.query import Query
 
 JPEG_QUALITY = 88
@@ -32,12 +38,26 @@ class Renderer:
 
     Attributes:
         tiles: the light field.
+        pictures: of its virtual cameras, for views that move.
         method: of views that do not move: nearest rays, or a blend where that is better.
     """
 
-    def __init__(self, source: LightField, method: Method | None = None) -> None:
-        """Take a light field, whose file stays open, and the method if it is not to be chosen."""
+    def __init__(
+        self,
+        source: LightField,
+        method: Method | None = None,
+        progress: Progress = lambda _: None,
+    ) -> None:
+        """Make the pictures of all virtual cameras.
+
+        Args:
+            source: a light field, whose file stays open.
+            method: None for the one that suits it.
+            progress: called with each step.
+        """
         self.tiles = MirrorTiles(source)
+        self.pictures = pinhole_pictures(source, progress)
+        self._limits = search_radius(self.tiles), horizon_search_radius(self.tiles)
         self.method: Method = method or suitable_method(self.tiles).method
         self._lock = Lock()
         self._numbers = count(1)
@@ -72,9 +92,10 @@ class Renderer:
             proceed: called now and then while a lens's pinholes are added up; may raise.
         """
         view = query.camera(self.capture_mm)
+        if query.aperture == 0 and query.still:
+            return synthesise(self.tiles, view, self.method).image
         if query.aperture == 0:
-            method: Method = self.method if query.still else "nearest"
-            return synthesise(self.tiles, view, method).image
+            return moving_view(self.pictures, view, self._limits)
         lens = ThinLens(query.aperture, query.focus)
         if query.still:
             return refocus(self.tiles, view, lens, proceed=proceed).image

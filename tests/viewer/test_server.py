@@ -54,11 +54,12 @@ def test_the_page_asks_nobody_else(server: ViewServer) -> None:
 
 
 def test_a_view_is_that_of_the_library(server: ViewServer, renderer: Renderer) -> None:
-    answer, body = get(server, f"/{server.token}/view?azimuth=40&elevation=20&{SMALL}")
+    answer, body = get(server, f"/{server.token}/view?azimuth=40&elevation=20&still=1&{SMALL}")
     assert answer.status == 200
     assert answer.headers["Content-Type"] == "image/jpeg"
     query = Query(azimuth=40, elevation=20, width=160, height=120)
-    image = synthesise(renderer.tiles, query.camera(renderer.capture_mm)).image
+    view = query.camera(renderer.capture_mm)
+    image = synthesise(renderer.tiles, view, renderer.method).image
     shown = np.asarray(Image.open(BytesIO(body)))
     assert shown.shape == image.shape
     assert np.abs(shown.astype(float) - image).mean() < 3

@@ -193,8 +193,8 @@ byId("turn").addEventListener("click", () => turn(!viewer.turning));
 byId("home").addEventListener("click", home);
 
 [canvas.width, canvas.height] = [data.start.width, data.start.height];
-const atRest = data.method === "blend" ? "a blend of virtual cameras" : "nearest rays too";
-byId("how").textContent = `While it moves: nearest rays, or 9 pinholes of the lens at half size; `
+const atRest = data.method === "blend" ? "a blend of virtual cameras" : "nearest rays";
+byId("how").textContent = `While it moves: the nearest virtual cameras, or 9 pinholes of the lens at half size; `
   + `smaller where this computer is slow. At rest: ${atRest}, or 69 pinholes.`;
 show();
 ask(true).then(() => { document.documentElement.dataset.ready = "true"; });
