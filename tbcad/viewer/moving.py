@@ -6,62 +6,15 @@ cameras at hand (docs/datasets.md), a pixel costs a comparison with each camera 
 at a picture, and no search among rays.
 """
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
-from tbcad.datasets.crops import chosen_mirrors
-from tbcad.datasets.pictures import default_size, taken_pictures
-from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
+from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.parallel import compiled, in_threads
-from tbcad.types import Bools, Bytes, Floats, Ints, Progress
+from tbcad.types import Bools, Bytes, Floats, Ints
 
 # Pixels along the sides of a region, and of the blocks in it whose pixels share a list of cameras.
 REGION_PX, BLOCK_PX = 64, 16
-MOST_BYTES, BYTES_PER_PIXEL = 1 << 30, 4  # of all pictures with their masks
-
-
-@dataclass(frozen=True)
-class PinholePictures:
-    """Pictures of m virtual cameras that look at the origin.
-
-    Attributes:
-        centre: of the pinholes, mm, (m, 3).
-        axes: rows: along the rows, down the columns, forward, (m, 3, 3).
-        focal_px: (m,).
-        picture: (m, s, s, 3).
-        mask: where it is known, (m, s, s).
-        capture_mm: diameter of the capture sphere.
-    """
-
-    centre: Floats
-    axes: Floats
-    focal_px: Floats
-    picture: Bytes
-    mask: Bools
-    capture_mm: float
-
-
-def pinhole_pictures(source: LightField, progress: Progress = lambda _: None) -> PinholePictures:
-    """The pictures of all virtual cameras of a light field."""
-    virtual = virtual_cameras(source, chosen_mirrors(source, None, 1), progress)
-    taken = taken_pictures(source, virtual, _size(virtual, source.capture_mm), None, progress)
-    axes = np.array([one.axes for one in taken.cameras]).reshape(-1, 3, 3)
-    focal = np.array([1 / one.pixel_pitch for one in taken.cameras])
-    return PinholePictures(
-        virtual.centre, axes, focal, taken.picture, taken.mask, source.capture_mm
-    )
-
-
-def _size(virtual: VirtualCameras, capture_mm: float) -> int:
-    """Width and height of the pictures, smaller where they would take too much memory."""
-    if not len(virtual):
-        return 1
-    most = math.isqrt(MOST_BYTES // (BYTES_PER_PIXEL * len(virtual)))
-    return min(default_size(virtual, capture_mm), most)
 
 
 def moving_view(pictures: PinholePictures, view: Camera, limits: tuple[float, ...]) -> Bytes:
@@ -95,25 +48,13 @@ def moving_view(pictures: PinholePictures, view: Camera, limits: tuple[float, ..
 def _seen_from(pictures: PinholePictures, view: Camera) -> Floats:
     """Virtual cameras on the side of a view, (k, 13).
 
-    Of each the number; its place along the view's axes, over which its rays are as far from target
-    rays, mm, as root mean square over the capture sphere's depth (`two_plane`); and the place in
-    its picture of image point (x, y), homogeneous: at (0, 0), and what x and y add to it.
+    Of each the number, its weighted place (`facing`), and the place in its picture of image point
+    (x, y) on the plane through the origin, homogeneous: at (0, 0), and what x and y add to it.
     """
-    scale, plane = pictures.capture_mm / 2 / np.sqrt(3), -float(view.pinhole @ view.forward)
-    place = (pictures.centre - view.pinhole) @ view.axes.T
-    depth = place[:, 2] - plane
-    near = np.flatnonzero(depth < 0)  # the others see the back of the object
-    weighted = place[near] / np.sqrt(1 + (depth[near, None] / scale) ** 2)
-    across = plane * view.axes
-    middle = view.pinhole + across[2] - pictures.centre[near]
-    size = pictures.mask.shape[1]
-    lens = np.zeros((len(near), 3, 3))
-    lens[:, 0, 0] = lens[:, 1, 1] = pictures.focal_px[near]
-    lens[:, :2, 2], lens[:, 2, 2] = (size - 1) / 2, 1.0  # whole numbers are pixel centres
-    into = lens @ pictures.axes[near]
-    points = [into @ across[0], into @ across[1]]
-    first = (into @ middle[..., None])[..., 0]
-    return np.column_stack([near, weighted, first, *points])
+    near, place = facing(pictures, view)
+    matrix, plane = projections(pictures, view, near), -float(view.pinhole @ view.forward)
+    first = plane * matrix[:, :, 2] + matrix[:, :, 3]
+    return np.column_stack([near, place, first, plane * matrix[:, :, 0], plane * matrix[:, :, 1]])
 
 
 @compiled

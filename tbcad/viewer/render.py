@@ -9,6 +9,7 @@ from threading import Lock
 import numpy as np
 from PIL import Image
 
+from tbcad.datasets.pinhole_pictures import pinhole_pictures
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.views.method import suitable_method
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
@@ -20,7 +21,7 @@ from tbcad.simulate.views.synthesis import (
     synthesise,
 )
 from tbcad.types import Bytes, Progress
-from tbcad.viewer.moving import moving_view, pinhole_pictures
+from tbcad.viewer.moving import moving_view
 from tbcad.viewer.query import Query
 
 JPEG_QUALITY = 88

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tbcad.datasets.pinhole_pictures import PinholePictures, pinhole_pictures
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.image_quality import image_quality
@@ -13,7 +14,7 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import horizon_search_radius, search_radius, synthesise
 from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Floats
-from tbcad.viewer.moving import PinholePictures, moving_view, pinhole_pictures
+from tbcad.viewer.moving import moving_view
 from tests.simulate.conftest import cameras, knot, light_field  # noqa: F401
 
 CAPTURE_MM = 60.0
