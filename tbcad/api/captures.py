@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tbcad.api.arguments import silent
 
@@ -68,7 +68,7 @@ def view(
     *,
     distance_mm: float = 640.0,
     size: tuple[int, int] = (640, 480),
-    method: Method | None = None,
+    method: Method | Literal["depth"] | None = None,
 ) -> SynthesisedView:
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
@@ -78,13 +78,15 @@ def view(
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
         size: columns and rows of the picture.
-        method: "nearest" rays or "blend"; None: the one that suits the light field.
+        method: "nearest" rays; "blend" on a plane, or at the "depth" that the light field itself
+            shows; None: nearest or blend, whichever suits the light field.
 
     Raises:
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
     """
     from math import radians
 
+    from tbcad.depth.view import depth_view
     from tbcad.simulate.scene.viewpoint import camera_around_object
     from tbcad.simulate.views.method import suitable_method
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
@@ -93,6 +95,8 @@ def view(
     angles = radians(azimuth_deg), radians(elevation_deg)
     camera = camera_around_object(*angles, distance_mm, light_field.capture_mm, size)
     tiles = MirrorTiles(light_field)
+    if method == "depth":
+        return depth_view(tiles, camera)[0]
     return synthesise(tiles, camera, method or suitable_method(tiles).method)
 
 

@@ -8,6 +8,7 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_capture, check_is_export, check_is_object
 from tbcad.cli.options import (
+    METHODS,
     Azimuth,
     Capture,
     Distance,
@@ -18,7 +19,6 @@ from tbcad.cli.options import (
     Fov,
     Height,
     JsonResult,
-    MethodOfView,
     ObjectFile,
     OutPicture,
     OutReplaced,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.views.method import MethodChoice
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import Method
-    from tbcad.types import Bytes
+    from tbcad.types import Bytes, Progress
 
 MOST_SAMPLES = 8
 WIDEST_DEG = 170
@@ -109,7 +109,14 @@ def view(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     out: OutPicture = Path("view.png"),
-    method: MethodOfView = None,
+    method: Annotated[
+        Literal["nearest", "blend", "depth"] | None,
+        typer.Option(
+            help=f"{METHODS}; depth: a blend at the depth that the light field itself shows. By "
+            "default blend, but nearest where the virtual cameras are so far apart that their "
+            "pictures of one point differ."
+        ),
+    ] = None,
     surface: Annotated[
         Literal["plane", "object"],
         typer.Option(
@@ -117,6 +124,15 @@ def view(
             "of the object, or the object itself."
         ),
     ] = "plane",
+    depth_files: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--depth",
+            metavar="FILE",
+            help="Also write the depth of --method depth: as PNG of 16 bits, or as points (PLY); "
+            "repeatable.",
+        ),
+    ] = None,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
@@ -131,29 +147,72 @@ def view(
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.scene.ground_truth import pinhole_picture
-    from tbcad.simulate.scene.ray_casting import depth_along_rays
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.simulate.views.synthesis import synthesise
 
     _check_pictures(capture_folder, out, force)
+    _check_depth(depth_files or [], out, method, surface, force)
     with stages(3) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = _viewpoint(source, (azimuth, elevation, distance), (width, height), fov)
         scene = _scene(capture_folder)
-        depth = None
-        if surface == "object":
-            if scene is None:
-                raise InputError(f"{capture_folder} has no object: use --surface plane")
-            depth = depth_along_rays(scene)
+        if surface == "object" and scene is None:
+            raise InputError(f"{capture_folder} has no object: use --surface plane")
         screen.stage("view")
-        tiles = MirrorTiles(source)
-        chosen = _method(tiles, method, surface)
-        picture = synthesise(tiles, at, chosen.method, depth).image
+        tiles, chosen, reason = MirrorTiles(source), "depth", "as --method says"
+        if method == "depth":
+            picture = _depth_view(tiles, at, depth_files or [], screen.detail)
+        else:
+            chosen, reason = (choice := _method(tiles, method, surface))
+            picture = _view(tiles, at, choice.method, scene if surface == "object" else None)
         screen.stage("truth")
         truth = None if scene is None else to_bytes(pinhole_picture(scene, at))
-    typer.echo(f"method {chosen.method}: {chosen.reason}")
-    _show(out, picture, truth, (chosen.method, "ray-traced"))
+    typer.echo(f"method {chosen}: {reason}")
+    _show(out, picture, truth, (chosen, "ray-traced"))
+    for file in depth_files or []:
+        typer.echo(f"{file}: depth")
     return 0
+
+
+def _check_depth(
+    files: list[Path],
+    out: Path,
+    method: Literal["nearest", "blend", "depth"] | None,
+    surface: Literal["plane", "object"],
+    force: bool,
+) -> None:
+    from tbcad.simulate.image_files import check_image_path
+
+    if method != "depth" and files:
+        raise InputError(f"--depth {files[0]}: no depth is looked for: add --method depth")
+    if method == "depth" and surface == "object":
+        raise InputError("--method depth finds the surface itself: leave out --surface object")
+    for k, file in enumerate(files):
+        check_image_path(file, force, (".png", ".ply"))
+        if file in (out, *_compared_files(out), *files[:k]):
+            raise InputError(f"--depth {file}: another file of this command: choose another name")
+
+
+def _view(tiles: "MirrorTiles", at: "Camera", method: "Method", scene: "Scene | None") -> "Bytes":
+    """The picture, on the surface of an object if one is given."""
+    from tbcad.simulate.scene.ray_casting import depth_along_rays
+    from tbcad.simulate.views.synthesis import synthesise
+
+    depth = None if scene is None else depth_along_rays(scene)
+    return synthesise(tiles, at, method, depth).image
+
+
+def _depth_view(
+    tiles: "MirrorTiles", at: "Camera", files: list[Path], progress: "Progress"
+) -> "Bytes":
+    """The picture at the depth that is found, and files of that depth."""
+    from tbcad.atomic_files import replace_files
+    from tbcad.depth.view import depth_view
+
+    picture, depth = depth_view(tiles, at, progress)
+    for file in files:
+        content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
+        replace_files(file.parent, {file.name: content})
+    return picture.image
 
 
 @app.command()

@@ -23,6 +23,7 @@ WITHOUT_FIGURES = {"picture", "report", "simulate-run", "view", "refocus"}
 SEVERAL_KINDS = {
     "--n",  # build leaves its check to the design
     "--cameras",  # camera: a file of them; export: names of virtual ones
+    "--method",  # view also finds the depth first, which takes too long for moving and for studies
     "--from",  # init: a design's name; studies: the smallest n
     "--size",  # run, export: a picture's pixels; intrinsics: width of a square, mm
     "--to",  # studies: the largest n; export: the program that reads it

@@ -99,6 +99,44 @@ def test_view(
     assert "PSNR" in capsys.readouterr().out
 
 
+def test_depth_of_a_view(captured: Path, tmp_path: Path) -> None:
+    words = ["view", str(captured), "--method", "depth", "--out", str(tmp_path / "view.png")]
+    words += ["--width", "160", "--height", "120"]
+    png, ply = tmp_path / "depth.png", tmp_path / "points.ply"
+    assert run([*words, "--depth", str(png), "--depth", str(ply)]) == 0
+    assert Image.open(png).size == (40, 30)
+    assert ply.read_bytes().startswith(b"ply\n")
+    first = png.read_bytes(), ply.read_bytes()
+    assert run([*words, "--depth", str(png), "--depth", str(ply), "--force"]) == 0
+    assert (png.read_bytes(), ply.read_bytes()) == first
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        (["--depth", "d.png"], "add --method depth"),
+        (["--method", "depth", "--surface", "object"], "leave out --surface object"),
+        (["--method", "depth", "--depth", "d.gif"], "ends in .png or .ply"),
+        (["--method", "depth", "--depth", "view.png"], "choose another name"),
+        (["--method", "depth", "--depth", "d.png", "--depth", "d.png"], "choose another name"),
+    ],
+)
+def test_depth_that_cannot_be(
+    captured: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    more: list[str],
+    wrong: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["view", str(captured), *more]) == 2
+    error = capsys.readouterr().err
+    assert wrong in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
 def test_pictures_that_exist_are_replaced_on_force_only(
     captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,1 @@
+"""Depth of what a light field shows, found without a mesh."""

@@ -1,0 +1,94 @@
+"""The depth of a view as a surface: for a blend, as points, and as files."""
+
+from dataclasses import dataclass, replace
+from io import BytesIO
+
+import numpy as np
+import trimesh
+from PIL import Image
+from scipy.ndimage import map_coordinates
+
+from tbcad.datasets.pinhole_pictures import PinholePictures
+from tbcad.depth.plane_sweep import swept_depth
+from tbcad.errors import InputError
+from tbcad.optics.camera import Camera
+from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.types import Bytes, Floats
+
+# Pixels of a view for one of its depth: mirrors show a tenth of a view's resolution at most.
+STEP_PX = 4
+# A plane that is less different than a middling one, by colour, is no surface but empty or even.
+KNOWN = 3.0
+BLACK = 8  # of 255: no brighter is the background, which is matt black
+DEEPEST = 65535  # the number of the capture sphere's front in a PNG of 16 bits; 0 is unknown
+
+
+@dataclass(frozen=True)
+class DepthMap:
+    """Depth of a view.
+
+    Attributes:
+        view: the camera of the depth's pixels.
+        depth: mm behind the plane through the origin that faces the view, (h, w); NaN where rays
+            pass the capture sphere.
+        known: by how much colours differ more on other planes, (h, w).
+        capture_mm: diameter of the capture sphere.
+    """
+
+    view: Camera
+    depth: Floats
+    known: Floats
+    capture_mm: float
+
+    def along_rays(self, origin: Floats, direction: Floats) -> Floats:
+        """Distance (n,) along rays (n, 3) of the view's pinhole to the surface, mm."""
+        place = self.view.project(origin + direction)
+        depth = map_coordinates(np.nan_to_num(self.depth), place.T[::-1], order=1, mode="nearest")
+        plane = -float(self.view.pinhole @ self.view.forward)
+        return np.asarray((plane + depth) / (direction @ self.view.forward))
+
+    def points(self) -> Floats:
+        """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
+        along = view_directions(self.view)
+        along /= (along @ self.view.forward)[..., None]
+        plane = -float(self.view.pinhole @ self.view.forward)
+        points = self.view.pinhole + (plane + self.depth)[..., None] * along
+        return np.where((self.known > KNOWN)[..., None], points, np.nan)
+
+    def png(self) -> bytes:
+        """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
+        share = 0.5 - self.depth / self.capture_mm
+        number = np.rint(1 + (DEEPEST - 1) * np.clip(share, 0, 1))
+        number = np.where(self.known > KNOWN, number, 0)
+        with BytesIO() as buffer:
+            Image.fromarray(number.astype(np.uint16)).save(buffer, "PNG")
+            return buffer.getvalue()
+
+    def ply(self, image: Bytes) -> bytes:
+        """The points that are known as PLY, with the colours of a picture of the view (h, w, 3).
+
+        What is black there is left out: the background, whose depth nothing shows.
+        """
+        points = self.points().reshape(-1, 3)
+        size = self.view.width_px, self.view.height_px
+        smaller = Image.fromarray(image).resize(size, Image.Resampling.BOX)
+        colours = np.asarray(smaller).reshape(-1, 3)
+        kept = np.isfinite(points).all(axis=1) & (colours.max(axis=1) > BLACK)
+        cloud = trimesh.PointCloud(points[kept], colors=colours[kept])
+        content = cloud.export(file_type="ply")
+        return content if isinstance(content, bytes) else content.encode("ascii")
+
+
+def depth_map(pictures: PinholePictures, view: Camera) -> DepthMap:
+    """The depth of a view.
+
+    Raises:
+        InputError: the camera does not look at the origin, so planes across it mean nothing.
+    """
+    aside = np.linalg.norm(np.cross(view.pinhole, view.forward))
+    if aside > pictures.capture_mm / 2:
+        raise InputError("the view does not look at the object: turn its camera to the origin")
+    size = -(-view.width_px // STEP_PX), -(-view.height_px // STEP_PX)
+    smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
+    depth, known = swept_depth(pictures, smaller)
+    return DepthMap(smaller, depth, known, pictures.capture_mm)
