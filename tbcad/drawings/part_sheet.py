@@ -230,16 +230,13 @@ def _levels(shape: Shape, frame: _Frame) -> Iterator[Entity]:
     x, y, z = (_chosen(shape, frame, k) for k in range(3))
     (left, low), _ = _outline(frame, "B")
     above, side = frame.views["B"], frame.views["A"]
-    yield from ruler_across(
-        [(above.at(at * np.eye(3)[0])[0], mm(at)) for at in x], low, low - LEVELS_MM
-    )
-    yield from ruler_upward(
-        [(above.at(at * np.eye(3)[1])[1], mm(at)) for at in y], left, left - LEVELS_MM
-    )
+    rulers = [(above.at(at * np.eye(3)[0])[0], mm(at)) for at in x]
+    yield from ruler_across(rulers, above.origin[0], low, low - LEVELS_MM)
+    rulers = [(above.at(at * np.eye(3)[1])[1], mm(at)) for at in y]
+    yield from ruler_upward(rulers, above.origin[1], left, left - LEVELS_MM)
     (left, _), _ = _outline(frame, "A")
-    yield from ruler_upward(
-        [(side.at(at * np.eye(3)[2])[1], mm(at)) for at in z], left, left - LEVELS_MM
-    )
+    rulers = [(side.at(at * np.eye(3)[2])[1], mm(at)) for at in z]
+    yield from ruler_upward(rulers, side.origin[1], left, left - LEVELS_MM)
 
 
 def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
@@ -264,12 +261,12 @@ def _overall(frame: _Frame, found: Sequence[Cylinder]) -> Iterator[Entity]:
         and np.allclose((frame.high - frame.low)[:2], 2 * one.radius, atol=SAME_MM)
         for one in found
     )
-    sign = "Ø" if round_part else ""
+    form = "Ø<>" if round_part else "<>"
     (left, _), (right, high) = _outline(frame, "A")
-    yield from across((left, high), (right, high), high + LENGTH_MM, sign + width)
+    yield across((left, high), (right, high), high + LENGTH_MM, width, form)
     (left, low), (right, high) = _outline(frame, "C")
-    yield from across((left, high), (right, high), high + LENGTH_MM, sign + depth)
-    yield from upward((right, low), (right, high), right + LENGTH_MM, height)
+    yield across((left, high), (right, high), high + LENGTH_MM, depth, form)
+    yield upward((right, low), (right, high), right + LENGTH_MM, height)
 
 
 def _pages(
