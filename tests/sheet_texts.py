@@ -6,12 +6,12 @@ from itertools import combinations
 import numpy as np
 
 from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
-from tbcad.formats.entities import Text
+from tbcad.formats.entities import Text, simple
 from tbcad.formats.pdf import text_width
 
 
 def texts(sheet: Sheet) -> list[Text]:
-    return [one for one in sheet.entities if isinstance(one, Text)]
+    return [one for one in simple(sheet.entities) if isinstance(one, Text)]
 
 
 def covered(text: Text) -> tuple[float, float, float, float]:

@@ -20,6 +20,7 @@ from tbcad_verify.record.prototype_tables import Balls, PartsList, Plan, PlateHo
 import tbcad
 from tbcad.cli.app import app
 from tbcad.cli.help_order import HEADINGS
+from tbcad.reference.template import design_template
 
 ROOT = Path(__file__).parents[2]
 RECORDS: dict[str, type[BaseModel]] = {
@@ -82,15 +83,14 @@ def _plain(text: str) -> str:
 
 
 def _keys() -> Iterator[str]:
-    """The paper's design, in which every key is explained, section by section."""
+    """What `tbcad init` writes, in which every key is explained, section by section."""
     yield (
         "# Keys of a design\n\nA design is a TOML file. These are all its keys with their "
-        "defaults, as in `designs/turtleback.toml`; a key that is left out has the value given "
+        "defaults, as `tbcad init` writes them; a key that is left out has the value given "
         "here. On the command line: `tbcad build --set shell.wall_mm=4`."
     )
-    text = (ROOT / "designs/turtleback.toml").read_text("utf-8")
-    for section in re.split(r"\n(?=\[)", text):
-        name = re.match(r"\[(.*)\]", section)
+    for section in re.split(r"\n(?=(?:# .*\n)+\[)", design_template()):
+        name = re.search(r"^\[(.*)\]", section, re.MULTILINE)
         yield f"\n## {name[1] if name else 'Name'}\n\n```toml\n{section.strip()}\n```"
 
 

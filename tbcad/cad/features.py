@@ -7,9 +7,12 @@ import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepTools import BRepTools
 from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane
+from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
@@ -76,6 +79,12 @@ def bounds(shape: TopoDS_Shape) -> Floats:
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     x, y, z, right, back, high = box.Get()
     return np.array([[x, y, z], [right, back, high]])
+
+
+def distance(shape: TopoDS_Shape, point: Floats) -> float:
+    """Least distance of a point (mm, (3,)) from a shape, mm."""
+    vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
+    return float(BRepExtrema_DistShapeShape(vertex, shape).Value())
 
 
 def cylinders(shape: TopoDS_Shape) -> list[Cylinder]:

@@ -6,7 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from tbcad.drafting.sheet import Box
-from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Polyline, Text
+from tbcad.formats.entities import (
+    Circle,
+    Dimension,
+    Layer,
+    Line,
+    Measured,
+    Point,
+    Polyline,
+    Simple,
+    Text,
+)
 from tbcad.formats.pdf import text_width
 from tbcad.types import Floats
 
@@ -22,25 +32,41 @@ SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 LEAST_MM = 1e-9  # lines across x or y are taken for as much oblique
 
 
-def across(start: Point, end: Point, level: float, text: str) -> Iterator[Entity]:
-    """A horizontal dimension between two points, its line at a level."""
-    for point in (start, end):
-        away = math.copysign(1.0, level - point[1])
-        foot = (point[0], point[1] + away * GAP_MM)
-        yield Line(Layer.DIMENSIONS, foot, (point[0], level + away * BEYOND_MM))
-    yield from _measured((start[0], level), (end[0], level), text, 0.0)
+def across(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
+    """A horizontal dimension between two points, its line at a level; <> stands for the size."""
+    feet = [_extended(point, (point[0], level)) for point in (start, end)]
+    line = (end[0], level)
+    measured = _measured((start[0], level), line, form.replace("<>", size), 0.0)
+    return _length(start, end, line, 0.0, (size, form), (*feet, *measured))
 
 
-def upward(start: Point, end: Point, level: float, text: str) -> Iterator[Entity]:
-    """A vertical dimension between two points, its line at a level."""
-    for point in (start, end):
-        away = math.copysign(1.0, level - point[0])
-        foot = (point[0] + away * GAP_MM, point[1])
-        yield Line(Layer.DIMENSIONS, foot, (level + away * BEYOND_MM, point[1]))
-    yield from _measured((level, start[1]), (level, end[1]), text, 90.0)
+def upward(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
+    """A vertical dimension between two points, its line at a level; <> stands for the size."""
+    feet = [_extended(point, (level, point[1])) for point in (start, end)]
+    line = (level, end[1])
+    measured = _measured((level, start[1]), line, form.replace("<>", size), 90.0)
+    return _length(start, end, line, 90.0, (size, form), (*feet, *measured))
 
 
-def _measured(start: Point, end: Point, text: str, turn: float) -> Iterator[Entity]:
+def _length(
+    start: Point,
+    end: Point,
+    line: Point,
+    turn: float,
+    text: tuple[str, str],
+    drawn: tuple[Simple, ...],
+) -> Dimension:
+    return Dimension(Layer.DIMENSIONS, Measured.LENGTH, start, end, line, turn, *text, drawn)
+
+
+def _extended(point: Point, line: Point) -> Line:
+    """An extension line from a point to a place of the dimension line, and beyond it."""
+    x, y = (float(np.sign(b - a)) for a, b in zip(point, line, strict=True))
+    foot = point[0] + x * GAP_MM, point[1] + y * GAP_MM
+    return Line(Layer.DIMENSIONS, foot, (line[0] + x * BEYOND_MM, line[1] + y * BEYOND_MM))
+
+
+def _measured(start: Point, end: Point, text: str, turn: float) -> Iterator[Simple]:
     above = ABOVE_MM
     yield Line(Layer.DIMENSIONS, start, end)
     if math.dist(start, end) < SHORT_MM:  # arrows from outside
@@ -81,7 +107,7 @@ def arrow(tip: Point, tail: Point) -> Polyline:
     return Polyline(Layer.DIMENSIONS, corners)
 
 
-def leader(tip: Point, corner: Point, text: str) -> Iterator[Entity]:
+def leader(tip: Point, corner: Point, text: str) -> Iterator[Simple]:
     """An arrow to a point, from a corner that a text begins at, on the side away from the point."""
     yield Line(Layer.DIMENSIONS, tip, corner)
     yield arrow(tip, corner)
@@ -91,7 +117,15 @@ def leader(tip: Point, corner: Point, text: str) -> Iterator[Entity]:
     yield Text(Layer.DIMENSIONS, (left, corner[1] + ABOVE_MM), TEXT_MM, text)
 
 
-def centre_cross(circle: Circle) -> Iterator[Entity]:
+def diameter(circle: Circle, tip: Point, corner: Point, size: str, form: str) -> Dimension:
+    """A circle's diameter, told at a leader to a point of it; <> stands for the size."""
+    opposite = 2 * circle.centre[0] - tip[0], 2 * circle.centre[1] - tip[1]
+    drawn = tuple(leader(tip, corner, form.replace("<>", size)))
+    kind, layer = Measured.DIAMETER, Layer.DIMENSIONS
+    return Dimension(layer, kind, opposite, tip, corner, 0.0, size, form, drawn)
+
+
+def centre_cross(circle: Circle) -> Iterator[Simple]:
     """Centre lines of a circle."""
     (x, y), reach = circle.centre, circle.radius + CROSS_MM
     yield Line(Layer.CENTRE, (x - reach, y), (x + reach, y))
@@ -103,7 +137,7 @@ def labels(
     texts: Iterable[str],
     lines: Sequence[tuple[Point, Point]] = (),
     taken: Sequence[Box] = (),
-) -> Iterator[Entity]:
+) -> Iterator[Simple]:
     """A label beside each circle, clear of all circles and other labels where there is room.
 
     Args:
@@ -157,34 +191,46 @@ def _meet(one: Box, other: Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def ruler_across(levels: Sequence[tuple[float, str]], edge: float, row: float) -> Iterator[Entity]:
+def ruler_across(
+    levels: Sequence[tuple[float, str]], zero: float, edge: float, row: float
+) -> Iterator[Dimension]:
     """Running dimensions below an edge: a text for each x, turned, in a row (ISO 129-1).
 
     Args:
         levels: x on paper and text.
+        zero: x on paper of the datum.
         edge: y where extension lines begin.
         row: y of the row of texts; they go down from it.
     """
     places = spread([x for x, _ in levels], RULER_MM)
     for (x, text), place in zip(levels, places, strict=True):
-        knee = row + JOG_MM
-        yield Polyline(
-            Layer.DIMENSIONS, ((x, edge - GAP_MM), (x, knee), (place, row)), closed=False
-        )
+        way = (x, edge - GAP_MM), (x, row + JOG_MM), (place, row)
         low = row - GAP_MM - text_width(text, LABEL_MM)
-        yield Text(Layer.DIMENSIONS, (place + LABEL_MM / 2, low), LABEL_MM, text, "left", 90.0)
+        words = Text(Layer.DIMENSIONS, (place + LABEL_MM / 2, low), LABEL_MM, text, "left", 90.0)
+        yield _running((zero, edge), (x, edge), 0.0, way, words)
 
 
-def ruler_upward(levels: Sequence[tuple[float, str]], edge: float, row: float) -> Iterator[Entity]:
+def ruler_upward(
+    levels: Sequence[tuple[float, str]], zero: float, edge: float, row: float
+) -> Iterator[Dimension]:
     """Running dimensions left of an edge: a text for each y, in a column that ends at a row."""
     places = spread([y for y, _ in levels], RULER_MM)
     for (y, text), place in zip(levels, places, strict=True):
-        knee = row + JOG_MM
-        yield Polyline(
-            Layer.DIMENSIONS, ((edge - GAP_MM, y), (knee, y), (row, place)), closed=False
-        )
+        way = (edge - GAP_MM, y), (row + JOG_MM, y), (row, place)
         at = row - GAP_MM, place - LABEL_MM / 2
-        yield Text(Layer.DIMENSIONS, at, LABEL_MM, text, "right")
+        words = Text(Layer.DIMENSIONS, at, LABEL_MM, text, "right")
+        yield _running((edge, zero), (edge, y), 90.0, way, words)
+
+
+def _running(
+    datum: Point, point: Point, turn: float, way: tuple[Point, ...], words: Text
+) -> Dimension:
+    """A running dimension; the minus of its text stands before what is measured."""
+    size = words.text.removeprefix("-")
+    form = words.text.removesuffix(size) + "<>"
+    drawn = Polyline(Layer.DIMENSIONS, way, closed=False), words
+    kind, layer = Measured.RUNNING, Layer.DIMENSIONS
+    return Dimension(layer, kind, datum, point, way[-1], turn, size, form, drawn)
 
 
 def spread(wanted: Sequence[float], gap: float) -> list[float]:

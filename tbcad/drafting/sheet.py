@@ -7,7 +7,18 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tbcad.formats.dxf import write_dxf
-from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline, Text
+from tbcad.formats.entities import (
+    Arc,
+    Circle,
+    Dimension,
+    Entity,
+    Layer,
+    Line,
+    Point,
+    Polyline,
+    Simple,
+    Text,
+)
 from tbcad.formats.pdf import text_width, write_pdf
 from tbcad.version import __version__
 
@@ -188,30 +199,34 @@ def moved(entity: Entity, start: Point, scale: float) -> Entity:
     def new(point: Point) -> Point:
         return (point[0] - start[0]) * scale, (point[1] - start[1]) * scale
 
+    if isinstance(entity, Dimension):
+        begin, end, line = map(new, (entity.start, entity.end, entity.line))
+        drawn = tuple(_moved(one, new, scale) for one in entity.drawn)
+        return replace(entity, start=begin, end=end, line=line, drawn=drawn)
     return _moved(entity, new, scale)
 
 
 @singledispatch
-def _moved(entity: Entity, new: Callable[[Point], Point], scale: float) -> Entity:
+def _moved(entity: Simple, new: Callable[[Point], Point], scale: float) -> Simple:
     raise TypeError(entity)
 
 
 @_moved.register
-def _(entity: Line, new: Callable[[Point], Point], scale: float) -> Entity:
+def _(entity: Line, new: Callable[[Point], Point], scale: float) -> Simple:
     return replace(entity, start=new(entity.start), end=new(entity.end))
 
 
 @_moved.register
-def _(entity: Polyline, new: Callable[[Point], Point], scale: float) -> Entity:
+def _(entity: Polyline, new: Callable[[Point], Point], scale: float) -> Simple:
     return replace(entity, corners=tuple(map(new, entity.corners)))
 
 
 @_moved.register(Circle)
 @_moved.register(Arc)
-def _(entity: Circle | Arc, new: Callable[[Point], Point], scale: float) -> Entity:
+def _(entity: Circle | Arc, new: Callable[[Point], Point], scale: float) -> Simple:
     return replace(entity, centre=new(entity.centre), radius=entity.radius * scale)
 
 
 @_moved.register
-def _(entity: Text, new: Callable[[Point], Point], scale: float) -> Entity:
+def _(entity: Text, new: Callable[[Point], Point], scale: float) -> Simple:
     return replace(entity, place=new(entity.place), height=entity.height * scale)

@@ -7,6 +7,7 @@ from tbcad.formats.entities import Entity, Layer, Point, Text
 from tbcad.formats.pdf import text_width
 
 ROW_MM, TEXT_MM, CELL_MM = 5.0, 2.5, 1.5  # height of rows and texts, room before a text
+LEAST_MM = 1.6  # height of a text that is read without a lens
 
 
 def table(
@@ -18,6 +19,16 @@ def table(
         for width, text in zip(widths, cells, strict=True):
             yield rectangle((left, low, left + width, low + ROW_MM), Layer.DIMENSIONS)
             if text:
-                height = TEXT_MM * min(1.0, (width - 2 * CELL_MM) / text_width(text, TEXT_MM))
-                yield Text(Layer.DIMENSIONS, (left + CELL_MM, low + CELL_MM - 0.25), height, text)
+                place = left + CELL_MM, low + CELL_MM - 0.25
+                yield Text(Layer.DIMENSIONS, place, _height(text, width), text)
             left += width
+
+
+def is_legible(text: str, width: float) -> bool:
+    """Whether a text is large enough in a cell of a width (mm)."""
+    return not text or _height(text, width) >= LEAST_MM
+
+
+def _height(text: str, width: float) -> float:
+    """Height of a text such that it fits into a cell."""
+    return TEXT_MM * min(1.0, (width - 2 * CELL_MM) / text_width(text, TEXT_MM))

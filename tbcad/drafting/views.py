@@ -8,7 +8,16 @@ import numpy as np
 
 from tbcad.cad.projection import FULL_DEG, Chain, Curve, Projection, Round, Segment
 from tbcad.drafting.sheet import placed
-from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
+from tbcad.formats.entities import (
+    Arc,
+    Circle,
+    Entity,
+    Layer,
+    Line,
+    Point,
+    Polyline,
+    simple,
+)
 from tbcad.types import Floats
 
 # Right, up and toward the eye in the part's frame: from in front, from above, from the left.
@@ -69,7 +78,7 @@ def as_entities(curves: Iterable[Curve], layer: Layer) -> Iterator[Entity]:
 def straight(entities: Iterable[Entity]) -> list[tuple[Point, Point]]:
     """Straight pieces of what is drawn, by their ends: arcs as chords."""
     pieces: list[tuple[Point, Point]] = []
-    for one in entities:
+    for one in simple(entities):
         match one:
             case Line(_, start, end):
                 pieces.append((start, end))

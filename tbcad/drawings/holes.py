@@ -1,11 +1,12 @@
 """Round holes and slots of a part: their numbers, sizes and places for a drawing's table."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad.cad.features import HOLE_DEG, SLOT_DEG, Cylinder
+from tbcad.drafting.tables import is_legible
 from tbcad.drafting.views import ABOVE, FRONT, LEFT
 from tbcad.types import Floats
 
@@ -72,17 +73,18 @@ def numbered_holes(
     return numbered
 
 
-def cells(number: str, hole: Hole) -> tuple[str, ...]:
-    """The row of a hole in the table, below HEAD."""
+def table_rows(number: str, hole: Hole) -> Iterator[tuple[str, ...]]:
+    """The row of a hole in the table, below HEAD, and a second one for what has no room in it."""
     wall = hole.cylinder
     depth = "through" if hole.through else mm(wall.length)
-    return (
-        number,
-        mm(2 * wall.radius),
-        *(f"{value + 0.0:.2f}" for value in np.round(hole.mouth, 2).tolist()),
-        depth,
-        _remark(hole),
+    place = (f"{value + 0.0:.2f}" for value in np.round(hole.mouth, 2).tolist())
+    remarks = _remarks(hole)
+    first, *others = (
+        [" ".join(remarks)] if is_legible(" ".join(remarks), WIDTHS_MM[-1]) else remarks
     )
+    yield number, mm(2 * wall.radius), *place, depth, first
+    for one in others:
+        yield *("" for _ in HEAD[1:]), one
 
 
 def mm(value: float) -> str:
@@ -90,16 +92,17 @@ def mm(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
 
 
-def _remark(hole: Hole) -> str:
+def _remarks(hole: Hole) -> list[str]:
+    """What a slot is, what goes in, and the axis of a tilted hole."""
+    found = [hole.takes] if hole.takes else []
     if np.any(hole.slot):
         length = float(np.linalg.norm(hole.slot)) + 2 * hole.cylinder.radius
         slot = f"slot {mm(2 * hole.cylinder.radius)} x {mm(length)}"
-        return f"{slot}, {hole.takes}" if hole.takes else slot
+        return [f"{slot},", *found] if found else [slot]
     if hole.is_tilted:
         x, y, z = (np.round(hole.cylinder.axis, 3) + 0.0).tolist()
-        axis = f"({x:.3f} {y:.3f} {z:.3f})"
-        return f"{hole.takes} {axis}" if hole.takes else axis
-    return hole.takes
+        found.append(f"({x:.3f} {y:.3f} {z:.3f})")
+    return found or [""]
 
 
 def _order(hole: Hole) -> tuple[bool, str, tuple[float, ...]]:
@@ -117,19 +120,18 @@ def _hole(wall: Cylinder, slot: Floats, fasteners: Iterable[Fastener]) -> Hole:
     return Hole(wall, mouth + slot / 2, view, slot, _for(wall, slot, fasteners))
 
 
+def is_coaxial(wall: Cylinder, place: Floats, along: Floats, slot: Floats | None = None) -> bool:
+    """Whether a line is the axis of a hole, or lies between a slot's ends."""
+    axis, offset = wall.axis, place - wall.start
+    off = offset - (offset @ axis) * axis
+    if slot is not None and np.any(slot):
+        off = off - np.clip(off @ slot / float(slot @ slot), 0.0, 1.0) * slot
+    return bool(abs(along @ axis) >= PARALLEL_COS and np.linalg.norm(off) < NEAR_MM)
+
+
 def _for(wall: Cylinder, slot: Floats, fasteners: Iterable[Fastener]) -> str:
     """The part that lies on the axis of a hole or between a slot's ends."""
-    axis, length = wall.axis, float(np.linalg.norm(slot))
-    names = set()
-    for part, place, along in fasteners:
-        if abs(along @ axis) < PARALLEL_COS:
-            continue
-        offset = place - wall.start
-        off = offset - (offset @ axis) * axis
-        if length:
-            off = off - np.clip(off @ slot / length**2, 0.0, 1.0) * slot
-        if np.linalg.norm(off) < NEAR_MM:
-            names.add(part)
+    names = {part for part, place, along in fasteners if is_coaxial(wall, place, along, slot)}
     return " ".join(sorted(names))
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tbcad.drafting.dimensions import across, labels, leader
+from tbcad.drafting.dimensions import across, diameter, labels
 from tbcad.drafting.sheet import (
     A3,
     LEFT_MM,
@@ -275,10 +275,11 @@ def _capture_length(
     turn = math.radians(LEADER_DEG)
     tip = x + scale * capture * math.cos(turn), y + scale * capture * math.sin(turn)
     corner = tip[0] - LEADER_MM, tip[1] - LEADER_MM
-    yield from leader(tip, corner, f"capture sphere Ø{2 * capture:g}")
+    sphere = Circle(Layer.CUT, middle, scale * capture)
+    yield diameter(sphere, tip, corner, f"{2 * capture:g}", "capture sphere Ø<>")
     low, reach = y + scale * float(pinhole[1]), abs(float(pinhole[0]))
     left, right = (x - scale * reach, low), (x + scale * reach, low)
-    yield from across(left, right, low - LEVEL_MM, f"{2 * reach:g}")
+    yield across(left, right, low - LEVEL_MM, f"{2 * reach:g}")
 
 
 def _values(

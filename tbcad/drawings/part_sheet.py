@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -29,17 +28,19 @@ from tbcad.drafting.sheet import (
     notes,
     title_block,
 )
-from tbcad.drafting.tables import ROW_MM, table
+from tbcad.drafting.tables import ROW_MM
 from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.drawings.columns import Table, drawn, in_columns
+from tbcad.drawings.fits import Mate, fits_table
 from tbcad.drawings.holes import (
     HEAD,
     VIEWS,
     WIDTHS_MM,
     Fastener,
     Hole,
-    cells,
     mm,
     numbered_holes,
+    table_rows,
 )
 from tbcad.formats.entities import Circle, Entity, Layer, Point, Text
 from tbcad.formats.pdf import text_width
@@ -94,20 +95,29 @@ class _Frame:
         return np.asarray(self.box[1])
 
 
-def part_sheets(shape: Shape, fasteners: Sequence[Fastener], text: PartText) -> list[Sheet]:
-    """All sheets of a part: views and what fits of the table, then the rest of the table.
+def part_sheets(
+    shape: Shape,
+    fasteners: Sequence[Fastener],
+    text: PartText,
+    mates: Sequence[Mate] = (),
+    others: Sequence[Table] = (),
+) -> list[Sheet]:
+    """All sheets of a part: views and what fits of the tables, then the rest of the tables.
 
     Args:
         shape: in the drawing's frame, x to the right and z up in view A, its origin the datum.
         fasteners: that go into it, in the same frame.
         text: what is written.
+        mates: what fits into its holes, in the same frame.
+        others: tables besides those of holes and fits.
     """
     box, found = bounds(shape), cylinders(shape)
     holes = numbered_holes(found, fasteners)
-    frame = _frame(box, len(holes))
-    rows = [cells(number, hole) for number, hole in holes]
-    first, others = _pages(rows, frame.paper)
-    block = replace(text.block, sheet=f"1 of {1 + len(others)}")
+    rows = tuple(row for number, hole in holes for row in table_rows(number, hole))
+    tables = [Table(HEAD, WIDTHS_MM, rows), fits_table(holes, mates), *others]
+    frame = _frame(box, sum(len(one.rows) for one in tables))
+    first, pages = _pages(tables, frame.paper)
+    block = replace(text.block, sheet=f"1 of {1 + len(pages)}")
     low = drawing_room(frame.paper)[1]
     lengths = [*_overall(frame, found)]
     entities = [
@@ -117,14 +127,14 @@ def part_sheets(shape: Shape, fasteners: Sequence[Fastener], text: PartText) -> 
         *_picture(shape, frame),
         *_levels(shape, frame),
         *lengths,
-        *_table(frame.paper, first),
+        *_column(frame.paper, first),
         *notes((LEFT_MM + BESIDE_MM, low), _notes_width(frame.paper), text.notes),
     ]
     origin = frame.views["A"].origin
     sheet = Sheet(
         text.name, block.title, text.name, frame.paper, frame.scale, origin, tuple(entities)
     )
-    rest = [_table_sheet(text, page, k, 1 + len(others)) for k, page in enumerate(others, start=2)]
+    rest = [_table_sheet(text, page, k, 1 + len(pages)) for k, page in enumerate(pages, start=2)]
     return [sheet, *rest]
 
 
@@ -132,11 +142,11 @@ def _notes_width(paper: Point) -> float:
     return paper[0] - BORDER_MM - TITLE_MM[0] - LEFT_MM - 2 * BESIDE_MM
 
 
-def _frame(box: Floats, holes: int) -> _Frame:
+def _frame(box: Floats, rows: int) -> _Frame:
     """Paper, scale and places: the smaller paper where it takes as large a scale, or full size."""
-    small, large = _scale(A4, box, holes), _scale(A3, box, holes)
+    small, large = _scale(A4, box, rows), _scale(A3, box, rows)
     paper, scale = (A4, small) if small >= min(large, 1.0) else (A3, large)
-    left, low, right, high = _room(paper, holes)
+    left, low, right, high = _room(paper, rows)
     width, depth, height = (scale * (box[1] - box[0])).tolist()
     spare_x = right - left - width - depth - BEFORE_MM - BETWEEN_MM - BEHIND_MM
     spare_y = high - low - height - depth - BEFORE_MM - BETWEEN_MM - BEHIND_MM
@@ -151,8 +161,8 @@ def _frame(box: Floats, holes: int) -> _Frame:
     return _Frame(paper, scale, views, box, right)
 
 
-def _scale(paper: Point, box: Floats, holes: int) -> float:
-    left, low, right, high = _room(paper, holes)
+def _scale(paper: Point, box: Floats, rows: int) -> float:
+    left, low, right, high = _room(paper, rows)
     width, depth, height = (box[1] - box[0]).tolist()
     taken = BEFORE_MM + BETWEEN_MM + BEHIND_MM
     fitting = (
@@ -164,10 +174,10 @@ def _scale(paper: Point, box: Floats, holes: int) -> float:
     return next(fitting, SCALES[-1])
 
 
-def _room(paper: Point, holes: int) -> tuple[float, float, float, float]:
+def _room(paper: Point, rows: int) -> tuple[float, float, float, float]:
     """Room of the views: what border, title block and table leave."""
     left, low, right, high = drawing_room(paper)
-    return left, low, right - (sum(WIDTHS_MM) + BESIDE_MM if holes else 0.0), high
+    return left, low, right - (sum(WIDTHS_MM) + BESIDE_MM if rows else 0.0), high
 
 
 def _view(
@@ -230,16 +240,13 @@ def _levels(shape: Shape, frame: _Frame) -> Iterator[Entity]:
     x, y, z = (_chosen(shape, frame, k) for k in range(3))
     (left, low), _ = _outline(frame, "B")
     above, side = frame.views["B"], frame.views["A"]
-    yield from ruler_across(
-        [(above.at(at * np.eye(3)[0])[0], mm(at)) for at in x], low, low - LEVELS_MM
-    )
-    yield from ruler_upward(
-        [(above.at(at * np.eye(3)[1])[1], mm(at)) for at in y], left, left - LEVELS_MM
-    )
+    rulers = [(above.at(at * np.eye(3)[0])[0], mm(at)) for at in x]
+    yield from ruler_across(rulers, above.origin[0], low, low - LEVELS_MM)
+    rulers = [(above.at(at * np.eye(3)[1])[1], mm(at)) for at in y]
+    yield from ruler_upward(rulers, above.origin[1], left, left - LEVELS_MM)
     (left, _), _ = _outline(frame, "A")
-    yield from ruler_upward(
-        [(side.at(at * np.eye(3)[2])[1], mm(at)) for at in z], left, left - LEVELS_MM
-    )
+    rulers = [(side.at(at * np.eye(3)[2])[1], mm(at)) for at in z]
+    yield from ruler_upward(rulers, side.origin[1], left, left - LEVELS_MM)
 
 
 def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
@@ -264,38 +271,35 @@ def _overall(frame: _Frame, found: Sequence[Cylinder]) -> Iterator[Entity]:
         and np.allclose((frame.high - frame.low)[:2], 2 * one.radius, atol=SAME_MM)
         for one in found
     )
-    sign = "Ø" if round_part else ""
+    form = "Ø<>" if round_part else "<>"
     (left, _), (right, high) = _outline(frame, "A")
-    yield from across((left, high), (right, high), high + LENGTH_MM, sign + width)
+    yield across((left, high), (right, high), high + LENGTH_MM, width, form)
     (left, low), (right, high) = _outline(frame, "C")
-    yield from across((left, high), (right, high), high + LENGTH_MM, sign + depth)
-    yield from upward((right, low), (right, high), right + LENGTH_MM, height)
+    yield across((left, high), (right, high), high + LENGTH_MM, depth, form)
+    yield upward((right, low), (right, high), right + LENGTH_MM, height)
 
 
-def _pages(
-    rows: list[tuple[str, ...]], paper: Point
-) -> tuple[list[tuple[str, ...]], list[list[list[tuple[str, ...]]]]]:
-    """Rows of the first sheet, and columns of the sheets that follow."""
+def _pages(tables: Sequence[Table], paper: Point) -> tuple[list[Table], list[list[list[Table]]]]:
+    """The column of the first sheet, and the columns of the sheets that follow."""
+    first, *others = in_columns(tables, _rows(paper), _rows(A4))
+    return first, [others[k : k + 2] for k in range(0, len(others), 2)]
+
+
+def _rows(paper: Point) -> int:
+    """Rows that a column has room for."""
     _, low, _, high = drawing_room(paper)
-    first = int((high - low - BESIDE_MM) / ROW_MM) - 1
-    _, low, _, high = drawing_room(A4)
-    column = int((high - low - BESIDE_MM) / ROW_MM) - 1
-    rest = rows[first:]
-    starts = [*range(0, len(rest), column), len(rest)]
-    columns = [rest[a:b] for a, b in pairwise(starts)]
-    return rows[:first], [columns[k : k + 2] for k in range(0, len(columns), 2)]
+    return int((high - low - BESIDE_MM) / ROW_MM)
 
 
-def _table(paper: Point, rows: Sequence[tuple[str, ...]]) -> Iterator[Entity]:
-    if rows:
-        _, _, right, high = drawing_room(paper)
-        yield from table((right - sum(WIDTHS_MM), high), WIDTHS_MM, (HEAD, *rows))
+def _column(paper: Point, tables: Sequence[Table]) -> Iterator[Entity]:
+    _, _, right, high = drawing_room(paper)
+    yield from drawn((right - sum(WIDTHS_MM), high), tables)
 
 
 def _table_sheet(
-    text: PartText, columns: Sequence[list[tuple[str, ...]]], number: int, count: int
+    text: PartText, columns: Sequence[Sequence[Table]], number: int, count: int
 ) -> Sheet:
-    """What is left of the table of holes."""
+    """What is left of the tables."""
     block = replace(text.block, sheet=f"{number} of {count}")
     left, _, _, high = drawing_room(A4)
     step = sum(WIDTHS_MM) + BESIDE_MM
@@ -304,8 +308,8 @@ def _table_sheet(
         *title_block(A4, None, block),
         *(
             entity
-            for k, rows in enumerate(columns)
-            for entity in table((left + BESIDE_MM + k * step, high), WIDTHS_MM, (HEAD, *rows))
+            for k, tables in enumerate(columns)
+            for entity in drawn((left + BESIDE_MM + k * step, high), tables)
         ),
     ]
     name = f"{text.name}_{number}"

@@ -1,7 +1,8 @@
 """Sheets of printed parts: their frames, fasteners and notes from the export's record."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,19 @@ from tbcad.cad.projection import Shape
 from tbcad.cad.solids import moved
 from tbcad.drafting.sheet import Sheet, TitleBlock
 from tbcad.drawings.export import Export, Record
+from tbcad.drawings.fits import Mate, purchased_mate, reamed_to
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
+from tbcad.drawings.seats import Seat, seats_table
 from tbcad.formats.step_named import read_named_solid
+from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.tolerance.process.process import load_process
 from tbcad.types import Floats
 
 RESIN, RESIN_PROCESS, FILAMENT_PROCESS = "resin", "sla", "fdm"
 MAKERS_SHARE = 4.0  # standard deviations that a maker's tolerance is taken for: decision 0007
 BASE = "base"
+ON_AXIS = (BASE, "frame")  # roles of parts that shaft and bearings may go into
 ON_TOP = ("washers", "nuts")  # kinds that are on screws: a hole is for the screw
 ON_AXIS_MM, PARALLEL_COS = 1e-3, 1 - 1e-9
 CORNER = "lowest corner on the left and in front"
@@ -37,6 +42,8 @@ class PartJob:
         lines: what may be the datum: its name, a point and a direction, in the drawing's frame.
         origin: what the machine's origin becomes, (3,).
         fasteners: that go into it, in the drawing's frame.
+        mates: what fits into its holes, likewise.
+        seats: that may be on it, likewise.
     """
 
     path: Path
@@ -45,6 +52,8 @@ class PartJob:
     origin: Floats
     lines: tuple[tuple[str, Floats, Floats], ...]
     fasteners: tuple[Fastener, ...]
+    mates: tuple[Mate, ...] = ()
+    seats: tuple[Seat, ...] = ()
 
 
 def part_job(export: Export, part: Record) -> PartJob:
@@ -67,7 +76,62 @@ def part_job(export: Export, part: Record) -> PartJob:
     )
     directions = {"axis": frame[2], "vertical": np.array([0.0, 0.0, 1.0])}
     lines = tuple((name, origin, one @ axes) for name, one in directions.items())
-    return PartJob(path, _text(export, part), axes, origin, lines, fasteners)
+    mates = [
+        *(purchased_mate(export.machine.listed(name), *at) for name, *at in fasteners),
+        *_on_axis(export.machine, part, origin, frame[2] @ axes),
+    ]
+    seats = list(_seats(export, axes, origin)) if part["role"] == BASE else []
+    mates += _spigots(record, seats)
+    return PartJob(
+        path,
+        _text(export, part),
+        axes,
+        origin,
+        lines,
+        fasteners,
+        tuple(one for one in mates if one),
+        tuple(seats),
+    )
+
+
+def _on_axis(machine: Machine, part: Record, place: Floats, along: Floats) -> Iterator[Mate | None]:
+    """Shaft and bearings, which are on the axis of rotation."""
+    if part["role"] not in ON_AXIS:
+        return
+    reamed = reamed_to(part["what"])
+    for name in sorted({one["part"] for one in machine.record["bought"] if one["part"]}):
+        found = machine.listed(name)
+        if found and found.kind in ("shafts", "bearings"):
+            yield purchased_mate(found, place, along, reamed)
+
+
+def _seats(export: Export, axes: Floats, origin: Floats) -> Iterator[Seat]:
+    """All seats, by the balls' list and the record."""
+    assert export.machine is not None
+    with export.file("balls.csv").open(encoding="utf-8", newline="") as file:
+        balls = {int(row["number"]): row for row in csv.DictReader(file)}
+    for one in export.machine.record["seats"]:
+        row = balls[one["ball"]]
+        takes = f"cap {one['ball']}" if row["kind"] == "cap" else f"ball {row['size']}"
+        centre = np.array([float(row[name]) for name in ("bx", "by", "bz")]) @ axes + origin
+        contacts = np.array(one["contacts_mm"]) @ axes + origin
+        radius, pad = float(row["body_radius_mm"]), one["pad_diameter_mm"]
+        axis = np.array(one["axis"]) @ axes
+        yield Seat(one["ball"], takes, radius, centre, axis, contacts, pad)
+
+
+def _spigots(record: Record, seats: Sequence[Seat]) -> Iterator[Mate]:
+    """Spigots of caps in the pockets of their seats, along the seats' axes."""
+    for cap in record["caps"]:
+        for seat in seats:
+            if seat.number == cap["ball"]:
+                yield Mate(
+                    f"spigot of cap {seat.number}",
+                    seat.centre,
+                    seat.axis,
+                    cap["spigot_mm"],
+                    cap["socket_mm"],
+                )
 
 
 def _text(export: Export, part: Record) -> PartText:
@@ -102,7 +166,12 @@ def draw_part(job: PartJob) -> list[Sheet]:
     fasteners = [(part, place - datum, along) for part, place, along in job.fasteners]
     first, *others = job.text.notes
     lines = (first, f"Origin of x, y, z: {what}.", *others)
-    return part_sheets(shape, fasteners, PartText(job.text.name, job.text.block, lines))
+    text = PartText(job.text.name, job.text.block, lines)
+    mates = [replace(one, place=one.place - datum) for one in job.mates]
+    seats = [
+        replace(one, centre=one.centre - datum, contacts=one.contacts - datum) for one in job.seats
+    ]
+    return part_sheets(shape, fasteners, text, mates, [seats_table(shape, seats)])
 
 
 def _datum(shape: Shape, job: PartJob) -> tuple[Floats, str]:

@@ -141,7 +141,7 @@ def _lengths(low: Floats, high: Floats, origin: Point, scale: float) -> list[Ent
     )
     width, height = (high - low).tolist()
     return [
-        *across((left, top), (right, top), top + LENGTH_MM, mm(width)),
-        *upward((right, bottom), (right, top), right + LENGTH_MM, mm(height)),
-        *upward(origin, (left, top), left - LENGTH_MM, mm(float(high[1]))),
+        across((left, top), (right, top), top + LENGTH_MM, mm(width)),
+        upward((right, bottom), (right, top), right + LENGTH_MM, mm(height)),
+        upward(origin, (left, top), left - LENGTH_MM, mm(float(high[1]))),
     ]

@@ -7,10 +7,11 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Polyline, Text
+from tbcad.formats.dxf_dimensions import add_dimension
+from tbcad.formats.entities import Arc, Circle, Dimension, Entity, Layer, Line, Polyline, Text
 
 if TYPE_CHECKING:
-    from ezdxf.layouts import Modelspace
+    from ezdxf.layouts import BaseLayout
 
 VERSION = "R2010"
 MILLIMETRES = 4  # of $INSUNITS
@@ -70,34 +71,34 @@ def _fixed_dates() -> Iterator[None]:
 
 
 @singledispatch
-def _add(entity: Entity, space: "Modelspace") -> None:
+def _add(entity: Entity, space: "BaseLayout") -> None:
     raise TypeError(entity)
 
 
 @_add.register(Line)
-def _(entity: Line, space: "Modelspace") -> None:
+def _(entity: Line, space: "BaseLayout") -> None:
     space.add_line(entity.start, entity.end, {"layer": entity.layer})
 
 
 @_add.register(Circle)
-def _(entity: Circle, space: "Modelspace") -> None:
+def _(entity: Circle, space: "BaseLayout") -> None:
     space.add_circle(entity.centre, entity.radius, {"layer": entity.layer})
 
 
 @_add.register(Arc)
-def _(entity: Arc, space: "Modelspace") -> None:
+def _(entity: Arc, space: "BaseLayout") -> None:
     angles = entity.start_deg, entity.end_deg
     space.add_arc(entity.centre, entity.radius, *angles, dxfattribs={"layer": entity.layer})
 
 
 @_add.register(Polyline)
-def _(entity: Polyline, space: "Modelspace") -> None:
+def _(entity: Polyline, space: "BaseLayout") -> None:
     attributes = {"layer": entity.layer}
     space.add_lwpolyline(entity.corners, close=entity.closed, dxfattribs=attributes)
 
 
 @_add.register(Text)
-def _(entity: Text, space: "Modelspace") -> None:
+def _(entity: Text, space: "BaseLayout") -> None:
     from ezdxf.enums import TextEntityAlignment
 
     attributes = {"layer": entity.layer}
@@ -105,3 +106,10 @@ def _(entity: Text, space: "Modelspace") -> None:
         entity.text, height=entity.height, rotation=entity.turn_deg, dxfattribs=attributes
     )
     text.set_placement(entity.place, align=TextEntityAlignment[ALIGNMENTS[entity.align]])
+
+
+@_add.register(Dimension)
+def _(entity: Dimension, space: "BaseLayout") -> None:
+    block = add_dimension(entity, space)
+    for one in entity.drawn:
+        _add(one, block)

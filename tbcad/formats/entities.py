@@ -3,6 +3,8 @@
 x is to the right and y up. The same entities are written as DXF and as PDF.
 """
 
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, TypeAlias
@@ -84,5 +86,63 @@ class Text:
     turn_deg: float = 0.0
 
 
-Entity: TypeAlias = Line | Circle | Arc | Polyline | Text
+Simple: TypeAlias = Line | Circle | Arc | Polyline | Text
+"""What is drawn as it is."""
+
+
+class Measured(StrEnum):
+    """What a dimension measures."""
+
+    LENGTH = "length"  # from start to end, along a direction
+    RUNNING = "running"  # from a datum, along x or y
+    DIAMETER = "diameter"  # from a point of a circle to the one opposite
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension: what it measures, and how it is drawn.
+
+    Attributes:
+        layer: of it.
+        kind: of it.
+        start: of what is measured, or the datum.
+        end: of what is measured.
+        line: where the dimension line meets the extension line from the end; of a running
+            dimension the end of its line, of a diameter that of its leader.
+        turn_deg: direction that is measured along, from the x axis: 0 or 90.
+        size: the number that is written.
+        form: of the text, with <> for the number.
+        drawn: lines, arrows and text.
+    """
+
+    layer: Layer
+    kind: Measured
+    start: Point
+    end: Point
+    line: Point
+    turn_deg: float
+    size: str
+    form: str
+    drawn: tuple[Simple, ...]
+
+    @property
+    def measured(self) -> float:
+        """What a ruler on the drawing would show, mm."""
+        x, y = self.end[0] - self.start[0], self.end[1] - self.start[1]
+        if self.kind is Measured.DIAMETER:
+            return math.hypot(x, y)
+        turn = math.radians(self.turn_deg)
+        return abs(x * math.cos(turn) + y * math.sin(turn))
+
+
+Entity: TypeAlias = Simple | Dimension
 """Whatever a drawing consists of."""
+
+
+def simple(entities: Iterable[Entity]) -> Iterator[Simple]:
+    """All that is drawn: of dimensions their lines, arrows and texts."""
+    for entity in entities:
+        if isinstance(entity, Dimension):
+            yield from entity.drawn
+        else:
+            yield entity

@@ -10,7 +10,18 @@ from functools import cache, singledispatch
 from importlib.resources import files
 from pathlib import Path
 
-from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline, Text
+from tbcad.formats.entities import (
+    Arc,
+    Circle,
+    Entity,
+    Layer,
+    Line,
+    Point,
+    Polyline,
+    Simple,
+    Text,
+    simple,
+)
 
 POINTS_PER_MM = 72 / 25.4
 THICK_MM, THIN_MM, FINE_MM = 0.5, 0.25, 0.13  # lines by ISO 128; of hatching and many rays
@@ -54,7 +65,7 @@ def write_pdf(
         entities: in mm from the page's lower left corner.
     """
     scale = _number(POINTS_PER_MM)
-    drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, entities)])
+    drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
     box = " ".join(_number(side * POINTS_PER_MM) for side in size)
     font = "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>"
     objects = [
@@ -98,7 +109,7 @@ def _escaped(text: str) -> str:
     return text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
 
 
-def _styled(entity: Entity) -> str:
+def _styled(entity: Simple) -> str:
     if isinstance(entity, Text):
         return _text(entity)
     width, dash = WIDTHS.get(entity.layer, THIN_MM), DASHES.get(entity.layer, "[]")

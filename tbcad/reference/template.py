@@ -19,6 +19,9 @@ shown: take the # away to set it. "auto": tbcad chooses, and design.json says wh
   tbcad build FILE                 builds and verifies it
   tbcad explain mirrors.margin_mm  explains a key, or any other word"""
 
+# What a design says of keys that it leaves out; here they are all.
+ELSEWHERE = "All keys, with units and ranges: tbcad init. What is not set here has its default."
+
 
 @dataclass
 class Remarks:
@@ -35,13 +38,10 @@ def design_template(name: str = PAPER) -> str:
         name: of a design that comes with tbcad.
     """
     file = shipped_designs()[name]
-    if name == PAPER:  # sets every key to its default, and explains it as the models do
-        values: Table = {}
-        remarks = Remarks(["The design of the paper."])
-    else:
-        values = _dotted(read_toml(file, name, "design"))
-        remarks = _remarks(read_text(file, name, "design"))
-    lines = [f"# {line}".rstrip() for line in (*remarks.whole, "", *HEAD.splitlines())]
+    values = _dotted(read_toml(file, name, "design"))
+    remarks = _remarks(read_text(file, name, "design"))
+    whole = "\n".join(remarks.whole).removesuffix(ELSEWHERE).rstrip()
+    lines = [f"# {line}".rstrip() for line in (*whole.splitlines(), "", *HEAD.splitlines())]
     for section in key_sections():
         lines += _section_lines(section, values, remarks)
     return "\n".join(lines) + "\n"

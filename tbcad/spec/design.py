@@ -1,7 +1,7 @@
 """The design spec: what a user may choose, in named units, checked before anything is computed.
 
-Every key, its unit, range and default stand here once; `designs/turtleback.toml` explains
-them at length and equals the defaults, which are the design of the paper.
+Every key, its unit, range, default and explanation stand here once; `tbcad init`, `tbcad explain`
+and the site tell them. The defaults are the design of the paper, `designs/turtleback.toml`.
 """
 
 from __future__ import annotations
@@ -52,13 +52,17 @@ class OpticsSpec(Section):
     """Where the mirrors, the cameras and the object are."""
 
     n: Annotated[int, Reason("at n = 1 no camera sees a mirror whole")] = Field(18, ge=2, le=60)
-    """Subdivision of the icosahedron: the number of mirrors grows with its square."""
+    """Subdivision of the icosahedron: both halves together have about 5 n^2 mirrors, 1657 at n
+    = 18."""
     capture_diameter_mm: float = Field(60.0, gt=0, le=1000)
-    """Diameter of the capture sphere, which every virtual camera must see whole."""
+    """Diameter of the capture sphere, which every virtual camera must see whole. At the paper's
+    geometry 60 is the limit: larger, and the object blocks light between mirrors and cameras."""
     camera_mm: Point = (100.0, 0.0, -100.0)
-    """Pinhole of camera a; camera b is its mirror image in the plane x = 0."""
+    """Pinhole of camera a; camera b is its mirror image in the plane x = 0. z points up, the
+    object is at the origin."""
     semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
-    """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole."""
+    """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole. Larger:
+    mirrors farther away."""
 
 
 class CameraSpec(Section):
@@ -70,25 +74,30 @@ class CameraSpec(Section):
     """Rows of the sensor."""
     hfov_deg: Annotated[float, OrWord(FIT)] = Field(FIT, ge=1, le=MAX_HFOV)
     """Angle of view across the columns; fit: the smallest whole number of degrees that leaves a
-    border round the mirrors, 89 for the paper's design."""
+    border of 2 % round the mirrors, 89 for the paper's design; more for a smaller n."""
 
 
 class MirrorsSpec(Section):
     """How the mirrors are curved."""
 
     radius_rule: RadiusRule = "traced"
-    """Radii from exact ray tracing, from eqs. 1 and 2 of the paper, or planar mirrors."""
+    """How mirrors get their radii. traced: by exact ray tracing, as large as possible for
+    seeing the whole capture sphere; paper: by eqs. 1 and 2 of the paper, which are paraxial and
+    see about 51 mm of 60; flat: planar mirrors."""
     margin_mm: float = Field(0.6, ge=0, le=MAX_MARGIN)
-    """Coverage added to the capture diameter as the target of rule traced."""
+    """Coverage that rule traced adds to the capture diameter, for errors of manufacture and
+    mounting."""
     own_margins_mm: Annotated[tuple[Margin, ...], BeforeValidator(as_tuple)] = Field(
         (), max_length=MAX_MIRRORS
     )
     """The same for each mirror, in the order of one camera's, none below margin_mm; empty: every
     mirror has margin_mm. tbcad build --for-process computes them."""
     max_radius_widths: float = Field(30.0, ge=5, le=1000)
-    """Largest radius in half widths l; a mirror that needs less curvature is nearly flat."""
+    """Largest radius in half widths l of the mirror; one that needs less curvature than this
+    gets this radius, nearly flat, and sees more than it must."""
     coating_um: float = Field(0.0, ge=0, le=500)
-    """Thickness of the mirror coat; the modelled sphere is smaller by it."""
+    """Thickness of the reflecting coat; the modelled sphere is smaller by it, so that the
+    coated one has the right radius."""
 
     @model_validator(mode="after")
     def _own_margins_fit(self) -> Self:
@@ -110,11 +119,12 @@ class FlangeSpec(Section):
     thickness_mm: float = Field(5.0, ge=1, le=50)
     """Thickness of the plate."""
     bolt_hole_mm: float = Field(4.3, ge=1, le=30)
-    """Diameter of the bolts' clearance holes."""
+    """Diameter of the bolts' clearance holes: 4.3 for M4. It leaves 1 mm of the width on either
+    side."""
     bolts: int = Field(6, ge=2, le=60)
     """Number of bolt holes."""
     dowel_hole_mm: float = Field(4.0, ge=1, le=30)
-    """Diameter of the dowel holes."""
+    """Diameter of the dowel pins' holes, with the same 1 mm on either side."""
     dowels: int = Field(2, ge=0, le=10)
     """Number of dowel holes."""
 
@@ -143,9 +153,13 @@ class ShellSpec(Section):
     wall_mm: float = Field(3.0, ge=0.4, le=50)
     """Material behind the deepest valley or groove between mirrors."""
     edges: EdgeKind = "valley"
-    """Where mirrors end: where neighbouring spheres meet, or on pedestals of their own."""
+    """Where mirrors end. valley: where neighbouring spheres meet, without step or groove, but
+    an edge moves where either of its two mirrors is off; pedestal: each mirror stands on a
+    pedestal with straight walls, and a groove parts it from its neighbours: errors cost less
+    than a third, the grooves some of the pixels."""
     groove_mm: float = Field(0.1, ge=0.02, le=5)
-    """Width of the grooves between pedestals at the mirrors' corners; without pedestals unused."""
+    """Width of the grooves between pedestals at the mirrors' corners; they are four times as
+    deep. Without pedestals unused."""
     seam_flange: FlangeSpec = FlangeSpec()
     """Joins the two halves at x = 0."""
     foot_flange: FootFlangeSpec = FootFlangeSpec()
@@ -156,9 +170,11 @@ class MeshSpec(Section):
     """How fine the STL and 3MF are."""
 
     ray_error_mm: float = Field(0.05, ge=0.01, le=10)
-    """How far a ray off a facet may miss, at the capture sphere, the ray off the exact sphere."""
+    """How far a ray off a facet at a mirror's rim may miss, at the capture sphere, the ray off
+    the exact sphere: a facet reflects like a flat mirror."""
     chord_error_mm: float = Field(0.015, ge=0.0002, le=1)
-    """Distance of a mirror's facets from its sphere."""
+    """Distance of a mirror's facets from its sphere; the stricter of this and ray_error_mm
+    counts."""
     structure_error_mm: float = Field(0.02, ge=0.002, le=5)
     """Distance of all other facets (back, flanges, holes) from the exact surface."""
 
@@ -167,7 +183,8 @@ class StepSpec(Section):
     """How the STEP is written."""
 
     pcurves: bool = False
-    """Write the curves in the surfaces' parameters too: files grow about eightfold."""
+    """Write the curves in the surfaces' parameters too, which some old programs need: files
+    grow about eightfold."""
 
 
 class Spec(Section):

@@ -96,7 +96,8 @@ class BaseSpec(Section):
     pad_mm: float = Field(3.0, ge=0.5, le=20)
     """Diameter of the three pads that carry a ball; smaller for balls of less than 4.5 pads."""
     pad_offset_mm: float = Field(0.0, ge=-0.05, le=0.3)
-    """By how much pads are printed off their places, away from the balls: the coupon's result."""
+    """By how much pads are printed off their places, away from the balls: the offset of the
+    coupon's seat that fits, for printers that make pads stand out too far."""
     pad_angle_deg: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=70)
     """Angle between a pad's normal and the axis of its seat; auto: the first of 50, 40 and 30 whose
     seats stay out of the light."""
@@ -112,13 +113,15 @@ class BaseSpec(Section):
     magnet_height_mm: float = Field(3.0, ge=0.5, le=20)
     """Height of the magnets."""
     strong_magnet_height_mm: float = Field(5.0, ge=0.5, le=20)
-    """Height of the magnets of balls that those of magnet_height_mm would not hold."""
+    """Height of the magnets of balls that those of magnet_height_mm would not hold with twice
+    the force needed."""
     magnet_gap_mm: float = Field(0.5, ge=0.1, le=5)
     """Gap between ball and magnet, or depth of the glue well below the ball."""
     magnet_play_mm: float = Field(0.2, ge=0, le=1)
     """Play of the magnet in its pocket, on the diameter."""
     cap_play_mm: float = Field(0.1, ge=0.02, le=0.5)
-    """Play on the diameter of a cap's spigot in its seat, which lets the cap tilt."""
+    """Play on the diameter of a cap's spigot in its seat, which lets the cap tilt: ream the
+    seat's pocket and fit the spigot."""
     digit_mm: float = Field(6.0, ge=3, le=30)
     """Height of the digits in relief."""
     relief_mm: float = Field(0.6, ge=0.2, le=3)
@@ -211,15 +214,21 @@ class StageSpec(Section):
     """The stage that carries the object, with LEDs at known places for calibration."""
 
     top_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-1000, le=1000)
-    """Height of the disc that carries the object; it must be inside the capture sphere."""
+    """Height of the disc that carries the object; it must be inside the capture sphere. auto:
+    19/60 of the capture diameter below the origin, or as low as it fits."""
     disc_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=4, le=500)
-    """Diameter of that disc, which is turned by 180 degrees for the other half."""
+    """Diameter of that disc, which is turned by 180 degrees for the other half; auto: 17/60 of
+    the capture diameter, at least 12."""
     object_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=1, le=1000)
-    """Diameter of the room on the disc that stage and LEDs leave free: an upright cylinder."""
+    """Diameter of the room on the disc that stage and LEDs leave free for the object, an
+    upright cylinder up to the capture sphere; auto: two thirds of the capture diameter."""
     led: Led = "LED-3"
     """LEDs in the pockets."""
     leds_mm: Annotated[Places, OR_AUTO] = AUTO
-    """Centres of the LEDs' domes, not in one plane, two or more seen by a mirror; [] for none."""
+    """Centres of the LEDs' domes beside the object's room, not in one plane, two or more of
+    them seen from each mirror past an object and other LEDs; [] for none. auto: two pairs half
+    a turn apart, in proportion to the capture sphere; none in one of less than 60 mm, which has
+    no room, and none where they would hide each other."""
     led_ma: float = Field(10.0, ge=0.5, le=100)
     """Current of an LED, at most; the resistor is the next larger of the series E24."""
     led_supply_v: float = Field(24.0, ge=3, le=48)
@@ -237,7 +246,9 @@ class LightSpec(Section):
     """Lamps that light the object, and a shroud of card that keeps other light away."""
 
     lamp_z_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-1000, le=0)
-    """Height of the lamps' middles, 0 for none; auto: as high as light and base permit."""
+    """Height of the lamps' middles: four upright ones on the uprights and on stands as far on
+    the other side of the object, or where these have no room, two level ones; 0: none; auto: as
+    high as light and base permit, or 0 where they permit none."""
     strips: int = Field(2, ge=1, le=6)
     """LED strips on each lamp, side by side."""
     segments: int = Field(1, ge=1, le=6)
@@ -252,7 +263,8 @@ class FrameSpec(Section):
     """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
 
     floor_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-3000, le=-10)
-    """Height of the base plate's upper face."""
+    """Height of the base plate's upper face; auto: as high as camera and base permit, -230 for
+    the paper's design."""
     clearance_mm: float = Field(3.0, ge=0.5, le=50)
     """Minimum distance of all static parts from the light and from what the base sweeps."""
     flange_mm: float = Field(8.0, ge=3, le=30)
@@ -279,48 +291,65 @@ class PrototypeSpec(Section):
     k: Annotated[_Count | Literal["auto"], BeforeValidator(_count)] = "auto"
     """Number of balls, or auto: the smallest number within the limits below that has room."""
     radius_weight_deg: float = Field(0.25, ge=0, le=100)
-    """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm."""
+    """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm.
+    Larger: groups more alike in radius (fewer pixels lost), less in direction."""
     auto_direction_max_deg: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=90)
-    """With k auto: largest error of direction of any mirror."""
+    """With k auto: largest angle between any mirror's direction and its ball's; auto: 63.4 / n,
+    the distance of mirrors, but no less than at n = 18, 3.5."""
     auto_direction_median_deg: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=90)
-    """With k auto: largest median error of direction."""
+    """With k auto: largest median of that angle; auto: 0.43 of the distance of mirrors, but no
+    less than at n = 18."""
     auto_lost_percent: float = Field(25.0, ge=0, le=100)
     """With k auto: largest share of the shell's pixels that the balls lose."""
     catalogues: Annotated[tuple[str, ...], BeforeValidator(_names('["metric", "my.csv"]'))] = (
         "metric",
         "inch",
     )
-    """Lists of balls on sale: metric, inch, or CSV files."""
+    """Lists of balls on sale: metric, inch, or CSV files (as seen from the folder tbcad runs
+    in) with the columns size,diameter_mm,standard,grades,mass_g,source."""
     prices: Annotated[
         tuple[str, ...], BeforeValidator(_names('["my_prices.csv", "estimates"]'))
     ] = ("estimates",)
-    """Lists of prices: estimates, or CSV files; the first that has a part counts."""
+    """Lists of prices: estimates, or CSV files (as seen from the folder tbcad runs in) with the
+    columns part,each,per_kg,currency,date,source; the first list and line that fits a part
+    counts."""
     grade: GradeName = "G40"
-    """Grade of the balls by ISO 3290-1; only sizes sold in it are used."""
+    """Grade of the balls by ISO 3290-1, not ABMA; only sizes sold in it are used. G40 is the
+    best that reaches 60 mm."""
     largest_ball_mm: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=1000)
-    """Largest ball to buy, however large the lists go."""
+    """Largest ball to buy, however large the lists go. Smaller: a lighter base, and more caps.
+    auto: 0.8 of the semi-minor axis, at most 60."""
     snap: Snap = "cover"
-    """Which stock ball a group gets: the largest that shows all, or the nearest in radius."""
+    """Which ball a group gets. cover: the largest that shows the whole capture sphere for every
+    mirror of the group; nearest: the one nearest to the mean radius of the group: more pixels,
+    but pictures overlap."""
     picture: Picture = "moved"
-    """Whether a ball's picture is moved to its mirror's place when pictures are merged."""
+    """What happens to a ball's picture when pictures are merged. moved: it is moved to its
+    mirror's place; fixed: it stays, and balls must then be so small that few pixels remain,
+    unless k is very large."""
     caps: bool = True
-    """Give groups beyond the largest ball a made cap of their own radius."""
+    """Give groups that need more than the largest ball a printed or turned cap of their own
+    radius, in the same seat; false: they get the largest ball."""
     cap_rim_mm: float = Field(2.0, ge=0, le=50)
     """Width of the rim round the part of a cap in use."""
     ball_wall_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=50)
-    """Minimum distance between two balls, and between a ball and the post or the camera."""
+    """Minimum distance between two balls, and between a ball and the post or the camera: space
+    for the walls of their seats. auto: 0.04 of the semi-minor axis, from 1.2 to 3."""
     light_margin_mm: float = Field(0.5, ge=0, le=20)
     """Minimum distance of a ball from the light of another."""
     post_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=200)
-    """Post straight below the object, which no ball may reach; 0: none, the hub is hollow."""
+    """Post straight below the object, which no ball may reach; 0: none, the object is held
+    through a hollow hub; auto: a third of the capture diameter, from 8 to 20."""
     camera_diameter_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=500)
-    """Body of the camera behind its pinhole, which no ball may reach; 0: none."""
+    """Body of the camera behind its pinhole, which no ball may reach; 0: none; auto: 0.56 of
+    the pinhole's distance from the object in steps of 5, from 25 to 60."""
     camera_length_mm: float = Field(100.0, ge=0, le=1000)
     """Length of that body, from the pinhole back."""
     max_swing_deg: float = Field(300.0, gt=0, le=360)
     """Largest swing of the base that the drive allows."""
     stop_error_deg: float = Field(0.5, gt=0, le=20)
-    """Error of direction that a mirror may have from sharing a stop of the base with others."""
+    """Error of direction that a mirror may have from sharing a stop of the base with others.
+    Larger: fewer stops."""
     base: BaseSpec = BaseSpec()
     """The printed carrier of the balls."""
     motion: MotionSpec = MotionSpec()

@@ -62,11 +62,9 @@ def test_the_section_of_the_samples_shell(tmp_path: Path) -> None:
     ends = np.array([(*one.dxf.start.vec2, *one.dxf.end.vec2) for one in lines]).reshape(-1, 2)
     assert ends.max(axis=0) == pytest.approx(high, abs=chord)
     assert ends[:, 0].min() == pytest.approx(low[0], abs=chord)
-    words = {one.dxf.text for one in space.query("TEXT")}
-    assert any(
-        word.replace(".", "").isdigit() and abs(float(word) - (high - low)[0]) < chord
-        for word in words
-    )
+    width, height, top = (one.dxf.actual_measurement for one in space.query("DIMENSION"))
+    assert (width, height) == pytest.approx((high - low).tolist(), abs=chord)
+    assert top == pytest.approx(high[1], abs=chord)
     assert len(space.query('LINE[layer=="hatch"]')) > 20
 
 
@@ -101,4 +99,9 @@ def test_the_optical_layout_of_the_sample(
     assert rays
     for ray in rays:
         assert ray[0][:2] == pytest.approx((x, z))
+    sizes = {one.dxf.text: one.dxf.actual_measurement for one in space.query("DIMENSION")}
+    assert sizes == {
+        "capture sphere <>": pytest.approx(design["capture_diameter_mm"]),
+        "<>": pytest.approx(2 * x),
+    }
     assert refused([*words[1:-1]], capsys).endswith("replace it with --force\n")

@@ -1,6 +1,5 @@
 """The viewer and a turntable in Chromium: they draw, drags turn them, nobody else is asked."""
 
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,11 +9,18 @@ import pytest
 from PIL import Image
 
 from tbcad.cli import run
-from tbcad.simulate.capture.light_field import LightField
 from tbcad.viewer.query import Query
-from tbcad.viewer.render import Renderer
 from tbcad.viewer.server import ViewServer
 from tests.clients.browser import Browser
+from tests.clients.viewer_page import (
+    PICTURE_APERTURE_MM,
+    PICTURE_PX,
+    PIXELS,
+    SLIDE,
+    at_rest,
+    save_picture,
+    served,
+)
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
@@ -22,24 +28,6 @@ MIDDLE = """(() => {
   const box = document.getElementById("canvas").getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
 })()"""
-PIXELS = """(() => {
-  const canvas = document.getElementById("canvas");
-  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
-  copy.drawImage(canvas, 0, 0);
-  const data = copy.getImageData(0, 0, canvas.width, canvas.height).data;
-  let sum = 0;
-  for (let i = 0; i < data.length; i++) sum = (sum * 31 + data[i]) % 4294967296;
-  return [sum, new Set(data).size];
-})()"""
-SHOWN_AT_REST = """viewer.last?.still === 1 && viewer.inFlight === 0
-  && Math.abs(((viewer.last.azimuth - viewer.state.azimuth) % 360 + 540) % 360 - 180) < 1e-6
-  && ["elevation", "distance", "aperture", "focus"].every(
-    (name) => viewer.last[name] === viewer.state[name])"""
-SLIDE = """(() => {{
-  const slide = document.getElementById("{}");
-  slide.value = {};
-  slide.dispatchEvent(new Event("input"));
-}})()"""
 
 
 @pytest.fixture(scope="module")
@@ -51,15 +39,8 @@ def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(captured: Path) -> Iterator[ViewServer]:
-    with (
-        LightField.open(captured) as source,
-        ViewServer(Renderer(source), "knot", Query(width=320, height=240)) as running,
-    ):
-        thread = threading.Thread(target=running.serve_forever)
-        thread.start()
+    with served(captured, Query(width=320, height=240)) as running:
         yield running
-        running.shutdown()
-        thread.join()
 
 
 @pytest.fixture
@@ -70,18 +51,6 @@ def page(browser: Browser, server: ViewServer) -> Iterator[Browser]:
     yield browser
     assert browser.faults == []
     assert all(url.startswith(server.address) for url in browser.requests)
-
-
-def at_rest(page: Browser) -> int:
-    """Sum of the pixels when the view that is wanted is shown."""
-    started = time.monotonic()
-    while not page.value(SHOWN_AT_REST):
-        assert time.monotonic() - started < 60, page.value("JSON.stringify(viewer)")
-        time.sleep(0.05)
-    total, values = page.value(PIXELS)
-    assert values > 50
-    assert page.value("document.getElementById('problem').textContent") == ""
-    return int(total)
 
 
 def test_a_drag_moves_the_viewpoint(page: Browser) -> None:
@@ -141,6 +110,19 @@ def test_a_server_that_has_ended_is_told(page: Browser) -> None:
         ".then(() => document.getElementById('problem').textContent)"
     )
     assert told.startswith("tbcad show has ended")
+
+
+def test_the_picture_of_the_documentation(browser: Browser, captured: Path, tmp_path: Path) -> None:
+    """Made as `python docs/screenshots.py` makes it: a lens at rest, seen from azimuth 35."""
+    browser.events.clear()
+    save_picture(browser, captured, tmp_path / "show.png")
+    with Image.open(tmp_path / "show.png") as picture:
+        assert picture.size == PICTURE_PX
+        assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 500
+    state = browser.value("viewer.last")
+    assert (state["azimuth"], state["elevation"]) == (35.0, 40.0)
+    assert state["aperture"] == PICTURE_APERTURE_MM
+    assert browser.faults == []
 
 
 def test_a_turntable_opens_from_disk_and_turns(

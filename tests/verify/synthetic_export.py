@@ -10,7 +10,6 @@ import csv
 import hashlib
 import io
 import json
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -19,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-PAPER = Path(__file__).parents[2] / "designs" / "turtleback.toml"
+SAMPLE = Path(__file__).parents[2] / "docs" / "sample" / "design.json"  # as tbcad wrote it
 # Of keys whose values tbcad chooses, by section of the prototype.
 CHOSEN: dict[str, dict[str, Any]] = {
     "": {
@@ -425,8 +424,8 @@ def camera_sheet(design: Design, record: list[dict[str, Any]]) -> dict[str, Any]
 
 
 def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
-    """Every key of the paper's design, and the values of this one."""
-    value = tomllib.loads(PAPER.read_text(encoding="utf-8"))
+    """Every key, with the values of the committed sample where this design has none of its own."""
+    value: dict[str, Any] = json.loads(SAMPLE.read_text(encoding="utf-8"))["spec"]
     value["optics"] = {
         "n": design.n,
         "capture_diameter_mm": design.target,
@@ -436,6 +435,8 @@ def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
     value["camera"] = sensor
     for section, chosen in CHOSEN.items():
         (value["prototype"][section] if section else value["prototype"]).update(chosen)
+    value["mirrors"] |= {"radius_rule": "traced"}
+    value["mesh"] |= {"structure_error_mm": 0.02}
     value["mirrors"]["coating_um"] = 1000 * design.coating
     return value
 

@@ -69,7 +69,7 @@ def _one_strip(lamps: LampLayout, origin: tuple[float, float], scale: float) -> 
         return
     x, y = origin[0] + lamps.length * scale, origin[1]
     end = y + lamps.strip["width_mm"] * scale
-    yield from upward((x, y), (x, end), x + BESIDE_STRIPS_MM, f"{lamps.strip['width_mm']:g}")
+    yield upward((x, y), (x, end), x + BESIDE_STRIPS_MM, f"{lamps.strip['width_mm']:g}")
 
 
 def _place_note(lamps: LampLayout) -> str:

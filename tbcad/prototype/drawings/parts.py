@@ -9,8 +9,8 @@ from tbcad.drafting.dimensions import (
     across,
     arrow,
     centre_cross,
+    diameter,
     labels,
-    leader,
     upward,
 )
 from tbcad.drafting.sheet import (
@@ -159,16 +159,25 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
         *title_block(paper, scale, bill.block(title, part, "on the face at the zero disc")),
         *drawn,
         *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
-        *across(
+        across(
             (origin[0] - ring.radius, origin[1]),
             (origin[0] + ring.radius, origin[1]),
             origin[1] - ring.radius - ASIDE_MM / 2,
-            f"(Ø{2 * radius:.1f})",
+            f"{2 * radius:.1f}",
+            "(Ø<>)",
         ),
-        *_called(
-            first, (origin[0] + ring.radius, top), f"{len(holes)} x Ø{SCREW_MM:g} on Ø{circle:g}"
+        diameter(
+            first,
+            *_called(first, (origin[0] + ring.radius, top)),
+            f"{SCREW_MM:g}",
+            f"{len(holes)} x Ø<> on Ø{circle:g}",
         ),
-        *_called(bore, (origin[0] + ring.radius, origin[1]), f"Ø{part['bore_mm']:g}"),
+        diameter(
+            bore,
+            *_called(bore, (origin[0] + ring.radius, origin[1])),
+            f"{part['bore_mm']:g}",
+            "Ø<>",
+        ),
         *notes(corner, NOTES_MM - BESIDE_MM, text),
     ]
     return Sheet(WHEEL, title, part.name, paper, scale, origin, tuple(entities))
@@ -222,7 +231,7 @@ def _heights(
     for level, height in enumerate(heights, 1):
         at = x + height * scale
         yield Line(Layer.CENTRE, (at, low - OFF_MM), (at, high + OFF_MM))
-        yield from across((x, high), (at, high), high + level * LEVEL_MM, f"{height:.1f}")
+        yield across((x, high), (at, high), high + level * LEVEL_MM, f"{height:.1f}")
 
 
 def fitted(
@@ -240,8 +249,8 @@ def fitted(
 def outer(origin: Point, on_paper: Point, size: Point) -> Iterator[Entity]:
     """Length below, width on the left."""
     (x, y), (length, width) = origin, on_paper
-    yield from across((x, y), (x + length, y), y - ASIDE_MM, f"{size[0]:g}")
-    yield from upward((x, y), (x, y + width), x - ASIDE_MM, f"{size[1]:g}")
+    yield across((x, y), (x + length, y), y - ASIDE_MM, f"{size[0]:g}")
+    yield upward((x, y), (x, y + width), x - ASIDE_MM, f"{size[1]:g}")
 
 
 def _datum(origin: Point) -> Iterator[Entity]:
@@ -258,13 +267,13 @@ def _datum(origin: Point) -> Iterator[Entity]:
         yield Text(Layer.DIMENSIONS, place, TEXT_MM, name)
 
 
-def _called(circle: Circle, corner: Point, text: str) -> Iterator[Entity]:
-    """A leader from a place to a circle."""
+def _called(circle: Circle, corner: Point) -> tuple[Point, Point]:
+    """Both ends of a leader: on a circle, and beside a place."""
     place = corner[0] + BESIDE_MM, corner[1] + BESIDE_MM
     x, y = place[0] - circle.centre[0], place[1] - circle.centre[1]
     share = circle.radius / float(np.hypot(x, y))
     tip = circle.centre[0] + share * x, circle.centre[1] + share * y
-    yield from leader(tip, place, text)
+    return tip, place
 
 
 def _hole_cells(frame: FrameLayout) -> list[tuple[str, ...]]:

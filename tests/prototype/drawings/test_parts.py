@@ -9,7 +9,7 @@ import pytest
 
 from tbcad.drafting.dimensions import labels
 from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet, choose_scale, scale_text
-from tbcad.formats.entities import Circle, Layer, Line, Polyline, Text
+from tbcad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
 from tbcad.geometry.primitives import Cylinder, Prism
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
@@ -52,7 +52,7 @@ def test_the_plates_holes_are_at_full_size(drawn: dict[str, Sheet], frame: Frame
 
 
 def test_the_table_has_every_hole(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
-    texts = [one.text for one in drawn[PLATE].entities if isinstance(one, Text)]
+    texts = [one.text for one in simple(drawn[PLATE].entities) if isinstance(one, Text)]
     for place in (frame.holes - frame.corner).tolist():
         for value in place:
             assert f"{value:.2f}" in texts
@@ -71,7 +71,7 @@ def test_a_hub_of_the_wheel_is_turned_off(drawn: dict[str, Sheet], frame: FrameL
     assert isinstance(wheel, Cylinder)  # along the axis from the hub to the plate
     back = -float((wheel.start + wheel.length * wheel.axis) @ wheel.axis)
     gap = back - frame.head.plate.front
-    texts = [one.text for one in drawn[WHEEL].entities if isinstance(one, Text)]
+    texts = [one.text for one in simple(drawn[WHEEL].entities) if isinstance(one, Text)]
     assert f"Turn off a hub: the head's plate is {gap:g} mm behind." in texts
 
 
@@ -95,7 +95,7 @@ def test_every_strip_of_a_lamp_is_drawn(drawn: dict[str, Sheet], frame: FrameLay
     ]
     assert [np.ptp(one, axis=0).tolist() for one in outlines] == [pytest.approx([50, 8])] * 2
     assert np.ptp(np.vstack(outlines), axis=0) == pytest.approx([lamps.length, lamps.width])
-    words = [one.text for one in drawn[LAMP].entities if isinstance(one, Text)]
+    words = [one.text for one in simple(drawn[LAMP].entities) if isinstance(one, Text)]
     assert any(text.startswith("Cut 8 pieces of 50 ± 0.5, 2 for each of 4 lamps") for text in words)
 
 
@@ -107,7 +107,7 @@ def test_heights_of_the_lamps_screws_are_on_the_upright(
     (body,) = plate.added
     assert isinstance(body, Prism)
     top = np.vstack([body.corners, body.corners + body.along])[:, 2].max()
-    words = [one.text for one in drawn[UPRIGHT].entities if isinstance(one, Text)]
+    words = [one.text for one in simple(drawn[UPRIGHT].entities) if isinstance(one, Text)]
     screws = [one for one in frame.fasteners if "lamp_holder_3" in one.through]
     assert screws
     for screw in screws:
@@ -122,9 +122,25 @@ def test_no_text_meets_another_or_the_border(drawn: dict[str, Sheet], name: str)
 @pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
 def test_no_line_leaves_the_border(drawn: dict[str, Sheet], name: str) -> None:
     sheet = drawn[name]
-    ends = [end for one in sheet.entities if isinstance(one, Line) for end in (one.start, one.end)]
+    ends = [
+        end
+        for one in simple(sheet.entities)
+        if isinstance(one, Line)
+        for end in (one.start, one.end)
+    ]
     assert np.min(ends, axis=0)[0] > LEFT_MM
     assert np.max(ends, axis=0)[0] < sheet.paper[0] - BORDER_MM
+
+
+@pytest.mark.parametrize(("name", "count"), [(PLATE, 2), (WHEEL, 3), (UPRIGHT, 3), (LAMP, 3)])
+def test_dimensions_measure_what_they_say(drawn: dict[str, Sheet], name: str, count: int) -> None:
+    """On the sheet at full size, as far as the digits of each go."""
+    found = [one for one in drawn[name].full_size() if isinstance(one, Dimension)]
+    assert len(found) >= count
+    for one in found:
+        digits = len(one.size.partition(".")[2])
+        assert one.measured == pytest.approx(float(one.size), abs=0.5001 * 10.0**-digits)
+        assert sum(isinstance(part, Text) for part in one.drawn) == 1
 
 
 def test_labels_of_near_holes_keep_apart() -> None:

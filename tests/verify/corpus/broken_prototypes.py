@@ -27,6 +27,7 @@ from tests.verify.corpus.prototype_changes import (
     drive,
     empty_step,
     exchange,
+    exploded_dimensions,
     fastener,
     fastener_off,
     fewer_circles,
@@ -41,6 +42,7 @@ from tests.verify.corpus.prototype_changes import (
     led,
     leds_on_one_side,
     listed,
+    longer_dimension,
     longer_outline,
     mark_aside,
     mounted_in,
@@ -55,6 +57,7 @@ from tests.verify.corpus.prototype_changes import (
     not_printed,
     nudged,
     origin_of,
+    other_size,
     other_words,
     picture,
     program,
@@ -412,6 +415,9 @@ DRAWINGS: tuple[Mutation, ...] = (
             ("a longer outline", UPRIGHT, longer_outline, "upright_left: its outline"),
             ("a longer strip", LAMP, longer_outline, "lamp_1: its outlines are not"),
             ("other words", UPRIGHT, other_words, "does not say what"),
+            ("a longer dimension", PLATE, longer_dimension, "mm are drawn"),
+            ("another size", WHEEL, other_size, "a dimension says 12.5 where"),
+            ("no dimensions", LAMP, exploded_dimensions, "it has no dimension"),
         )
     ),
     fails(

@@ -104,6 +104,26 @@ def other_words(space: Any) -> None:
     space.query("TEXT")[0].dxf.text = "something else"
 
 
+def longer_dimension(space: Any) -> None:
+    """One that measures 10 % more than it says."""
+    one = next(one for one in space.query("DIMENSION") if one.dimtype == 0)
+    start, end = one.dxf.defpoint2, one.dxf.defpoint3
+    one.dxf.defpoint3 = start + 1.1 * (end - start)
+
+
+def other_size(space: Any) -> None:
+    """One whose picture has another number."""
+    one = next(iter(space.query("DIMENSION")))
+    (text,) = (part for part in one.doc.blocks.get(one.dxf.geometry) if part.dxftype() == "TEXT")
+    text.dxf.text = "12.5"
+
+
+def exploded_dimensions(space: Any) -> None:
+    """Lines and texts in place of dimensions."""
+    for one in list(space.query("DIMENSION")):
+        one.explode()
+
+
 def listed(part: str, **cells: object) -> Job:
     """Other cells in a part's row of the parts list."""
 

@@ -1,6 +1,6 @@
 """Drawings of what is cut or drilled: holes and outlines of the DXF are those of the assembly.
 
-The DXF is read by its group codes, in plain Python; the PDF must say the same in words.
+The PDF must say the same in words, and every dimension what is measured between its points.
 """
 
 from __future__ import annotations
@@ -8,44 +8,23 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.flat_drawing import SAME_MM, FlatDrawing, read_dxf
 from tbcad_verify.prototype.purchases import frame_axes
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import Drawing
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
+from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
 from tbcad_verify.step.solids_text import TextSolid, holes
 from tbcad_verify.types import Floats
 
 CHECKS = {"drawings": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
-CUT = "cut"  # the layer of outlines and holes
-SAME_MM = 1e-6
-X, Y, RADIUS, LAYER, TEXT = 10, 20, 40, 8, 1  # group codes
 PDF_HEAD = b"%PDF-1."
 PDF_TEXT = re.compile(rb"\(((?:[^()\\]|\\.)*)\) Tj")
-MOST_CIRCLES = 1000
 CORNERS = 4  # of a strip
-
-Entity = dict[int, list[str]]
-
-
-@dataclass(frozen=True)
-class FlatDrawing:
-    """What a DXF says.
-
-    Attributes:
-        circles: (N, 3) x, y and radius of those to be cut, mm.
-        corners: (M, 2) of the outlines to be cut.
-        texts: all words.
-    """
-
-    circles: Floats
-    corners: Floats
-    texts: Counter[str]
 
 
 def checks(
@@ -75,56 +54,12 @@ def _faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Ite
         else:
             yield from _board_faults(context, name, solid, flat)
         yield from _words(context, drawings[part], flat)
+        for fault in flat.dimension_faults():
+            yield f"{drawings[part].dxf}: {fault}"
 
 
 def _text(context: PrototypeContext, file: str) -> str:
     return read(context.export.folder, file, MAX_TEXT_BYTES).text()
-
-
-def read_dxf(text: str) -> FlatDrawing:
-    """Circles and outlines on the layer to be cut, and all texts.
-
-    Raises:
-        Unknown: it is no DXF, or has too many circles.
-    """
-    entities = dxf_entities(text)
-    cut = [one for one in entities if one.get(LAYER) == [CUT]]
-    circles = [
-        [float(one[code][0]) for code in (X, Y, RADIUS)] for one in cut if one[0] == ["CIRCLE"]
-    ]
-    if len(circles) > MOST_CIRCLES:
-        raise Unknown(f"a drawing has {len(circles)} circles")
-    corners = [
-        [float(x), float(y)]
-        for one in cut
-        if one[0] == ["LWPOLYLINE"]
-        for x, y in zip(one[X], one[Y], strict=True)
-    ]
-    texts = Counter(one[TEXT][0] for one in entities if one[0] == ["TEXT"])
-    return FlatDrawing(np.array(circles).reshape(-1, 3), np.array(corners).reshape(-1, 2), texts)
-
-
-def dxf_entities(text: str) -> list[Entity]:
-    """Entities of a DXF, the values of each by group code.
-
-    Raises:
-        Unknown: it is no DXF.
-    """
-    lines = [line.strip() for line in text.splitlines()]
-    try:
-        codes = [int(line) for line in lines[::2]]
-        pairs = list(zip(codes, lines[1::2], strict=True))
-        begin = pairs.index((2, "ENTITIES"))
-        end = pairs.index((0, "ENDSEC"), begin)
-    except ValueError:
-        raise Unknown("a drawing is no DXF") from None
-    found: list[Entity] = []
-    for code, value in pairs[begin + 1 : end]:
-        if code == 0:
-            found.append({})
-        if found:
-            found[-1].setdefault(code, []).append(value)
-    return found
 
 
 def _board_faults(

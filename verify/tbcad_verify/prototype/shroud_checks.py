@@ -10,7 +10,7 @@ import numpy as np
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import NOT_BODIES
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.drawing_checks import CUT, X, Y, dxf_entities
+from tbcad_verify.prototype.flat_drawing import CUT, X, Y, dxf_entities
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import Panel, Shroud
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
