@@ -57,6 +57,7 @@ class Deviation:
             focal=one[:, 0],
             facets=still[:, 0],
             foot=np.zeros(self.offset.shape),
+            wall=np.zeros((count, len(model.walls))),
             form=np.zeros((*self.offset.shape, len(TERMS))),
         )
 

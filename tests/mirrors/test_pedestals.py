@@ -9,8 +9,6 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.as_made import as_made
-from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tests.mirror_arrays import mirror_array
 from tests.pedestal_designs import pedestal_design
 
@@ -52,6 +50,3 @@ def test_simulations_that_know_only_joined_mirrors_refuse_pedestals() -> None:
     cameras = reflectors(pedestal_design("n=3"))
     with pytest.raises(InputError, match=r"shell\.edges=valley"):
         exact_tracer(cameras[0])
-    with pytest.raises(InputError, match=r"shell\.edges=valley"):
-        edge_models(cameras)
-    assert "pedestals" in as_made(cameras, 60.0, 0.0).reason

@@ -30,6 +30,7 @@ class ShellDraws:
         focal: focal length over the designed one, (s,).
         facets: coverage lost on facets, mm, (s,).
         foot: of the foot plane at each mirror, along its normal, mm, (s, m).
+        wall: of each wall of a pedestal, along its normal into the mirror's cell, mm, (s, w).
         form: factors of the mirrors' form errors (tbcad.tolerance.montecarlo.form), mm, (s, m, t).
     """
 
@@ -43,6 +44,7 @@ class ShellDraws:
     focal: Floats
     facets: Floats
     foot: Floats
+    wall: Floats
     form: Floats
 
     def __len__(self) -> int:
@@ -56,6 +58,7 @@ def draw(
     builds: Sequence[int],
     mirrors: int,
     warp: WarpMaps | None = None,
+    walls: int = 0,
 ) -> tuple[ShellDraws, ShellDraws]:
     """Errors of both halves of some builds.
 
@@ -66,6 +69,7 @@ def draw(
         mirrors: m of each half.
         warp: what the process's warp does to them (`warp_maps_of`); needed where neighbours share
             it.
+        walls: w of each half that end mirrors on pedestals.
 
     Raises:
         ValueError: it is missing.
@@ -75,7 +79,7 @@ def draw(
     shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors)
     drawn = draw_kinds(errors, seed, builds, shapes)
     maps = warp or (None, None)
-    return _half(drawn, 0, maps[0]), _half(drawn, 1, maps[1])
+    return _half(drawn, 0, maps[0], walls), _half(drawn, 1, maps[1], walls)
 
 
 def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
@@ -102,7 +106,7 @@ def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
     }
 
 
-def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> ShellDraws:
+def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None, walls: int) -> ShellDraws:
     def of(kind: str) -> Floats:
         return drawn[kind][:, side]
 
@@ -117,6 +121,7 @@ def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> Shell
         focal=1 + of("camera_focal"),
         facets=of("facets"),
         foot=np.zeros(of("sphere_radius").shape),
+        wall=np.zeros((len(of("facets")), walls)),
         form=of("waviness") * np.sqrt(term_shares()),
     )
     if warp is None:  # each mirror is displaced by its own
@@ -132,6 +137,7 @@ def _add_warp(draws: ShellDraws, build: int, warp: WarpMap, numbers: Floats) -> 
     draws.centre[build] += centre
     draws.radius[build] += radius
     draws.foot[build] += foot
+    draws.wall[build] += warp.walls_moved(numbers)
     draws.form[build][:, ASTIGMATISM] += astigmatism
 
 
