@@ -13,7 +13,7 @@ MIDDLE = 0.5
 
 @dataclass(frozen=True)
 class GrooveWalls:
-    """Walls of one half, w of them; none where neighbouring spheres meet.
+    """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet.
 
     Attributes:
         mirror: that each ends, (w,).
@@ -23,6 +23,11 @@ class GrooveWalls:
 
     mirror: Ints
     table: Floats
+
+    @classmethod
+    def of_planes(cls, mirror: Ints, point: Floats, normal: Floats) -> "GrooveWalls":
+        """Walls that end mirrors (w,) at planes through points, with normals, (w, 3) each."""
+        return cls(mirror, np.column_stack([point, normal, np.zeros(len(mirror))]))
 
     def __len__(self) -> int:
         """Number of walls."""
@@ -38,6 +43,10 @@ class GrooveWalls:
         """Unit normals into the mirrors' cells, (w, 3)."""
         return self.table[:, 3:6]
 
+    def first_of_mirrors(self, mirrors: int) -> Ints:
+        """Where the walls of each of m mirrors begin, and where those of the last end, (m + 1,)."""
+        return np.searchsorted(self.mirror, np.arange(mirrors + 1))
+
 
 def groove_walls(cells: Cells) -> GrooveWalls:
     """The walls of a camera's cells, in the order of `PedestalCells.walls`."""
@@ -46,5 +55,4 @@ def groove_walls(cells: Cells) -> GrooveWalls:
     first = len(cells.surfaces) - len(cells.walls)
     edge = cells.wall_rings[:, 0] // 2
     point = cells.arcs.at(edge, np.full(len(edge), MIDDLE))
-    table = np.column_stack([point, -cells.surfaces.normal[first:], np.zeros(len(edge))])
-    return GrooveWalls(cells.walls[:, 0], table)
+    return GrooveWalls.of_planes(cells.walls[:, 0], point, -cells.surfaces.normal[first:])
