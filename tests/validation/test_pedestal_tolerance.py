@@ -20,7 +20,7 @@ from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sensitivity import scaled
+from tbcad.tolerance.montecarlo.sensitivity import scaled, shell_kinds
 from tbcad.tolerance.montecarlo.smooth_field import pivots, smooth_field
 from tests.pedestal_designs import pedestal_design
 from tests.tolerance.exact_builds import traced_coverage, verified_coverage, write_meshes
@@ -141,6 +141,22 @@ def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels, mi
     slow = bisected_coverage(halves[1], replace(one, wall=moved), mirror)
     assert found == pytest.approx(slow, abs=1e-4)
     assert abs(found - mirror_coverage(halves[1], one).diameter[0, mirror]) > 0.02
+
+
+def test_walls_have_an_error_of_their_own(halves: EdgeModels) -> None:
+    """Normal, of no other's numbers; where spheres meet there is none to study."""
+    errors = Errors(groove_wall=Error(0.01))
+    a, b = drawn(halves, errors, range(4))
+    assert a.wall.shape == (4, len(halves[0].walls))
+    every = np.concatenate([a.wall.ravel(), b.wall.ravel()])
+    assert len(np.unique(every)) == len(every)
+    assert every.std() == pytest.approx(0.01, rel=4 / np.sqrt(2 * len(every)))
+    assert abs(every.mean()) < 4 * 0.01 / np.sqrt(len(every))
+    still = draw(Errors(), 7, range(4), len(halves[0]), None, len(halves[0].walls))[0]
+    moved = mirror_coverage(halves[0], replace(still, wall=a.wall)).diameter
+    assert np.array_equal(moved, mirror_coverage(halves[0], a).diameter)
+    assert shell_kinds(errors, len(halves[0].walls)) == ["groove_wall"]
+    assert shell_kinds(errors, 0) == []
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-3, 0.1])

@@ -76,18 +76,19 @@ def draw(
     """
     if warp is None and errors.warp.spread != 0 and errors.warp.length != 0:
         raise ValueError("the warp of these errors needs its maps")
-    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors)
+    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors, walls)
     drawn = draw_kinds(errors, seed, builds, shapes)
     maps = warp or (None, None)
-    return _half(drawn, 0, maps[0], walls), _half(drawn, 1, maps[1], walls)
+    return _half(drawn, 0, maps[0]), _half(drawn, 1, maps[1])
 
 
-def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
+def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shape]:
     """Shape of each kind of error of a shell, in the order of the streams; only append to it.
 
     Args:
         m: number of mirrors of a half.
         modes: number of vectors that the warp of a half follows from.
+        walls: number of walls of pedestals of a half.
     """
     return {
         "sphere_centre": (2, m, 3),
@@ -103,10 +104,11 @@ def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
         "facets": (2,),
         "warp": (2, modes, 3),
         "waviness": (2, m, len(TERMS)),
+        "groove_wall": (2, walls),
     }
 
 
-def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None, walls: int) -> ShellDraws:
+def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> ShellDraws:
     def of(kind: str) -> Floats:
         return drawn[kind][:, side]
 
@@ -121,7 +123,7 @@ def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None, walls: i
         focal=1 + of("camera_focal"),
         facets=of("facets"),
         foot=np.zeros(of("sphere_radius").shape),
-        wall=np.zeros((len(of("facets")), walls)),
+        wall=of("groove_wall"),
         form=of("waviness") * np.sqrt(term_shares()),
     )
     if warp is None:  # each mirror is displaced by its own
