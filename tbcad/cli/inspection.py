@@ -41,10 +41,11 @@ def inspection(
         print_json(record)
         return 0
     smallest = record["limits"]["smallest"]
+    walls = f", its walls by {smallest['wall_um']:.1f} um" if "wall_um" in smallest else ""
     typer.echo(
         f"Every mirror may be off by {smallest['offset_um']:.2f} um along its normal, "
-        f"{smallest['tilt_mrad']:.2f} mrad and {smallest['radius_mm'] * 1000:.0f} um of radius, "
-        "all at once;\nmost by more: see the tables. Shells at their limits show "
+        f"{smallest['tilt_mrad']:.2f} mrad and {smallest['radius_mm'] * 1000:.0f} um of radius"
+        f"{walls}, all at once;\nmost by more: see the tables. Shells at their limits show "
         f"{record['simulated_minimum_mm']:.2f} of {record['target_mm']:g} mm (simulated)."
     )
     typer.echo(f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}")

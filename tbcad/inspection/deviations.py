@@ -26,21 +26,23 @@ class Deviation:
         offset: of the apex along the normal, toward the light, micrometres, (..., m).
         tilt: of the normal about two axes across it, mrad, (..., m, 2).
         radius: by which the sphere is too large, its apex in place, mm, (..., m).
+        wall: of all walls of the mirror's pedestal out of it, micrometres, (..., m).
     """
 
     offset: Floats
     tilt: Floats
     radius: Floats
+    wall: Floats
 
     @classmethod
     def none(cls, builds: int, mirrors: int) -> "Deviation":
         """No deviation in some builds."""
         shape = (builds, mirrors)
-        return cls(np.zeros(shape), np.zeros((*shape, 2)), np.zeros(shape))
+        return cls(np.zeros(shape), np.zeros((*shape, 2)), np.zeros(shape), np.zeros(shape))
 
     def __neg__(self) -> "Deviation":
         """Return the opposite of each."""
-        return Deviation(-self.offset, -self.tilt, -self.radius)
+        return Deviation(-self.offset, -self.tilt, -self.radius, -self.wall)
 
     def draws(self, model: EdgeModel) -> ShellDraws:
         """The deviations as errors of simulated builds, everything else being as designed."""
@@ -57,6 +59,7 @@ class Deviation:
             focal=one[:, 0],
             facets=still[:, 0],
             foot=np.zeros(self.offset.shape),
+            wall=-MM_PER_UM * self.wall[..., model.walls.mirror],
             form=np.zeros((*self.offset.shape, len(TERMS))),
         )
 

@@ -28,13 +28,15 @@ RECORD = "inspection.json"
 DATUM_FACES = {"A": "foot", "B": "seam"}
 WAVELENGTH_NM = 550.0  # the middle of the visible
 SCATTERED = 0.01  # share of the light that roughness may scatter: a judgement
-UNITS = ("offset_um", "tilt_mrad", "radius_mm")
+UNITS = ("offset_um", "tilt_mrad", "radius_mm", "wall_um")
+SPHERE_KINDS = UNITS[:3]
 COLUMNS = (
     *("id", "centre_x_mm", "centre_y_mm", "centre_z_mm", "radius_mm"),
     *("apex_x_mm", "apex_y_mm", "apex_z_mm", "normal_x", "normal_y", "normal_z"),
     *("offset_limit_um", "tilt_limit_mrad", "radius_limit_mm", "profile_mm"),
     *("offset_sigma_um", "tilt_sigma_mrad", "radius_sigma_mm"),
 )
+WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um")  # of mirrors on pedestals
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,30 @@ class Half:
         """Width of the zone about each mirror that its offset leaves, mm, (m,)."""
         return np.round(2 * MM_PER_UM * self.limits.each[:, 0], 6)
 
+    @property
+    def wall_um(self) -> Floats | None:
+        """By how much the walls of each pedestal may be off, (m,); None where spheres meet."""
+        each = self.limits.each
+        return each[:, len(SPHERE_KINDS)] if each.shape[1] > len(SPHERE_KINDS) else None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the table."""
+        return COLUMNS if self.wall_um is None else COLUMNS + WALL_COLUMNS
+
     def rows(self) -> list[Row]:
         """Rows of the table."""
+        each, sigma = (
+            np.hsplit(of, [len(SPHERE_KINDS)]) for of in (self.limits.each, self.limits.sigma)
+        )
         numbers = np.column_stack(
             [
                 *(self.surfaces.centre, self.surfaces.radius, self.surfaces.apex),
-                *(self.surfaces.normal, self.limits.each, self.profile_mm, self.limits.sigma),
+                *(self.surfaces.normal, each[0], self.profile_mm, sigma[0], each[1], sigma[1]),
             ]
         ).tolist()
         named = zip(self.ids, numbers, strict=True)
-        return [dict(zip(COLUMNS, (name, *row), strict=True)) for name, row in named]
+        return [dict(zip(self.columns, (name, *row), strict=True)) for name, row in named]
 
 
 def halves(export: ExportedDesign, limits: Limits) -> tuple[Half, Half]:
@@ -96,7 +112,7 @@ def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
         InputError: the export has no such solid, or it is not that of its mirrors.
     """
     table, step = f"inspection_{half.name[-1]}.csv", f"{half.name}_tolerances.step"
-    write_table(folder / table, COLUMNS, half.rows())
+    write_table(folder / table, half.columns, half.rows())
     solid = read_named_solid(export / f"{half.name}.step")
     names = {name for name, _ in solid.faces}
     missing = sorted({*half.ids, *DATUM_FACES.values()} - names)
@@ -117,7 +133,7 @@ def tolerances(half: Half, dowel: str) -> FaceTolerances:
         flatness=dict.fromkeys(DATUM_FACES.values(), seat),
         profile=dict(zip(half.ids, half.profile_mm.tolist(), strict=True)),
         radius=dict(zip(half.ids, radius, strict=True)),
-        notes=notes(),
+        notes=notes(half.wall_um),
     )
 
 
@@ -127,9 +143,17 @@ def dowel_face(solid: Solid, diameter: float) -> str:
     return next(name for name, face in holes if isclose(2 * cylinder_radius(face), diameter))
 
 
-def notes() -> dict[str, str]:
-    """What tolerances of faces cannot say."""
-    return {
+def notes(wall_um: Floats | None = None) -> dict[str, str]:
+    """What tolerances of faces cannot say.
+
+    Args:
+        wall_um: by how much the walls of each pedestal may be off, (m,).
+    """
+    walls = {}
+    if wall_um is not None:
+        limit = f"{wall_um.min():.1f} um along their normals, or as the table allows"
+        walls["walls of grooves"] = f"at the edges of mirrors within {limit}"
+    return walls | {
         "surface finish": f"mirrors polished, Rq {roughness_nm():.1f} nm or better",
         "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",
         "datums": "A foot plane, B seam plane, C dowel hole",
@@ -152,8 +176,8 @@ def write_record(
         **facts,
         "designed_minimum_mm": float(found.coverage.min()),
         "limits": {
-            "smallest": dict(zip(UNITS, smallest, strict=True)),
-            "median": dict(zip(UNITS, median, strict=True)),
+            "smallest": dict(zip(UNITS, smallest, strict=False)),
+            "median": dict(zip(UNITS, median, strict=False)),
             "seat_um": limits.seat_um,
             "roughness_rq_nm": roughness_nm(),
         },

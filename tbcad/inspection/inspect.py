@@ -8,8 +8,8 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.inspection.deviations import Deviation
 from tbcad.inspection.files import halves, write_half, write_record
-from tbcad.inspection.limits import Limits, mirror_limits
-from tbcad.inspection.sensitivity import sensitivities
+from tbcad.inspection.limits import Limits, mirror_limits, whole_margin_steps
+from tbcad.inspection.sensitivity import Sensitivities, sensitivities
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.edge_model import edge_models
@@ -48,8 +48,7 @@ def inspect(
         InputError: the shell leaves no deviation, or its solids are not those of its record.
     """
     progress("sensitivities")
-    found = sensitivities(export.reflectors)
-    limits = mirror_limits(found, export.capture_mm, wanted)
+    found, limits = found_limits(export, wanted)
     facts = {
         "exports": str(export.folder),
         "target_mm": export.capture_mm,
@@ -63,6 +62,25 @@ def inspect(
     return write_record(folder, found, limits, {**facts, "files": files})
 
 
+def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, Limits]:
+    """Losses of an export's virtual cameras, and the limits that follow; see `mirror_limits`.
+
+    Losses are taken for small deviations. They grow faster than those: another edge of a cell
+    becomes the one that limits its coverage. Where edges do not depend on neighbours, deviations
+    are large enough for that. So losses are then taken for deviations that would cost the whole
+    margin. Each is convex, so what several kinds cost together is at most the mean of what each
+    costs when it is as many times as large.
+    """
+    found = sensitivities(export.reflectors)
+    limits = mirror_limits(found, export.capture_mm, wanted)
+    if minimum_at_limits(export, limits) >= export.capture_mm:
+        return found, limits
+    radius = np.concatenate([one.mirrors.radius for one in export.reflectors])
+    steps = whole_margin_steps(found, limits, radius)
+    found = sensitivities(export.reflectors, steps)
+    return found, mirror_limits(found, export.capture_mm, wanted).within(steps, found)
+
+
 def minimum_at_limits(export: ExportedDesign, limits: Limits, builds: int = BUILDS) -> float:
     """Minimum coverage of simulated shells whose mirrors are all at their limits, mm.
 
@@ -73,7 +91,11 @@ def minimum_at_limits(export: ExportedDesign, limits: Limits, builds: int = BUIL
     for model, each in zip(models, np.split(limits.each, 2), strict=True):
         shape = (builds, len(model))
         sign = generator.choice([-1.0, 1.0], (2, *shape))
+        wall = np.zeros(shape)
         angle = generator.uniform(0, 2 * np.pi, shape)
         tilt = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * each[:, 1, None]
-        draws.append(Deviation(sign[0] * each[:, 0], tilt, sign[1] * each[:, 2]).draws(model))
+        if len(model.walls):
+            wall = generator.choice([-1.0, 1.0], shape) * each[:, 3]
+        off = Deviation(sign[0] * each[:, 0], tilt, sign[1] * each[:, 2], wall)
+        draws.append(off.draws(model))
     return float(coverage(models, (draws[0], draws[1]), worst_only=True)[0].min())

@@ -1,6 +1,6 @@
 """Limits of each mirror that leave every virtual camera its coverage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -9,22 +9,28 @@ from tbcad.errors import InputError
 from tbcad.inspection.sensitivity import KINDS, Sensitivities
 from tbcad.types import Floats, Ints
 
-PLACES = np.array([3, 4, 5])  # decimals of limits: a nanometre, or what turns or bends by less
+SMALLEST_LIMIT = 1e-3  # um, mrad or mm, where nothing is left after rounding down
+PLACES = np.array([3, 4, 5, 3])  # decimals of limits: a nanometre, or what turns or bends by less
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of all mirrors, a's first, by offset (um), tilt (mrad) and radius (mm).
+    """Limits of all mirrors, a's first: offset (um), tilt (mrad), radius (mm), walls (um) if any.
 
     Attributes:
-        each: a mirror may be off by this, whatever the others do within theirs, (2 m, 3).
-        sigma: standard deviations with which the wanted share of shells is good, (2 m, 3).
+        each: a mirror may be off by this, whatever the others do within theirs, (2 m, kinds).
+        sigma: standard deviations with which the wanted share of shells is good, (2 m, kinds).
         seat_um: by which each half may sit wrong, also with all mirrors at their limits.
     """
 
     each: Floats
     sigma: Floats
     seat_um: float
+
+    def within(self, steps: Floats, found: Sensitivities) -> "Limits":
+        """The same, no limit more than its part of the deviation whose loss is known."""
+        largest = _floor(steps / kinds_and_seat(found), PLACES[: steps.shape[1]])
+        return replace(self, each=np.minimum(self.each, largest))
 
 
 def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limits:
@@ -48,14 +54,34 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
             f"a virtual camera sees {found.coverage.min():.2f} mm as designed, of {target_mm:g} mm "
             "that are asked for: no deviation is allowed; enlarge mirrors.margin_mm"
         )
-    parts = len(KINDS) + 1
+    parts = kinds_and_seat(found)
     deviations = normal.ppf(wanted ** (1 / len(margin)))
     each = margin[:, None] / parts / _positive(found.total())
     variance = (margin / deviations)[:, None] ** 2 / parts
     sigma = np.sqrt(variance / _positive(found.total(power=2)))
     seat = margin / parts / _positive(found.seat)
     each, sigma = (_smallest(found.mirror, of[found.camera]) for of in (each, sigma))
-    return Limits(_floor(each, PLACES), _floor(sigma, PLACES), float(_floor(seat.min(), 1)))
+    places = PLACES[: found.loss.shape[1]]
+    return Limits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
+
+
+def whole_margin_steps(found: Sensitivities, limits: Limits, radius: Floats) -> Floats:
+    """Deviations (2 m, kinds) that would take a whole margin if losses were linear.
+
+    Args:
+        found: losses.
+        limits: that follow from them.
+        radius: of the mirrors (2 m,), mm: no step is more than half of it.
+    """
+    steps = kinds_and_seat(found) * np.maximum(limits.each, SMALLEST_LIMIT)
+    column = KINDS.index("radius")
+    steps[:, column] = np.minimum(steps[:, column], radius / 2)
+    return np.asarray(steps)
+
+
+def kinds_and_seat(found: Sensitivities) -> int:
+    """Number of parts that a margin is shared out in."""
+    return int(found.loss.shape[1]) + 1
 
 
 def _positive(loss: Floats) -> Floats:

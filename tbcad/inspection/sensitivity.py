@@ -16,8 +16,8 @@ from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.types import Floats, Ints
 
-KINDS = ("offset", "tilt", "radius")
-STEP = (1.0, 0.02, 0.05)  # um, mrad, mm: the edges of cells move by some micrometres
+KINDS = ("offset", "tilt", "radius", "wall")
+STEP = np.array([1.0, 0.02, 0.05, 1.0])  # um, mrad, mm, um: edges move by some micrometres
 SEAT_STEP_UM = 10.0
 
 
@@ -28,7 +28,8 @@ class Sensitivities:
     Attributes:
         camera: number of the virtual camera, (k,).
         mirror: number of the mirror, a's first, (k,).
-        loss: by offset (mm/um), tilt (mm/mrad) and radius (mm/mm), in the worse sense, (k, 3).
+        loss: by each kind of deviation that there is, in the worse sense: offset (mm/um), tilt
+            (mm/mrad), radius (mm/mm), and of pedestals the walls (mm/um), (k, kinds).
         seat: lost when both halves sit wrong by a micrometre, mm/um, (v,).
         coverage: of each virtual camera as designed, mm, (v,).
     """
@@ -40,21 +41,31 @@ class Sensitivities:
     coverage: Floats
 
     def total(self, power: int = 1) -> Floats:
-        """Sum over a virtual camera's mirrors of the powers of its losses, (v, 3)."""
-        summed = np.zeros((len(self.coverage), len(KINDS)))
+        """Sum over a virtual camera's mirrors of the powers of its losses, (v, kinds)."""
+        summed = np.zeros((len(self.coverage), self.loss.shape[1]))
         np.add.at(summed, self.camera, self.loss**power)
         return summed
 
 
-def sensitivities(cameras: tuple[Reflector, Reflector]) -> Sensitivities:
+def sensitivities(
+    cameras: tuple[Reflector, Reflector], steps: Floats | None = None
+) -> Sensitivities:
     """Losses of all virtual cameras by all that they depend on.
 
     Args:
         cameras: both, with their mirrors as designed, which are spheres.
+        steps: deviation of each mirror, a's first, whose loss is taken, (2 m, kinds); without them
+            small ones.
     """
     models = edge_models(cameras)
     designed = _coverage(models, Deviation.none(1, len(models[0])))[0]
-    halves = [_half(models, half, camera, designed) for half, camera in enumerate(cameras)]
+    if steps is None:
+        kinds = len(KINDS) if len(models[0].walls) else KINDS.index("wall")
+        steps = np.tile(STEP[:kinds], (2 * len(models[0]), 1))
+    halves = [
+        _half(models, half, camera, designed, of_half)
+        for half, (camera, of_half) in enumerate(zip(cameras, np.split(steps, 2), strict=True))
+    ]
     camera, mirror, loss = map(np.concatenate, zip(*halves, strict=True))
     seat = sum(_seat_losses(models, half, designed) for half in (0, 1))
     return Sensitivities(camera, mirror, loss, np.asarray(seat), designed)
@@ -69,27 +80,30 @@ def touching(camera: Reflector) -> list[Ints]:
 
 
 def _half(
-    models: EdgeModels, half: int, camera: Reflector, designed: Floats
+    models: EdgeModels, half: int, camera: Reflector, designed: Floats, steps: Floats
 ) -> tuple[Ints, Ints, Floats]:
-    """Virtual cameras (k,), mirrors (k,) and losses (k, 3) by the mirrors of one half."""
+    """Virtual cameras (k,), mirrors (k,) and losses (k, kinds) by the mirrors of one half."""
     near, m = touching(camera), len(camera)
     seen_by = np.split(virtual_camera_numbers(models[1].halved), 2)[half]
     mirror = np.repeat(np.arange(m), [len(one) + 1 for one in near])
     seen = seen_by[np.concatenate([np.append(one, i) for i, one in enumerate(near)])]
     seen, mirror = np.unique(np.column_stack([seen, mirror]), axis=0).T
     classes = independent_classes(near)
-    lost = [_losses(models, half, classes, kind, designed) for kind in range(len(KINDS))]
-    return seen, mirror + half * m, np.stack([one[classes[mirror], seen] for one in lost], axis=1)
+    of_class = classes == np.arange(classes.max() + 1)[:, None]
+    lost = [
+        _losses(models, half, of_class * step, kind, designed) for kind, step in enumerate(steps.T)
+    ]
+    loss = np.stack([one[classes[mirror], seen] for one in lost], axis=1) / steps[mirror]
+    return seen, mirror + half * m, loss
 
 
-def _losses(models: EdgeModels, half: int, classes: Ints, kind: int, designed: Floats) -> Floats:
-    """Coverage lost for a unit of one kind of deviation of each class of mirrors, (c, v)."""
-    step = STEP[kind] * (classes == np.arange(classes.max() + 1)[:, None])
+def _losses(models: EdgeModels, half: int, step: Floats, kind: int, designed: Floats) -> Floats:
+    """Coverage lost by one kind of deviation of each class of mirrors (c, m), (c, v)."""
     axes = [_only(kind, step)]
     if KINDS[kind] == "tilt":
         axes.append(replace(axes[0], tilt=axes[0].tilt[..., ::-1]))
     worse = [_worse(designed, (_coverage(models, one, half) for one in (a, -a))) for a in axes]
-    return np.asarray(np.sqrt(sum(one**2 for one in worse)) / STEP[kind])
+    return np.asarray(np.sqrt(sum(one**2 for one in worse)))
 
 
 def _only(kind: int, amount: Floats) -> Deviation:

@@ -19,6 +19,7 @@ from tbcad.runs.exposure import Frame
 from tbcad.runs.record import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.simulate.scene.reflector import check_joined
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import edge_models, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
@@ -135,7 +136,11 @@ def random_half(
         errors: of the process.
         seed: of all builds.
         build: number of the build.
+
+    Raises:
+        InputError: the mirrors are planar, or stand on pedestals.
     """
+    check_joined(export.reflectors[half], "runs")
     designed, models = designed_half(export, half), edge_models(export.reflectors)
     drawn = draw(errors, seed, [build], len(designed.radius), warp_maps_of(models, errors))
     draws = _turned(drawn[half], _flip(half))

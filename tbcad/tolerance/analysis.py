@@ -25,14 +25,13 @@ from tbcad.tolerance.montecarlo.builds import (
     estimate_yield,
     simulate,
 )
-from tbcad.tolerance.montecarlo.draws import shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.sensitivity import (
     SingleErrorEffect,
     WorstCoverage,
     one_at_a_time,
-    present_kinds,
+    shell_kinds,
 )
 from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
 from tbcad.tolerance.options import ToleranceOptions
@@ -227,10 +226,9 @@ def _single_errors(
 ) -> tuple[SingleErrorEffect, ...]:
     wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
     effects = []
-    for kind in present_kinds(errors):
-        if kind in shell_error_shapes(0):
-            detail(kind)
-            effects.append(one_at_a_time(errors, kind, wanted, target, worst))
+    for kind in shell_kinds(errors, len(simulator.edge_models[0].walls)):
+        detail(kind)
+        effects.append(one_at_a_time(errors, kind, wanted, target, worst))
     return tuple(sorted(effects, key=lambda one: -one.loss))
 
 

@@ -4,7 +4,6 @@ import numpy as np
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 
 from tbcad.errors import InputError
-from tbcad.optics.pedestals import PedestalCells
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.builds import WorstCase, estimate_yield, simulate
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
@@ -32,8 +31,6 @@ def as_made(
     """
     if not all((one.mirrors.curvature > 0).all() for one in cameras):
         return AsMade(reason="the mirrors are planar")
-    if any(isinstance(one.cells, PedestalCells) for one in cameras):
-        return AsMade(reason="builds of mirrors on pedestals are not simulated so far")
     models, yields = edge_models(cameras), []
     for name in BUILT_IN:
         detail(name)

@@ -22,6 +22,8 @@ from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.reflection import miss_distances, reflected_rays
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import shell_envelope
@@ -37,7 +39,9 @@ def made(array: MirrorArray, draws: ShellDraws, k: int) -> Cells:
     radius = 1 / every.curvature[:m] + draws.radius[k]
     centre = array.mirrors.centre + draws.centre[k]
     spheres = Surfaces(centre + radius[:, None] * every.normal[:m], every.normal[:m], 1 / radius)
-    walls = Surfaces(every.apex[m:], every.normal[m:], every.curvature[m:])
+    walls = every.subset(slice(m, m + PLANES))
+    if isinstance(array.cells, PedestalCells):
+        return array.cells.with_mirrors(spheres)
     return cells_of(spheres.joined(walls), array.cells.triangles)
 
 
@@ -45,7 +49,11 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
     """Cells scaled evenly, seen from an object's middle."""
     at = cells.surfaces
     surfaces = Surfaces(at.apex * scale - middle, at.normal, at.curvature / scale)
-    return replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
+    moved = replace(cells, surfaces=surfaces, corners=cells.corners * scale - middle)
+    if isinstance(moved, PedestalCells):
+        points = moved.edges.points * scale - middle
+        return replace(moved, edges=replace(moved.edges, points=points))
+    return moved
 
 
 def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:

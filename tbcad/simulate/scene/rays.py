@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.parallel import compiled
-from tbcad.simulate.scene.reflector import Reflector, check_joined
+from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Bools, Floats, Ints
 
 MirrorNumbers = NDArray[np.int32]
@@ -110,21 +110,18 @@ def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays
     """A function that traces rows of a camera's pixels off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
-    what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror.
-
-    Raises:
-        InputError: the mirrors stand on pedestals.
+    what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror,
+    nor what lies beyond a wall of the mirror's own pedestal: there the ray ends in a groove.
     """
-    check_joined(reflector, "views")
     boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
     camera, edges = reflector.camera, (reflector.side, reflector.foot)
-    table = _table(reflector.mirrors, camera.pinhole)
+    table, walls = _table(reflector.mirrors, camera.pinhole), _wall_table(reflector)
 
     def trace(rows: range, shift: Shift) -> ReflectedRays:
         direction = pixel_directions(camera, rows, shift)
         near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
         in_band = boxes - np.array([0, 0, rows.start, rows.start])
-        mirror = _first_mirror(camera.pinhole, direction, table, near, in_band, *edges)
+        mirror = _first_mirror(camera.pinhole, direction, table, near, in_band, walls, edges)
         rays = reflect_pixels(camera.pinhole, direction, reflector.mirrors, mirror)
         return rays.without(_inside_neighbours(table, neighbours, mirror, rays.origin))
 
@@ -146,6 +143,12 @@ def _table(mirrors: Surfaces, pinhole: Floats) -> Floats:
     at_pinhole = np.broadcast_to(pinhole, mirrors.apex.shape)
     value, gradient = mirrors.value(every, at_pinhole), mirrors.gradient(every, at_pinhole)
     return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature, value, gradient])
+
+
+def _wall_table(reflector: Reflector) -> tuple[Ints, Floats]:
+    """Where each mirror's walls begin, (m + 1,), and their points and normals, (w, 6)."""
+    walls = reflector.walls
+    return walls.first_of_mirrors(len(reflector)), np.column_stack([walls.point, walls.normal])
 
 
 @compiled
@@ -181,16 +184,29 @@ def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
 
 
 @compiled
+def _within(walls: Floats, point: tuple[float, float, float]) -> bool:
+    """Whether a point lies on the inner side of all walls (k, 6)."""
+    for wall in walls:
+        value = 0.0
+        for j in range(3):
+            value += (point[j] - wall[j]) * wall[3 + j]
+        if value < 0:
+            return False
+    return True
+
+
+@compiled
 def _first_mirror(
     pinhole: Floats,
     direction: Floats,
     table: Floats,
     near: Ints,
     boxes: Ints,
-    side: float,
-    foot: float,
+    walls: tuple[Ints, Floats],
+    edges: tuple[float, float],
 ) -> MirrorNumbers:
     """The mirror that each ray of the band enters first, from 1, out of those near it."""
+    (side, foot), (first_wall, every_wall) = edges, walls
     height, width = direction.shape[0], direction.shape[1]
     mirror = np.zeros((height, width), dtype=np.int32)
     reach = np.full((height, width), np.inf)
@@ -203,6 +219,10 @@ def _first_mirror(
                     0 < t < reach[y, x]
                     and side * (pinhole[0] + t * dx) >= 0
                     and pinhole[2] + t * dz >= foot
+                    and _within(
+                        every_wall[first_wall[i] : first_wall[i + 1]],
+                        (pinhole[0] + t * dx, pinhole[1] + t * dy, pinhole[2] + t * dz),
+                    )
                 ):
                     reach[y, x], mirror[y, x] = t, i + 1
     return mirror

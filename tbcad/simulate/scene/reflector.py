@@ -8,6 +8,7 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
+from tbcad.optics.groove_walls import GrooveWalls, groove_walls
 from tbcad.optics.pedestals import PedestalCells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
@@ -43,6 +44,11 @@ class Reflector:
         return self.cells.mirror_surfaces
 
     @property
+    def walls(self) -> GrooveWalls:
+        """What ends mirrors on pedestals, besides seam and foot."""
+        return groove_walls(self.cells)
+
+    @property
     def foot(self) -> float:
         """Height z of the foot plane, mm."""
         return float(self.cells.surfaces.apex[self.cells.foot, 2])
@@ -72,9 +78,12 @@ class Reflector:
         """For each mirror the neighbours that the seam or the foot cuts, -1 where no more, (m, k).
 
         A ray may enter the sphere of such a neighbour beyond the edge, where there is no mirror;
-        what it would meet inside that sphere lies in the wall.
+        what it would meet inside that sphere lies in the wall. Mirrors on pedestals end at planes
+        of their own: they have no such neighbours.
         """
         faces, m = self.cells.arcs.faces, len(self)
+        if isinstance(self.cells, PedestalCells):
+            return np.full((m, 0), -1)
         cut = np.zeros(m + 2, dtype=bool)
         cut[faces[(faces >= m).any(axis=1)].min(axis=1)] = True
         pairs = np.concatenate([faces, faces[:, ::-1]])
@@ -104,7 +113,7 @@ class SubstitutedReflector(Reflector):
 
 
 def check_joined(reflector: Reflector, what: str) -> None:
-    """Refuse mirrors on pedestals, where only edges between neighbouring spheres are known.
+    """Refuse mirrors on pedestals, where only whole spheres are known.
 
     Raises:
         InputError: as said; `what` is not simulated.

@@ -109,7 +109,8 @@ class ShellCase:
 
     def draws(self, builds: range) -> tuple[ShellDraws, ShellDraws]:
         """Errors of both halves of the builds of these numbers."""
-        return draw(self.errors, self.seed, builds, len(self.edge_models[0]), self.warp)
+        half = self.edge_models[0]
+        return draw(self.errors, self.seed, builds, len(half), self.warp, len(half.walls))
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ class ShellDraws:
         focal: focal length over the designed one, (s,).
         facets: coverage lost on facets, mm, (s,).
         foot: of the foot plane at each mirror, along its normal, mm, (s, m).
+        wall: of each wall of a pedestal, along its normal into the mirror's cell, mm, (s, w).
         form: factors of the mirrors' form errors (tbcad.tolerance.montecarlo.form), mm, (s, m, t).
     """
 
@@ -43,6 +44,7 @@ class ShellDraws:
     focal: Floats
     facets: Floats
     foot: Floats
+    wall: Floats
     form: Floats
 
     def __len__(self) -> int:
@@ -56,6 +58,7 @@ def draw(
     builds: Sequence[int],
     mirrors: int,
     warp: WarpMaps | None = None,
+    walls: int = 0,
 ) -> tuple[ShellDraws, ShellDraws]:
     """Errors of both halves of some builds.
 
@@ -66,24 +69,26 @@ def draw(
         mirrors: m of each half.
         warp: what the process's warp does to them (`warp_maps_of`); needed where neighbours share
             it.
+        walls: w of each half that end mirrors on pedestals.
 
     Raises:
         ValueError: it is missing.
     """
     if warp is None and errors.warp.spread != 0 and errors.warp.length != 0:
         raise ValueError("the warp of these errors needs its maps")
-    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors)
+    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors, walls)
     drawn = draw_kinds(errors, seed, builds, shapes)
     maps = warp or (None, None)
     return _half(drawn, 0, maps[0]), _half(drawn, 1, maps[1])
 
 
-def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
+def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shape]:
     """Shape of each kind of error of a shell, in the order of the streams; only append to it.
 
     Args:
         m: number of mirrors of a half.
         modes: number of vectors that the warp of a half follows from.
+        walls: number of walls of pedestals of a half.
     """
     return {
         "sphere_centre": (2, m, 3),
@@ -99,6 +104,7 @@ def shell_error_shapes(m: int, modes: int = 0) -> dict[str, Shape]:
         "facets": (2,),
         "warp": (2, modes, 3),
         "waviness": (2, m, len(TERMS)),
+        "groove_wall": (2, walls),
     }
 
 
@@ -117,6 +123,7 @@ def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> Shell
         focal=1 + of("camera_focal"),
         facets=of("facets"),
         foot=np.zeros(of("sphere_radius").shape),
+        wall=of("groove_wall"),
         form=of("waviness") * np.sqrt(term_shares()),
     )
     if warp is None:  # each mirror is displaced by its own
@@ -132,6 +139,7 @@ def _add_warp(draws: ShellDraws, build: int, warp: WarpMap, numbers: Floats) -> 
     draws.centre[build] += centre
     draws.radius[build] += radius
     draws.foot[build] += foot
+    draws.wall[build] += warp.walls_moved(numbers)
     draws.form[build][:, ASTIGMATISM] += astigmatism
 
 

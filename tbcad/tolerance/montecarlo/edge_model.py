@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, perpendicular_axes, unit
 from tbcad.optics.camera import Camera
-from tbcad.simulate.scene.reflector import Reflector, check_joined
+from tbcad.optics.groove_walls import GrooveWalls, groove_walls
+from tbcad.optics.power_diagram import PLANES
+from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.form import MONOMIALS, term_polynomials
@@ -21,7 +23,7 @@ from tbcad.tolerance.montecarlo.form_samples import (
     SECOND,
 )
 from tbcad.tolerance.montecarlo.neighbour_pairs import NeighbourPairs, cell_radii, neighbour_pairs
-from tbcad.tolerance.montecarlo.warp import WarpMaps, warp_maps
+from tbcad.tolerance.montecarlo.warp import ShellShape, WarpMaps, warp_maps
 from tbcad.types import Bools, Floats
 
 # No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
@@ -44,6 +46,7 @@ class EdgeModel:
         screen: two axes and the normal of a plane through the object for each mirror, (m, 3, 3);
             the normal is the direction u.
         cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
+        walls: that end mirrors on pedestals, w of them; none where neighbouring spheres meet.
     """
 
     view: Camera
@@ -52,6 +55,7 @@ class EdgeModel:
     halved: Bools
     screen: Floats
     cell_radius: Floats
+    walls: GrooveWalls
 
     def __len__(self) -> int:
         """Number of mirrors."""
@@ -78,19 +82,14 @@ def edge_models(cameras: tuple[Reflector, Reflector]) -> EdgeModels:
 
 
 def edge_model(at: Reflector) -> EdgeModel:
-    """The fast model of one camera with its mirrors.
-
-    Raises:
-        InputError: the mirrors stand on pedestals.
-    """
-    check_joined(at, "builds")
-    surfaces = at.cells.surfaces
+    """The fast model of one camera with its mirrors."""
+    surfaces = at.cells.surfaces.subset(slice(len(at) + PLANES))
     table = np.column_stack([surfaces.apex, surfaces.normal, surfaces.curvature])
     first = unit(ASYMMETRIC - dot(at.u, ASYMMETRIC)[:, None] * at.u)
     screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
     halved = surfaces.apex[: len(at), 0] == 0
     pairs, radius = neighbour_pairs(at.cells), cell_radii(at.cells)
-    return EdgeModel(at.camera, table, pairs, halved, screen, radius)
+    return EdgeModel(at.camera, table, pairs, halved, screen, radius, groove_walls(at.cells))
 
 
 def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
@@ -99,13 +98,15 @@ def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
     if errors.warp.spread == 0 or length == 0:
         return None
     a, b = models
-    return warp_maps((a.table, b.table), (a.cell_radius, b.cell_radius), length)
+    shapes = [ShellShape(one.table, one.cell_radius, one.walls) for one in (a, b)]
+    return warp_maps((shapes[0], shapes[1]), length)
 
 
 def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
-    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r, 7).
+    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r + w, 7).
 
-    They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed).
+    They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed) and the w
+    walls.
 
     A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
     thicker coating moves too. Their tilt is not an error of its own kind.
@@ -115,7 +116,8 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     """
     m, footed = len(edge_model), edge_model.pairs.footed
     rows = np.append(np.arange(m + 2), np.full(len(footed), m + 1))
-    table = np.repeat(edge_model.table[None, rows], len(draws), axis=0)
+    designed = np.concatenate([edge_model.table[rows], edge_model.walls.table])
+    table = np.repeat(designed[None], len(draws), axis=0)
     curvature = edge_model.table[:m, CURVATURE]
     if np.any(draws.radius * curvature <= -1):
         raise InputError(
@@ -125,18 +127,19 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * edge_model.normal
     table[:, :m, CURVATURE] = curvature / (1 + draws.radius * curvature)
     foot = edge_model.table[m + 1, NORMAL]
-    table[:, m + 2 :, APEX] += draws.foot[:, footed, None] * foot
+    table[:, m + 2 : len(rows), APEX] += draws.foot[:, footed, None] * foot
+    table[:, len(rows) :, APEX] += draws.wall[:, :, None] * edge_model.walls.normal
     return table
 
 
 def form_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
-    """Waviness of the surfaces of s builds, (s, m + 2 + r, FORM_COLUMNS), of planes 0.
+    """Waviness of the surfaces of s builds, (s, m + 2 + r + w, FORM_COLUMNS), of planes 0.
 
     They are in the order of `surface_tables`; (s, 0, ...) where no mirror has any.
     """
     if not draws.form.any():
         return np.empty((len(draws), 0, FORM_COLUMNS))
-    planes = 2 + len(edge_model.pairs.footed)
+    planes = PLANES + len(edge_model.pairs.footed) + len(edge_model.walls)
     forms = np.zeros((len(draws), len(edge_model) + planes, FORM_COLUMNS))
     of_mirrors, axes = forms[:, : len(edge_model)], perpendicular_axes(edge_model.normal)
     # Not by BLAS, whose threads would get into the way of those that simulate builds.

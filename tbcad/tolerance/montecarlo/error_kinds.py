@@ -70,6 +70,7 @@ class Errors:
         warp: smooth displacement of the points of a shell along each axis, mm; of length 0 an
             error of each mirror's centre.
         waviness: root mean square of the form error within a mirror, mm.
+        groove_wall: each wall of a pedestal along its normal, by itself, mm.
     """
 
     sphere_centre: Error = NO_ERROR
@@ -92,6 +93,7 @@ class Errors:
     wind_up: Error = NO_ERROR
     warp: Error = NO_ERROR
     waviness: Error = NO_ERROR
+    groove_wall: Error = NO_ERROR
 
     @property
     def whole_radius(self) -> Error:

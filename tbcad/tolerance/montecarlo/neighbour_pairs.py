@@ -8,6 +8,8 @@ from scipy.sparse import coo_array, csr_array
 
 from tbcad.geometry.vectors import norm
 from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
@@ -29,6 +31,7 @@ class NeighbourPairs:
         face: mirrors and planes, in the order of their distance from both of the pair.
         reach: maximum distance of the edge's points from its middle, mm, (e,).
         footed: mirrors whose pairs have a foot plane of their own, (r,): faces m + 2 onwards.
+            The walls of pedestals come after them.
     """
 
     pair: Ints
@@ -49,6 +52,8 @@ def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     Errors move corners by far less than a cell is wide, so a mirror meets no other mirror. Seam and
     foot are the first faces of each pair: they are never covered.
     """
+    if isinstance(cells, PedestalCells):
+        return _pairs_with_walls(cells)
     m = cells.mirrors
     adjacency = _adjacency(cells)
     nearby = csr_array(adjacency + adjacency @ adjacency)
@@ -57,6 +62,27 @@ def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     offset, face = _cutting_faces(nearby, cells.surfaces, m, pair)
     reach_mm = REACH * np.append(cell_radii(cells), [0, 0])[pair].max(axis=1)
     return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+
+
+def _pairs_with_walls(cells: PedestalCells) -> NeighbourPairs:
+    """A mirror on a pedestal and each plane that ends it; its other planes cut the edge there."""
+    m, (offsets, sides) = cells.mirrors, cells.rings
+    mirror, plane = cells.arcs.faces[sides // 2].T
+    plane = np.where(plane < m + PLANES, plane, plane + np.count_nonzero(plane == m + 1))
+    count = np.diff(offsets)[mirror]
+    of_pair, place = rows_and_places(count)
+    side = offsets[mirror][of_pair] + place
+    others = side != of_pair
+    offset = np.concatenate([[0], np.cumsum(count - 1)])
+    reach_mm = REACH * cell_radii(cells)[mirror]
+    pair, face = np.column_stack([mirror, plane]), plane[side[others]]
+    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+
+
+def rows_and_places(count: Ints) -> tuple[Ints, Ints]:
+    """Row of each entry of a table with some entries a row (r,), and its place in the row."""
+    row = np.repeat(np.arange(len(count)), count)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
@@ -73,7 +99,10 @@ def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
 
 def cell_radii(cells: Cells) -> Floats:
     """Distance of each mirror's farthest corner from its apex, mm, (m,)."""
-    mirror, corner = cells.triangles.ravel(), np.repeat(np.arange(len(cells.corners)), 3)
+    mirror, corner = cells.triangles.ravel(), np.repeat(np.arange(len(cells.triangles)), 3)
+    if isinstance(cells, PedestalCells):
+        sides = cells.rings[1] // 2
+        mirror, corner = cells.arcs.left[sides], cells.arcs.start[sides]
     mirror, corner = mirror[mirror < cells.mirrors], corner[mirror < cells.mirrors]
     radius = np.zeros(cells.mirrors)
     np.maximum.at(radius, mirror, norm(cells.corners[corner] - cells.surfaces.apex[mirror]))
@@ -92,9 +121,7 @@ def _adjacency(cells: Cells) -> csr_array:
 def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, pair: Ints) -> tuple[Ints, Ints]:
     """Where the faces of each pair (e, 2) begin, (e + 1,), and the faces: see NeighbourPairs."""
     first, second = pair.T
-    count = np.diff(nearby.indptr)[first]
-    of_pair = np.repeat(np.arange(len(pair)), count)
-    place = np.arange(len(of_pair)) - np.repeat(np.cumsum(count) - count, count)
+    of_pair, place = rows_and_places(np.diff(nearby.indptr)[first])
     face = nearby.indices[nearby.indptr[first][of_pair] + place].astype(np.int64)
     other = (face != first[of_pair]) & (face != second[of_pair])
     of_pair, face = of_pair[other], face[other]

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
+from tbcad.tolerance.montecarlo.draws import shell_error_shapes
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Floats
 
@@ -43,6 +44,12 @@ def present_kinds(errors: Errors) -> list[str]:
     """The kinds of error that are not zero."""
     kinds = {field.name: getattr(errors, field.name) for field in fields(errors)}
     return [kind for kind, error in kinds.items() if error.spread != 0 or error.mean != 0]
+
+
+def shell_kinds(errors: Errors, walls: int) -> list[str]:
+    """Those that a shell with some walls of pedestals in each half has."""
+    shapes = shell_error_shapes(1, 1, walls)
+    return [kind for kind in present_kinds(errors) if 0 not in shapes.get(kind, (0,))]
 
 
 def only_kind(errors: Errors, kind: str) -> Errors:

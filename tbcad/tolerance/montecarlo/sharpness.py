@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.optics.camera import Camera
+from tbcad.optics.groove_walls import GrooveWalls
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
@@ -96,7 +97,17 @@ class BuiltReflector(SubstitutedReflector):
     """A camera and its mirrors at their places in a build.
 
     The cells are those of the design: they only limit where in the picture a mirror may be.
+
+    Attributes:
+        built_walls: of the pedestals.
     """
+
+    built_walls: GrooveWalls
+
+    @property
+    def walls(self) -> GrooveWalls:
+        """What ends mirrors on pedestals."""
+        return self.built_walls
 
     def boxes(self) -> Ints:
         """Columns and rows about each cell, wider by its own size on all sides, (m, 4)."""
@@ -118,7 +129,14 @@ def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflec
     normal = tilt.apply(at.mirrors.normal)
     apex = centre + draws.shell_shift[build] + scale * radius[:, None] * normal
     surfaces = Surfaces(apex, normal, 1 / (scale * radius))
-    return BuiltReflector(at.camera_id, _view(at.camera, draws, build), at.u, at.cells, surfaces)
+    view, walls = _view(at.camera, draws, build), at.walls
+    point = walls.point + draws.wall[build][:, None] * walls.normal
+    built = GrooveWalls.of_planes(
+        walls.mirror,
+        tilt.apply(scale * point) + draws.shell_shift[build],
+        tilt.apply(walls.normal),
+    )
+    return BuiltReflector(at.camera_id, view, at.u, at.cells, surfaces, built)
 
 
 def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from tbcad.geometry.vectors import dot, perpendicular_axes
+from tbcad.optics.groove_walls import GrooveWalls
 from tbcad.simulate.parallel import compiled_loop
 from tbcad.tolerance.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.tolerance.montecarlo.smooth_field import SmoothField, pivots, smooth_field
@@ -34,6 +35,8 @@ class WarpMap:
         normal: there, (m, q, 3).
         foot_basis: of the field where each mirror is nearest to the foot plane, (m, K).
         foot_normal: unit normal of the foot plane, (3,).
+        wall_basis: of the field in the middle of the edge at each wall of a pedestal, (K, w).
+        wall_normal: unit normals of the walls, (w, 3).
     """
 
     basis: Floats
@@ -41,11 +44,17 @@ class WarpMap:
     normal: Floats
     foot_basis: Floats
     foot_normal: Floats
+    wall_basis: Floats
+    wall_normal: Floats
 
     @property
     def modes(self) -> int:
         """Number of random numbers K for each axis."""
         return len(self.basis)
+
+    def walls_moved(self, numbers: Floats) -> Floats:
+        """Displacements of the walls of one build by numbers (K, 3), along their normals, (w,)."""
+        return dot(field_values(self.wall_basis, numbers).T, self.wall_normal)
 
     def moved(self, numbers: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Displacements of the mirrors of one build.
@@ -67,6 +76,21 @@ class WarpMap:
 WarpMaps: TypeAlias = tuple[WarpMap, WarpMap]
 
 
+@dataclass(frozen=True)
+class ShellShape:
+    """One half as designed.
+
+    Attributes:
+        table: apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7).
+        cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
+        walls: of pedestals.
+    """
+
+    table: Floats
+    cell_radius: Floats
+    walls: GrooveWalls
+
+
 @compiled_loop
 def field_values(basis: Floats, numbers: Floats) -> Floats:
     """Displacements (3, p) by random numbers (K, 3) and the field's basis (K, p).
@@ -84,27 +108,23 @@ def field_values(basis: Floats, numbers: Floats) -> Floats:
     return result
 
 
-def warp_maps(
-    tables: tuple[Floats, Floats], radii: tuple[Floats, Floats], length: float
-) -> WarpMaps:
+def warp_maps(halves: tuple[ShellShape, ShellShape], length: float) -> WarpMaps:
     """The maps of both halves, whose fields follow from the same mirrors of each.
 
     Args:
-        tables: of each half apex, normal, curvature of the m mirrors, seam and foot, (m + 2, 7).
-        radii: of each half the distance of each mirror's farthest corner from its apex, mm, (m,).
+        halves: as designed.
         length: correlation length, mm.
     """
-    chosen = pivots(tables[0][:-2, :3], length)
+    chosen = pivots(halves[0].table[:-2, :3], length)
     first, second = (
-        _warp_map(table, radius, smooth_field(table[:-2, :3], length, chosen))
-        for table, radius in zip(tables, radii, strict=True)
+        _warp_map(half, smooth_field(half.table[:-2, :3], length, chosen)) for half in halves
     )
     return first, second
 
 
-def _warp_map(table: Floats, radius: Floats, field: SmoothField) -> WarpMap:
-    apex, foot = table[:-2, :3], table[-1]
-    points, normal = mirror_points(table[:-2], RING_SHARE * radius)
+def _warp_map(half: ShellShape, field: SmoothField) -> WarpMap:
+    apex, foot = half.table[:-2, :3], half.table[-1]
+    points, normal = mirror_points(half.table[:-2], RING_SHARE * half.cell_radius)
     height = np.broadcast_to(_astigmatism(), (len(apex), RING_POINTS + 1, 2))
     unknowns = np.concatenate([normal, np.ones((*normal.shape[:2], 1)), height], axis=2)
     above = dot(apex - foot[:3], foot[3:6])
@@ -114,6 +134,8 @@ def _warp_map(table: Floats, radius: Floats, field: SmoothField) -> WarpMap:
         normal=normal,
         foot_basis=field.basis(apex - above[:, None] * foot[3:6]),
         foot_normal=foot[3:6],
+        wall_basis=np.ascontiguousarray(field.basis(half.walls.point).T),
+        wall_normal=half.walls.normal,
     )
 
 

@@ -152,6 +152,8 @@ class Process(Section):
     """Each shell: smooth displacement of its points along each axis."""
     waviness_um: RootMeanSquare
     """Root mean square of the height of the form error within each mirror."""
+    groove_wall_um: Micrometres
+    """Each wall of a groove between mirrors on pedestals along its normal, by itself."""
     scale_isotropic_permille: Permille
     """Growth of each shell."""
     scale_axis_permille: Permille

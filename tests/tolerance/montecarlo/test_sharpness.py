@@ -178,7 +178,14 @@ def test_boxes_hold_all_pixels(cameras: Cameras) -> None:
     for at, drawn in zip(cameras, builds(cameras, LARGE, 3), strict=True):
         for k in range(3):
             built = built_reflector(at, drawn, k)
-            parts = (built.camera_id, built.camera, built.u, built.cells, built.surfaces)
+            parts = (
+                built.camera_id,
+                built.camera,
+                built.u,
+                built.cells,
+                built.surfaces,
+                built.walls,
+            )
             everywhere = numbers(WholeFrame(*parts))
             assert np.array_equal(numbers(built), everywhere)
             lost += int((numbers(OwnCells(*parts)) != everywhere).sum())

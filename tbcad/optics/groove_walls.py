@@ -1,0 +1,58 @@
+"""Walls of the grooves between mirrors on pedestals: planes that end one mirror each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.types import Floats, Ints
+
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True)
+class GrooveWalls:
+    """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet.
+
+    Attributes:
+        mirror: that each ends, (w,).
+        table: the middle of that mirror's edge at the wall, the unit normal into the mirror's
+            cell, and a curvature of 0, (w, 7).
+    """
+
+    mirror: Ints
+    table: Floats
+
+    @classmethod
+    def of_planes(cls, mirror: Ints, point: Floats, normal: Floats) -> "GrooveWalls":
+        """Walls that end mirrors (w,) at planes through points, with normals, (w, 3) each."""
+        return cls(mirror, np.column_stack([point, normal, np.zeros(len(mirror))]))
+
+    def __len__(self) -> int:
+        """Number of walls."""
+        return len(self.mirror)
+
+    @property
+    def point(self) -> Floats:
+        """Middle of the mirror's edge at each wall, mm, (w, 3)."""
+        return self.table[:, :3]
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals into the mirrors' cells, (w, 3)."""
+        return self.table[:, 3:6]
+
+    def first_of_mirrors(self, mirrors: int) -> Ints:
+        """Where the walls of each of m mirrors begin, and where those of the last end, (m + 1,)."""
+        return np.searchsorted(self.mirror, np.arange(mirrors + 1))
+
+
+def groove_walls(cells: Cells) -> GrooveWalls:
+    """The walls of a camera's cells, in the order of `PedestalCells.walls`."""
+    if not isinstance(cells, PedestalCells):
+        return GrooveWalls(np.arange(0), np.empty((0, 7)))
+    first = len(cells.surfaces) - len(cells.walls)
+    edge = cells.wall_rings[:, 0] // 2
+    point = cells.arcs.at(edge, np.full(len(edge), MIDDLE))
+    return GrooveWalls.of_planes(cells.walls[:, 0], point, -cells.surfaces.normal[first:])

@@ -1,0 +1,217 @@
+"""Pixels' rays off mirrors on pedestals: a search over all solids, and the mesh of a shell."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.formats.stl import write_stl
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.record import write_record
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import PLANES
+from tbcad.shell.files import shell_envelope
+from tbcad.shell.mesh import shell_mesh
+from tbcad.simulate.capture.light_field import light_field_in_memory
+from tbcad.simulate.capture.photograph import photograph, to_bytes
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.spec.load import load_spec
+from tbcad.tolerance.montecarlo.coverage import mirror_coverage
+from tbcad.tolerance.montecarlo.draws import draw
+from tbcad.tolerance.montecarlo.edge_model import edge_model
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerance.montecarlo.sharpness import built_reflector
+from tests.pedestal_designs import pedestal_design
+
+SETTINGS = ("n=6", "width_px=416", "height_px=310", "shell.groove_mm=0.4")
+CENTRE = (0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def made() -> MirrorDesign:
+    return pedestal_design(*SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def cameras(made: MirrorDesign) -> tuple[Reflector, Reflector]:
+    return reflectors(made)
+
+
+@pytest.fixture(scope="module")
+def exported(made: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
+    """The record, with both shells beside it as STL."""
+    folder: Path = tmp_path_factory.mktemp("pedestals")
+    write_record(folder, made, shells=True)
+    array = made.arrays[0]
+    mesh = shell_mesh(made.spec, array.modelled_cells, shell_envelope(made), array.apex_distance)
+    write_stl(folder / "shell_a.stl", mesh)
+    write_stl(folder / "shell_b.stl", mesh.mirrored())
+    return read_export(folder)
+
+
+def every_row(at: Reflector) -> ReflectedRays:
+    return exact_tracer(at)(range(at.camera.height_px), CENTRE)
+
+
+def searched(at: Reflector, way: np.ndarray) -> np.ndarray:
+    """First mirror, from 1, that rays (k, 3) meet: balls cut by half-spaces, on segments.
+
+    A ray may meet the wall of a pedestal first, which is no mirror.
+    """
+    cells, pinhole = at.cells, at.camera.pinhole
+    assert isinstance(cells, PedestalCells)
+    to_centre = at.mirrors.centre - pinhole
+    along = way @ to_centre.T
+    rest = at.mirrors.radius**2 - dot(to_centre, to_centre) + along**2
+    half = np.sqrt(np.maximum(rest, 0))
+    low, high = along - half, np.where(rest > 0, along + half, -np.inf)
+    on_sphere = low.copy()
+    planes = [(slice(None), -n, p) for n, p in cells_planes(cells)]
+    walls = zip(*wall_planes(cells), strict=True)
+    for mirror, n, p in [*planes, *walls]:  # outside where value > 0
+        value, rate = n @ (pinhole - p), way @ n
+        crossing = -value / rate
+        enters, leaves = np.where(rate < 0, crossing, -np.inf), np.where(rate > 0, crossing, np.inf)
+        if isinstance(mirror, slice):
+            enters, leaves = enters[:, None], leaves[:, None]
+        low[:, mirror] = np.maximum(low[:, mirror], enters)
+        high[:, mirror] = np.minimum(high[:, mirror], leaves)
+    reach = np.where(low < high, low, np.inf)
+    first = reach.argmin(axis=1)
+    row = np.arange(len(way))
+    there = np.isfinite(reach[row, first]) & (reach[row, first] == on_sphere[row, first])
+    return np.where(there, first + 1, 0)
+
+
+def cells_planes(cells: PedestalCells) -> list[tuple[np.ndarray, np.ndarray]]:
+    at, m = cells.surfaces, cells.mirrors
+    return [(at.normal[k], at.apex[k]) for k in range(m, m + PLANES)]
+
+
+def wall_planes(cells: PedestalCells) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    first = cells.mirrors + PLANES
+    return cells.walls[:, 0], cells.surfaces.normal[first:], cells.surfaces.apex[first:]
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_mirrors_are_those_that_a_search_finds(
+    cameras: tuple[Reflector, Reflector], camera: int
+) -> None:
+    at = cameras[camera]
+    rays = every_row(at)
+    way = unit(pixel_directions(at.camera, range(at.camera.height_px))).reshape(-1, 3)
+    found = searched(at, way)
+    assert np.array_equal(rays.mirror.ravel(), found)
+    assert (found == 0).mean() > 0.05  # grooves, and what lies beside the mirrors
+
+
+def test_pixels_are_those_of_the_fast_model(cameras: tuple[Reflector, Reflector]) -> None:
+    at = cameras[0]
+    half = edge_model(at)
+    still = draw(Errors(), 1, range(1), len(half), None, len(half.walls))[0]
+    area = mirror_coverage(half, still).pixels[0]
+    count, inside = counted(at), within_frame(at)
+    assert inside.sum() > 60
+    assert np.abs(area - count)[inside] == pytest.approx(0, abs=0.5 * np.sqrt(count.max()))
+
+
+def counted(at: Reflector) -> np.ndarray:
+    """Pixels of each mirror."""
+    return np.bincount(every_row(at).mirror.ravel(), minlength=len(at) + 1)[1:]
+
+
+def within_frame(at: Reflector) -> np.ndarray:
+    """Which mirrors' pictures lie inside the frame."""
+    box = at.boxes()
+    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < at.camera.width_px)
+    return inside & (box[:, 3] < at.camera.height_px)
+
+
+def test_the_mesh_of_the_shell_shows_the_same(exported: ExportedDesign, knot: Scene) -> None:
+    """Rays of every pixel off the facets of the STL; grooves are dark in both."""
+    shells = read_shell_meshes(exported)
+    for at in exported.reflectors:
+        rays = range(at.camera.height_px)
+        exact, mesh = every_row(at), mesh_tracer(shells, at)(rays, CENTRE)
+        same = exact.mirror == mesh.mirror
+        assert same.mean() > 0.999  # but for pixel centres on an edge
+        both = same & (exact.mirror > 0)
+        assert np.abs(mesh.origin[both] - exact.origin[both]).max() < 1e-4
+        turned = np.cross(exact.direction[both], mesh.direction[both])
+        assert 200 * norm(turned).max() < 2e-3  # mm at the object
+        pictures = [
+            np.concatenate([band.colour for band in photograph(at.camera, trace, knot)]).astype(int)
+            for trace in (exact_tracer(at), mesh_tracer(shells, at))
+        ]
+        assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
+
+
+def test_exported_pedestals_are_those_of_the_design(
+    exported: ExportedDesign, cameras: tuple[Reflector, Reflector]
+) -> None:
+    for read, at in zip(exported.reflectors, cameras, strict=True):
+        one, other = every_row(read), every_row(at)
+        assert (one.mirror == other.mirror).mean() > 0.9999
+
+
+def test_views_are_as_good_as_where_spheres_meet(knot: Scene) -> None:
+    """Grooves of 0.1 mm part the pictures of mirrors, and views do not show them: mean of four."""
+    places = ((20, 60), (200, 35), (90, 85), (310, 20))
+    views = [
+        camera_around_object(np.radians(a), np.radians(e), 640.0, 60.0, (160, 120))
+        for a, e in places
+    ]
+    truths = [to_bytes(pinhole_picture(knot, view)) for view in views]
+    found, black = {}, {}
+    for edges in ("pedestal", "valley"):
+        settings = ["n=6", "width_px=416", "height_px=310", f"shell.edges={edges}"]
+        both = reflectors(design(load_spec(None, settings)))
+        photographs = [(at, photograph(at.camera, exact_tracer(at), knot)) for at in both]
+        tiles = MirrorTiles(light_field_in_memory(photographs, 60.0))
+        seen = [synthesise(tiles, view, "nearest").image for view in views]
+        pairs = list(zip(truths, seen, strict=True))
+        found[edges] = np.mean([image_quality(*pair).ssim for pair in pairs])
+        black[edges] = sum(
+            np.count_nonzero((one.max(axis=2) == 0) & (truth.max(axis=2) > 0))
+            for truth, one in pairs
+        )
+    assert found["pedestal"] == pytest.approx(found["valley"], abs=0.02)
+    assert black["pedestal"] < 1.1 * black["valley"]
+
+
+def test_pixels_of_builds_are_those_of_the_fast_model(
+    cameras: tuple[Reflector, Reflector],
+) -> None:
+    """Shells that are moved, turned and grown take their walls along; each wall is off as well."""
+    errors = Errors(
+        sphere_centre=Error(0.02),
+        scale_isotropic=Error(0.01),
+        shell_shift=Error(0.4),
+        shell_tilt=Error(5e-3),
+        camera_shift=Error(0.2),
+        camera_focal=Error(5e-3),
+    )
+    for at, one in zip(
+        cameras,
+        draw(errors, 5, range(1), len(cameras[0]), None, len(cameras[0].walls)),
+        strict=True,
+    ):
+        moved = replace(one, wall=np.random.default_rng(3).normal(0, 0.2, one.wall.shape))
+        pixels = counted(built_reflector(at, moved, 0))
+        area = mirror_coverage(edge_model(at), moved).pixels[0]
+        inside = within_frame(built_reflector(at, moved, 0))
+        assert inside.sum() > 50
+        assert np.abs(area - pixels)[inside] == pytest.approx(0, abs=0.6 * np.sqrt(pixels.max()))
+        # Walls of the design would give other pictures.
+        assert np.abs(area - counted(built_reflector(at, one, 0)))[inside].max() > 30

@@ -1,0 +1,244 @@
+"""Simulated builds of mirrors on pedestals against closed forms, slow tracing and verification."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export as read_record
+
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.mirrors.record import write_record
+from tbcad.optics.reflection import miss_distances
+from tbcad.output.manifest import write_manifest
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.tolerance.as_made import as_made
+from tbcad.tolerance.montecarlo.builds import MonteCarloCase, WorstCase, simulate
+from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
+from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
+from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerance.montecarlo.sensitivity import scaled, shell_kinds
+from tbcad.tolerance.montecarlo.smooth_field import pivots, smooth_field
+from tests.pedestal_designs import pedestal_design
+from tests.tolerance.exact_builds import traced_coverage, verified_coverage, write_meshes
+from tests.tolerance.exact_fields import displaced_coverage
+from tests.tolerance.montecarlo.every_edge import every_edge
+
+COARSE = Errors(
+    sphere_centre=Error(0.03),
+    sphere_radius=Error(0.03),
+    scale_isotropic=Error(0.002),
+    camera_shift=Error(0.2),
+    coating=Error(0.01, 0.005),
+)
+POSED = replace(COARSE, shell_shift=Error(0.2), shell_tilt=Error(0.002))
+SLA = Errors(warp=Error(0.0346, length=50.0))
+WIDE = 16.0  # mm, of a mirror about its apex: see test_warp
+
+
+@pytest.fixture(scope="module")
+def small() -> MirrorDesign:
+    return pedestal_design("n=6")
+
+
+@pytest.fixture(scope="module")
+def halves(small: MirrorDesign) -> EdgeModels:
+    return edge_models(reflectors(small))
+
+
+def drawn(halves: EdgeModels, errors: Errors, builds: range) -> tuple[ShellDraws, ShellDraws]:
+    maps, half = warp_maps_of(halves, errors), halves[0]
+    return draw(errors, 7, builds, len(half), maps, len(half.walls))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [("n=2",), ("n=5",), ("n=9",), ("n=6", "shell.groove_mm=0.5"), ("n=4", "radius_rule=flat")],
+)
+def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
+    made = pedestal_design(*settings)
+    models = edge_models(reflectors(made))
+    for array, half, one in zip(
+        made.arrays, models, drawn(models, Errors(), range(1)), strict=True
+    ):
+        found = mirror_coverage(half, one)
+        if "radius_rule=flat" not in settings:  # the slow tracing knows no planes
+            assert np.abs(found.diameter[0] - traced_coverage(array, one, 0)).max() < 1e-6
+        assert found.diameter[0] == pytest.approx(array.coverage, abs=5e-5)
+        assert (found.crossings[0, ~half.halved] % 2 == 1).all()
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_random_builds_against_slow_tracing(
+    halves: EdgeModels, small: MirrorDesign, share: float
+) -> None:
+    """Cells cut anew from displaced spheres by the walls of the design, within 1e-6 mm."""
+    for array, half, one in zip(
+        small.arrays, halves, drawn(halves, scaled(POSED, share), range(10)), strict=True
+    ):
+        found = mirror_coverage(half, one).diameter
+        slow = np.stack([traced_coverage(array, one, k) for k in range(10)])
+        assert np.abs(found - slow).max() < 1e-6
+        assert np.abs(found - array.coverage).max() > 1.5 * share
+
+
+def test_a_mirror_that_is_off_changes_no_other(halves: EdgeModels) -> None:
+    """Not by a bit: neither what they cover nor their pictures."""
+    half, alone = halves[0], 40
+    still = drawn(halves, Errors(), range(1))[0]
+    centre, form = np.zeros_like(still.centre), np.zeros_like(still.form)
+    centre[0, alone], form[0, alone] = [0.05, -0.04, 0.06], 0.002
+    before, after = (
+        mirror_coverage(half, one) for one in (still, replace(still, centre=centre, form=form))
+    )
+    # With waviness an edge is displaced along plane and sphere: by nothing where there is none.
+    for name in ("diameter", "pixels"):
+        changed = np.flatnonzero(np.abs(getattr(after, name) - getattr(before, name))[0] > 1e-9)
+        assert changed.tolist() == [alone], name
+    spheres = mirror_coverage(half, replace(still, centre=centre)).diameter[0]
+    assert np.flatnonzero(spheres != before.diameter[0]).tolist() == [alone]
+
+
+def bisected_coverage(half: EdgeModel, draws: ShellDraws, mirror: int, ways: int = 4_000) -> float:
+    """Coverage of a mirror of the first build by where each way from its apex leaves its planes."""
+    apex, normal, curvature = half.apex[mirror], half.normal[mirror], half.table[mirror, 6]
+    scale, radius = draws.scale[0], 1 / curvature + draws.radius[0, mirror]
+    centre = apex - normal / curvature + draws.centre[0, mirror]
+    own = half.walls.mirror == mirror
+    point = half.walls.point[own] + draws.wall[0, own, None] * half.walls.normal[own]
+    planes = [
+        *zip(point, half.walls.normal[own], strict=True),
+        *half.table[-2:, :6].reshape(2, 2, 3),
+    ]
+    first = np.linalg.svd(normal[None])[2][1]
+    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
+    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
+
+    def outward(angle: np.ndarray) -> np.ndarray:
+        return np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way
+
+    low, high = np.zeros(ways), np.full(ways, min(np.pi / 2, 60 / radius))
+    for _ in range(40):
+        middle = (low + high) / 2
+        x = centre + radius * outward(middle)
+        kept = np.all([(x - p) @ n >= 0 for p, n in planes], axis=0)
+        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
+    built = outward(low) / scale
+    built /= np.linalg.norm(built, axis=1, keepdims=True)
+    x = scale * (centre + radius * outward(low))
+    return float(2 * miss_distances(half.view.pinhole, x, built).min())
+
+
+@pytest.mark.parametrize("mirror", [3, 30, 55])
+def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels, mirror: int) -> None:
+    errors = Errors(sphere_centre=Error(0.03), sphere_radius=Error(0.03), scale_axis=Error(0.01))
+    one = drawn(halves, errors, range(1))[1]
+    moved = np.random.default_rng(2).normal(0, 0.1, one.wall.shape)
+    found = mirror_coverage(halves[1], replace(one, wall=moved)).diameter[0, mirror]
+    slow = bisected_coverage(halves[1], replace(one, wall=moved), mirror)
+    assert found == pytest.approx(slow, abs=1e-4)
+    assert abs(found - mirror_coverage(halves[1], one).diameter[0, mirror]) > 0.02
+
+
+def test_walls_have_an_error_of_their_own(halves: EdgeModels) -> None:
+    """Normal, of no other's numbers; where spheres meet there is none to study."""
+    errors = Errors(groove_wall=Error(0.01))
+    a, b = drawn(halves, errors, range(4))
+    assert a.wall.shape == (4, len(halves[0].walls))
+    every = np.concatenate([a.wall.ravel(), b.wall.ravel()])
+    assert len(np.unique(every)) == len(every)
+    assert every.std() == pytest.approx(0.01, rel=4 / np.sqrt(2 * len(every)))
+    assert abs(every.mean()) < 4 * 0.01 / np.sqrt(len(every))
+    still = draw(Errors(), 7, range(4), len(halves[0]), None, len(halves[0].walls))[0]
+    moved = mirror_coverage(halves[0], replace(still, wall=a.wall)).diameter
+    assert np.array_equal(moved, mirror_coverage(halves[0], a).diameter)
+    assert shell_kinds(errors, len(halves[0].walls)) == ["groove_wall"]
+    assert shell_kinds(errors, 0) == []
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3, 0.1])
+def test_same_bits_as_with_every_edge(halves: EdgeModels, size: float) -> None:
+    """Faces and parts of edges that are passed over change nothing."""
+    errors = Errors(
+        sphere_centre=Error(size), sphere_radius=Error(size), scale_axis=Error(size / 9)
+    )
+    draws = drawn(halves, errors, range(4))
+    for half, one in zip(halves, draws, strict=True):
+        slow, fast = every_edge(half, one), mirror_coverage(half, one)
+        assert np.array_equal(fast.diameter, 2 * np.sqrt(slow[..., 0]))
+        assert np.array_equal(fast.crossings, slow[..., 1])
+    whole, worst = (coverage(halves, draws, only)[0] for only in (False, True))
+    assert np.array_equal(worst.min(axis=1), whole.min(axis=1))
+
+
+def test_warped_builds_against_displaced_material(halves: EdgeModels, small: MirrorDesign) -> None:
+    """Halves whose every point is displaced: walls go along with the mirrors that they end."""
+    length, builds = SLA.warp.length, 3
+    chosen = pivots(halves[0].apex, length)
+    fields = [smooth_field(half.apex, length, chosen) for half in halves]
+    shapes = shell_error_shapes(len(halves[0]), len(chosen))
+    numbers = draw_kinds(SLA, 7, range(builds), shapes)["warp"]
+    draws = drawn(halves, SLA, range(builds))
+    for side, (half, array) in enumerate(zip(halves, small.arrays, strict=True)):
+        fast = mirror_coverage(half, draws[side]).diameter
+        fixed = replace(draws[side], wall=np.zeros_like(draws[side].wall))
+        without = mirror_coverage(half, fixed).diameter
+        whole = ~half.halved & (half.cell_radius < WIDE)
+        for k in range(builds):
+            exact = displaced_coverage(array, fields[side], numbers[k, side])
+            assert fast[k].min() == pytest.approx(exact.min(), abs=0.05)
+            assert np.abs(fast[k] - exact)[whole].max() < 0.05
+            assert np.abs(without[k] - exact)[whole].max() > 0.2
+
+
+@pytest.fixture(scope="module")
+def record(small: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Export:
+    """The record as the verification reads it; its meshes are then replaced."""
+    folder = tmp_path_factory.mktemp("made")
+    write_record(folder, small, shells=True)
+    write_manifest(folder)
+    return read_record(folder)
+
+
+def test_random_builds_against_the_verification_of_their_meshes(
+    halves: EdgeModels, small: MirrorDesign, record: Export
+) -> None:
+    """Both shells meshed, written, read, mirrors found and measured by rays: within 0.05 mm."""
+    draws = drawn(halves, scaled(COARSE, 0.5), range(5))
+    fast, _ = coverage(halves, draws)
+    for k in range(5):
+        write_meshes(small, draws, k, record.folder)
+        shifts = {name: one.camera_shift[k] for name, one in zip("ab", draws, strict=True)}
+        assert np.abs(fast[k] - verified_coverage(record, shifts)).max() < 0.05
+    assert fast.min(axis=1).max() < 60.6 - 0.3  # the meshes are not the design's
+
+
+def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
+    errors = replace(SLA, waviness=Error(5e-4), sphere_centre=Error(0.005))
+    case = MonteCarloCase(halves, errors, 5)
+    together, alone = case(range(4)), case(range(2, 3))
+    for name in ("coverage", "pixels", "angle"):
+        assert np.array_equal(getattr(together, name)[2:3], getattr(alone, name)), name
+    assert np.array_equal(WorstCase(halves, errors, 5)(range(4)).worst, together.worst)
+
+
+def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
+    halves: EdgeModels, small_design: MirrorDesign
+) -> None:
+    """Centres and radii off by 5 um each: less than a third."""
+    errors = Errors(sphere_centre=Error(0.005), sphere_radius=Error(0.005))
+    joined = edge_models(reflectors(small_design))
+    pedestal, valley = (
+        simulate(WorstCase(of, errors, 1), 40).worst.mean() for of in (halves, joined)
+    )
+    assert 60.6 - 0.1 > pedestal > 60.6 - 0.7
+    assert 3 * (60.6 - pedestal) < 60.6 - valley
+
+
+def test_every_build_says_how_it_would_be_made(small: MirrorDesign) -> None:
+    found = as_made(reflectors(small), 60.0, 0.0)
+    assert found.reason == ""
+    assert len(found.processes) == 5
