@@ -94,14 +94,20 @@ def _validation_properties(
 
 
 def _name_product(writer: STEPControl_Writer, name: str) -> None:
-    """Name the product and its solid; the kernel's own name counts up with every file."""
-    model = writer.Model()
+    """Name the one product and its one solid; the kernel's own name counts up with every file."""
+    model, unnamed = writer.Model(), [StepBasic_Product, StepShape_ManifoldSolidBrep]
     for k in range(1, model.NbEntities() + 1):
         entity = model.Value(k)
-        if isinstance(entity, StepBasic_Product):
+        kind = next((kind for kind in unnamed if isinstance(entity, kind)), None)
+        if kind is None:
+            continue
+        if kind is StepBasic_Product:
             entity.SetId(TCollection_HAsciiString(name))
-        if isinstance(entity, (StepBasic_Product, StepShape_ManifoldSolidBrep)):
-            entity.SetName(TCollection_HAsciiString(name))
+        entity.SetName(TCollection_HAsciiString(name))
+        unnamed.remove(kind)
+        if not unnamed:  # both are among the first of ten thousands
+            return
+    raise StepError(f"the kernel wrote no product or no solid of {name}")
 
 
 def write_header(writer: STEPControl_Writer, name: str) -> None:

@@ -15,9 +15,15 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 
 def norm(v: Floats) -> Floats:
-    """Lengths (...) of vectors (..., 3)."""
-    result: Floats = np.linalg.norm(v, axis=-1)
-    return result
+    """Lengths (...) of vectors (..., 3), to the bit those of np.linalg.norm.
+
+    That adds up three numbers for each vector, which takes six times as long as adding columns.
+    """
+    square = np.square(v)
+    total: Floats = square[..., 0]
+    for k in range(1, square.shape[-1]):
+        total = total + square[..., k]
+    return np.sqrt(total)
 
 
 def unit(v: Floats) -> Floats:

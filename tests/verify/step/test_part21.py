@@ -1,5 +1,6 @@
 """The reader of STEP text against steputils, a parser of the whole grammar."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steputils import p21
+from tbcad_verify.step import part21
 from tbcad_verify.step.part21 import (
     Enumeration,
     Reference,
@@ -49,6 +51,35 @@ def test_every_entity_of_a_shell() -> None:
         name, text = entities.texts[number]
         assert name == entity.name
         assert parameters(text) == [as_ours(one) for one in entity.params]
+
+
+def test_both_expressions_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = SAMPLE.read_text(encoding="utf-8")
+    found = read_entities(text).texts
+    monkeypatch.setattr(part21, "PLAIN", re.compile(r"(?!)"))
+    assert read_entities(text).texts == found
+
+
+@pytest.mark.parametrize(
+    "entity",
+    [
+        "A(1)/* ) ;#2=B(2); */;",
+        "A(1)/*)*/;",
+        "A('it''s;)','')\n ;",
+        "A(/* x) ;*/'y');",
+        "(A(1)B($));",
+    ],
+)
+def test_comments_and_texts_in_an_entity(entity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def found() -> dict[int, tuple[str, str]] | str:
+        try:
+            return read_entities(f"{HEAD}#1={entity}\n#3=C(#1);{END}").texts
+        except ValueError as error:
+            return str(error)
+
+    quick = found()
+    monkeypatch.setattr(part21, "PLAIN", re.compile(r"(?!)"))
+    assert found() == quick
 
 
 def written(value: Value) -> str:

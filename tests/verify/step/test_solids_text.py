@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step import solids_text
 from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.solids_text import (
     RoundFace,
@@ -40,6 +41,18 @@ def test_a_solid_has_its_product_name_and_corners(text: str) -> None:
     corners = found["shell_a"].corners
     assert (np.lexsort(corners.T[::-1]) == np.arange(len(corners))).all()
     assert corners[:, 0].min() == pytest.approx(0, abs=1e-9)
+
+
+def test_below_geometry_is_nothing_that_counts(
+    text: str, casing: Casing, sample: Export, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = read_solids(text)["shell_a"]
+    monkeypatch.setattr(solids_text, "GEOMETRY", frozenset())
+    slow = read_solids(text)["shell_a"]
+    assert np.array_equal(found.corners, slow.corners)
+    assert repr(found.faces) == repr(slow.faces)
+    everything = read_casing(text, frozenset(sample.mirrors.ids))
+    assert np.array_equal(casing.valleys, everything.valleys)
 
 
 def test_holes_are_those_of_the_design(sample: Export, text: str) -> None:

@@ -121,8 +121,8 @@ def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
     # A sphere about the pinhole is met by all rays.
     sine = np.where(norm(toward) > shell.radius, shell.radius / norm(toward), np.nan)
     half = np.nan_to_num(np.arcsin(sine), nan=np.pi) + SLACK
-    parts = chunks(d.shape[1], CHUNK)
-    first = in_threads(lambda part: _first(shell, unit(toward), half, d[:, part]), parts)
+    toward, parts = unit(toward), chunks(d.shape[1], CHUNK)
+    first = in_threads(lambda part: _first(shell, toward, half, d[:, part]), parts)
     return np.concatenate([np.zeros(0, dtype=np.int64), *first])
 
 
