@@ -30,6 +30,7 @@ SYMBOL_MM = 20.0  # from the symbol's middle to the end of its cell
 LABEL_MM, VALUE_MM, NOTE_MM = 1.8, 3.0, 3.0  # heights of texts
 INSIDE_MM = 1.5  # of a cell's texts from its border
 LINE_MM = 5.5  # from note to note
+BESIDE_MM = 4.0  # of notes and tables from a border
 TOLERANCES = "ISO 2768-m"
 FIRST_ANGLE = "first angle (ISO 5456-2)"
 Box: TypeAlias = tuple[float, float, float, float]
@@ -116,9 +117,10 @@ def drawing_room(paper: Point) -> Box:
     return LEFT_MM, BORDER_MM + TITLE_MM[1], paper[0] - BORDER_MM, paper[1] - BORDER_MM
 
 
-def border(paper: Point) -> Iterator[Entity]:
-    """The border."""
+def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
+    """Border and title block; without a scale nothing is to scale."""
     yield rectangle((LEFT_MM, BORDER_MM, paper[0] - BORDER_MM, paper[1] - BORDER_MM), Layer.FRAME)
+    yield from title_block(paper, scale, block)
 
 
 def rectangle(box: Box, layer: Layer) -> Polyline:
@@ -185,6 +187,12 @@ def notes(place: Point, width: float, lines: Sequence[str]) -> Iterator[Entity]:
     height = NOTE_MM * min(1.0, width / widest)
     for k, line in enumerate(lines, 1):
         yield Text(Layer.DIMENSIONS, (place[0], place[1] - k * LINE_MM), height, line)
+
+
+def notes_beside_title(paper: Point, lines: Sequence[str]) -> Iterator[Entity]:
+    """Lines of notes in the lower left corner, from the border to the title block."""
+    left, low, right, _ = drawing_room(paper)
+    return notes((left + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, lines)
 
 
 def placed(entities: Iterable[Entity], origin: Point, scale: float) -> list[Entity]:

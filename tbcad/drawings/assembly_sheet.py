@@ -9,15 +9,13 @@ import trimesh
 
 from tbcad.drafting.sheet import (
     A3,
-    LEFT_MM,
-    TITLE_MM,
+    BESIDE_MM,
     Sheet,
     TitleBlock,
-    border,
     drawing_room,
-    notes,
+    notes_beside_title,
     placed,
-    title_block,
+    sheet_frame,
 )
 from tbcad.drafting.tables import table
 from tbcad.drafting.views import as_entities
@@ -42,7 +40,7 @@ PIXELS = RADIUS / BALLOON_MM  # of the call-outs' own unit, 1/mm
 SCALES = (0.5, 0.4, 0.2, 0.1)
 PIECE_MM = 2.0  # edges are tested in pieces as long
 HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
-BESIDE_MM, TITLE_GAP_MM = 4.0, 6.0
+TITLE_GAP_MM = 6.0
 
 
 @dataclass(frozen=True)
@@ -146,12 +144,11 @@ def _sheet(
         "What is hidden here is on another sheet; what is nowhere is inside others or has no body.",
     )
     entities = [
-        *border(A3),
-        *title_block(A3, scale, block),
+        *sheet_frame(A3, scale, block),
         *drawn,
         *_balloons(job, anchors, (left, low, column, high), scale, origin),
         *table((column + BESIDE_MM, high), WIDTHS_MM, (HEAD, *cells)),
-        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, text),
+        *notes_beside_title(A3, text),
     ]
     name = NAME if k == 0 else f"{NAME}_{k + 1}"
     return Sheet(name, block.title, NAME, A3, scale, origin, tuple(entities))

@@ -11,16 +11,13 @@ import numpy as np
 from tbcad.drafting.dimensions import across, diameter, labels
 from tbcad.drafting.sheet import (
     A3,
-    LEFT_MM,
-    TITLE_MM,
     Sheet,
     TitleBlock,
-    border,
     choose_scale,
     drawing_room,
-    notes,
+    notes_beside_title,
     placed,
-    title_block,
+    sheet_frame,
 )
 from tbcad.drafting.tables import table
 from tbcad.drafting.views import straight
@@ -35,7 +32,7 @@ IN_PLANE = 1e-9  # of a direction's y
 HEAD, WIDTHS_MM = ("symbol", "what", "value"), (16.0, 58.0, 30.0)
 NAMES = ("P", "C", "V")  # apex, centre and virtual camera of the mirror that is named
 ELLIPSE_POINTS = 361
-AROUND_MM, BESIDE_MM = 12.0, 4.0  # room round the drawing; from the border
+AROUND_MM = 12.0  # room round the drawing
 CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
 BEYOND = 1.6  # of the capture radius: where reflected rays end
 LEVEL_MM, LEADER_MM, LEADER_DEG = 8.0, 12.0, 200.0  # of a dimension and of the leader's corner
@@ -112,13 +109,12 @@ def layout_sheet(design: Record, rows: Sequence[Mapping[str, str]], title: str) 
         "optical layout", title, "-", 1, "-", "section y = 0", tolerances="nominal sizes"
     )
     entities = [
-        *border(A3),
-        *title_block(A3, scale, block),
+        *sheet_frame(A3, scale, block),
         *on_paper,
         *_places(mirrors, pinhole, reach, middle, scale, on_paper),
         *_capture_length(capture, pinhole, middle, scale),
         *table((column, high), WIDTHS_MM, (HEAD, *_values(rows, mirrors, optics, major))),
-        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, _text()),
+        *notes_beside_title(A3, _text()),
     ]
     return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
 

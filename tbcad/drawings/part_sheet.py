@@ -18,15 +18,12 @@ from tbcad.drafting.dimensions import (
 from tbcad.drafting.sheet import (
     A3,
     A4,
-    BORDER_MM,
-    LEFT_MM,
-    TITLE_MM,
+    BESIDE_MM,
     Sheet,
     TitleBlock,
-    border,
     drawing_room,
-    notes,
-    title_block,
+    notes_beside_title,
+    sheet_frame,
 )
 from tbcad.drafting.tables import ROW_MM
 from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
@@ -49,7 +46,7 @@ from tbcad.types import Floats
 BEFORE_MM, BEHIND_MM = 30.0, 16.0  # room for levels left and below; for lengths above and right
 BETWEEN_MM = 18.0  # from view to view
 LENGTH_MM, LEVELS_MM = 9.0, 8.0  # of dimension lines, and of the levels' texts, from a view
-BESIDE_MM, NAME_MM, NAME_OFF_MM = 4.0, 2.5, 4.5  # height of a view's name and its place below
+NAME_MM, NAME_OFF_MM = 2.5, 4.5  # height of a view's name and its place below
 # ISO 5455, with 1:2.5 of its extended list.
 SCALES = (5.0, 2.0, 1.0, 0.5, 0.4, 0.2, 0.1)
 MOST_HIDDEN = 300  # edges of a view; more hide what they are to show, and are left out
@@ -118,17 +115,15 @@ def part_sheets(
     frame = _frame(box, sum(len(one.rows) for one in tables))
     first, pages = _pages(tables, frame.paper)
     block = replace(text.block, sheet=f"1 of {1 + len(pages)}")
-    low = drawing_room(frame.paper)[1]
     lengths = [*_overall(frame, found)]
     entities = [
-        *border(frame.paper),
-        *title_block(frame.paper, frame.scale, block),
+        *sheet_frame(frame.paper, frame.scale, block),
         *(one for letter in VIEWS for one in _view(shape, frame, letter, holes, straight(lengths))),
         *_picture(shape, frame),
         *_levels(shape, frame),
         *lengths,
         *_column(frame.paper, first),
-        *notes((LEFT_MM + BESIDE_MM, low), _notes_width(frame.paper), text.notes),
+        *notes_beside_title(frame.paper, text.notes),
     ]
     origin = frame.views["A"].origin
     sheet = Sheet(
@@ -136,10 +131,6 @@ def part_sheets(
     )
     rest = [_table_sheet(text, page, k, 1 + len(pages)) for k, page in enumerate(pages, start=2)]
     return [sheet, *rest]
-
-
-def _notes_width(paper: Point) -> float:
-    return paper[0] - BORDER_MM - TITLE_MM[0] - LEFT_MM - 2 * BESIDE_MM
 
 
 def _frame(box: Floats, rows: int) -> _Frame:
@@ -304,8 +295,7 @@ def _table_sheet(
     left, _, _, high = drawing_room(A4)
     step = sum(WIDTHS_MM) + BESIDE_MM
     entities = [
-        *border(A4),
-        *title_block(A4, None, block),
+        *sheet_frame(A4, None, block),
         *(
             entity
             for k, tables in enumerate(columns)

@@ -11,15 +11,12 @@ from tbcad.cad.projection import Curve, section
 from tbcad.drafting.dimensions import across, upward
 from tbcad.drafting.sheet import (
     A3,
-    LEFT_MM,
-    TITLE_MM,
     Sheet,
     TitleBlock,
-    border,
     drawing_room,
-    notes,
+    notes_beside_title,
     placed,
-    title_block,
+    sheet_frame,
 )
 from tbcad.drafting.views import FRONT, as_entities, straight
 from tbcad.drawings.export import Export
@@ -29,7 +26,7 @@ from tbcad.formats.step_named import read_named_solid
 from tbcad.types import Floats
 
 SCALES = (5.0, 2.0, 1.0, 0.5, 0.4, 0.2, 0.1)
-AROUND_MM, LENGTH_MM, BESIDE_MM, DOT_MM = 25.0, 10.0, 4.0, 0.6
+AROUND_MM, LENGTH_MM, DOT_MM = 25.0, 10.0, 0.6
 HATCH_MM = 2.0  # from line to line, on paper, at 45 degrees (ISO 128-3)
 UP_DEG = 45.0
 
@@ -93,15 +90,12 @@ def draw_shell(job: ShellJob) -> list[Sheet]:
     )
     outline = placed(as_entities(curves, Layer.CUT), origin, scale)
     entities = [
-        *border(A3),
-        *title_block(A3, scale, job.block),
+        *sheet_frame(A3, scale, job.block),
         *hatching(outline),
         *outline,
         Circle(Layer.DIMENSIONS, origin, DOT_MM),
         *_lengths(low, high, origin, scale),
-        *notes(
-            (LEFT_MM + BESIDE_MM, bottom), right - TITLE_MM[0] - left - 2 * BESIDE_MM, job.notes
-        ),
+        *notes_beside_title(A3, job.notes),
     ]
     return [Sheet(job.name, job.block.title, job.name, A3, scale, origin, tuple(entities))]
 

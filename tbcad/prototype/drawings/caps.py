@@ -4,14 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tbcad.drafting.sheet import (
-    A4,
-    Sheet,
-    TitleBlock,
-    border,
-    choose_scale,
-    title_block,
-)
+from tbcad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
 from tbcad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_limits import MATERIAL, MIN_REFLECTANCE, CapLimits
@@ -46,10 +39,9 @@ def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: Ca
         view="section through the axis",
     )
     entities = [
-        *border(A4),
+        *sheet_frame(A4, scale, block),
         *_section(base, prototype, one, scale),
         *_table(one),
-        *title_block(A4, scale, block),
     ]
     return Sheet(one.drawing, block.title, name, A4, scale, MIDDLE_MM, tuple(entities))
 

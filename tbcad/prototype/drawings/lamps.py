@@ -5,16 +5,16 @@ from collections.abc import Iterator
 from tbcad.drafting.dimensions import upward
 from tbcad.drafting.sheet import (
     A4,
+    BESIDE_MM,
     Sheet,
-    border,
     drawing_room,
     notes,
     placed,
     rectangle,
-    title_block,
+    sheet_frame,
 )
 from tbcad.formats.entities import Entity, Layer, Line
-from tbcad.prototype.drawings.parts import BESIDE_MM, Listed, fitted, outer
+from tbcad.prototype.drawings.parts import Listed, fitted, outer
 from tbcad.prototype.frame.brackets import EXTRUSION_MM
 from tbcad.prototype.light.lamp import EDGE_MM, LampLayout
 
@@ -46,8 +46,7 @@ def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
         "mA for each piece; all pieces in parallel.",
     )
     entities = [
-        *border(paper),
-        *title_block(paper, scale, bill.block(title, part, "on the shining face")),
+        *sheet_frame(paper, scale, bill.block(title, part, "on the shining face")),
         *drawn,
         *outer(origin, (size[0] * scale, size[1] * scale), size),
         *_one_strip(lamps, origin, scale),

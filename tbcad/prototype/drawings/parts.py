@@ -16,17 +16,16 @@ from tbcad.drafting.dimensions import (
 from tbcad.drafting.sheet import (
     A3,
     A4,
-    LEFT_MM,
-    TITLE_MM,
+    BESIDE_MM,
     Sheet,
     TitleBlock,
-    border,
     choose_scale,
     drawing_room,
     notes,
+    notes_beside_title,
     placed,
     rectangle,
-    title_block,
+    sheet_frame,
 )
 from tbcad.drafting.tables import TEXT_MM, table
 from tbcad.formats.csv_table import Row
@@ -47,7 +46,6 @@ ASIDE_MM = 14.0  # of dimension lines from the part
 BEFORE_MM, BEHIND_MM = 22.0, 10.0  # room for dimensions left and below, and on the other sides
 NOTES_MM = 85.0  # width of the notes' column on A4
 DATUM_MM, OFF_MM = 8.0, 4.0  # length of the arrows at the origin, and their distance from it
-BESIDE_MM = 4.0  # from border or drawing to notes and tables
 LAMP_NOTES = {
     0: (),
     1: ("Left end on the plate. Marked: the screw of the lamps' holder, in the front slot.",),
@@ -113,15 +111,14 @@ def plate_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
         "Seen from the side that carries the brackets. Deburr all edges.",
     )
     entities = [
-        *border(paper),
-        *title_block(paper, scale, bill.block(title, part, "from above")),
+        *sheet_frame(paper, scale, bill.block(title, part, "from above")),
         *part_drawn,
         *(line for circle in circles for line in centre_cross(circle)),
         *labels(circles, numbers),
         *outer(origin, (size[0] * scale, size[1] * scale), size),
         *_datum(origin),
         *table((left_of_table, high), TABLE_MM, (TABLE_HEAD, *_hole_cells(frame))),
-        *notes((LEFT_MM + BESIDE_MM, low), right - TITLE_MM[0] - left - 2 * BESIDE_MM, text),
+        *notes_beside_title(paper, text),
     ]
     return Sheet(PLATE, title, part.name, paper, scale, origin, tuple(entities))
 
@@ -155,8 +152,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
     ring, bore, first = circles[0], circles[1], circles[2]
     top = ring.centre[1] + ring.radius
     entities = [
-        *border(paper),
-        *title_block(paper, scale, bill.block(title, part, "on the face at the zero disc")),
+        *sheet_frame(paper, scale, bill.block(title, part, "on the face at the zero disc")),
         *drawn,
         *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
         across(
@@ -205,8 +201,7 @@ def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
         *LAMP_NOTES[len(heights)],
     )
     entities = [
-        *border(paper),
-        *title_block(paper, scale, bill.block(title, part, "from the side")),
+        *sheet_frame(paper, scale, bill.block(title, part, "from the side")),
         *drawn,
         Line(Layer.CENTRE, (origin[0] - 4, centre), (origin[0] + length * scale + 4, centre)),
         *outer(origin, (length * scale, side * scale), (round(length, 1), side)),
