@@ -29,8 +29,8 @@ class DepthMap:
 
     Attributes:
         view: the camera of the depth's pixels.
-        depth: mm behind the plane through the origin that faces the view, (h, w); NaN where rays
-            pass the capture sphere.
+        depth: mm behind the plane through the origin that faces the view, (h, w); NaN where
+            nothing shows it.
         known: by how much colours differ more on other planes, (h, w).
         capture_mm: diameter of the capture sphere.
     """

@@ -40,8 +40,8 @@ def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats
 
     Returns:
         Depth (h, w), mm behind the plane through the origin that faces the view; NaN where rays
-        pass the capture sphere. And by how much colours differ more on a middling plane than on
-        that one (h, w), 0 to MOST_DIFFERENT.
+        pass the capture sphere, or are seen by fewer than REFERENCE cameras. And by how much
+        colours differ more on a middling plane than on that one (h, w), 0 to MOST_DIFFERENT.
     """
     radius = pictures.capture_mm / 2
     planes = np.linspace(-radius, radius, PLANES)
@@ -58,7 +58,7 @@ def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats
     known = np.where(
         compared.any(axis=0), _middling(difference, compared) - difference.min(axis=0), 0.0
     )
-    return np.where(inside.any(axis=0), depth, np.nan), known
+    return np.where(compared.any(axis=0), depth, np.nan), known
 
 
 def _average(plane: Colours, compared: Bools) -> None:

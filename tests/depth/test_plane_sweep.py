@@ -99,5 +99,6 @@ def test_rays_that_pass_the_capture_sphere_have_no_depth() -> None:
 def test_few_cameras_know_nothing() -> None:
     pictures = pictures_of(0.0)
     pictures.mask[2:] = False
-    _, known = swept_depth(pictures, VIEW)
+    found, known = swept_depth(pictures, VIEW)
+    assert np.isnan(found).all()
     assert known.max() == 0
