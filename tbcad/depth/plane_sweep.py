@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter, uniform_filter
 
 from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import chunks, compiled, in_threads
+from tbcad.simulate.parallel import chunks, compiled, first_then_threads
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
@@ -47,9 +47,11 @@ def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats
     planes = np.linspace(-radius, radius, PLANES)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
-    in_threads(
+    rows = chunks(view.height_px, ROWS_PER_CHUNK)
+    middle = len(rows) // 2  # there rays meet the capture sphere, so the loop is compiled
+    first_then_threads(
         partial(_compare_rows, pictures, view, planes, inside, difference),
-        chunks(view.height_px, ROWS_PER_CHUNK),
+        [*rows[middle:], *rows[:middle]],
     )
     compared = np.isfinite(difference)
     for plane, counted in zip(difference, compared, strict=True):

@@ -41,6 +41,15 @@ def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Re
         return list(pool.map(work, items))
 
 
+def first_then_threads(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """The same, but the first item alone, before any thread.
+
+    So loops are compiled by one thread: once, two threads that called a loop which was not
+    compiled yet have ended the process.
+    """
+    return [work(item) for item in items[:1]] + in_threads(work, items[1:])
+
+
 def in_batches(
     work: Callable[[Item], Result],
     items: Sequence[Item],

@@ -10,7 +10,7 @@ import numpy as np
 
 from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import compiled, in_threads
+from tbcad.simulate.parallel import compiled, first_then_threads
 from tbcad.types import Bools, Bytes, Floats, Ints
 
 # Pixels along the sides of a region, and of the blocks in it whose pixels share a list of cameras.
@@ -41,7 +41,7 @@ def moving_view(pictures: PinholePictures, view: Camera, limits: tuple[float, ..
         for y in range(0, view.height_px, REGION_PX)
         for x in range(0, view.width_px, REGION_PX)
     ]
-    in_threads(fill, corners)
+    first_then_threads(fill, corners)
     return image
 
 
