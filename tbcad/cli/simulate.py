@@ -8,6 +8,7 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_capture, check_is_export, check_is_object
 from tbcad.cli.options import (
+    DEFAULT_METHOD,
     METHODS,
     Azimuth,
     Capture,
@@ -112,9 +113,8 @@ def view(
     method: Annotated[
         Literal["nearest", "blend", "depth"] | None,
         typer.Option(
-            help=f"{METHODS}; depth: a blend at the depth that the light field itself shows. By "
-            "default blend, but nearest where the virtual cameras are so far apart that their "
-            "pictures of one point differ."
+            help=f"{METHODS}; depth: a blend at the depth that the light field itself shows. "
+            f"{DEFAULT_METHOD}"
         ),
     ] = None,
     surface: Annotated[

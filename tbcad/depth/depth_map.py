@@ -18,9 +18,9 @@ from tbcad.types import Bytes, Floats
 # Pixels of a view for one of its depth: mirrors show a tenth of a view's resolution at most.
 STEP_PX = 4
 # A plane that is less different than a middling one, by colour, is no surface but empty or even.
-KNOWN = 3.0
+MIN_CONFIDENCE = 3.0
 BLACK = 8  # of 255: no brighter is the background, which is matt black
-DEEPEST = 65535  # the number of the capture sphere's front in a PNG of 16 bits; 0 is unknown
+FRONT = 65535  # the number of the capture sphere's front in a PNG of 16 bits; 0 is unknown
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class DepthMap:
         view: the camera of the depth's pixels.
         depth: mm behind the plane through the origin that faces the view, (h, w); NaN where
             nothing shows it.
-        known: by how much colours differ more on other planes, (h, w).
+        confidence: by how much colours differ more on other planes, (h, w).
         capture_mm: diameter of the capture sphere.
     """
 
     view: Camera
     depth: Floats
-    known: Floats
+    confidence: Floats
     capture_mm: float
 
     def along_rays(self, origin: Floats, direction: Floats) -> Floats:
@@ -53,13 +53,13 @@ class DepthMap:
         along /= (along @ self.view.forward)[..., None]
         plane = -float(self.view.pinhole @ self.view.forward)
         points = self.view.pinhole + (plane + self.depth)[..., None] * along
-        return np.where((self.known > KNOWN)[..., None], points, np.nan)
+        return np.where((self.confidence > MIN_CONFIDENCE)[..., None], points, np.nan)
 
     def png(self) -> bytes:
         """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
         share = 0.5 - self.depth / self.capture_mm
-        number = np.rint(1 + (DEEPEST - 1) * np.clip(share, 0, 1))
-        number = np.where(self.known > KNOWN, number, 0)
+        number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
+        number = np.where(self.confidence > MIN_CONFIDENCE, number, 0)
         with BytesIO() as buffer:
             Image.fromarray(number.astype(np.uint16)).save(buffer, "PNG")
             return buffer.getvalue()
@@ -90,5 +90,5 @@ def depth_map(pictures: PinholePictures, view: Camera) -> DepthMap:
         raise InputError("the view does not look at the object: turn its camera to the origin")
     size = -(-view.width_px // STEP_PX), -(-view.height_px // STEP_PX)
     smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
-    depth, known = swept_depth(pictures, smaller)
-    return DepthMap(smaller, depth, known, pictures.capture_mm)
+    depth, confidence = swept_depth(pictures, smaller)
+    return DepthMap(smaller, depth, confidence, pictures.capture_mm)

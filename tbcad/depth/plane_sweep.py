@@ -7,6 +7,7 @@ colours differ least, summed over a window, is taken.
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter
@@ -31,8 +32,21 @@ REFERENCE = 3
 ROWS_PER_CHUNK = 8
 
 
+class _Cameras(NamedTuple):
+    """Virtual cameras on the side of a view: numbers (k,), places (k, 3), matrices (k, 3, 4)."""
+
+    number: Ints
+    place: Floats
+    matrix: Floats
+
+
+def _seen_from(pictures: PinholePictures, view: Camera) -> _Cameras:
+    number, place = facing(pictures, view)
+    return _Cameras(number, place, projections(pictures, view, number))
+
+
 def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats]:
-    """Depth of a view's pixels, and how surely it is known.
+    """Depth of a view's pixels, and its confidence.
 
     Args:
         pictures: of all virtual cameras.
@@ -47,20 +61,21 @@ def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats
     planes = np.linspace(-radius, radius, PLANES)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
+    cameras = _seen_from(pictures, view)
     rows = chunks(view.height_px, ROWS_PER_CHUNK)
     middle = len(rows) // 2  # there rays meet the capture sphere, so the loop is compiled
     first_then_threads(
-        partial(_compare_rows, pictures, view, planes, inside, difference),
+        partial(_compare_rows, pictures, cameras, view, planes, inside, difference),
         [*rows[middle:], *rows[:middle]],
     )
     compared = np.isfinite(difference)
     for plane, counted in zip(difference, compared, strict=True):
         _average(plane, counted)
     depth = median_filter(_lowest(difference, planes), WINDOW_PX)
-    known = np.where(
-        compared.any(axis=0), _middling(difference, compared) - difference.min(axis=0), 0.0
+    confidence = np.where(
+        compared.any(axis=0), _median(difference, compared) - difference.min(axis=0), 0.0
     )
-    return np.where(compared.any(axis=0), depth, np.nan), known
+    return np.where(compared.any(axis=0), depth, np.nan), confidence
 
 
 def _average(plane: Colours, compared: Bools) -> None:
@@ -70,7 +85,7 @@ def _average(plane: Colours, compared: Bools) -> None:
     plane[...] = np.where(compared, mean, MOST_DIFFERENT)
 
 
-def _middling(difference: Colours, compared: Bools) -> Floats:
+def _median(difference: Colours, compared: Bools) -> Floats:
     """Median (h, w) of differences (d, h, w) on the planes where there are any."""
     ordered = np.sort(np.where(compared, difference, np.inf), axis=0)
     middle = np.maximum(compared.sum(axis=0) - 1, 0) // 2
@@ -88,6 +103,7 @@ def _inside(view: Camera, planes: Floats, radius: float) -> Bools:
 
 def _compare_rows(
     pictures: PinholePictures,
+    cameras: _Cameras,
     view: Camera,
     planes: Floats,
     inside: Bools,
@@ -95,10 +111,6 @@ def _compare_rows(
     rows: slice,
 ) -> None:
     """Fill in the differences (d, h, w) of some rows, whose first is the first of a block."""
-    near, place = facing(pictures, view)
-    if len(near) < REFERENCE:
-        return
-    matrix = projections(pictures, view, near)
     distance = planes - float(view.pinhole @ view.forward)
     half = np.array([view.width_px - 1, view.height_px - 1]) / 2
     for top in range(rows.start, min(rows.stop, view.height_px), BLOCK_PX):
@@ -108,11 +120,11 @@ def _compare_rows(
                 continue
             first = np.array([left, top]) - half
             middle = (first + (BLOCK_PX - 1) / 2) * view.pixel_pitch
-            across = place[:, :2] - place[:, 2:] * middle
+            across = cameras.place[:, :2] - cameras.place[:, 2:] * middle
             order = np.argsort((across**2).sum(axis=1))[:CAMERAS]
             _compare(
-                matrix[order],
-                near[order],
+                cameras.matrix[order],
+                cameras.number[order],
                 distance,
                 np.array([*first, view.pixel_pitch]),
                 inside[block],

@@ -39,9 +39,9 @@ def tiles(knot: Scene) -> MirrorTiles:  # noqa: F811
 
 
 def flat(depth: float) -> DepthMap:
-    known = np.full((30, 40), 9.0)
-    known[0, 0] = 0
-    return DepthMap(VIEW, np.full((30, 40), depth), known, CAPTURE_MM)
+    confidence = np.full((30, 40), 9.0)
+    confidence[0, 0] = 0
+    return DepthMap(VIEW, np.full((30, 40), depth), confidence, CAPTURE_MM)
 
 
 def test_rays_and_points_meet_the_surface() -> None:

@@ -60,11 +60,11 @@ def met(camera: Camera, depth: float, bend: float) -> Floats:
 
 @pytest.mark.parametrize("depth", [-12.0, 0.0, 9.3])
 def test_a_plane(depth: float) -> None:
-    found, known = swept_depth(pictures_of(depth), VIEW)
+    found, confidence = swept_depth(pictures_of(depth), VIEW)
     middle = np.s_[18:42, 24:56]
     assert np.abs(found[middle] - depth).max() < 1.0
     assert np.median(np.abs(found[middle] - depth)) < 0.3
-    assert known[middle].min() > 3
+    assert confidence[middle].min() > 3
 
 
 def test_a_sphere() -> None:
@@ -83,22 +83,22 @@ def test_a_sphere() -> None:
 def test_what_has_no_texture_is_not_known() -> None:
     pictures = pictures_of(0.0)
     pictures.picture[...] = 90
-    _, known = swept_depth(pictures, VIEW)
-    assert known.max() < 1e-3
+    _, confidence = swept_depth(pictures, VIEW)
+    assert confidence.max() < 1e-3
 
 
 def test_rays_that_pass_the_capture_sphere_have_no_depth() -> None:
-    found, known = swept_depth(pictures_of(0.0), VIEW)
+    found, confidence = swept_depth(pictures_of(0.0), VIEW)
     ray = unit_directions(VIEW, range(60))
     passes = np.linalg.norm(np.cross(VIEW.pinhole, ray), axis=2) > CAPTURE_MM / 2 + 0.5
     assert passes.any()
     assert np.isnan(found[passes]).all()
-    assert (known[passes] == 0).all()
+    assert (confidence[passes] == 0).all()
 
 
 def test_few_cameras_know_nothing() -> None:
     pictures = pictures_of(0.0)
     pictures.mask[2:] = False
-    found, known = swept_depth(pictures, VIEW)
+    found, confidence = swept_depth(pictures, VIEW)
     assert np.isnan(found).all()
-    assert known.max() == 0
+    assert confidence.max() == 0

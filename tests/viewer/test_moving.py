@@ -42,6 +42,11 @@ def numbered(count: int, seed: int) -> PinholePictures:
     )
 
 
+@pytest.fixture(scope="module")
+def pictures(light_field: LightField) -> PinholePictures:  # noqa: F811
+    return pinhole_pictures(light_field)
+
+
 def distance(two_plane: TwoPlane, target: Floats, centre: Floats) -> float:
     """Of a target ray (4,) from the nearest of all rays through a point, by least squares.
 
@@ -86,9 +91,8 @@ def test_masked_pictures_are_not_taken() -> None:
     assert used[-1] not in moving_view(pictures, view, FAR)
 
 
-def test_places_in_pictures_are_the_cameras_own(light_field: LightField) -> None:  # noqa: F811
+def test_places_in_pictures_are_the_cameras_own(pictures: PinholePictures) -> None:
     """Each picture seen from its own pinhole is that picture."""
-    pictures = pinhole_pictures(light_field)
     size, number = pictures.mask.shape[1], 17
     hfov = 2 * np.arctan(size / 2 / pictures.focal_px[number])
     right, _, forward = pictures.axes[number]
@@ -102,11 +106,12 @@ def test_places_in_pictures_are_the_cameras_own(light_field: LightField) -> None
 @pytest.mark.parametrize("place", PLACES_DEG)
 def test_about_as_good_as_nearest_rays(
     light_field: LightField,  # noqa: F811
+    pictures: PinholePictures,
     knot: Scene,  # noqa: F811
     place: tuple[float, float],
 ) -> None:
     tiles, view = MirrorTiles(light_field), seen_at(*place, 640, (160, 120))
     limits = search_radius(tiles), horizon_search_radius(tiles)
     truth = np.rint(pinhole_picture(knot, view)).astype(np.uint8)
-    moving = image_quality(truth, moving_view(pinhole_pictures(light_field), view, limits))
+    moving = image_quality(truth, moving_view(pictures, view, limits))
     assert moving.ssim > image_quality(truth, synthesise(tiles, view).image).ssim - 0.01
