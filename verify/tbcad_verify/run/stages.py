@@ -6,14 +6,10 @@ Each is independent of the others: the checks of one that breaks are unknown, ne
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tbcad_verify.mesh.holes import RoundHoles
-from tbcad_verify.mesh.mass import MassProperties, mass_properties
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_facets
-from tbcad_verify.mesh.rays import in_threads
-from tbcad_verify.mesh.segments import Edges, measure_edges
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
 from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
@@ -22,24 +18,21 @@ from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart
 from tbcad_verify.prototype.stages import PRINTING, verify_prototype
 from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
-from tbcad_verify.record.export import Export, Part, read_export
+from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.run.fork import StagesWork, in_order
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
-    FOLDS,
     MANIFEST,
-    TOPOLOGY,
-    fold_check,
     manifest_checks,
-    mesh_checks,
     record_checks,
 )
+from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
-from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
-from tbcad_verify.shell.recover import Recovery, recover
+from tbcad_verify.shell.mirror_image import flipped_measures
+from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.types import Floats
 
 SHELL_STAGES = (
@@ -53,31 +46,6 @@ SHELL_STAGES = (
     "every pixel",
 )
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
-
-
-@dataclass(frozen=True)
-class ShellPart:
-    """One part of a shell as measured; None where that failed.
-
-    Attributes:
-        part: its record.
-        mesh: its triangles, joined.
-        edges: of the mesh.
-        topology: what is wrong with the mesh.
-        mass: volume, area, centroid and box.
-        recovery: its patches and mirrors.
-        checks: of the mesh.
-        reason: why something is None.
-    """
-
-    part: Part
-    mesh: Mesh | None
-    edges: Edges | None
-    topology: Topology | None
-    mass: MassProperties | None
-    recovery: Recovery | None
-    checks: list[Check]
-    reason: str
 
 
 def stage_titles(export: Export) -> tuple[str, ...]:
@@ -139,13 +107,23 @@ def _verify_shells(
     facets.clear()  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
-    holes = {}
+    measured: dict[str, PartMeasures] = {}
     for shell in shells:
-        measures = _assess_printing(shell, profiles, required, sink)
+        measures, lost = attempt(partial(_shell_measures, shell, measured))
         if measures:
-            holes[shell.part.name] = measures.holes
+            measured[shell.part.name] = measures
+        _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
     if shells:
+        holes = {name: measures.holes for name, measures in measured.items()}
         _trace_shells(export, shells, holes, sink)
+
+
+def _shell_measures(shell: ShellPart, measured: Mapping[str, PartMeasures]) -> PartMeasures:
+    """What printers need to know of a shell; of a mirror image it is known already."""
+    original = measured.get(shell.image_of.name) if shell.image_of else None
+    if original and shell.mesh and shell.mass:
+        return flipped_measures(original, shell.mesh, shell.mass)
+    return _measures(shell)
 
 
 def _verify_prototype(
@@ -160,7 +138,8 @@ def _verify_prototype(
     measured = verify_prototype(export, export.prototype, facets, sink)
     sink(Results(stages=[PRINTING]))
     for printed in measured:
-        _assess_printing(printed, profiles, required, sink)
+        measures, lost = attempt(partial(_measures, printed))
+        _assess_printing(printed.part.stl, measures, lost, profiles, required, sink)
 
 
 def _compare_3mf(
@@ -173,48 +152,31 @@ def _compare_3mf(
 
 
 def _measure_shells(export: Export, stls: list[Facets], sink: ResultSink) -> list[ShellPart]:
-    pairs = list(zip(export.parts, stls, strict=True))
-    shells = in_threads(lambda pair: _measure_shell(export, *pair), pairs)
+    shells = measure_shells(export, stls)
     for shell in shells:
         masses = {} if shell.mass is None else {shell.part.name: shell.mass}
         sink(Results(checks=shell.checks, masses=masses))
     return shells
 
 
-def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
-    radius_mm, pinhole = export.target_mm / 2, pinhole_of(export, part)
-    mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
-    topology, no_topology = attempt(lambda: examine_topology(require(mesh, no_mesh), facets))
-    mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
-    edges, _ = attempt(lambda: measure_edges(require(mesh, no_mesh)))
-    recovery, no_mirrors = attempt(
-        lambda: recover(require(mesh, no_mesh), pinhole, radius_mm, edges)
+def _measures(part: ShellPart | MeasuredPart) -> PartMeasures:
+    return measure(
+        require(part.mesh, part.reason),
+        require(part.topology, part.reason).status,
+        require(part.mass, part.reason),
+        part.edges,
     )
-    checks = guarded(
-        check_names(TOPOLOGY, part.stl),
-        lambda: mesh_checks(part.stl, require(topology, no_topology)),
-    ) + guarded(
-        check_names(FOLDS, part.stl),
-        lambda: [fold_check(part.stl, require(recovery, no_mirrors).folds)],
-    )
-    reason = no_mesh or no_mirrors or no_topology or no_mass
-    return ShellPart(part, mesh, edges, topology, mass, recovery, checks, reason)
 
 
 def _assess_printing(
-    measured: ShellPart | MeasuredPart, profiles: list[Profile], required: bool, sink: ResultSink
-) -> PartMeasures | None:
-    """The checks of all printers; what was measured for them, if it could be."""
-    stl, reason = measured.part.stl, measured.reason
-    mesh, mass, topology = measured.mesh, measured.mass, measured.topology
-    measures, lost = attempt(
-        lambda: measure(
-            require(mesh, reason),
-            require(topology, reason).status,
-            require(mass, reason),
-            measured.edges,
-        )
-    )
+    stl: str,
+    measures: PartMeasures | None,
+    lost: str,
+    profiles: list[Profile],
+    required: bool,
+    sink: ResultSink,
+) -> None:
+    """The checks of all printers, of what was measured, or why it was not."""
 
     def work() -> list[Check]:
         shape = require(measures, lost)
@@ -223,7 +185,6 @@ def _assess_printing(
         return [print_check(one, required) for one in prints]
 
     sink(Results(checks=guarded([print_name(stl, profile) for profile in profiles], work)))
-    return measures
 
 
 def _trace_shells(
@@ -274,4 +235,5 @@ def _set_up(export: Export, shells: list[ShellPart]) -> OpticalSetup:
         export,
         [require(shell.mesh, shell.reason) for shell in shells],
         [require(shell.recovery, shell.reason) for shell in shells],
+        any(shell.image_of for shell in shells),
     )

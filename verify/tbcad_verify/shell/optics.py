@@ -14,6 +14,7 @@ from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
+from tbcad_verify.shell.mirror_image import is_image_of_camera
 from tbcad_verify.shell.recover import Recovery, join_recoveries
 from tbcad_verify.types import Floats, Ints
 
@@ -35,6 +36,8 @@ class OpticalSetup:
         scene: for rays.
         mirrors: (M,) reflecting surfaces as recovered, coat included; those of missing ones
             must not be used.
+        symmetric: whether camera b, its mesh and the matches of its mirrors are camera a's,
+            reflected in the plane x = 0.
     """
 
     export: Export
@@ -45,6 +48,7 @@ class OpticalSetup:
     virtual: VirtualCameras
     scene: RayScene
     mirrors: Surfaces
+    symmetric: bool = False
 
     @property
     def radius(self) -> float:
@@ -106,8 +110,17 @@ class OpticalSetup:
         return sorted(matches | ({"nothing"} if (facets < 0).any() else set()))
 
 
-def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> OpticalSetup:
-    """Join all parts, match their mirrors with the record, and get ready for rays."""
+def set_up(
+    export: Export, meshes: list[Mesh], recoveries: list[Recovery], second_is_image: bool = False
+) -> OpticalSetup:
+    """Join all parts, match their mirrors with the record, and get ready for rays.
+
+    Args:
+        export: with the record.
+        meshes: of all parts.
+        recoveries: of all parts.
+        second_is_image: whether there are two parts, the second the mirror image of the first.
+    """
     mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
@@ -125,6 +138,16 @@ def set_up(export: Export, meshes: list[Mesh], recoveries: list[Recovery]) -> Op
         virtual_cameras(export.mirrors),
         scene,
         mirrors,
+        second_is_image and _symmetric(export, matches, counts[0]),
+    )
+
+
+def _symmetric(export: Export, matches: Match, patches: int) -> bool:
+    """Whether two cameras see mirror images, given as many patches in each half."""
+    (name, one), (other_name, other) = sorted(export.cameras.items())
+    own, others = (matches.segment[export.mirrors.camera == key] for key in (name, other_name))
+    return is_image_of_camera(other, one) and np.array_equal(
+        np.where(own < 0, own, own + patches), others
     )
 
 

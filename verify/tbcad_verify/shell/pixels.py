@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tbcad_verify.mesh.surfaces import distance_before_mirror
@@ -48,7 +50,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
     path, clear, minimum, median, maximum, framed, double, half, nearly_all = check_names(
         CHECKS, files
     )
-    tally = light.total([light.full_sensor(setup.sensor_scene(camera)) for camera in setup.cameras])
+    tally = light.total(_tallies(setup))
     rings = [(camera, _ring(setup, camera, seen)) for camera in setup.cameras]
     each = np.bincount(setup.virtual.index, tally.pixels, setup.virtual.count)
     none = [setup.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
@@ -64,6 +66,31 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
         informative(half, float(spread[0])),
         informative(nearly_all, float(spread[1])),
     ]
+
+
+def _tallies(setup: OpticalSetup) -> list[light.PixelTally]:
+    """What each camera's pixels see; mirror images are not traced again."""
+    first, *others = setup.cameras
+    tally = light.full_sensor(setup.sensor_scene(first))
+    if setup.symmetric:
+        return [tally, _image(setup, tally)]
+    return [tally, *(light.full_sensor(setup.sensor_scene(camera)) for camera in others)]
+
+
+def _image(setup: OpticalSetup, tally: light.PixelTally) -> light.PixelTally:
+    """Camera b's tally from camera a's, of which everything is the mirror image."""
+    one, other = (np.flatnonzero(setup.export.mirrors.camera == c.id) for c in setup.cameras)
+    half = len(setup.mesh.faces) // 2
+    source = np.arange(len(setup.export.mirrors))
+    source[other], source[one] = one, other
+    blockers = np.where(tally.blockers < 0, -1, (tally.blockers + half) % (2 * half))
+    return replace(
+        tally,
+        pixels=tally.pixels[source],
+        blocked=tally.blocked[source],
+        nearest=tally.nearest[source],
+        blockers=np.unique(blockers),
+    )
 
 
 def _ring(setup: OpticalSetup, camera: Camera, seen: Coverage | None) -> image_rim.RimRays:
