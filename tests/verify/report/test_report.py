@@ -239,12 +239,12 @@ def test_a_check_that_breaks_is_unknown_and_no_pass(
 def test_everything_optical_is_unknown_without_a_setup(
     export_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tbcad_verify.run import stages
+    from tbcad_verify.shell import measured_shell
 
     def broken(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(stages, "recover", broken)
+    monkeypatch.setattr(measured_shell, "recover", broken)
     report = verify(export_folder, options=IN_PROCESS)
     names = {check.name for check in report.checks if check.passed is None}
     assert {"mirrors found", "coverage, facets", "light paths"} <= names
