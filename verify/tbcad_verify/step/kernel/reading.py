@@ -70,6 +70,6 @@ def transferred(path: Path) -> TopoDS_Shape:
 
 
 def _read_without_repair() -> None:
-    """Have the kernel repair nothing that it reads: that hides faults and takes a third more time."""
+    """Have the kernel repair nothing that it reads: repairs hide faults, and take time."""
     os.environ[f"CSF_{RESOURCES.name}Defaults"] = str(RESOURCES.parent)
     Interface_Static.SetCVal_s("read.step.resource.name", RESOURCES.name)
