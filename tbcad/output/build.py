@@ -15,6 +15,7 @@ from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
+from tbcad.shell.mandrel_files import design_mandrel, mandrel_record, write_mandrels
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -64,11 +65,16 @@ def write_export(
         pending.append(submit(work, *arguments))
         return pending[-1]
 
+    # Refused before anything is written.
+    mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = _write_parts(design, folder, parts, progress, submit_file, optional_prototype)
+    if mandrel:
+        submit_file(write_mandrels, design, mandrel, folder)
     write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
     for future in pending:
         future.result()
-    write_record(folder, replace(design, spec=export.spec), SHELL in parts)
+    mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
+    write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
     write_manifest(folder)
     return export
