@@ -37,6 +37,7 @@ from tbcad_verify.shell.integrity import (
     mesh_checks,
     record_checks,
 )
+from tbcad_verify.shell.mandrel import mandrel_results
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import Recovery, recover
@@ -52,6 +53,7 @@ SHELL_STAGES = (
     "coverage",
     "every pixel",
 )
+MANDRELS = "mandrels"
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
 
 
@@ -82,7 +84,8 @@ class ShellPart:
 
 def stage_titles(export: Export) -> tuple[str, ...]:
     """Titles of the stages that an export has, in order."""
-    return (*SHELL_STAGES, *(PROTOTYPE_STAGES if export.prototype else ()))
+    mandrels = (MANDRELS,) if export.mandrels else ()
+    return (*SHELL_STAGES, *mandrels, *(PROTOTYPE_STAGES if export.prototype else ()))
 
 
 def run_stages(
@@ -106,7 +109,7 @@ def run_stages(
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))
     export = read_export(folder)
-    parts = (*export.parts, *export.printed)
+    parts = (*export.parts, *export.mandrels, *export.printed)
     blobs = [read_facets(export.folder, part.stl) for part in parts]
     digests = {blob.name: blob.digest for _, blob in blobs}
     facets = [facets for facets, _ in blobs]
@@ -121,7 +124,8 @@ def run_stages(
     manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
     sink(Results(checks=manifest + record_checks(export)))
 
-    printed, facets = facets[len(export.parts) :], facets[: len(export.parts)]
+    shells, mandrels = len(export.parts), len(export.mandrels)
+    printed, facets = facets[shells + mandrels :], facets[: shells + mandrels]
     prototype = begin(lambda to: _verify_prototype(export, printed, profiles, bool(printers), to))
     _verify_shells(export, facets, profiles, bool(printers), sink)
     prototype(sink)
@@ -135,7 +139,8 @@ def _verify_shells(
     sink: ResultSink,
 ) -> None:
     sink(Results(stages=[MESHES]))
-    shells = _measure_shells(export, facets, sink)
+    negatives = facets[len(export.parts) :]
+    shells = _measure_shells(export, facets[: len(export.parts)], sink)
     facets.clear()  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
@@ -145,7 +150,19 @@ def _verify_shells(
         if measures:
             holes[shell.part.name] = measures.holes
     if shells:
-        _trace_shells(export, shells, holes, sink)
+        setup, no_setup = _trace_shells(export, shells, holes, sink)
+        _verify_mandrels(export, negatives, lambda: require(setup, no_setup), sink)
+
+
+def _verify_mandrels(
+    export: Export, facets: list[Facets], setup: Callable[[], OpticalSetup], sink: ResultSink
+) -> None:
+    """The negatives, whose mirrors are compared with what was found on the shells."""
+    if not export.mandrels:
+        return
+    sink(Results(stages=[MANDRELS]))
+    for mandrel, stl in zip(export.mandrels, facets, strict=True):
+        sink(mandrel_results(export, mandrel, stl, setup))
 
 
 def _verify_prototype(
@@ -231,7 +248,7 @@ def _trace_shells(
     shells: list[ShellPart],
     holes: Mapping[str, RoundHoles],
     sink: ResultSink,
-) -> None:
+) -> tuple[OpticalSetup | None, str]:
     """The optical stages: mirrors against the record, the casing, coverage, and every pixel."""
     files = ", ".join(part.stl for part in export.parts)
 
@@ -267,6 +284,7 @@ def _trace_shells(
         lambda: require(pixel_counts, no_pixels)[1],
         {"pixels": pixel_counts[0]} if pixel_counts else {},
     )
+    return setup, no_setup
 
 
 def _set_up(export: Export, shells: list[ShellPart]) -> OpticalSetup:
