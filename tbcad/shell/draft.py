@@ -9,7 +9,7 @@ from tbcad.geometry.vectors import unit
 from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals import PedestalCells
 from tbcad.optics.power_diagram import PLANES
-from tbcad.types import Floats, Ints
+from tbcad.types import Floats
 
 # Points on each arc: between two of them a normal turns by so little that draft changes by less
 # than 0.01 degrees.
@@ -25,13 +25,11 @@ class Draft:
 
     Attributes:
         pull: unit vector along which the shell is drawn, (3,).
-        angle: least angle between the negative's surface and the pull, rad; below 0 a face catches.
-        undercut: number of mirrors and walls that catch.
+        angle: least angle between the negative's surface and the pull, rad; below 0 it catches.
     """
 
     pull: Floats
     angle: float
-    undercut: int
 
 
 def draft_of(cells: Cells) -> Draft:
@@ -40,20 +38,16 @@ def draft_of(cells: Cells) -> Draft:
     Args:
         cells: of the modelled surfaces.
     """
-    face, normal = _mirror_normals(cells)
-    walls = _wall_normals(cells)
-    every = np.concatenate([normal, walls])
+    mirrors = _mirror_normals(cells)
+    every = np.concatenate([mirrors, _wall_normals(cells)])
     pull = best_pull(every)
     if pull is None:
-        pull = best_pull(normal)
+        pull = best_pull(mirrors)
     if pull is None:
         pull = unit(every.sum(axis=0))
     # Rounded so that the last bits of a search do not reach a file.
     pull = unit(np.round(pull, PULL_DIGITS) + 0.0)
-    number = np.concatenate([face, cells.mirrors + np.arange(len(walls))])
-    sine = every @ pull
-    least = float(np.arcsin(np.clip(sine.min(), -1, 1)))
-    return Draft(pull, least, len(np.unique(number[sine < 0])))
+    return Draft(pull, float(np.arcsin(np.clip((every @ pull).min(), -1, 1))))
 
 
 def best_pull(normals: Floats) -> Floats | None:
@@ -72,8 +66,8 @@ def best_pull(normals: Floats) -> Floats | None:
     return unit(-rest[:3] / rest[3])
 
 
-def _mirror_normals(cells: Cells) -> tuple[Ints, Floats]:
-    """Mirrors (k,) and the negative's outward normals (k, 3) along their outlines.
+def _mirror_normals(cells: Cells) -> Floats:
+    """The negative's outward normals along the mirrors' outlines, (k, 3).
 
     On a sphere the normal farthest from the pull is on the outline, but for cells that hold the
     sphere's point opposite to the pull, which no outline of theirs would let go either.
@@ -81,13 +75,12 @@ def _mirror_normals(cells: Cells) -> tuple[Ints, Floats]:
     arcs = cells.arcs
     arc, t = np.broadcast_arrays(np.arange(len(arcs))[:, None], np.linspace(0, 1, ARC_SAMPLES))
     points = arcs.at(arc, t)
-    faces, normals = [], []
+    normals = []
     for side in arcs.faces.T:
         mirror = np.flatnonzero(side < cells.mirrors)
         face = np.broadcast_to(side[mirror, None], (len(mirror), ARC_SAMPLES)).ravel()
-        faces.append(face)
         normals.append(-unit(cells.surfaces.gradient(face, points[mirror].reshape(-1, 3))))
-    return np.concatenate(faces), np.concatenate(normals)
+    return np.concatenate(normals)
 
 
 def _wall_normals(cells: Cells) -> Floats:

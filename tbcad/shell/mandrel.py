@@ -146,7 +146,10 @@ def _no_room(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> str:
                 f"{reason}: make bolt_hole_mm and dowel_hole_mm under shell.seam_flange and "
                 f"shell.foot_flange {size:g} or less, or set shell.negative to false"
             )
-    return f"{reason}, nor for smaller ones: make shell.wall_mm smaller, or set shell.negative to false"
+    return (
+        f"{reason}, nor for smaller ones: make shell.wall_mm smaller, "
+        "or set shell.negative to false"
+    )
 
 
 def _with_holes(shell: ShellSpec, size: float) -> ShellSpec:

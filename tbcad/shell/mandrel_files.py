@@ -94,5 +94,4 @@ def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> dict[str, Any]:
         **mandrel_files(array),
         "pull": (pull + 0.0).tolist(),
         "draft_deg": round(float(np.degrees(draft.angle)), DRAFT_DIGITS),
-        "undercut_faces": draft.undercut,
     }

@@ -100,12 +100,10 @@ class Mandrel(Part):
     Attributes:
         pull: (3,) unit, along which the shell is drawn.
         draft_deg: least angle between pull and surface; below 0 it catches.
-        undercut_faces: number of mirrors and walls that catch.
     """
 
     pull: Vector
     draft_deg: float = Field(ge=-90, le=90)
-    undercut_faces: int = Field(ge=0)
 
     @field_validator("pull", mode="after")
     @classmethod

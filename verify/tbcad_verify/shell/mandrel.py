@@ -25,6 +25,7 @@ from tbcad_verify.record.flange_holes import Hole, HoleLimits
 from tbcad_verify.record.mandrel_holes import blind_hole_faults
 from tbcad_verify.report.checks import (
     Check,
+    CheckName,
     at_most,
     attempt,
     check_names,
@@ -49,6 +50,7 @@ CHECKS = {
     "mandrel surface": "mm",
     "mandrel body": "faults",
     "mandrel draft": "deg",
+    "mandrel draft, deviation from record": "deg",
     "mandrel pull": "facets",
 }
 
@@ -108,7 +110,7 @@ def mandrel_checks(
     """
     shared = _shared(mesh, setup.mesh, _shell_mirrors(setup, mandrel.camera), len(export.mirrors))
     modelled = export.mirrors.surfaces().coated(-export.coating_mm)
-    mirrors, surface, body, draft, pull = check_names(CHECKS, mandrel.stl)
+    mirrors, surface, body, draft, recorded, pull = check_names(CHECKS, mandrel.stl)
     ids = export.mirrors.ids
     lost = shared.missing.astype(np.float64)
     errors = _surface_errors(mesh, shared.own, modelled, export.mirrors.camera == mandrel.camera)
@@ -127,20 +129,27 @@ def mandrel_checks(
             surface, worst, SURFACE_MM, worst_offenders(ids, errors, "mm", errors > SURFACE_MM)
         ),
         at_most(body, len(faults), 0, short_list(faults)),
+        informative(draft, least, _how_it_comes_off(least, mandrel.pull)),
         at_most(
-            draft,
+            recorded,
             abs(least - mandrel.draft_deg),
             DRAFT_DEG,
             f"{least:.2f} degrees along the recorded pull, the record has {mandrel.draft_deg:.2f}",
         ),
-        _pull_check(pull, mandrel, int(caught.sum())),
+        _pull_check(pull, least, int(caught.sum())),
     ]
 
 
-def _pull_check(name: tuple[str, str, str], mandrel: Mandrel, caught: int) -> Check:
-    """Nothing may be in the way of a shell that can be drawn; others are counted."""
-    if mandrel.draft_deg < 0:
-        return informative(name, caught, "undercut: to be dissolved or melted out of the shell")
+def _how_it_comes_off(least: float, pull: Floats) -> str:
+    if least < 0:
+        return "the shell catches: dissolve the mandrel, or melt it out"
+    return "draw the shell along (" + ", ".join(f"{one:.3f}" for one in pull.tolist()) + ")"
+
+
+def _pull_check(name: CheckName, least: float, caught: int) -> Check:
+    """Nothing may be in the way of a shell whose draft is nowhere negative; others only inform."""
+    if least < 0:
+        return informative(name, caught)
     return at_most(name, caught, 0, "the shell catches there when it is drawn")
 
 
