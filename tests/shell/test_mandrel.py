@@ -1,4 +1,4 @@
-"""Negatives of shells: mesh, solid and closed forms against each other, and the way a shell takes."""
+"""Negatives of shells: mesh, solid and closed forms agree; how a shell comes off."""
 
 import numpy as np
 import pytest

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,7 +216,7 @@ def test_other_holes_are_refused(
     assert fault in failed["mandrel body"]
 
 
-def rewritten(folder: Path, change: Callable[[dict], None]) -> None:
+def rewritten(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
     file = folder / "design.json"
     record = json.loads(file.read_text(encoding="utf-8"))
     change(record)
@@ -248,7 +249,9 @@ def test_a_pull_is_a_unit_vector(folder: Path) -> None:
     ],
     ids=["one", "none", "not asked for", "twice"],
 )
-def test_mandrels_are_those_of_the_spec(folder: Path, change: Callable[[dict], None]) -> None:
+def test_mandrels_are_those_of_the_spec(
+    folder: Path, change: Callable[[dict[str, Any]], None]
+) -> None:
     assert contradictions(read_export(folder)) == []
     rewritten(folder, change)
     assert contradictions(read_export(folder)) == ["the mandrels of shell.negative"]
