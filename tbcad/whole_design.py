@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Literal
 
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 
 if TYPE_CHECKING:
     from build123d import Part
@@ -52,10 +52,26 @@ class Design(MirrorDesign):
         from tbcad.cad.part import as_part
         from tbcad.shell.files import camera_solid
 
+        solid = camera_solid(self, self._array(camera))
+        return as_part(solid.name, solid.shape)
+
+    def mandrel(self, camera: Literal["a", "b"] = "a") -> "Part":
+        """Return the negative of one camera's shell as a build123d part, in the same frame.
+
+        Raises:
+            SpecError: its holes do not fit; it says what to change.
+            InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
+        """
+        from tbcad.cad.part import as_part
+        from tbcad.shell.mandrel_files import mandrel_solid
+
+        solid = mandrel_solid(self, self._array(camera))
+        return as_part(solid.name, solid.shape)
+
+    def _array(self, camera: str) -> MirrorArray:
         if camera not in ("a", "b"):
             raise InputError(f"there is no camera {camera!r}: allowed are 'a' and 'b'")
-        solid = camera_solid(self, self.arrays["ab".index(camera)])
-        return as_part(solid.name, solid.shape)
+        return self.arrays["ab".index(camera)]
 
     def printed_parts(self) -> "dict[str, Part]":
         """Return the printed parts of the prototype by name, as they are assembled, base angle 0.

@@ -95,5 +95,14 @@ def test_bad_input_is_one_line() -> None:
         tbcad.design(tbcad.load_spec(None), n=4)
     with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
         tbcad.design(n=3).shell("c")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
+        tbcad.design(n=3).mandrel("c")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"optics\.n is 99"):
         tbcad.design(n=99)
+
+
+def test_a_mandrel_is_a_part() -> None:
+    part = tbcad.design(n=2).mandrel("b")
+    assert part.label == "mandrel_b"
+    assert part.is_valid
+    assert abs(part.bounding_box().max.X) < 1e-6

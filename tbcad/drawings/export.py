@@ -13,6 +13,7 @@ from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 
 DESIGN, PROTOTYPE = "design.json", "prototype.json"
 SHELLS = ("shell_a", "shell_b")
+MANDRELS = ("mandrel_a", "mandrel_b")
 PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
 SCHEMA = "tbcad-design/2"
 Record = dict[str, Any]
@@ -35,6 +36,11 @@ class Export:
     design: Record
     machine: Machine | None
     shells: tuple[str, ...]
+
+    @property
+    def mandrels(self) -> tuple[str, ...]:
+        """Names of the shells' negatives that it has."""
+        return tuple(name for name in MANDRELS if f"{name}.step" in self.manifest.files)
 
     @property
     def title(self) -> str:

@@ -1,4 +1,4 @@
-"""The sheet of a shell: its section through the camera's axis, and where its mirrors are listed."""
+"""The sheet of a shell or its negative: a section, and where its mirrors are listed."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from tbcad.drafting.sheet import (
     sheet_frame,
 )
 from tbcad.drafting.views import FRONT, as_entities, straight
-from tbcad.drawings.export import Export
+from tbcad.drawings.export import Export, Record
 from tbcad.drawings.holes import mm
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
 from tbcad.formats.step_named import read_named_solid
@@ -54,7 +54,43 @@ def shell_job(export: Export, name: str) -> ShellJob:
     Raises:
         InputError: its file is missing, or not as it was written.
     """
-    step, spec, camera = f"{name}.step", export.design["spec"], name[-1]
+    spec, camera = export.design["spec"], name[-1]
+    text = (
+        f"Wall {spec['shell']['wall_mm']:g} mm behind the deepest valley of the mirrors.",
+        f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
+        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad inspection.",
+        "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
+    )
+    return _job(export, name, text)
+
+
+def mandrel_job(export: Export, name: str) -> ShellJob:
+    """What is needed to draw a shell's negative.
+
+    Raises:
+        InputError: its file is missing, or not as it was written.
+    """
+    spec, camera = export.design["spec"], name[-1]
+    record = next(one for one in export.design["mandrels"] if one["name"] == name)
+    text = (
+        f"Negative of shell_{camera}: concave mirrors, named alike in {name}.step.",
+        f"Centres, and radii with the coat of {spec['mirrors']['coating_um']:g} um: mirrors.csv",
+        f"(camera {camera}).",
+        _release(record),
+        "x = 0 and z = foot flat; blind holes. Dot: O, centre of the capture sphere.",
+    )
+    return _job(export, name, text)
+
+
+def _release(record: Record) -> str:
+    if record["draft_deg"] < 0:
+        return "Undercut: the shell cannot be drawn off; dissolve the mandrel, or melt it out."
+    pull = " ".join(f"{one + 0.0:.3f}" for one in record["pull"])
+    return f"The shell is drawn along ({pull}), draft {record['draft_deg']:.1f} degrees."
+
+
+def _job(export: Export, name: str, notes: tuple[str, ...]) -> ShellJob:
+    step = f"{name}.step"
     block = TitleBlock(
         title=name.replace("_", " "),
         design=export.title,
@@ -64,15 +100,11 @@ def shell_job(export: Export, name: str) -> ShellJob:
         view="section y = 0",
         tolerances="inspection table",
     )
-    text = (
-        f"Wall {spec['shell']['wall_mm']:g} mm behind the deepest valley of the mirrors.",
-        f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
-        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad inspection.",
-        "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
+    where = (
         f"Shape and what has no size here: {step},",
         f"sha256 {export.digest(step)}...",
     )
-    return ShellJob(export.file(step), block, text, name)
+    return ShellJob(export.file(step), block, (*notes, *where), name)
 
 
 def draw_shell(job: ShellJob) -> list[Sheet]:

@@ -108,6 +108,7 @@ def drawable(export: Export) -> list[str]:
     whole = [ASSEMBLY] if export.machine else []
     return [
         *export.shells,
+        *export.mandrels,
         *whole,
         *parts,
         *([OPTICAL_LAYOUT] if has_layout(export.design) else []),
@@ -134,12 +135,14 @@ def _chosen(export: Export, only: Sequence[str]) -> list[str]:
 def _job(export: Export, name: str) -> Job:
     from tbcad.drawings.assembly_sheet import assembly_job, draw_assembly
     from tbcad.drawings.printed_parts import draw_part, part_job
-    from tbcad.drawings.shell_sheet import draw_shell, shell_job
+    from tbcad.drawings.shell_sheet import draw_shell, mandrel_job, shell_job
 
     if name == ASSEMBLY and export.machine:
         return Job(name, draw_assembly, (assembly_job(export, export.machine),))
     if name in export.shells:
         return Job(name, draw_shell, (shell_job(export, name),))
+    if name in export.mandrels:
+        return Job(name, draw_shell, (mandrel_job(export, name),))
     if name == OPTICAL_LAYOUT:
         rows = layout_rows(export)
         return Job(name, layout_sheet, (export.design, rows, export.title))

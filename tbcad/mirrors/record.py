@@ -1,14 +1,17 @@
 """The record of a design: mirrors.csv, and design.json with the resolved spec and the cameras."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.spec.load import spec_dict
+
+Record: TypeAlias = dict[str, Any]
 
 SCHEMA = "tbcad-design/2"
 DESIGN_FILE, MIRRORS_FILE = "design.json", "mirrors.csv"
@@ -43,18 +46,27 @@ def mirror_rows(array: MirrorArray) -> list[Row]:
     ]
 
 
-def write_record(folder: Path, design: MirrorDesign, shells: bool) -> None:
-    """Write mirrors.csv and design.json; `shells`: whether the shells' files are there too."""
+def write_record(
+    folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[Record] = ()
+) -> None:
+    """Write mirrors.csv and design.json.
+
+    Args:
+        folder: to write into.
+        design: the mirrors.
+        shells: whether the shells' files are there too.
+        mandrels: records of the shells' negatives that are there too.
+    """
     write_table(
         folder / MIRRORS_FILE,
         COLUMNS,
         (row for array in design.arrays for row in mirror_rows(array)),
     )
-    text = json.dumps(document(design, shells), indent=1, allow_nan=False) + "\n"
+    text = json.dumps(document(design, shells, mandrels), indent=1, allow_nan=False) + "\n"
     (folder / DESIGN_FILE).write_text(text, encoding="utf-8")
 
 
-def document(design: MirrorDesign, shells: bool) -> dict[str, Any]:
+def document(design: MirrorDesign, shells: bool, mandrels: Sequence[Record] = ()) -> Record:
     """What design.json holds; the mirrors are in the file that it names."""
     spec = design.spec
     return {
@@ -65,6 +77,7 @@ def document(design: MirrorDesign, shells: bool) -> dict[str, Any]:
         "foot_z_mm": design.arrays[0].foot,
         "cameras": [camera_record(array) for array in design.arrays],
         "parts": [shell_record(array) for array in design.arrays if shells],
+        **({"mandrels": list(mandrels)} if mandrels else {}),
         "mirrors": MIRRORS_FILE,
     }
 
@@ -85,6 +98,15 @@ def camera_record(array: MirrorArray) -> dict[str, Any]:
 
 def shell_record(array: MirrorArray) -> dict[str, str]:
     """Record of one part and its files."""
-    name = f"shell_{array.camera_id}"
+    return _part_files("shell", array)
+
+
+def mandrel_files(array: MirrorArray) -> dict[str, str]:
+    """Name and files of one shell's negative."""
+    return _part_files("mandrel", array)
+
+
+def _part_files(part: str, array: MirrorArray) -> dict[str, str]:
+    name = f"{part}_{array.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
     return {"name": name, "camera": array.camera_id, **files}

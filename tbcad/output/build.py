@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.camera.sheet import write_camera_sheet
@@ -15,6 +17,8 @@ from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
+from tbcad.shell.mandrel import Mandrel
+from tbcad.shell.mandrel_files import design_mandrel, mandrel_record, write_mandrels
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -27,7 +31,7 @@ class Export:
     Attributes:
         spec: the design's, with a value for every key that was chosen on the way.
         parts: some of PARTS.
-        note: why a part was left out; empty when none was.
+        note: why a part was left out, or cannot be used in every way; empty otherwise.
     """
 
     spec: Spec
@@ -64,14 +68,28 @@ def write_export(
         pending.append(submit(work, *arguments))
         return pending[-1]
 
+    # Refused before anything is written.
+    mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = _write_parts(design, folder, parts, progress, submit_file, optional_prototype)
+    if mandrel:
+        submit_file(write_mandrels, design, mandrel, folder)
     write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
     for future in pending:
         future.result()
-    write_record(folder, replace(design, spec=export.spec), SHELL in parts)
+    if mandrel and mandrel.draft.angle < 0:
+        export = replace(export, note="; ".join(filter(None, (export.note, _undercut(mandrel)))))
+    mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
+    write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
     write_manifest(folder)
     return export
+
+
+def _undercut(mandrel: Mandrel) -> str:
+    return (
+        f"mandrels: undercut by up to {-np.degrees(mandrel.draft.angle):.0f} degrees, so no shell "
+        "can be drawn off: dissolve them or melt them out, or set shell.edges to valley"
+    )
 
 
 def _write_parts(

@@ -112,32 +112,34 @@ def _flanged(shell: ShellSpec, back: Spheroid, foot: float) -> Envelope:
     x, z = seam_flange.thickness_mm, foot + foot_flange.thickness_mm
 
     def over(width: float) -> EllipseArc:
-        return _arc_over_top(back.widened(width), x, z).moved(-x * X)
+        return arc_over_top(back.widened(width), x, z).moved(-x * X)
 
     def around(width: float, start_x: float) -> EllipseArc:
-        return _arc_around(back.widened(width), start_x, foot, foot)
+        return arc_around(back.widened(width), start_x, foot, foot)
 
     foot_width = _foot_width(foot_flange, back, seam_flange.width_mm, foot, x, z)
     foot_holes = around(foot_flange.width_mm / 2, x + seam_flange.width_mm / 2)
     return Envelope(
         back=back,
         foot=foot,
-        seam_back=_arc_over_top(back, x, z),
-        foot_back=_arc_around(back, x, z, z),
+        seam_back=arc_over_top(back, x, z),
+        foot_back=arc_around(back, x, z, z),
         seam_rim=over(seam_flange.width_mm),
         foot_rim=around(foot_width, 0.0),
-        seam_holes=_holes(seam_flange, over(seam_flange.width_mm / 2), x * X, seam_flange.width_mm),
-        foot_holes=_holes(foot_flange, foot_holes, (z - foot) * Z, foot_flange.width_mm / 2),
+        seam_holes=flange_holes(
+            seam_flange, over(seam_flange.width_mm / 2), x * X, seam_flange.width_mm
+        ),
+        foot_holes=flange_holes(foot_flange, foot_holes, (z - foot) * Z, foot_flange.width_mm / 2),
     )
 
 
-def _arc_over_top(spheroid: Spheroid, x: float, z: float) -> EllipseArc:
+def arc_over_top(spheroid: Spheroid, x: float, z: float) -> EllipseArc:
     """Arc over the top in the plane x, between the points at height z."""
     low, high = spheroid.crossing(x, z)
     return spheroid.section(X, x).arc(low, high, spheroid.centre + FAR_MM * Z)
 
 
-def _arc_around(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
+def arc_around(spheroid: Spheroid, x: float, z: float, plane: float) -> EllipseArc:
     """Arc round the mirrors in the plane z = plane, between the points at x."""
     low, high = spheroid.crossing(x, z)
     return spheroid.section(Z, plane).arc(low, high, spheroid.centre + FAR_MM * X)
@@ -161,7 +163,7 @@ def _foot_width(
     )
 
 
-def _holes(flange: FlangeSpec, line: EllipseArc, direction: Floats, margin: float) -> Holes:
+def flange_holes(flange: FlangeSpec, line: EllipseArc, direction: Floats, margin: float) -> Holes:
     """Bolts and dowels at even distances along a line, dowels near its ends and between."""
     count = flange.bolts + flange.dowels
     pitch = (line.length - 2 * margin) / (count - 1)

@@ -102,8 +102,10 @@ def wall_names(ids: Sequence[str], cells: Cells) -> list[str]:
     return [f"{ids[mirror]}_{ids[across]}" for mirror, across in cells.walls.tolist()]
 
 
-def shell_properties(solid: Solid, array: MirrorArray) -> SolidProperties:
-    """Volume, area and centroid of a camera's half.
+def shell_properties(
+    solid: Solid, array: MirrorArray, *, negative: bool = False
+) -> SolidProperties:
+    """Volume, area and centroid of a camera's half, or of its negative.
 
     Mirrors that are spheres are integrated along their arcs, and so are walls of pedestals: the
     kernel takes seconds for them.
@@ -113,11 +115,13 @@ def shell_properties(solid: Solid, array: MirrorArray) -> SolidProperties:
         return properties(solid.shape)
     origin = mean_corner(solid.shape)
     mirrors = cell_moments(cells, origin)
-    total = FaceIntegrals(origin, mirrors.volume, mirrors.volume_moment, float(mirrors.area.sum()))
+    side = -1.0 if negative else 1.0  # of the material
+    area = float(mirrors.area.sum())
+    total = FaceIntegrals(origin, side * mirrors.volume, side * mirrors.volume_moment, area)
     if isinstance(cells, PedestalCells):
         walls = wall_moments(cells, origin)
         area = float(walls.area.sum())
-        total += FaceIntegrals(origin, walls.volume, walls.volume_moment, area)
+        total += FaceIntegrals(origin, side * walls.volume, side * walls.volume_moment, area)
     for face in faces(solid.shape)[len(array) + len(wall_names(array.ids, cells)) :]:
         total += face_integrals(face, origin)
     return total.properties

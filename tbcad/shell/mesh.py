@@ -11,6 +11,7 @@ from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals import PedestalCells
 from tbcad.shell.boundary import boundary_chain
 from tbcad.shell.casing_edges import ARC_ENDS, casing_lines, outline
+from tbcad.shell.cell_outlines import CellOutlines
 from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.shell.walls import wall_facets
@@ -35,18 +36,25 @@ def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -
         envelope: what closes them.
         distance: from each mirror to the object, mm, (m,).
     """
-    front = mirror_facets(spec, cells, distance)
-    builder = _MeshBuilder(front, spec.mesh.structure_error_mm)
-    if isinstance(cells, PedestalCells):
-        builder.triangles.append(wall_facets(cells, front.outlines))
-    _add_casing(builder, cells, front, envelope)
+    builder, outlines = front_facets(spec, cells, distance)
+    _add_casing(builder, cells, outlines, envelope)
     return builder.mesh()
 
 
-class _MeshBuilder:
+def front_facets(spec: Spec, cells: Cells, distance: Floats) -> tuple["MeshBuilder", CellOutlines]:
+    """A builder with the facets of mirrors and walls of pedestals, and the mirrors' outlines."""
+    front = mirror_facets(spec, cells, distance)
+    builder = MeshBuilder(front, spec.mesh.structure_error_mm)
+    if isinstance(cells, PedestalCells):
+        builder.triangles.append(wall_facets(cells, front.outlines))
+    return builder, front.outlines
+
+
+class MeshBuilder:
     """Vertices and triangles, collected face by face; curves within a chord error, mm."""
 
     def __init__(self, front: Facets, error: float) -> None:
+        """Begin with the mirrors' facets."""
         self.error, self.points, self.triangles = error, front.vertices, [front.triangles]
 
     def mesh(self) -> Mesh:
@@ -127,9 +135,11 @@ class _MeshBuilder:
         self.triangles.append(triangles[:, ::-1] if away else triangles)
 
 
-def _add_casing(builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope) -> None:
+def _add_casing(
+    builder: MeshBuilder, cells: Cells, outlines: CellOutlines, envelope: Envelope
+) -> None:
     """Back, flanges, rims and holes: all faces but the mirrors'."""
-    edges = _edges(builder, cells, front, envelope)
+    edges = _edges(builder, cells, outlines, envelope)
 
     def ring(face: str) -> Ints:
         lines = outline(face, edges, lambda line: line[::-1])
@@ -147,7 +157,7 @@ def _add_casing(builder: _MeshBuilder, cells: Cells, front: Facets, envelope: En
 
 
 def _edges(
-    builder: _MeshBuilder, cells: Cells, front: Facets, envelope: Envelope
+    builder: MeshBuilder, cells: Cells, outlines: CellOutlines, envelope: Envelope
 ) -> dict[str, Ints]:
     """Vertices along the edges of the casing, by the names of casing_edges."""
     backs = envelope.seam_back, envelope.foot_back
@@ -163,8 +173,8 @@ def _edges(
         "seam_rim_back": seam_rim_back,
         "foot_rim": foot_rim,
         "foot_rim_top": foot_rim_top,
-        "seam_front": front.outlines.along(boundary_chain(cells, cells.seam)),
-        "foot_front": front.outlines.along(boundary_chain(cells, cells.foot)),
+        "seam_front": outlines.along(boundary_chain(cells, cells.seam)),
+        "foot_front": outlines.along(boundary_chain(cells, cells.foot)),
     }
     ends = {ARC_ENDS[name]: curves[name][[0, -1]] for name in ARC_ENDS}
     ends["front"] = curves["seam_front"][[0, -1]]

@@ -160,6 +160,9 @@ class ShellSpec(Section):
     groove_mm: float = Field(0.1, ge=0.02, le=5)
     """Width of the grooves between pedestals at the mirrors' corners; they are four times as
     deep. Without pedestals unused."""
+    negative: bool = False
+    """Whether to write the negative of each shell's mirrors too: mandrel_a and mandrel_b, solids
+    with concave mirrors on which a shell is electroformed."""
     seam_flange: FlangeSpec = FlangeSpec()
     """Joins the two halves at x = 0."""
     foot_flange: FootFlangeSpec = FootFlangeSpec()

@@ -71,6 +71,12 @@ def wanted(export: Path, relative: float) -> list[ExpectedPart]:
     return found
 
 
+def trimesh_volume(stl: Path) -> float:
+    import trimesh
+
+    return float(trimesh.load_mesh(stl).volume)
+
+
 def mirrors(export: Path, camera: str) -> int:
     """Number of a camera's curved mirrors."""
     rows = read_csv(export / "mirrors.csv")
@@ -83,6 +89,15 @@ def of(program: str, checks: Iterable[Check]) -> list[Check]:
     if all(map(is_skipped, mine)):
         pytest.skip(mine[0].detail)
     return mine
+
+
+@pytest.fixture(scope="module")
+def mandrels(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The paper's shells with their negatives."""
+    out = tmp_path_factory.mktemp("clients") / "mandrels"
+    options = ["--parts", "shell", "--set", "shell.negative=true", "--no-verify"]
+    assert run(["build", "--out", str(out), *options]) == 0
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -148,6 +163,29 @@ def test_freecad_sees_bolt_and_dowel_holes(export: Path, camera: str) -> None:
         kinds = json.loads((given.folder / "kinds.json").read_text())
     assert kinds["Sphere"] == 847
     assert kinds["Cylinder"] == 15
+
+
+@pytest.mark.parametrize("program", ["freecad", "gmsh", "admesh"])
+def test_each_program_passes_a_mandrel(mandrels: Path, program: str) -> None:
+    volume = trimesh_volume(mandrels / "mandrel_a.stl")
+    files = {kind: f"mandrel_a.{kind}" for kind in ("step", "stl", "3mf")}
+    part = ExpectedPart("mandrel_a", files, 847, volume, 1e-3 * volume)
+    for check in of(program, check_with_programs(mandrels, [part])):
+        assert check.passed is True, check
+        assert check.measured is not None, check
+
+
+@pytest.mark.parametrize("camera", ["a", "b"])
+def test_freecad_sees_a_mandrels_blind_holes(mandrels: Path, camera: str) -> None:
+    command = on_path("freecadcmd", "FreeCADCmd")
+    if not command:
+        pytest.skip("freecadcmd is not installed")
+    with sandbox(command, mandrels, f"mandrel_{camera}.step", "step", Limits()) as given:
+        (given.folder / "look.py").write_text(KINDS)
+        done = given.run(given.folder / "look.py")
+        assert done.code == 0, done
+        kinds = json.loads((given.folder / "kinds.json").read_text())
+    assert kinds == {"Sphere": 847, "Cylinder": 15, "Plane": 2 + 15}
 
 
 def cut(path: Path) -> None:

@@ -94,6 +94,25 @@ class Part(PartFiles):
     camera: str = ""
 
 
+class Mandrel(Part):
+    """The negative of one camera's shell, and how the shell comes off.
+
+    Attributes:
+        pull: (3,) unit, along which the shell is drawn.
+        draft_deg: least angle between pull and surface; below 0 it catches.
+    """
+
+    pull: Vector
+    draft_deg: float = Field(ge=-90, le=90)
+
+    @field_validator("pull", mode="after")
+    @classmethod
+    def _unit(cls, pull: Floats) -> Floats:
+        if abs(float(pull @ pull) - 1) > SQUARE:
+            raise ValueError("is no unit vector")
+        return pull
+
+
 class Design(Strict):
     """design.json: see `Export`."""
 
@@ -103,6 +122,7 @@ class Design(Strict):
     foot_z_mm: float = Field(ge=-1e6, le=1e6)
     cameras: list[Camera] = Field(min_length=1, max_length=MOST)
     parts: list[Part] = Field(max_length=MOST)
+    mandrels: list[Mandrel] = Field(default=[], max_length=MOST)
     mirrors: Literal["mirrors.csv"]
 
     @model_validator(mode="after")
@@ -155,6 +175,7 @@ class Export:
         manifest: file name -> (size, sha256), as it should be.
         digests: file name -> (size, sha256), of the bytes that all this was parsed from.
         prototype: the machine with balls; None where only the shell was built.
+        mandrels: negatives of the shells, in the record's order.
     """
 
     folder: Path
@@ -168,6 +189,7 @@ class Export:
     manifest: Mapping[str, tuple[int, str]]
     digests: Mapping[str, tuple[int, str]]
     prototype: Prototype | None = None
+    mandrels: tuple[Mandrel, ...] = ()
 
     @property
     def printed(self) -> tuple[PrintedPart, ...]:
@@ -177,7 +199,7 @@ class Export:
     @property
     def part_files(self) -> frozenset[str]:
         """All files of all parts, and of their assembly."""
-        parts = (*self.parts, *self.printed)
+        parts = (*self.parts, *self.mandrels, *self.printed)
         names = {name for part in parts for name in (part.stl, part.step, part.threemf)}
         if self.prototype:
             names |= {self.prototype.assembly.step, self.prototype.assembly.glb}
@@ -225,14 +247,17 @@ def read_export(folder: Path) -> Export:
         manifest=manifest.digests(),
         digests=digests,
         prototype=prototype,
+        mandrels=tuple(design.mandrels),
     )
 
 
 def _check_parts(design: Design, prototype: Prototype | None) -> None:
-    others = prototype.parts if prototype else []
-    meshes = [part.stl for part in design.parts] + [part.stl for part in others]
+    others = [*design.mandrels, *(prototype.parts if prototype else [])]
+    meshes = [part.stl for part in (*design.parts, *others)]
     if not meshes or len(set(meshes)) != len(meshes):
         raise BadExport(f"{DESIGN}: parts must be there, each with an STL of its own; {AGAIN}")
     twice = {part.name for part in design.parts} & {part.name for part in others}
+    if orphans := {one.camera for one in design.mandrels} - {one.camera for one in design.parts}:
+        raise BadExport(f"{DESIGN}: camera {min(orphans)!r} has a mandrel and no shell; {AGAIN}")
     if twice:
         raise BadExport(f"{RECORD}: part {min(twice)!r} is in {DESIGN} too; {AGAIN}")

@@ -144,6 +144,9 @@ def contradictions(export: Export) -> list[str]:
     wrong = [name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC]
     if export.spec.mesh.largest_mm > LARGEST_MESH_ERROR_MM:
         wrong.append(f"a mesh error of more than {LARGEST_MESH_ERROR_MM:g} mm in the spec")
+    shells = export.parts if export.spec.shell.negative else ()
+    if sorted(one.camera for one in export.mandrels) != sorted(one.camera for one in shells):
+        wrong.append("the mandrels of shell.negative")
     return sorted(wrong)
 
 

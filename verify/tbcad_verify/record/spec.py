@@ -77,6 +77,7 @@ class ShellSpec(Strict):
     wall_mm: float = Field(ge=0.4, le=50)
     edges: Literal["valley", "pedestal"] = "valley"  # exports from before these keys have none
     groove_mm: float = Field(default=0.1, ge=0.02, le=5)
+    negative: bool = False
     seam_flange: FlangeSpec
     foot_flange: FlangeSpec
 

@@ -38,6 +38,7 @@ KEY_FIGURES = (
     KeyFigure("object clearance", "clearance"),
     KeyFigure("centre error", "mirrors off"),
     KeyFigure("ball centres", "balls off"),
+    KeyFigure("mandrel draft", "mandrel draft"),
     KeyFigure("step volume", "STEP volume off"),
     KeyFigure("step area", "STEP area off"),
     KeyFigure("pixels, balls", "pixels kept", "%"),

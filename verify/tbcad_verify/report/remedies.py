@@ -61,6 +61,8 @@ REMEDIES = {
     "mirrors found": _MESH,
     "mesh wall": _MESH,
     "mesh holes": _MESH,
+    "mandrel": _MESH,
+    "mandrel draft, deviation from record": _RECORD,
     "form error": _MIRROR,
     "centre error": _MIRROR,
     "radius error": _MIRROR,

@@ -29,6 +29,7 @@ from tbcad_verify.shell.integrity import (
     manifest_checks,
     record_checks,
 )
+from tbcad_verify.shell.mandrel import mandrel_results
 from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
 from tbcad_verify.shell.mirror_image import flipped_measures
@@ -45,12 +46,14 @@ SHELL_STAGES = (
     "coverage",
     "every pixel",
 )
+MANDRELS = "mandrels"
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
 
 
 def stage_titles(export: Export) -> tuple[str, ...]:
     """Titles of the stages that an export has, in order."""
-    return (*SHELL_STAGES, *(PROTOTYPE_STAGES if export.prototype else ()))
+    mandrels = (MANDRELS,) if export.mandrels else ()
+    return (*SHELL_STAGES, *mandrels, *(PROTOTYPE_STAGES if export.prototype else ()))
 
 
 def run_stages(
@@ -74,7 +77,7 @@ def run_stages(
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))
     export = read_export(folder)
-    parts = (*export.parts, *export.printed)
+    parts = (*export.parts, *export.mandrels, *export.printed)
     blobs = [read_facets(export.folder, part.stl) for part in parts]
     digests = {blob.name: blob.digest for _, blob in blobs}
     facets = [facets for facets, _ in blobs]
@@ -89,7 +92,8 @@ def run_stages(
     manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
     sink(Results(checks=manifest + record_checks(export)))
 
-    printed, facets = facets[len(export.parts) :], facets[: len(export.parts)]
+    shells, mandrels = len(export.parts), len(export.mandrels)
+    printed, facets = facets[shells + mandrels :], facets[: shells + mandrels]
     prototype = begin(lambda to: _verify_prototype(export, printed, profiles, bool(printers), to))
     _verify_shells(export, facets, profiles, bool(printers), sink)
     prototype(sink)
@@ -103,7 +107,8 @@ def _verify_shells(
     sink: ResultSink,
 ) -> None:
     sink(Results(stages=[MESHES]))
-    shells = _measure_shells(export, facets, sink)
+    negatives = facets[len(export.parts) :]
+    shells = _measure_shells(export, facets[: len(export.parts)], sink)
     facets.clear()  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
@@ -115,7 +120,19 @@ def _verify_shells(
         _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
     if shells:
         holes = {name: measures.holes for name, measures in measured.items()}
-        _trace_shells(export, shells, holes, sink)
+        setup, no_setup = _trace_shells(export, shells, holes, sink)
+        _verify_mandrels(export, negatives, lambda: require(setup, no_setup), sink)
+
+
+def _verify_mandrels(
+    export: Export, facets: list[Facets], setup: Callable[[], OpticalSetup], sink: ResultSink
+) -> None:
+    """The negatives, whose mirrors are compared with what was found on the shells."""
+    if not export.mandrels:
+        return
+    sink(Results(stages=[MANDRELS]))
+    for mandrel, stl in zip(export.mandrels, facets, strict=True):
+        sink(mandrel_results(export, mandrel, stl, setup))
 
 
 def _shell_measures(shell: ShellPart, measured: Mapping[str, PartMeasures]) -> PartMeasures:
@@ -192,7 +209,7 @@ def _trace_shells(
     shells: list[ShellPart],
     holes: Mapping[str, RoundHoles],
     sink: ResultSink,
-) -> None:
+) -> tuple[OpticalSetup | None, str]:
     """The optical stages: mirrors against the record, the casing, coverage, and every pixel."""
     files = ", ".join(part.stl for part in export.parts)
 
@@ -228,6 +245,7 @@ def _trace_shells(
         lambda: require(pixel_counts, no_pixels)[1],
         {"pixels": pixel_counts[0]} if pixel_counts else {},
     )
+    return setup, no_setup
 
 
 def _set_up(export: Export, shells: list[ShellPart]) -> OpticalSetup:

@@ -29,6 +29,11 @@ from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_stages, stage_titles
 from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
 from tbcad_verify.run.worker import send_stages
+from tbcad_verify.step.mandrel_checks import (
+    MandrelComparison,
+    mandrel_comparisons,
+    mandrel_step_checks,
+)
 from tbcad_verify.step.shell_checks import (
     ShellComparison,
     area_checks,
@@ -43,8 +48,9 @@ MM3_PER_CM3 = 1e3
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
 Comparisons = dict[str, ShellComparison | Unknown]
+Mandrels = dict[str, MandrelComparison | Unknown]
 AreaChecks = list[Check] | None
-Steps = tuple[Files, Comparisons, AreaChecks]
+Steps = tuple[Files, Comparisons, Mandrels, AreaChecks]
 
 
 @dataclass(frozen=True)
@@ -153,27 +159,33 @@ def _steps(export: Export, limits: Limits) -> Iterator[Callable[[], Steps]]:
 
 
 def _no_steps(export: Export, reason: str) -> Steps:
-    files: Files = {part.name: Unknown(reason) for part in (*export.parts, *export.printed)}
-    return files, shell_comparisons(export, files), None
+    parts = (*export.parts, *export.mandrels, *export.printed)
+    files: Files = {part.name: Unknown(reason) for part in parts}
+    return files, shell_comparisons(export, files), mandrel_comparisons(export, files), None
 
 
 def _read_steps(export: Export, limits: Limits) -> Steps:
     files = read_step_files(export, limits)
     areas = area_checks(export) if any(part.step for part in export.parts) else None
-    return files, shell_comparisons(export, files), areas
+    mandrels = mandrel_comparisons(export, files)
+    return files, shell_comparisons(export, files), mandrels, areas
 
 
 def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:
     wait = cache(steps)
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        _, comparisons, areas = wait()
+        _, comparisons, _, areas = wait()
         coverage = results.mirrors.get("coverage_fitted_mm")
         checks = shell_step_checks(export, results.masses, comparisons, coverage, areas)
         results.add(Results(checks=checks))
+    if any(part.step for part in export.mandrels):
+        results.add(Results(stages=["STEP of the mandrels"]))
+        _, _, mandrels, _ = wait()
+        results.add(Results(checks=mandrel_step_checks(export, results.masses, mandrels)))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files, _, _ = wait()
+        files, _, _, _ = wait()
         results.add(Results(checks=part_step_checks(export, results.masses, files)))
 
 
@@ -192,7 +204,7 @@ def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> 
     cameras = export.mirrors.camera[~export.mirrors.flat]
     parts = [
         _expected(export, part, int((cameras == part.camera).sum()), results)
-        for part in export.parts
+        for part in (*export.parts, *export.mandrels)
     ]
     parts += [_expected(export, part, None, results) for part in export.printed]
     return check_with_programs(export.folder, parts, seconds, results.progress)

@@ -63,18 +63,43 @@ def read_casing(text: str, mirrors: frozenset[str]) -> Casing:
             raise Unknown("the back is no spheroid")
         centre, axis = table.placement(place)
         major, minor = table.numbers(curve)[-2:]
-        faces = table.of("ADVANCED_FACE")
-        names = {one: TEXT.findall(table.bodies[one])[0] for one in faces}
+        names = _face_names(table)
         reached = table.reached(*(one for one, name in names.items() if name in mirrors))
         corners = [one for one in reached if table.kinds.get(one) == "VERTEX_POINT"]
         valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
-        round_faces = [round_face(table, one) for one in faces if names[one] not in mirrors]
+        bores = _bores(table, names, mirrors)
     except (LookupError, ValueError) as error:
         raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
+    return Casing((major, minor), centre, axis, np.array(valleys).reshape(-1, 3), bores)
+
+
+def read_bores(text: str, mirrors: frozenset[str]) -> tuple[Hole, ...]:
+    """All round holes of a solid.
+
+    Args:
+        text: of the STEP file.
+        mirrors: names of the mirrors' faces and of the walls below them.
+
+    Raises:
+        Unknown: the text is broken.
+    """
+    try:
+        table = StepTable(text)
+        return _bores(table, _face_names(table), mirrors)
+    except (LookupError, ValueError) as error:
+        raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
+
+
+def _face_names(table: StepTable) -> dict[int, str]:
+    faces = table.of("ADVANCED_FACE")
+    return {one: TEXT.findall(table.bodies[one])[0] for one in faces}
+
+
+def _bores(table: StepTable, names: dict[int, str], mirrors: frozenset[str]) -> tuple[Hole, ...]:
+    round_faces = [round_face(table, one) for one, name in names.items() if name not in mirrors]
     hollow = tuple(face for face in round_faces if face and face.kind == "cylinder" and face.hollow)
     radii = sorted({round(face.radius, 6) for face in hollow})
-    bores = tuple(hole for radius in radii for hole in holes(hollow, radius, HOLE_MM))
-    return Casing((major, minor), centre, axis, np.array(valleys).reshape(-1, 3), bores)
+    return tuple(hole for radius in radii for hole in holes(hollow, radius, HOLE_MM))
 
 
 def wall(casing: Casing, camera: Camera, semi_minor: float) -> float:

@@ -50,6 +50,7 @@ class StepFaces:
         outward: (F,) true where a sphere is convex seen from outside the solid, and a plane faces
             the direction that the kernel gives, in the text too: kernels repair reversed faces,
             other readers may not.
+        inward: (F,) true where a sphere is concave seen from outside the solid, in kernel and text.
         area: (F,) mm^2.
         middle: (F, 3) of the area, mm.
 
@@ -63,6 +64,7 @@ class StepFaces:
     radius: Floats
     normal: Floats
     outward: NDArray[np.bool_]
+    inward: NDArray[np.bool_]
     area: Floats
     middle: Floats
 
@@ -114,7 +116,7 @@ def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unkn
     Raises:
         BadExport: a file is missing, foreign or truncated.
     """
-    parts = [part for part in (*export.parts, *export.printed) if part.step]
+    parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
     files = examine_all([load(export.folder, part.step) for part in parts], limits)
     return {part.name: file for part, file in zip(parts, files, strict=True)}
 
@@ -215,6 +217,7 @@ def _faces(rows: list[Row], measured: list[Row]) -> StepFaces:
         np.array([row.get("radius", np.nan) for row in rows]),
         _vectors(joined, "normal"),
         np.array([_outward(row, text) for row, text in zip(joined, rows, strict=True)]),
+        np.array([_inward(row, text) for row, text in zip(joined, rows, strict=True)]),
         np.array([row.get("area", np.nan) for row in joined]),
         _vectors(joined, "centroid"),
     )
@@ -225,6 +228,10 @@ def _outward(row: Row, text: Row) -> bool:
         return bool(row.get("outward") and text["forward"])
     along = sum(a * b for a, b in zip(text["axis"], row["normal"], strict=True)) > 0
     return bool(along == text["forward"])
+
+
+def _inward(row: Row, text: Row) -> bool:
+    return row.get("kind") == "sphere" and not row["outward"] and not text["forward"]
 
 
 def _vectors(rows: list[Row], key: str) -> Floats:

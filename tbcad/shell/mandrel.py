@@ -1,0 +1,164 @@
+"""The negative of a shell, on which it is electroformed: what closes it, as points and curves.
+
+It fills the inside of the mirrors up to the joining planes x = 0 and z = foot, which the edges of
+the deposit are cut flush with. Blind holes in both planes, of the sizes of the shell's flanges,
+hold it, lead the current, and locate it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.geometry.conics import Spheroid
+from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.rotations import even_angles, unit_circle
+from tbcad.geometry.vectors import perpendicular_axes, unit
+from tbcad.optics.cells import Cells
+from tbcad.optics.surfaces import Surfaces
+from tbcad.shell.draft import Draft, draft_of
+from tbcad.shell.envelope import Holes, arc_around, arc_over_top, flange_holes
+from tbcad.spec.design import FlangeSpec, ShellSpec
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats
+
+X, _, Z = np.eye(3)
+# Depth of a blind hole in its diameter: a thread in aluminium holds as much as its screw.
+DEPTH_DIAMETERS = 2.0
+INSET_STEP_MM = 1.0
+# Where the distance of a hole from the mirrors is looked at: round it, and along it.
+ROUND, ALONG = 24, 5
+# Sizes of holes that are tried for a remedy, as shares of those that do not fit.
+REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)
+
+
+@dataclass(frozen=True)
+class Mandrel:
+    """What closes camera a's cells to a negative.
+
+    Attributes:
+        foot: height of the foot plane, mm.
+        seam_holes: blind holes along +x.
+        foot_holes: blind holes along +z.
+        draft: how the shell comes off.
+    """
+
+    foot: float
+    seam_holes: Holes
+    foot_holes: Holes
+    draft: Draft
+
+
+def mandrel_of(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Mandrel:
+    """Holes and draft of the negative of camera a's half.
+
+    Raises:
+        SpecError: when there is no room for the holes; it says which would fit.
+    """
+    holes = _inset_holes(shell, cells, ellipsoid)
+    if holes is None:
+        raise SpecError(_no_room(shell, cells, ellipsoid))
+    return Mandrel(_foot(cells), *holes, draft_of(cells))
+
+
+def _foot(cells: Cells) -> float:
+    return float(cells.surfaces.apex[cells.foot, 2])
+
+
+def _inset_holes(
+    shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid
+) -> tuple[Holes, Holes] | None:
+    """Holes of seam and foot as near the mirrors as the wall allows; None where none fit."""
+    found = []
+    for place in (_seam_holes, _foot_holes):
+        tried = place(shell, ellipsoid, _foot(cells))
+        holes = next((one for one in tried if _clear(one, cells.mirror_surfaces, shell)), None)
+        if holes is None:
+            return None
+        found.append(holes)
+    return found[0], found[1]
+
+
+def _seam_holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float) -> Iterator[Holes]:
+    flange = shell.seam_flange
+    low = foot + shell.wall_mm + _radius(flange)
+    for spheroid in _inner_spheroids(ellipsoid, shell.wall_mm + _radius(flange)):
+        try:
+            line = arc_over_top(spheroid, 0.0, low)
+            yield flange_holes(flange, line, _depth(flange) * X, 0.0)
+        except (ValueError, SpecError):  # the plane misses, or the line is too short
+            return
+
+
+def _foot_holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float) -> Iterator[Holes]:
+    flange = shell.foot_flange
+    behind_seam = _depth(shell.seam_flange) + shell.wall_mm + _radius(flange)
+    for spheroid in _inner_spheroids(ellipsoid, shell.wall_mm + _radius(flange)):
+        try:
+            line = arc_around(spheroid, behind_seam, foot, foot)
+            yield flange_holes(flange, line, _depth(flange) * Z, 0.0)
+        except (ValueError, SpecError):
+            return
+
+
+def _inner_spheroids(ellipsoid: Ellipsoid, first: float) -> Iterator[Spheroid]:
+    for inset in np.arange(first, ellipsoid.semi_minor, INSET_STEP_MM).tolist():
+        yield Spheroid(ellipsoid, -inset)
+
+
+def _radius(flange: FlangeSpec) -> float:
+    return max(flange.bolt_hole_mm, flange.dowel_hole_mm if flange.dowels else 0.0) / 2
+
+
+def _depth(flange: FlangeSpec) -> float:
+    return DEPTH_DIAMETERS * 2 * _radius(flange)
+
+
+def _clear(holes: Holes, mirrors: Surfaces, shell: ShellSpec) -> bool:
+    """Whether a wall is left between all holes and all mirrors."""
+    axes = perpendicular_axes(unit(holes.direction))
+    circle = unit_circle(even_angles(ROUND)) @ axes
+    along = np.linspace(0, 1, ALONG)[:, None] * holes.direction
+    rims = holes.centre[:, None] + holes.radius[:, None, None] * circle
+    points = (rims[:, :, None] + along).reshape(-1, 3)
+    return bool(distances(mirrors, points).min() >= shell.wall_mm)
+
+
+def distances(mirrors: Surfaces, points: Floats) -> Floats:
+    """Distance of points (k, 3) on the light's side from their nearest mirror, mm, (k,)."""
+    every = np.arange(len(mirrors))
+    value = mirrors.value(every, points[:, None])
+    root = np.sqrt(np.maximum(1 + 2 * mirrors.curvature * value, 0))
+    return np.asarray((2 * value / (1 + root)).min(axis=1))
+
+
+def _no_room(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> str:
+    """Why there is no room, and the largest holes tried for which there is."""
+    asked = max(_radius(shell.seam_flange), _radius(shell.foot_flange)) * 2
+    reason = (
+        f"the mandrel has no room for blind holes of {asked:g} mm with shell.wall_mm "
+        f"{shell.wall_mm:g} round them"
+    )
+    for share in REMEDY_SHARES:
+        size = round(share * asked, 1)
+        if size >= 1 and _inset_holes(_with_holes(shell, size), cells, ellipsoid):
+            return (
+                f"{reason}: make bolt_hole_mm and dowel_hole_mm under shell.seam_flange and "
+                f"shell.foot_flange {size:g} or less, or set shell.negative to false"
+            )
+    return (
+        f"{reason}, nor for smaller ones: make shell.wall_mm smaller, "
+        "or set shell.negative to false"
+    )
+
+
+def _with_holes(shell: ShellSpec, size: float) -> ShellSpec:
+    """The shell with no hole larger than a size, mm."""
+
+    def smaller(flange: FlangeSpec) -> FlangeSpec:
+        keys = ("bolt_hole_mm", "dowel_hole_mm")
+        return flange.model_copy(update={key: min(size, getattr(flange, key)) for key in keys})
+
+    return shell.model_copy(
+        update={key: smaller(getattr(shell, key)) for key in ("seam_flange", "foot_flange")}
+    )

@@ -1,0 +1,247 @@
+"""Negatives of shells: mesh, solid and closed forms agree; how a shell comes off."""
+
+import numpy as np
+import pytest
+import trimesh
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
+
+from tbcad.cad.solids import properties
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.shell.draft import best_pull, draft_of
+from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
+from tbcad.shell.mandrel import Mandrel, distances
+from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
+from tbcad.shell.mesh import front_facets
+from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
+from tests.helpers import area, bounds, volume
+
+OPTIONS = [
+    ["n=2"],
+    ["n=5"],
+    ["n=4", "radius_rule=flat"],
+    ["n=5", "coating_um=100"],
+    ["n=5", "camera_mm=[120, 15, -90]"],
+]
+EDGES = ["valley", "pedestal"]
+
+
+def made(edges: str, *options: str) -> MirrorDesign:
+    return design(load_spec(None, [f"shell.edges={edges}", "shell.negative=true", *options]))
+
+
+@pytest.mark.parametrize("edges", EDGES)
+@pytest.mark.parametrize("options", [*OPTIONS, ["n=13"]], ids=str)
+def test_mesh_is_closed_and_oriented(edges: str, options: list[str]) -> None:
+    mesh = camera_a_mandrel_mesh(made(edges, *options))
+    every = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+    assert every.is_watertight
+    assert every.is_winding_consistent
+    assert every.volume > 0
+    assert mesh.areas.min() > 0
+
+
+@pytest.mark.parametrize("edges", EDGES)
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+def test_solid_is_valid_and_has_the_volume_of_its_mesh(edges: str, options: list[str]) -> None:
+    """The mesh is built without the kernel: two ways to one volume."""
+    fine = [*options, "structure_error_mm=0.002", "chord_error_mm=0.001"]
+    mirrors = made(edges, *fine)
+    expected = pytest.approx(camera_a_mandrel_mesh(mirrors).volume, rel=3e-5)
+    for array in mirrors.arrays:
+        solid = mandrel_solid(mirrors, array)
+        assert BRepCheck_Analyzer(solid.shape).IsValid()
+        assert volume(solid.shape) == expected
+
+
+@pytest.mark.parametrize("edges", EDGES)
+def test_properties_are_those_that_the_kernel_integrates(edges: str) -> None:
+    mirrors = made(edges, "n=4")
+    for array in mirrors.arrays:
+        solid = mandrel_solid(mirrors, array)
+        fast, slow = shell_properties(solid, array, negative=True), properties(solid.shape)
+        assert fast.volume == pytest.approx(slow.volume, rel=1e-8)
+        assert fast.area == pytest.approx(slow.area, rel=1e-8)
+        assert fast.centroid == pytest.approx(slow.centroid, abs=1e-6)
+
+
+def test_mandrel_and_shell_fill_the_inside_together() -> None:
+    """Each mirror's face is the shell's, with its area, the material on the other side."""
+    mirrors = made("valley", "n=5")
+    for array in mirrors.arrays:
+        shell, mandrel = camera_solid(mirrors, array), mandrel_solid(mirrors, array)
+        for (name, face), (same, turned) in zip(shell.faces, mandrel.faces, strict=False):
+            if name not in array.ids:
+                break
+            assert name == same
+            assert face.Orientation() != turned.Orientation()
+            one, two = (BRepAdaptor_Surface(f).Sphere() for f in (face, turned))
+            assert one.Location().Coord() == two.Location().Coord()
+            assert one.Radius() == two.Radius()
+            assert area(face) == pytest.approx(area(turned), rel=1e-12)
+
+
+@pytest.mark.parametrize("edges", EDGES)
+def test_facets_are_the_shells_turned(edges: str) -> None:
+    """Corner by corner: all of the shell's mirrors and walls, and nothing else of it."""
+    mirrors = made(edges, "n=4")
+    array = mirrors.arrays[0]
+    builder, _ = front_facets(mirrors.spec, array.modelled_cells, array.apex_distance)
+    shell, mandrel = camera_a_mesh(mirrors), camera_a_mandrel_mesh(mirrors)
+    own = {facet(mandrel.vertices[one[::-1]]) for one in mandrel.triangles}
+    shared = own & {facet(shell.vertices[one]) for one in shell.triangles}
+    assert len(shared) == sum(map(len, builder.triangles))
+
+
+def facet(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """The corners in their order, the least first."""
+    points = [tuple(one) for one in corners.tolist()]
+    first = points.index(min(points))
+    return tuple(points[first:] + points[:first])
+
+
+@pytest.mark.parametrize("edges", EDGES)
+def test_faces_are_named_and_lie_in_the_joining_planes(edges: str) -> None:
+    mirrors = made(edges, "n=5")
+    for array, side in zip(mirrors.arrays, (1, -1), strict=True):
+        solid = mandrel_solid(mirrors, array)
+        names = [name for name, _ in solid.faces]
+        assert solid.name == f"mandrel_{array.camera_id}"
+        assert names[: len(array)] == array.ids
+        assert len(set(names)) == len(names)
+        kinds = {name: BRepAdaptor_Surface(face).GetType() for name, face in solid.faces}
+        assert all(kinds[name] == GeomAbs_Sphere for name in array.ids)
+        holes = [name for name in names if "_hole_" in name]
+        assert len(holes) == 8 + 7
+        assert all(kinds[name] == GeomAbs_Cylinder for name in holes)
+        assert all(kinds[name.replace("hole", "bottom")] == GeomAbs_Plane for name in holes)
+        low, high = bounds(solid.shape)
+        assert (low, -high)[side < 0][0] == pytest.approx(0, abs=1e-6)
+        assert low[2] == pytest.approx(array.foot, abs=1e-6)
+
+
+def hole_distance(mirrors: MirrorDesign, mandrel: Mandrel) -> float:
+    """Least distance of points in the bottoms' rims from any mirror, one by one."""
+    array = mirrors.arrays[0]
+    surfaces = array.modelled_cells.mirror_surfaces
+    angle = np.linspace(0, 2 * np.pi, 50)
+    least = np.inf
+    for holes, axes in ((mandrel.seam_holes, [1, 2]), (mandrel.foot_holes, [0, 1])):
+        for centre, radius in zip(holes.centre, holes.radius, strict=True):
+            for depth in (0, 1):
+                rim = np.tile(centre + depth * holes.direction, (len(angle), 1))
+                rim[:, axes] += radius * np.column_stack([np.cos(angle), np.sin(angle)])
+                away = np.linalg.norm(rim[:, None] - surfaces.centre, axis=2) - surfaces.radius
+                least = min(least, float(away.min()))
+    return least
+
+
+@pytest.mark.parametrize("n", [4, 6, 11])
+def test_holes_leave_a_wall_and_lie_near_it(n: int) -> None:
+    mirrors = made("valley", f"n={n}", "shell.wall_mm=4.5")
+    mandrel = design_mandrel(mirrors)
+    assert 4.5 <= hole_distance(mirrors, mandrel) < 4.5 + 2
+
+
+def test_holes_do_not_meet() -> None:
+    mandrel = design_mandrel(made("valley", "n=4"))
+    seam, foot = mandrel.seam_holes, mandrel.foot_holes
+    assert foot.centre[:, 0].min() - foot.radius.max() >= seam.direction[0] + 3 - 1e-9
+    assert seam.centre[:, 2].min() - seam.radius.max() >= mandrel.foot + 3 - 1e-9
+    assert np.array_equal(seam.direction, [8.6, 0, 0])
+
+
+def test_distances_are_those_of_spheres_and_planes() -> None:
+    mirrors = made("valley", "n=2").arrays[0].mirrors
+    points = np.array([[10.0, 5, 3], [40, -20, 8]])
+    expected = np.linalg.norm(points[:, None] - mirrors.centre, axis=2) - mirrors.radius
+    assert distances(mirrors, points) == pytest.approx(expected.min(axis=1), rel=1e-12)
+    flat = made("valley", "n=2", "radius_rule=flat").arrays[0].mirrors
+    heights = ((points[:, None] - flat.apex) * flat.normal).sum(axis=2)
+    assert distances(flat, points) == pytest.approx(heights.min(axis=1), rel=1e-12)
+
+
+class TestPull:
+    def test_of_a_corner_is_its_diagonal(self) -> None:
+        pull = best_pull(np.eye(3))
+        assert pull == pytest.approx(np.full(3, 3**-0.5), abs=1e-12)
+
+    def test_of_a_cone_is_its_axis(self) -> None:
+        angle, lean = np.linspace(0, 2 * np.pi, 40), 0.2
+        round_it = [np.cos(angle) * np.cos(lean), np.sin(angle) * np.cos(lean)]
+        normals = np.column_stack([*round_it, np.full(40, np.sin(lean))])
+        pull = best_pull(normals)
+        assert pull == pytest.approx([0, 0, 1], abs=1e-9)
+
+    def test_is_none_off_a_ball(self) -> None:
+        assert best_pull(np.concatenate([np.eye(3), -np.eye(3)])) is None
+
+    def test_nothing_draws_better(self) -> None:
+        """By brute force over directions about it."""
+        cells = made("valley", "n=6").arrays[0].modelled_cells
+        draft = draft_of(cells)
+        rng = np.random.default_rng(3)
+        arc = np.repeat(np.arange(len(cells.arcs)), 20)
+        points = cells.arcs.at(arc, np.tile(np.linspace(0, 1, 20), len(cells.arcs)))
+        normals = []
+        for side in cells.arcs.faces.T:
+            face = side[arc]
+            mine = face < cells.mirrors
+            centre = cells.surfaces.centre[face[mine]]
+            outward = centre - points[mine]  # of the negative: concave
+            normals.append(outward / np.linalg.norm(outward, axis=1)[:, None])
+        every = np.concatenate(normals)
+        best = np.degrees(np.arcsin((every @ draft.pull).min()))
+        assert best == pytest.approx(np.degrees(draft.angle), abs=0.02)
+        for step in (0.01, 0.1, 0.5):
+            tried = draft.pull + step * rng.standard_normal((200, 3))
+            tried /= np.linalg.norm(tried, axis=1)[:, None]
+            assert np.degrees(np.arcsin((every @ tried.T).min(axis=0))).max() < best + 1e-3
+
+
+@pytest.mark.parametrize(("n", "degrees"), [(4, 18.6), (6, 16.1)])
+def test_a_shell_with_valleys_can_be_drawn(n: int, degrees: float) -> None:
+    draft = design_mandrel(made("valley", f"n={n}")).draft
+    assert np.degrees(draft.angle) == pytest.approx(degrees, abs=0.1)
+    assert draft.pull[2] > 0.9
+    assert draft.pull[1] == 0
+
+
+def test_the_papers_shell_can_be_drawn(paper_design: MirrorDesign) -> None:
+    draft = draft_of(paper_design.arrays[0].modelled_cells)
+    assert np.degrees(draft.angle) == pytest.approx(11.97, abs=0.05)
+
+
+@pytest.mark.parametrize("n", [4, 6])
+def test_walls_of_pedestals_catch(n: int) -> None:
+    mirrors = made("pedestal", f"n={n}")
+    cells = mirrors.arrays[0].modelled_cells
+    draft = draft_of(cells)
+    walls = -cells.surfaces.normal[cells.mirrors + 2 :]
+    assert np.arcsin((walls @ draft.pull).min()) == pytest.approx(draft.angle)
+    assert draft.angle < np.radians(-20)
+
+
+class TestNoRoom:
+    def spec(self, *options: str) -> list[str]:
+        return ["n=4", *options]
+
+    def refused(self, *options: str) -> str:
+        with pytest.raises(SpecError) as error:
+            design_mandrel(made("valley", *self.spec(*options)))
+        assert "\n" not in str(error.value)
+        return str(error.value)
+
+    def test_names_holes_that_fit(self) -> None:
+        wide = ["seam_flange", "foot_flange"]
+        large = [f"shell.{one}.{key}" for one in wide for key in ("bolt_hole_mm", "dowel_hole_mm")]
+        sizes = [f"shell.{one}.width_mm=60" for one in wide]
+        text = self.refused(*sizes, *(f"{key}=30" for key in large))
+        size = text.split(" or less")[0].rsplit(" ", 1)[1]
+        fits = made("valley", *self.spec(*sizes, *(f"{key}={size}" for key in large)))
+        assert BRepCheck_Analyzer(mandrel_solid(fits, fits.arrays[0]).shape).IsValid()
+
+    def test_or_says_that_the_wall_is_thick(self) -> None:
+        assert "make shell.wall_mm smaller" in self.refused("shell.wall_mm=50")

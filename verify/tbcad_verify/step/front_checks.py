@@ -1,0 +1,172 @@
+"""The mirrors' faces of a STEP file against the record and the closed form."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad_verify.record.export import Camera, Export, Part
+from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.report.checks import Check, CheckName, at_most, each_at_most, short_list
+from tbcad_verify.step.part_checks import Checks, PartComparison
+from tbcad_verify.step.pedestal_faces import wall_errors
+from tbcad_verify.step.pedestals import PedestalWalls
+from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export, walls_of_export
+from tbcad_verify.step.step_file import StepFile
+from tbcad_verify.types import Floats, Ints
+
+SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
+CELL_SHARE = 1e-6  # of a cell's area
+MIDDLE_MM = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontComparison(PartComparison):
+    """The mirrors of a STEP file and all that they are compared with.
+
+    Attributes:
+        mirrors: the camera's m mirrors, as recorded.
+        foreign: ids of all other mirrors.
+        coating_mm: that is not part of the solid.
+        face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
+        cells: (m,) in closed form.
+        walls: of pedestals, by the record.
+        export: the record.
+        camera: that the part is for.
+    """
+
+    mirrors: Mirrors
+    foreign: frozenset[str]
+    coating_mm: float
+    face: Ints
+    cells: ClosedFormCells
+    walls: PedestalWalls | None
+    export: Export
+    camera: Camera
+
+
+def front_fields(export: Export, part: Part, file: StepFile) -> dict[str, Any]:
+    """The fields of a `FrontComparison` of a camera's part, but for the mesh's mass."""
+    mine = export.mirrors.camera == part.camera
+    mirrors = export.mirrors.take(np.flatnonzero(mine))
+    count = Counter(file.faces.names)
+    index = {name: k for k, name in enumerate(file.faces.names)}
+    return {
+        "name": part.name,
+        "file": file,
+        "mesh_mass": None,
+        "mesh_error": export.mesh_error_mm,
+        "mirrors": mirrors,
+        "foreign": frozenset(export.mirrors.ids) - frozenset(mirrors.ids),
+        "coating_mm": export.coating_mm,
+        "face": np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
+        "cells": cells_of_export(export, part.camera),
+        "walls": walls_of_export(export, part.camera),
+        "export": export,
+        "camera": export.cameras[part.camera],
+    }
+
+
+def names(name: CheckName, part: FrontComparison) -> Check:
+    """Every mirror's name on exactly one face; no name twice, none empty."""
+    ids, count = set(part.mirrors.ids), Counter(part.file.faces.names)
+    faults = [one for one in part.mirrors.ids if count[one] != 1]
+    faults += [
+        one or "(empty)" for one, n in count.items() if one not in ids and (n != 1 or not one)
+    ]
+    faults += [one for one in count if one in part.foreign]
+    detail = f"not on exactly one face, or another part's: {short_list(faults)}"
+    return at_most(name, len(faults), 0, detail)
+
+
+def surfaces(name: CheckName, part: FrontComparison) -> Check:
+    """Centre and radius of every sphere, position and tilt of every plane, as recorded."""
+    faces, mirrors = part.file.faces, part.mirrors
+    centre, apex, normal = (mirrors.columns(key, 3).T for key in ("cx", "px", "nx"))
+    point = _of(part, faces.point)
+    spheres = np.maximum(
+        np.linalg.norm(point - centre, axis=1),
+        np.abs(_of(part, faces.radius) - (mirrors.radius_mm - part.coating_mm)),
+    )
+    under = apex - part.coating_mm * normal
+    tilt = np.linalg.norm(_of(part, faces.normal) - normal, axis=1)
+    planes = np.maximum(np.abs(((point - under) * normal).sum(axis=1)), tilt)
+    error = np.where(mirrors.flat, planes, spheres)
+    error[_of(part, faces.kind) != np.where(mirrors.flat, "plane", "sphere")] = np.inf
+    limit = SURFACE_MM * max(1.0, float(np.nanmax(np.abs(centre), initial=0)) / 100)
+    return worst_of(name, mirrors.ids, error, limit, "mm")
+
+
+def outward(name: CheckName, part: FrontComparison) -> Check:
+    """Mirrors are convex seen from outside the solid; `surfaces` tests where planes face."""
+    outward = _of(part, part.file.faces.outward)
+    inward = [part.mirrors.ids[k] for k in np.flatnonzero(~outward).tolist()]
+    detail = f"the solid lies on the wrong side: {short_list(inward)}"
+    return at_most(name, len(inward), 0, detail)
+
+
+def areas(name: CheckName, part: FrontComparison) -> Check:
+    """Each mirror's area is its cell's, so that no face is the rest of its sphere."""
+    error = np.abs(_of(part, part.file.faces.area) / part.cells.area - 1)
+    return worst_of(name, part.mirrors.ids, error, CELL_SHARE, "of its cell's area off")
+
+
+def centroids(name: CheckName, part: FrontComparison) -> Check:
+    """The middle of each mirror's area is its cell's."""
+    centroid = part.cells.first / part.cells.area[:, None]
+    error = np.linalg.norm(_of(part, part.file.faces.middle) - centroid, axis=1)
+    return worst_of(name, part.mirrors.ids, error, MIDDLE_MM, "mm")
+
+
+def front_volume(name: CheckName, part: FrontComparison) -> Check:
+    """Volume between the origin and all mirrors: what the faces enclose against the closed form."""
+    faces = part.file.faces
+    area, middle = _of(part, faces.area), _of(part, faces.middle)
+    centre, radius = _of(part, faces.point), _of(part, faces.radius)
+    normal = _of(part, faces.normal)
+    # On a sphere x.n = r + C.(x - C)/r; on a plane it is the same everywhere.
+    spheres = radius + (centre * (middle - centre)).sum(axis=1) / radius
+    height = np.where(part.mirrors.flat, (middle * normal).sum(axis=1), spheres)
+    volume, expected = float((height * area).sum() / 3), float(part.cells.volume.sum())
+    return at_most(
+        name,
+        abs(volume / expected - 1),
+        CELL_SHARE,
+        f"{volume:.6f} mm^3 under the mirrors, {expected:.6f} by mirrors.csv alone",
+    )
+
+
+def walls(name: CheckName, part: FrontComparison) -> Check:
+    """The walls of pedestals, against those that follow from the record."""
+    errors = wall_errors(part.file.faces, part.mirrors.ids, part.walls)
+    return worst_of(name, *errors, SURFACE_MM, "mm")
+
+
+def _of(part: FrontComparison, column: NDArray[Any]) -> NDArray[Any]:
+    """(m, ...) the faces' figures in the order of the mirrors; NaN or empty for none."""
+    values = column[part.face].copy()
+    missing = part.face < 0
+    values[missing] = np.nan if values.dtype.kind == "f" else np.zeros((), dtype=values.dtype)
+    return values
+
+
+def worst_of(name: CheckName, ids: Sequence[str], error: Floats, limit: float, unit: str) -> Check:
+    """The worst mirror; one without a face counts as infinitely wrong."""
+    error = np.where(np.isnan(error), np.inf, error)
+    return each_at_most(name, ids, error, limit, unit)
+
+
+WALLS: Checks = {"step walls": ("mm", walls)}
+CHECKS: Checks = {
+    "step names": ("missing or extra", names),
+    "step surfaces": ("mm", surfaces),
+    "step outward": ("turned faces", outward),
+    "step cells": ("of the area", areas),
+    "step cell centroids": ("mm", centroids),
+    "step front volume": ("of the volume", front_volume),
+}
