@@ -34,10 +34,11 @@ CAMERAS = ("a", "b")
 class ShellLoop:
     """A run of a random build, and the machines that its photographs may be merged by."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, edges: str) -> None:
         self.folder, self.export = folder, folder / "exports"
         self.export.mkdir()
-        write_record(self.export, design(load_spec(None, list(DESIGN))), shells=False)
+        spec = load_spec(None, [*DESIGN, f"shell.edges={edges}"])
+        write_record(self.export, design(spec), shells=False)
         simulate_run(self.export, folder / "run", PROCESS, options=RunOptions(seed=3, shell=True))
         drawn = RunOptions(perfect=True, shell=True, phases=("dark",))
         simulate_run(self.export, folder / "drawn", options=drawn)
@@ -61,9 +62,9 @@ class ShellLoop:
         return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)
 
 
-@pytest.fixture(scope="module")
-def loop(tmp_path_factory: pytest.TempPathFactory) -> ShellLoop:
-    return ShellLoop(tmp_path_factory.mktemp("shell"))
+@pytest.fixture(scope="module", params=["valley", "pedestal"])
+def loop(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> ShellLoop:
+    return ShellLoop(tmp_path_factory.mktemp("shell"), request.param)
 
 
 def test_each_camera_has_its_calibration(loop: ShellLoop) -> None:

@@ -220,8 +220,9 @@ def picture(
     of: Annotated[
         str,
         typer.Option(
-            help="Subject: shell (both halves from outside, and the mirrors from a camera); rig, "
-            "sides, base, seat or exploded (the prototype)."
+            help="Subject: shell (both halves from outside, and the mirrors from a camera); edges "
+            "or seam (of the mirrors, close up); rig, sides, base, seat or exploded (the "
+            "prototype)."
         ),
     ] = "shell",
     force: ForceFile = False,

@@ -30,6 +30,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "picture": (
         ("exports/", "both shells: shell.png"),
+        ("exports/ --of edges", "the edges of mirrors close up, with a section"),
         ("exports/ --of exploded -o exploded.png", "the prototype, taken apart"),
     ),
     "camera": (

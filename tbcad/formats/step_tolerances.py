@@ -7,11 +7,12 @@ Product Manufacturing Information (semantic representation only, no drawn annota
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_Sphere
+from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
@@ -46,6 +47,7 @@ from tbcad.formats.step import END as STEP_END
 from tbcad.formats.step import StepError, configure, write_header
 from tbcad.formats.step_assembly import END
 
+Triple: TypeAlias = tuple[float, float, float]
 _KINDS = XCAFDimTolObjects_GeomToleranceType
 PROFILE = _KINDS.XCAFDimTolObjects_GeomToleranceType_ProfileOfSurface
 FLATNESS = _KINDS.XCAFDimTolObjects_GeomToleranceType_Flatness
@@ -60,6 +62,7 @@ class FaceTolerances:
         datums: name of each datum ("A" ...) and its face, in the order of their precedence.
         flatness: of faces, mm.
         profile: width of the zone about each face, in the frame of all datums, mm.
+        common_profile: the same for each of some faces that have one zone's width in common, mm.
         radius: of spherical faces and what it may be off either way, mm.
         notes: what each is about, and its text.
     """
@@ -69,6 +72,7 @@ class FaceTolerances:
     profile: Mapping[str, float]
     radius: Mapping[str, tuple[float, float]]
     notes: Mapping[str, str]
+    common_profile: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
 
 def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
@@ -108,9 +112,11 @@ def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
     label = {name: shapes.AddSubShape(part, face) for name, face in solid.faces}
     datums = [_datum(tool, name, label[face], k) for k, (name, face) in _order(given.datums)]
     for face, width in given.flatness.items():
-        _tolerance(tool, FLATNESS, width, label[face], ())
+        _tolerance(tool, FLATNESS, width, [label[face]], ())
     for face, width in given.profile.items():
-        _tolerance(tool, PROFILE, width, label[face], datums)
+        _tolerance(tool, PROFILE, width, [label[face]], datums)
+    for faces, width in given.common_profile.items():
+        _tolerance(tool, PROFILE, width, [label[face] for face in faces], datums)
     for face, (radius, limit) in given.radius.items():
         _radius(tool, radius, limit, label[face])
     return document
@@ -134,11 +140,11 @@ def _tolerance(
     tool: XCAFDoc_DimTolTool,
     kind: XCAFDimTolObjects_GeomToleranceType,
     width: float,
-    face: TDF_Label,
+    faces: Sequence[TDF_Label],
     datums: Sequence[TDF_Label],
 ) -> None:
     label = tool.AddGeomTolerance()
-    tool.SetGeomTolerance(_sequence(face), label)
+    tool.SetGeomTolerance(_sequence(*faces), label)
     tolerance = XCAFDimTolObjects_GeomToleranceObject()
     tolerance.SetType(kind)
     tolerance.SetValue(width)
@@ -202,13 +208,15 @@ class ReadTolerance:
         kind: "flatness", "profile" or "radius".
         value: width of the zone, or what the radius may be off, mm.
         centre: of the sphere that its face is on, mm; None on other faces.
+        planes: that its faces are on, a point (mm) and a unit normal each, either way.
         datums: names of the datums of its frame, in their order.
         nominal: radius, mm; 0 for tolerances.
     """
 
     kind: str
     value: float
-    centre: tuple[float, float, float] | None
+    centre: Triple | None
+    planes: tuple[tuple[Triple, Triple], ...] = ()
     datums: tuple[str, ...] = ()
     nominal: float = 0.0
 
@@ -241,8 +249,8 @@ def _read_zones(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator
         datums = [XCAFDoc_Datum.Set_s(one).GetObject() for one in _each(referred)]
         ordered = sorted(datums, key=lambda one: one.GetPosition())
         frame = tuple(one.GetName().ToCString() for one in ordered)
-        centre = _centre(tool, shapes, label)
-        yield ReadTolerance(names[zone.GetType()], zone.GetValue(), centre, frame)
+        centre, planes = _centre_and_planes(tool, shapes, label)
+        yield ReadTolerance(names[zone.GetType()], zone.GetValue(), centre, planes, frame)
 
 
 def _read_radii(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator[ReadTolerance]:
@@ -250,20 +258,21 @@ def _read_radii(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator
     tool.GetDimensionLabels(labels)
     for label in _each(labels):
         size = XCAFDoc_Dimension.Set_s(label).GetObject()
-        centre = _centre(tool, shapes, label)
+        centre, _ = _centre_and_planes(tool, shapes, label)
         yield ReadTolerance("radius", size.GetUpperTolValue(), centre, nominal=size.GetValue())
 
 
-def _centre(
+def _centre_and_planes(
     tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool, label: TDF_Label
-) -> tuple[float, float, float] | None:
+) -> tuple[Triple | None, tuple[tuple[Triple, Triple], ...]]:
     first, second = TDF_LabelSequence(), TDF_LabelSequence()
     tool.GetRefShapeLabel_s(label, first, second)
-    surface = BRepAdaptor_Surface(TopoDS.Face_s(shapes.GetShape_s(first.Value(1))))
-    if surface.GetType() != GeomAbs_Sphere:
-        return None
-    at = surface.Sphere().Location()
-    return at.X(), at.Y(), at.Z()
+    faces = [TopoDS.Face_s(shapes.GetShape_s(one)) for one in _each(first)]
+    surfaces = [BRepAdaptor_Surface(face) for face in faces]
+    if len(surfaces) == 1 and surfaces[0].GetType() == GeomAbs_Sphere:
+        return surfaces[0].Sphere().Location().Coord(), ()
+    flat = [one.Plane() for one in surfaces if one.GetType() == GeomAbs_Plane]
+    return None, tuple((one.Location().Coord(), one.Axis().Direction().Coord()) for one in flat)
 
 
 def _each(labels: TDF_LabelSequence) -> Iterator[TDF_Label]:

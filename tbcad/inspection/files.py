@@ -19,7 +19,11 @@ from tbcad.inspection.limits import Limits
 from tbcad.inspection.read_back import check_read_back
 from tbcad.inspection.sensitivity import Sensitivities
 from tbcad.mirrors.array import mirror_ids
+from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.surfaces import Surfaces
+from tbcad.shell.files import wall_names
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.types import Floats
 
@@ -49,6 +53,8 @@ class Half:
         surfaces: of the solid, below the coat.
         limits: of the mirrors.
         dowel_mm: diameter of the holes for dowel pins.
+        walls: of each mirror's pedestal: names of the faces, with a point (mm) and the normal of
+            their planes, (6,); none where spheres meet.
     """
 
     name: str
@@ -56,6 +62,7 @@ class Half:
     surfaces: Surfaces
     limits: Limits
     dowel_mm: float
+    walls: tuple[dict[str, Floats], ...]
 
     @property
     def profile_mm(self) -> Floats:
@@ -67,6 +74,12 @@ class Half:
         """By how much the walls of each pedestal may be off, (m,); None where spheres meet."""
         each = self.limits.each
         return each[:, len(SPHERE_KINDS)] if each.shape[1] > len(SPHERE_KINDS) else None
+
+    @property
+    def wall_profile_mm(self) -> list[float]:
+        """Width of the zones about the walls of each pedestal, mm; none where spheres meet."""
+        wall = self.wall_um
+        return [] if wall is None else np.round(2 * MM_PER_UM * wall, 6).tolist()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -99,10 +112,28 @@ def halves(export: ExportedDesign, limits: Limits) -> tuple[Half, Half]:
             one.mirrors.offset(-coat),
             Limits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
             export.spec.shell.foot_flange.dowel_hole_mm,
+            _walls(tuple(mirror_ids(one.camera_id, m)), one.cells),
         )
         for k, one in enumerate(export.reflectors)
     )
     return a, b
+
+
+def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[dict[str, Floats], ...]:
+    """Walls of each mirror's pedestal, as `Half` has them; none where spheres meet."""
+    if not isinstance(cells, PedestalCells):
+        return ()
+    planes = cells.surfaces.subset(slice(cells.mirrors + PLANES, None))
+    poses = zip(
+        cells.walls[:, 0].tolist(),
+        wall_names(ids, cells),
+        np.hstack([planes.apex, planes.normal]),
+        strict=True,
+    )
+    walls: tuple[dict[str, Floats], ...] = tuple({} for _ in ids)
+    for mirror, name, plane in poses:
+        walls[mirror][name] = plane
+    return walls
 
 
 def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
@@ -120,7 +151,9 @@ def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
         raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
     given = tolerances(half, dowel_face(solid, half.dowel_mm))
     write_tolerances(folder / step, solid, given)
-    check_read_back(folder / step, given, dict(zip(half.ids, half.surfaces.centre, strict=True)))
+    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
+    check_read_back(folder / step, given, centres, walls)
     return {"table": table, "solid": step}
 
 
@@ -134,6 +167,7 @@ def tolerances(half: Half, dowel: str) -> FaceTolerances:
         profile=dict(zip(half.ids, half.profile_mm.tolist(), strict=True)),
         radius=dict(zip(half.ids, radius, strict=True)),
         notes=notes(half.wall_um),
+        common_profile=dict(zip(map(tuple, half.walls), half.wall_profile_mm, strict=True)),
     )
 
 
@@ -151,8 +185,8 @@ def notes(wall_um: Floats | None = None) -> dict[str, str]:
     """
     walls = {}
     if wall_um is not None:
-        limit = f"{wall_um.min():.1f} um along their normals, or as the table allows"
-        walls["walls of grooves"] = f"at the edges of mirrors within {limit}"
+        limit = f"{wall_um.min():.1f} um along their normals, or as the zones allow"
+        walls["walls of grooves"] = f"zones hold at the edges of mirrors: within {limit}"
     return walls | {
         "surface finish": f"mirrors polished, Rq {roughness_nm():.1f} nm or better",
         "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",

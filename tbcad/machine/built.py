@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.machine.machine import Machine
 from tbcad.machine.other_errors import DISTORTION, LED_MM, PRINCIPAL_PX
+from tbcad.optics.groove_walls import NO_WALLS, GrooveWalls
 from tbcad.optics.lens_camera import LensCamera
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.tolerance.montecarlo.draws import ShellDraws
@@ -27,11 +28,13 @@ class BuiltPrototype:
         machine: camera, axis, reflecting spheres and LEDs.
         body_centre: of the spheres in the seats at base angle zero, mm, (k, 3).
         body_radius: mm, (k,).
+        walls: that end the mirrors of a shell; they do not turn with the base.
     """
 
     machine: Machine
     body_centre: Floats
     body_radius: Floats
+    walls: GrooveWalls = NO_WALLS
 
 
 @dataclass(frozen=True)

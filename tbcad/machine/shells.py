@@ -15,14 +15,15 @@ from tbcad.machine.built import BuiltPrototype, built_camera, draw_other_errors
 from tbcad.machine.designed import designed_shell
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS
+from tbcad.optics.groove_walls import GrooveWalls
 from tbcad.runs.exposure import Frame
 from tbcad.runs.record import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.reflector import check_joined
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import edge_models, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
+from tbcad.tolerance.montecarlo.sharpness import built_walls
 from tbcad.types import Floats
 
 CAMERAS = ("a", "b")
@@ -79,6 +80,7 @@ def shell_plan(export: ExportedDesign, half: int) -> Plan:
         angle=machine.angle,
         ball=ball,
         stop=np.zeros_like(ball),
+        parted=len(export.reflectors[half].walls) > 0,
     )
 
 
@@ -138,11 +140,11 @@ def random_half(
         build: number of the build.
 
     Raises:
-        InputError: the mirrors are planar, or stand on pedestals.
+        InputError: the mirrors are planar.
     """
-    check_joined(export.reflectors[half], "runs")
-    designed, models = designed_half(export, half), edge_models(export.reflectors)
-    drawn = draw(errors, seed, [build], len(designed.radius), warp_maps_of(models, errors))
+    designed, grooves = designed_half(export, half), export.reflectors[half].walls
+    maps = warp_maps_of(edge_models(export.reflectors), errors)
+    drawn = draw(errors, seed, [build], len(designed.radius), maps, len(grooves))
     draws = _turned(drawn[half], _flip(half))
     leds = draw_other_errors(len(designed.leds), seed, build).leds * _flip(half)
     other = replace(draw_other_errors(len(designed.leds), seed, build, half), leds=leds)
@@ -154,12 +156,28 @@ def random_half(
         radius=scale * (designed.radius + draws.radius[0]),
         leds=designed.leds + other.leds,
     )
-    return whole_spheres(machine)
+    walls = built_walls(grooves.flipped(_flip(half)), draws, 0, draws.wall[0])
+    walls = walls.joined(built_walls(_seam_and_foot(export, half), draws, 0))
+    return BuiltPrototype(machine, machine.centre, machine.radius, walls)
 
 
-def whole_spheres(machine: Machine) -> BuiltPrototype:
-    """A machine whose spheres are their own bodies."""
-    return BuiltPrototype(machine, machine.centre, machine.radius)
+def perfect_half(export: ExportedDesign, half: int) -> BuiltPrototype:
+    """One camera of an export's shell, built without errors: see `designed_half`."""
+    machine = designed_half(export, half)
+    grooves = export.reflectors[half].walls.flipped(_flip(half))
+    walls = grooves.joined(_seam_and_foot(export, half))
+    return BuiltPrototype(machine, machine.centre, machine.radius, walls)
+
+
+def _seam_and_foot(export: ExportedDesign, half: int) -> GrooveWalls:
+    """Both planes, as walls that end each mirror, in the frame of the machine."""
+    reflector = export.reflectors[half]
+    point = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, reflector.foot]])
+    normal = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # machine b is turned to camera a's side
+    mirror = np.repeat(np.arange(len(reflector)), 2)
+    return GrooveWalls.of_planes(
+        mirror, np.tile(point, (len(reflector), 1)), np.tile(normal, (len(reflector), 1))
+    )
 
 
 def _turned(draws: ShellDraws, flip: Floats) -> ShellDraws:

@@ -51,7 +51,7 @@ def cut_positions(cells: Cells, pinhole: Floats, radius: float | Floats) -> Floa
     Returns:
         Minus infinity for whole mirrors.
     """
-    mirror, x, along = _cut_images(cells, pinhole)
+    mirror, x, along = cut_images(cells, pinhole)
     largest = np.full(cells.mirrors, -np.inf)
     within = np.broadcast_to(radius, cells.mirrors)[mirror, None]
     np.maximum.at(largest, mirror, _largest_within(x, along, within))
@@ -73,8 +73,13 @@ def seam_gaps(cells: Cells, pinhole: Floats, radius: float) -> Floats:
     return np.where(position > ROUNDING_MM, 2 * position, 0.0)
 
 
-def _cut_images(cells: Cells, pinhole: Floats) -> tuple[Ints, Floats, Floats]:
-    """Mirror (e,) of each arc on a cut, x and place along the seam of its image, (e, SAMPLES)."""
+def cut_images(cells: Cells, pinhole: Floats) -> tuple[Ints, Floats, Floats]:
+    """Images of the cuts of camera a's mirrors, in the plane through the origin.
+
+    Returns:
+        The mirror of each arc on a cut, (e,), x and place along the seam of its image, mm,
+        (e, SAMPLES) each.
+    """
     mirror, arc = cell_sides(cells)
     cut = cells.halved[mirror] & (cells.arcs.faces[arc] == cells.seam).any(axis=1)
     mirror, arc = (np.broadcast_to(one[cut, None], (cut.sum(), SAMPLES)) for one in (mirror, arc))

@@ -29,6 +29,11 @@ class GrooveWalls:
         """Walls that end mirrors (w,) at planes through points, with normals, (w, 3) each."""
         return cls(mirror, np.column_stack([point, normal, np.zeros(len(mirror))]))
 
+    @classmethod
+    def none(cls) -> "GrooveWalls":
+        """No walls: mirrors end where neighbouring spheres meet."""
+        return cls.of_planes(np.arange(0), np.empty((0, 3)), np.empty((0, 3)))
+
     def __len__(self) -> int:
         """Number of walls."""
         return len(self.mirror)
@@ -47,11 +52,31 @@ class GrooveWalls:
         """Where the walls of each of m mirrors begin, and where those of the last end, (m + 1,)."""
         return np.searchsorted(self.mirror, np.arange(mirrors + 1))
 
+    def of_mirrors(self, mirrors: int) -> tuple[Ints, Floats]:
+        """Where the walls of each of m mirrors begin, (m + 1,), and all points and normals, (w, 6).
+
+        As compiled loops take them.
+        """
+        return self.first_of_mirrors(mirrors), np.ascontiguousarray(self.table[:, :6])
+
+    def joined(self, other: "GrooveWalls") -> "GrooveWalls":
+        """These walls and others, mirror after mirror."""
+        mirror = np.concatenate([self.mirror, other.mirror])
+        order = np.argsort(mirror, kind="stable")
+        return GrooveWalls(mirror[order], np.concatenate([self.table, other.table])[order])
+
+    def flipped(self, signs: Floats) -> "GrooveWalls":
+        """These walls with points and normals times -1 or 1 along the axes, (3,)."""
+        return GrooveWalls.of_planes(self.mirror, self.point * signs, self.normal * signs)
+
+
+NO_WALLS = GrooveWalls.none()
+
 
 def groove_walls(cells: Cells) -> GrooveWalls:
     """The walls of a camera's cells, in the order of `PedestalCells.walls`."""
     if not isinstance(cells, PedestalCells):
-        return GrooveWalls(np.arange(0), np.empty((0, 7)))
+        return NO_WALLS
     first = len(cells.surfaces) - len(cells.walls)
     edge = cells.wall_rings[:, 0] // 2
     point = cells.arcs.at(edge, np.full(len(edge), MIDDLE))

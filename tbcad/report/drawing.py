@@ -13,7 +13,8 @@ from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 
 SHELL = "shell"
 PROTOTYPE = ("rig", "sides", "base", "seat", "exploded")
-SUBJECTS = (SHELL, *PROTOTYPE)
+CLOSE_UPS = ("edges", "seam")
+SUBJECTS = (SHELL, *CLOSE_UPS, *PROTOTYPE)
 SHELL_FILES = ("design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
 MESH_SUFFIXES = (".stl", ".glb")
@@ -75,10 +76,10 @@ def _run(command: list[str]) -> None:
 
 def _check_files(folder: Path, subject: str) -> None:
     """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
-    part = "shell" if subject == SHELL else "prototype"
+    part = "prototype" if subject in PROTOTYPE else "shell"
     manifest = read_manifest(folder)
     listed = manifest.files if manifest else {}
-    required = SHELL_FILES if subject == SHELL else PROTOTYPE_FILES
+    required = PROTOTYPE_FILES if subject in PROTOTYPE else SHELL_FILES
     needed = [*required, *(name for name in listed if part == "prototype" and _is_drawn(name))]
     for name in (MANIFEST, *needed):
         if not (folder / name).is_file():
@@ -104,7 +105,9 @@ def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str
     Raises:
         InputError: when there is neither a screen nor a virtual one.
     """
-    module, what = ("shell_pictures", []) if subject == SHELL else ("prototype_pictures", [subject])
+    module, what = "shell_pictures", []
+    if subject != SHELL:
+        module, what = "close_ups" if subject in CLOSE_UPS else "prototype_pictures", [subject]
     return _on_screen(
         [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
     )

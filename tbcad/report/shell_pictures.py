@@ -49,7 +49,7 @@ def draw(folder: Path, picture: Path) -> None:
         picture: PNG file to write.
     """
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
-    shells = [_coloured(folder, camera) for camera in "ab"]
+    shells = [coloured(folder, camera) for camera in "ab"]
     size = float(np.abs(np.asarray(shells[0].bounds)).max())
     for column, (gap, direction) in enumerate(VIEWS):
         plotter.subplot(0, column)
@@ -101,7 +101,7 @@ def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats
     return focus - distance * forward, focus
 
 
-def _coloured(folder: Path, camera: str) -> pyvista.PolyData:
+def coloured(folder: Path, camera: str) -> pyvista.PolyData:
     """A shell with mirrors in the colour of their polar angle, alternating in brightness."""
     shell = pyvista.read(folder / f"shell_{camera}.stl")
     mirrors = read_mirrors(folder, camera)

@@ -6,10 +6,16 @@ import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
+from tbcad.optics.groove_walls import GrooveWalls
 from tbcad.optics.highlights import reflection_points
 from tbcad.optics.led_dome import disc_images, dome_samples
 from tbcad.optics.lens_camera import LensCamera
-from tbcad.simulate.prototype.ball_rays import ON_BALL_MM, ball_hits, balls_between
+from tbcad.simulate.prototype.ball_rays import (
+    ON_BALL_MM,
+    ball_hits,
+    balls_between,
+    points_within_walls,
+)
 from tbcad.simulated_run.occluders import Occluders
 from tbcad.types import Bools, Floats, Ints
 
@@ -98,16 +104,19 @@ def _reflected_once(
     seen = np.einsum("na,nax->nx", within[which, sample], disc.axes[which, :2])
     in_disc = place[which] + dome * seen
     point = reflection_points(centre[which], radius[which], in_disc, camera.pinhole)
-    shown = _seen(camera, balls, point, ball[which])
-    shown &= ~balls_between(point, light, balls)
+    shown = _seen(camera, balls, built.walls, point, ball[which])
+    shown &= ~balls_between(point, light, balls, built.walls.of_mirrors(len(balls)))
     shown[shown] = ~occluders.hide(point[shown], light[shown], turned)
     which, sample, pixel = which[shown], sample[shown], camera.project(point[shown])
     return LightPoints(led[which], pixel, area[which, sample])
 
 
-def _seen(camera: LensCamera, balls: Floats, point: Floats, ball: Ints) -> Bools:
+def _seen(
+    camera: LensCamera, balls: Floats, walls: GrooveWalls, point: Floats, ball: Ints
+) -> Bools:
     """Which points (n, 3) on balls (n,) the camera sees, on their front."""
-    hits = ball_hits(camera.pinhole, balls[None], unit(point - camera.pinhole), 0 * ball)
+    direction = unit(point - camera.pinhole)
+    hits = ball_hits(camera.pinhole, balls[None], direction, 0 * ball, walls)
     return np.asarray(hits.ball == ball + 1)
 
 
@@ -122,9 +131,11 @@ def _reflected_twice(
     first, last, led, place = first[bright], last[bright], led[bright], place[bright]
     one, two = _path(balls, first, last, place, camera.pinhole)
     area = _area_twice(camera, balls, (first, last), (place, one, two), dome)
+    walls = built.walls.of_mirrors(len(balls))
     shown = (area > FAINT_PX2) & _on_front(balls, first, one, place, two)
-    shown &= _seen(camera, balls, two, last) & ~balls_between(one, place, balls)
-    shown &= ~balls_between(two, one, balls)
+    shown &= points_within_walls(one, first, walls)
+    shown &= _seen(camera, balls, built.walls, two, last)
+    shown &= ~balls_between(one, place, balls, walls) & ~balls_between(two, one, balls, walls)
     shown[shown] = ~occluders.hide(one[shown], place[shown], turned)
     return LightPoints(led[shown], camera.project(two[shown]), area[shown])
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tbcad.optics.groove_walls import NO_WALLS, GrooveWalls
 from tbcad.optics.lens_camera import LensCamera
 from tbcad.simulate.capture.photograph import row_bands
 from tbcad.simulate.prototype.ball_rays import ball_hits, reflected_colours
@@ -22,7 +23,12 @@ def pixel_places(camera: LensCamera) -> Floats:
 
 
 def object_light(
-    pinhole: Floats, directions: Floats, balls: Floats, scene: Scene, turned: bool
+    pinhole: Floats,
+    directions: Floats,
+    balls: Floats,
+    scene: Scene,
+    turned: bool,
+    walls: GrooveWalls = NO_WALLS,
 ) -> Colours:
     """What a camera sees of a lit object, 0 to 255, (h, w, 3).
 
@@ -32,17 +38,22 @@ def object_light(
         balls: in the frame, (k, 8).
         scene: the object as it stands in the first run.
         turned: whether it is turned by 180 degrees.
+        walls: of the balls.
     """
     # Seen from the object, which rests, camera and balls are turned instead.
     flip = HALF_TURN if turned else np.ones(3)
-    placed = pinhole * flip, balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    pinhole, walls = pinhole * flip, walls.flipped(flip)
+    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
     bands = (directions[rows.start : rows.stop] * flip for rows in row_bands(len(directions)))
-    return np.concatenate([_band(*placed, scene, band) for band in bands])
+    return np.concatenate([_band(pinhole, balls, walls, scene, band) for band in bands])
 
 
-def _band(pinhole: Floats, balls: Floats, scene: Scene, directions: Floats) -> Colours:
+def _band(
+    pinhole: Floats, balls: Floats, walls: GrooveWalls, scene: Scene, directions: Floats
+) -> Colours:
     direction = directions.reshape(-1, 3)
-    hits = ball_hits(pinhole, balls[None], direction, np.zeros(len(direction), dtype=np.int64))
+    stop = np.zeros(len(direction), dtype=np.int64)
+    hits = ball_hits(pinhole, balls[None], direction, stop, walls)
     front, direct = object_in_front(scene, pinhole, direction, hits.distance)
     colours = np.where(front[:, None], direct, reflected_colours(scene, hits))
     return np.asarray(colours.reshape(directions.shape))

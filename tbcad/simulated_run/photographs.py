@@ -97,7 +97,8 @@ class SimulatedRun:
     def _object(self, number: int) -> Signal:
         pinhole = self.built.machine.camera.pinhole
         balls, turned = balls_of_frame(self.built, number), self._turned(number)
-        colour = object_light(pinhole, self.directions, balls, self.scene, turned)
+        walls = self.built.walls
+        colour = object_light(pinhole, self.directions, balls, self.scene, turned, walls)
         share = colour.astype(np.float32) * np.float32(self.chain.object_light / WHITE)
         return blurred(share, self.chain.spread)
 

@@ -19,7 +19,7 @@ from tbcad.errors import InputError
 from tbcad.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
-from tbcad.machine.shells import designed_half, random_half, shell_frame, whole_spheres
+from tbcad.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
@@ -107,7 +107,7 @@ def _shell(
     builds = []
     for half in range(len(export.reflectors)):
         built = (
-            whole_spheres(designed_half(export, half))
+            perfect_half(export, half)
             if options.perfect
             else random_half(export, half, errors, options.seed)
         )

@@ -11,10 +11,13 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.TopoDS import TopoDS_Face
 
 from tbcad.api import inspect
+from tbcad.formats.step import StepError
 from tbcad.formats.step_named import read_named_solid
-from tbcad.formats.step_tolerances import read_tolerances
+from tbcad.formats.step_tolerances import read_tolerances, write_tolerances
+from tbcad.inspection.files import dowel_face, halves, tolerances
 from tbcad.inspection.inspect import found_limits, minimum_at_limits
 from tbcad.inspection.limits import Limits
+from tbcad.inspection.read_back import check_read_back
 from tbcad.inspection.sensitivity import Sensitivities, sensitivities
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
@@ -107,6 +110,12 @@ def test_files_name_walls_and_their_limits(
     assert record["simulated_minimum_mm"] >= TARGET
     read = read_tolerances(tmp_path / "out" / "shell_b_tolerances.step")
     assert sum(one.kind == "profile" and one.centre is not None for one in read) == len(rows)
+    zones = [one for one in read if one.kind == "profile" and one.planes]
+    assert all(one.datums == ("A", "B", "C") for one in zones)
+    assert sum(len(one.planes) for one in zones) == len(groove_walls(made.arrays[1].cells))
+    widths = sorted(one.value for one in zones)
+    asked = sorted(2e-3 * float(row["wall_limit_um"]) for row in rows)
+    assert widths == pytest.approx(asked, abs=1e-9)
     assert "walls of grooves" in (tmp_path / "out" / "shell_b_tolerances.step").read_text("ascii")
 
 
@@ -126,3 +135,32 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(
         at, axis = face_plane(faces[name])
         assert np.linalg.norm(np.cross(axis, normal)) < 1e-9
         assert abs((point - at) @ axis) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [("narrower", "read otherwise"), ("swapped", "zones of walls"), ("missing", "zones of walls")],
+)
+def test_zones_of_walls_that_are_not_as_given_are_refused(
+    folder: Path,
+    export: ExportedDesign,
+    found: tuple[Sensitivities, Limits],
+    tmp_path: Path,
+    fault: str,
+    message: str,
+) -> None:
+    half = halves(export, found[1])[0]
+    solid = read_named_solid(folder / "shell_a.step")
+    given = tolerances(half, dowel_face(solid, half.dowel_mm))
+    write_tolerances(tmp_path / "a.step", solid, given)
+    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for one in half.walls for name, plane in one.items()}
+    check_read_back(tmp_path / "a.step", given, centres, walls)
+    (first, width), (second, other), *rest = given.common_profile.items()
+    changed = {
+        "narrower": {first: width / 2, second: other, **dict(rest)},
+        "swapped": {(*first[1:], second[0]): width, (first[0], *second[1:]): other, **dict(rest)},
+        "missing": {second: other, **dict(rest)},
+    }[fault]
+    with pytest.raises(StepError, match=message):
+        check_read_back(tmp_path / "a.step", replace(given, common_profile=changed), centres, walls)

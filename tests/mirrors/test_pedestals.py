@@ -1,18 +1,11 @@
 """Radii of mirrors on pedestals, and what refuses them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tbcad.errors import InputError
-from tbcad.machine.shells import random_half
 from tbcad.optics.cells import cell_areas
-from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tests.mirror_arrays import mirror_array
 from tests.pedestal_designs import pedestal_design
 
@@ -48,12 +41,3 @@ def test_a_coat_thicker_than_the_grooves_are_deep_is_refused() -> None:
 def test_an_unknown_kind_of_edge_is_refused() -> None:
     with pytest.raises(SpecError, match=r"shell\.edges"):
         load_spec(None, ["shell.edges=step"])
-
-
-def test_runs_of_whole_spheres_refuse_pedestals() -> None:
-    made = pedestal_design("n=3")
-    export = ExportedDesign(
-        folder=Path(), spec=made.spec, capture_mm=60.0, reflectors=reflectors(made)
-    )
-    with pytest.raises(InputError, match=r"runs of .* pedestals .* shell\.edges=valley"):
-        random_half(export, 0, Errors(), 1)

@@ -7,6 +7,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
 from tbcad.machine.machine import Machine
 from tbcad.optics.camera import Camera
+from tbcad.optics.groove_walls import NO_WALLS
 from tbcad.optics.led_dome import dome_images
 from tbcad.optics.lens_camera import without_distortion
 from tbcad.simulate.prototype.ball_rays import balls_between
@@ -73,7 +74,8 @@ def test_balls_between_points() -> None:
     ball = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]])
     start = np.array([[-3.0, 0.0, 0.0], [-3.0, 1.1, 0.0], [-3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     end = np.array([[3.0, 0.0, 0.0], [3.0, 1.1, 0.0], [-2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]])
-    assert balls_between(start, end, ball).tolist() == [True, False, False, False]
+    hidden = balls_between(start, end, ball, NO_WALLS.of_mirrors(1))
+    assert hidden.tolist() == [True, False, False, False]
 
 
 def test_an_object_in_the_way_hides_the_led_and_turns_with_the_run() -> None:

@@ -100,7 +100,7 @@ def ball_alternatives(
         fit: of these balls.
     """
     target = spec.optics.capture_diameter_mm
-    candidates = ball_candidates(array, groups, target)
+    candidates = ball_candidates(array, groups, target, spec.prototype.ball_margin_mm)
 
     def alternative(rule: dict[str, Any]) -> tuple[Balls, BallFit]:
         ruled = spec.prototype.model_copy(update=rule)

@@ -134,7 +134,7 @@ class BallChoices:
         """The mirrors in k groups, the ball of each, and how well it replaces them."""
         if k not in self._chosen:
             limits, target = self.spec.prototype, self.spec.optics.capture_diameter_mm
-            candidates = ball_candidates(self.array, self.groups(k), target)
+            candidates = ball_candidates(self.array, self.groups(k), target, limits.ball_margin_mm)
             balls = choose_balls(candidates, limits, self._catalogue)
             self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls, limits)
         return self._chosen[k]

@@ -95,13 +95,20 @@ class BallCandidates:
         array: camera a's mirrors.
         groups: of them.
         windows: their cells as the camera sees them.
-        target: required coverage diameter, mm.
+        target: coverage diameter that counts, mm.
+        margin: by which what is required is larger, mm.
     """
 
     array: MirrorArray
     groups: MirrorGroups
     windows: Windows
     target: float
+    margin: float
+
+    @property
+    def required(self) -> float:
+        """Least coverage diameter that passes, mm."""
+        return self.target + self.margin - COVERAGE_ROUNDING_MM
 
     def coverage(self, radius: Floats, moved: bool) -> Floats:
         """Coverage diameter (m,) with reflecting radii (k,), in moved cells or fixed ones, mm."""
@@ -117,9 +124,9 @@ class BallCandidates:
         return covered if moved else np.where(self._shows_origin(), covered, 0.0)
 
     def covers_groups(self, radius: Floats, ignored: Bools, moved: bool) -> Bools:
-        """Whether radii (k,) show the target for all mirrors of each group but those ignored."""
+        """Whether radii (k,) show what is required for each group's mirrors but those ignored."""
         covered = np.where(ignored, np.inf, self.coverage(radius, moved))
-        return np.asarray(self.groups.minimum(covered) >= self.target - COVERAGE_ROUNDING_MM)
+        return np.asarray(self.groups.minimum(covered) >= self.required)
 
     def _window_rotation(self) -> Floats:
         """Rotation of each mirror's window about the pinhole that takes its apex to the ball's."""
@@ -141,9 +148,12 @@ class BallCandidates:
         return replace(self, windows=self.windows.only(mirrors))
 
 
-def ball_candidates(array: MirrorArray, groups: MirrorGroups, target: float) -> BallCandidates:
-    """Groups of mirrors whose places balls can be tried in; target is a coverage in mm."""
-    return BallCandidates(array, groups, cell_windows(array.cells, array.camera.pinhole), target)
+def ball_candidates(
+    array: MirrorArray, groups: MirrorGroups, target: float, margin: float = 0.0
+) -> BallCandidates:
+    """Groups of mirrors whose places balls can be tried in; target and margin of coverage, mm."""
+    windows = cell_windows(array.cells, array.camera.pinhole)
+    return BallCandidates(array, groups, windows, target, margin)
 
 
 def choose_balls(candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue) -> Balls:
@@ -185,12 +195,12 @@ def _cap_bodies(radius: Floats, edge: Floats) -> tuple[Floats, Floats]:
 
 
 def coverable(candidates: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:
-    """Whether the smallest ball shows the target in each mirror's cell, (m,).
+    """Whether the smallest ball shows what is required in each mirror's cell, (m,).
 
     Where it does not, the mirror is too far from its group for any ball.
     """
     smallest = np.full(len(candidates.groups), catalogue.diameter[0] / 2)
-    return candidates.coverage(smallest, moved) >= candidates.target - COVERAGE_ROUNDING_MM
+    return np.asarray(candidates.coverage(smallest, moved) >= candidates.required)
 
 
 def _nearest(radius: Floats, catalogue: Catalogue, caps: bool) -> tuple[Floats, Ints]:

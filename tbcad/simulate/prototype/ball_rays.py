@@ -5,15 +5,19 @@ Along given directions, in the whole photograph of a stop, or in the pixels that
 
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
+from tbcad.geometry.vectors import dot
+from tbcad.optics.groove_walls import NO_WALLS, GrooveWalls
 from tbcad.optics.lens_camera import LensCamera
 from tbcad.optics.reflection import reflect
 from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
 from tbcad.simulate.parallel import compiled, in_threads
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
+from tbcad.simulate.scene.rays import within_walls
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
 # Where a ball's front ends its body begins; for a bought ball both are the same sphere.
@@ -23,6 +27,8 @@ ON_BALL_MM = 1e-6
 # What lies beyond the outermost pixels' centres by no more than rounding is on them.
 EDGE_PX = 1e-6
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+WallTable: TypeAlias = tuple[Ints, Floats]
+"""Of `GrooveWalls.of_mirrors`."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,24 @@ def trace_balls(run: PrototypeRun, direction: Floats, stop: Ints) -> BallHits:
     return ball_hits(run.camera.pinhole, run.balls, direction, stop)
 
 
-def ball_hits(pinhole: Floats, balls: Floats, direction: Floats, stop: Ints) -> BallHits:
+def trace_own_ball(run: PrototypeRun, direction: Floats, stop: Ints, ball: Ints) -> BallHits:
+    """What unit directions (n, 3) meet when nothing is but one ball (n,), from 1, at stops (n,)."""
+    sphere = run.balls[stop, np.maximum(ball, 1) - 1]
+    to_centre, radius = sphere[:, :3] - run.camera.pinhole, sphere[:, 3]
+    along = dot(to_centre, direction)
+    root = radius**2 - dot(to_centre, to_centre) + along**2
+    on = (ball > 0) & (root >= 0)
+    distance = np.where(on, along - np.sqrt(np.maximum(root, 0)), np.inf)
+    return _reflected(run.camera.pinhole, direction, np.where(on, ball, 0), distance, sphere)
+
+
+def ball_hits(
+    pinhole: Floats,
+    balls: Floats,
+    direction: Floats,
+    stop: Ints,
+    walls: GrooveWalls = NO_WALLS,
+) -> BallHits:
     """What unit directions (n, 3) from a pinhole (3,) meet.
 
     Args:
@@ -55,13 +78,22 @@ def ball_hits(pinhole: Floats, balls: Floats, direction: Floats, stop: Ints) -> 
         balls: at each stop, (s, k, 8): see PrototypeRun.
         direction: (n, 3).
         stop: from 0, (n,).
+        walls: that end the balls as mirrors on pedestals, if any.
     """
-    ball, distance = _first_ball(pinhole, direction, stop, balls)
+    ends = walls.of_mirrors(balls.shape[1])
+    ball, distance = _first_ball(pinhole, direction, stop, balls, ends)
+    return _reflected(pinhole, direction, ball, distance, balls[stop, np.maximum(ball, 1) - 1])
+
+
+def _reflected(
+    pinhole: Floats, direction: Floats, ball: Ints, distance: Floats, sphere: Floats
+) -> BallHits:
+    """Rays after the balls (n,), from 1, that they meet at distances (n,): of these the rows."""
     on = ball > 0
     origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
     origin[on] = pinhole + distance[on, None] * direction[on]
-    sphere = balls[stop[on], ball[on] - 1]
-    reflected[on] = reflect(direction[on], (origin[on] - sphere[:, :3]) / sphere[:, 3:4])
+    normal = (origin[on] - sphere[on, :3]) / sphere[on, 3:4]
+    reflected[on] = reflect(direction[on], normal)
     return BallHits(ball, origin, reflected, distance)
 
 
@@ -144,20 +176,56 @@ def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels
 
 
 @compiled
-def balls_between(start: Floats, end: Floats, balls: Floats) -> Bools:
-    """Whether a ball (k, 8) is between points (n, 3), which may be on balls."""
+def balls_between(start: Floats, end: Floats, balls: Floats, walls: WallTable) -> Bools:
+    """Whether a ball (k, 8) within its walls is between points (n, 3), which may be on balls."""
     hidden = np.zeros(len(start), dtype=np.bool_)
     for i in range(len(start)):
         way = end[i] - start[i]
         length = np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
         way /= length
         for k in range(len(balls)):
-            enters, leaves = _span(start[i], way, balls[k, :3], balls[k, 3])
-            body_enters, body_leaves = _span(start[i], way, balls[k, 4:7], balls[k, 7])
-            first = max(enters, body_enters)
-            if first <= min(leaves, body_leaves) and ON_BALL_MM < first < length - ON_BALL_MM:
+            own = walls[1][walls[0][k] : walls[0][k + 1]]
+            first, last, _ = _body_span(start[i], way, balls[k], own)
+            if first <= last and ON_BALL_MM < first < length - ON_BALL_MM:
                 hidden[i] = True
     return hidden
+
+
+@compiled
+def points_within_walls(point: Floats, ball: Ints, walls: WallTable) -> Bools:
+    """Which points (n, 3) are on the inner side of the walls of balls (n,), from 0."""
+    inside = np.zeros(len(point), dtype=np.bool_)
+    for i in range(len(point)):
+        own = walls[1][walls[0][ball[i]] : walls[0][ball[i] + 1]]
+        inside[i] = within_walls(own, (point[i, 0], point[i, 1], point[i, 2]))
+    return inside
+
+
+@compiled
+def _body_span(
+    start: Floats, direction: Floats, ball: Floats, walls: Floats
+) -> tuple[float, float, float]:
+    """Where a ray enters and leaves what a ball (8,) is, and where it enters its sphere.
+
+    That is what both its spheres have in common, on the inner side of its walls (k, 6).
+    """
+    enters, leaves = _span(start, direction, ball[:3], ball[3])
+    body_enters, body_leaves = _span(start, direction, ball[4:7], ball[7])
+    first, last = max(enters, body_enters), min(leaves, body_leaves)
+    if first > last:
+        return first, last, enters
+    for wall in walls:
+        value = rate = 0.0
+        for j in range(3):
+            value += (start[j] - wall[j]) * wall[3 + j]
+            rate += direction[j] * wall[3 + j]
+        if rate > 0:
+            first = max(first, -value / rate)
+        elif rate < 0:
+            last = min(last, -value / rate)
+        elif value < 0:
+            return np.inf, -np.inf, enters
+    return first, last, enters
 
 
 @compiled
@@ -176,21 +244,19 @@ def _span(pinhole: Floats, direction: Floats, centre: Floats, radius: float) -> 
 
 @compiled
 def _first_ball(
-    pinhole: Floats, direction: Floats, stop: Ints, balls: Floats
+    pinhole: Floats, direction: Floats, stop: Ints, balls: Floats, walls: WallTable
 ) -> tuple[Ints, Floats]:
     """Ball (n,), from 1, that n rays meet first, and its distance, mm, (n,).
 
-    A cap is what its two spheres have in common. A ray that enters it through the
-    sphere in the seat meets its dark side: no ball, but it hides what is behind.
+    A ray that enters a cap through the sphere in the seat meets its dark side, as one that enters a
+    pedestal through a wall does: no ball, but it hides what is behind.
     """
     ball, distance = np.zeros(len(direction), dtype=np.int64), np.full(len(direction), np.inf)
     for i in range(len(direction)):
         for k in range(balls.shape[1]):
-            row = balls[stop[i], k]
-            enters, leaves = _span(pinhole, direction[i], row[:3], row[3])
-            body_enters, body_leaves = _span(pinhole, direction[i], row[4:7], row[7])
-            first = max(enters, body_enters)
-            if 0 < first < distance[i] and first <= min(leaves, body_leaves):
+            own = walls[1][walls[0][k] : walls[0][k + 1]]
+            first, last, enters = _body_span(pinhole, direction[i], balls[stop[i], k], own)
+            if 0 < first < distance[i] and first <= last:
                 distance[i] = first
-                ball[i] = k + 1 if enters >= body_enters - SAME_MM else 0
+                ball[i] = k + 1 if enters >= first - SAME_MM else 0
     return ball, distance

@@ -18,7 +18,12 @@ from tbcad.geometry.vectors import unit
 from tbcad.optics.lens_camera import without_distortion
 from tbcad.simulate.capture.photograph import CENTRE, RowBand, Tracer, row_bands
 from tbcad.simulate.parallel import in_batches, in_threads
-from tbcad.simulate.prototype.ball_rays import BallHits, image_points, trace_balls
+from tbcad.simulate.prototype.ball_rays import (
+    BallHits,
+    image_points,
+    trace_balls,
+    trace_own_ball,
+)
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import MARGIN_PX
@@ -145,7 +150,11 @@ def merged_pixels(
     mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)
     straight = unit(pixel_directions(run.reflector.camera, rows, shift).reshape(-1, 3))
     direction = np.einsum("nx,nxy->ny", straight, plan.rotation[mirror])
-    hits = trace_balls(run, direction, plan.stop[mirror])
+    hits = (
+        trace_own_ball(run, direction, plan.stop[mirror], plan.ball[mirror])
+        if run.parted
+        else trace_balls(run, direction, plan.stop[mirror])
+    )
     inside = np.isfinite(image_points(run.camera, direction)[:, 0])
     ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
     front = inside & plan.in_front(mirror, direction, hits.distance)

@@ -87,6 +87,8 @@ class Plan:
         angle: of the base at each stop, radians, (s,).
         ball: that stands in, from 0, (2, m).
         stop: at which it does, from 0, (2, m).
+        parted: whether balls are ended by walls, so that a pixel of one never shows another: those
+            of a shell with mirrors on pedestals.
     """
 
     frame: Floats
@@ -99,6 +101,7 @@ class Plan:
     angle: Floats
     ball: Ints
     stop: Ints
+    parted: bool = False
 
     def __len__(self) -> int:
         """Number of balls."""

@@ -37,6 +37,7 @@ class PrototypeRun:
         ball_surfaces: the reflecting surface of that ball at that stop, (m,).
         window_rotation: matrices that rotate directions (3,) @ matrix of the shell's picture into
             the photograph's, (m, 3, 3).
+        parted: whether a pixel of one mirror never shows another's ball: mirrors on pedestals.
     """
 
     reflector: Reflector
@@ -46,6 +47,7 @@ class PrototypeRun:
     ball: Ints
     ball_surfaces: Surfaces
     window_rotation: Floats
+    parted: bool = False
 
     def __len__(self) -> int:
         """Number of stops."""
@@ -91,6 +93,7 @@ def prototype_run(
         ball=ball,
         ball_surfaces=Surfaces(apex, normal, 1 / radius),
         window_rotation=_window_rotations(window, reflector.camera.pinhole, apex, camera.pinhole),
+        parted=plan.parted,
     )
 
 

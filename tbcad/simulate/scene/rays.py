@@ -115,7 +115,8 @@ def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays
     """
     boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
     camera, edges = reflector.camera, (reflector.side, reflector.foot)
-    table, walls = _table(reflector.mirrors, camera.pinhole), _wall_table(reflector)
+    table = _table(reflector.mirrors, camera.pinhole)
+    walls = reflector.walls.of_mirrors(len(reflector))
 
     def trace(rows: range, shift: Shift) -> ReflectedRays:
         direction = pixel_directions(camera, rows, shift)
@@ -143,12 +144,6 @@ def _table(mirrors: Surfaces, pinhole: Floats) -> Floats:
     at_pinhole = np.broadcast_to(pinhole, mirrors.apex.shape)
     value, gradient = mirrors.value(every, at_pinhole), mirrors.gradient(every, at_pinhole)
     return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature, value, gradient])
-
-
-def _wall_table(reflector: Reflector) -> tuple[Ints, Floats]:
-    """Where each mirror's walls begin, (m + 1,), and their points and normals, (w, 6)."""
-    walls = reflector.walls
-    return walls.first_of_mirrors(len(reflector)), np.column_stack([walls.point, walls.normal])
 
 
 @compiled
@@ -184,7 +179,7 @@ def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
 
 
 @compiled
-def _within(walls: Floats, point: tuple[float, float, float]) -> bool:
+def within_walls(walls: Floats, point: tuple[float, float, float]) -> bool:
     """Whether a point lies on the inner side of all walls (k, 6)."""
     for wall in walls:
         value = 0.0
@@ -219,7 +214,7 @@ def _first_mirror(
                     0 < t < reach[y, x]
                     and side * (pinhole[0] + t * dx) >= 0
                     and pinhole[2] + t * dz >= foot
-                    and _within(
+                    and within_walls(
                         every_wall[first_wall[i] : first_wall[i + 1]],
                         (pinhole[0] + t * dx, pinhole[1] + t * dy, pinhole[2] + t * dz),
                     )

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
@@ -110,19 +109,6 @@ class SubstitutedReflector(Reflector):
     def mirrors(self) -> Surfaces:
         """The reflecting surfaces."""
         return self.surfaces
-
-
-def check_joined(reflector: Reflector, what: str) -> None:
-    """Refuse mirrors on pedestals, where only whole spheres are known.
-
-    Raises:
-        InputError: as said; `what` is not simulated.
-    """
-    if isinstance(reflector.cells, PedestalCells):
-        raise InputError(
-            f'shell.edges is "pedestal": {what} of mirrors on pedestals are not simulated so far: '
-            "build the design with --set shell.edges=valley for them"
-        )
 
 
 def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:

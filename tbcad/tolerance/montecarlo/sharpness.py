@@ -129,14 +129,26 @@ def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflec
     normal = tilt.apply(at.mirrors.normal)
     apex = centre + draws.shell_shift[build] + scale * radius[:, None] * normal
     surfaces = Surfaces(apex, normal, 1 / (scale * radius))
-    view, walls = _view(at.camera, draws, build), at.walls
-    point = walls.point + draws.wall[build][:, None] * walls.normal
-    built = GrooveWalls.of_planes(
-        walls.mirror,
-        tilt.apply(scale * point) + draws.shell_shift[build],
-        tilt.apply(walls.normal),
-    )
-    return BuiltReflector(at.camera_id, view, at.u, at.cells, surfaces, built)
+    view = _view(at.camera, draws, build)
+    walls = built_walls(at.walls, draws, build, draws.wall[build])
+    return BuiltReflector(at.camera_id, view, at.u, at.cells, surfaces, walls)
+
+
+def built_walls(
+    walls: GrooveWalls, draws: ShellDraws, build: int, off: Floats | float = 0.0
+) -> GrooveWalls:
+    """Walls as a build has them: moved with their shell, and each off by itself.
+
+    Args:
+        walls: as designed, w of them.
+        draws: of the builds.
+        build: index of the build.
+        off: along each wall's normal, mm, (w,) or one for all.
+    """
+    tilt, scale = Rotation.from_rotvec(draws.shell_tilt[build]), float(draws.scale[build].mean())
+    point = walls.point + np.reshape(off, (-1, 1)) * walls.normal
+    moved = tilt.apply(scale * point) + draws.shell_shift[build]
+    return GrooveWalls.of_planes(walls.mirror, moved, tilt.apply(walls.normal))
 
 
 def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:

@@ -77,6 +77,16 @@ class TestBalls:
         assert prototype.fit.coverage.min() > 60
         assert prototype.fit.coverable.all()
 
+    def test_a_margin_is_shown_besides(self, small_design: MirrorDesign) -> None:
+        # As many balls for both: more would show more.
+        plain, made = (
+            small(small_design, "prototype.k=8", f"ball_margin_mm={margin}") for margin in (0, 1.5)
+        )
+        assert 60 < plain.fit.coverage.min() < 61.5 < made.fit.coverage.min()
+        # Pixels are still those that see the capture sphere itself.
+        assert made.fit.pixels_shell.tolist() == plain.fit.pixels_shell.tolist()
+        assert 0.9 < made.fit.pixels.sum() / plain.fit.pixels.sum() < 1
+
     def test_the_next_larger_ball_would_not(
         self, prototype: PrototypeLayout, candidates: BallCandidates
     ) -> None:

@@ -225,6 +225,7 @@ class PrototypeSpec(Strict):
     grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     snap: Literal["cover", "nearest"]
+    ball_margin_mm: float = Field(0.0, ge=0, le=20)
     picture: Literal["moved", "fixed"]
     caps: bool
     cap_rim_mm: float = Field(ge=0, le=50)

@@ -1,0 +1,165 @@
+"""Edges and seam of the mirrors close up: the facets of an export, and what follows from them.
+
+Run as a program, `python -m tbcad.report.close_ups DIR edges|seam FILE`: see `shell_pictures`.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyvista
+
+from tbcad.figure_files import figure_file
+from tbcad.geometry.vectors import unit
+from tbcad.mirrors.array import mirror_ids
+from tbcad.report.seam_fields import draw_fields, seam_mirror
+from tbcad.report.section import Section, section_of
+from tbcad.report.shell_pictures import coloured
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INCHES = (13.0, 5.2)
+VIEW_PX = (900, 720)
+SHOWN_MM, SHOWN_APEXES = 9.0, 1.6  # about a mirror: this, or so many distances of its neighbours
+ASIDE = 0.9  # of the sight from the camera, so that light rakes over the edges
+ELEVATION_Z = 0.7  # z of the direction of the mirror whose edges are shown
+FILL = 0.45  # brightness of the light from straight above
+STRETCH = 4.0  # of heights in the section of three mirrors
+INSET_MM = 0.9  # half width of the edge in its own scale
+
+
+def draw(folder: Path, subject: str, picture: Path) -> None:
+    """Draw a subject of an export, "edges" or "seam", to a PNG file."""
+    export = read_export(folder)
+    panels = SUBJECTS[subject](export)
+    picture.write_bytes(figure_file(panels, INCHES))
+
+
+def _edges(export: ExportedDesign) -> "Callable[[Figure], None]":
+    reflector = export.reflectors[0]
+    section = section_of(export, _shown_mirror(reflector))
+    view = _shaded(export.folder, "a", reflector, section.mirrors[1])
+
+    def panels(figure: "Figure") -> None:
+        left, right = figure.subplots(1, 2, width_ratios=(1, 1.25))
+        _show(left, view, _edges_title(export))
+        _draw_section(right, section, mirror_ids("a", len(reflector)))
+
+    return panels
+
+
+def _seam(export: ExportedDesign) -> "Callable[[Figure], None]":
+    reflector = export.reflectors[0]
+    mirror = seam_mirror(export)
+    view = _shaded(export.folder, "ab", reflector, mirror)
+
+    def panels(figure: "Figure") -> None:
+        left, *fields = figure.subplots(1, 3, width_ratios=(1.1, 1, 1))
+        name = mirror_ids("", len(reflector))[mirror]
+        _show(left, view, f"Both halves of mirror {name}, from the object")
+        left.axvline(VIEW_PX[0] / 2, color="white", ls=":", lw=1.2)
+        left.text(VIEW_PX[0] / 2 + 8, VIEW_PX[1] - 12, "seam", color="white", fontsize=9)
+        draw_fields(fields, export, mirror)
+
+    return panels
+
+
+def _shown_mirror(reflector: Reflector) -> int:
+    """The mirror near the plane y = 0 at a middle elevation, (index)."""
+    x = np.sqrt(1 - ELEVATION_Z**2)
+    return int((reflector.u @ (x, 0, ELEVATION_Z)).argmax())
+
+
+def _edges_title(export: ExportedDesign) -> str:
+    if export.spec.shell.edges == "valley":
+        return "Valleys: spheres meet"
+    return f"Pedestals: grooves of {export.spec.shell.groove_mm:g} mm part the mirrors"
+
+
+def _show(axes: "Axes", view: Floats, title: str) -> None:
+    axes.imshow(view)
+    axes.set_axis_off()
+    axes.set_title(title, fontsize=10)
+
+
+def _shaded(folder: Path, cameras: str, reflector: Reflector, mirror: int) -> Floats:
+    """Facets about a mirror, (h, w, 3); both halves from the object, one half from the side."""
+    apex, normal = reflector.mirrors.apex[mirror], reflector.mirrors.normal[mirror]
+    distance = np.sort(np.linalg.norm(reflector.mirrors.apex - apex, axis=1))[1]
+    reach = min(SHOWN_MM, SHOWN_APEXES * distance)
+    raking = unit(np.cross(normal, [1.0, 0.0, 0.0] if len(cameras) > 1 else [0.0, 1.0, 0.0]))
+    # In the seam's plane, which is a straight line then; or from the side, for relief.
+    sight = unit(normal * [0, 1, 1]) if len(cameras) > 1 else unit(normal - ASIDE * raking)
+    plotter = pyvista.Plotter(off_screen=True, window_size=VIEW_PX, lighting="none")
+    plotter.set_background("white")
+    for camera in cameras:
+        shell = coloured(folder, camera)
+        near = np.linalg.norm(shell.cell_centers().points - apex, axis=1) < 3 * reach
+        plotter.add_mesh(shell.extract_cells(near), scalars="colour", rgb=True, specular=0.2)
+    for place, intensity in ((normal + 2.2 * raking, 1.0), (normal, FILL)):
+        light = pyvista.Light(position=apex + 100 * place, focal_point=apex, intensity=intensity)
+        plotter.add_light(light)
+    up = raking if len(cameras) > 1 else unit(np.cross([0.0, 1.0, 0.0], sight))
+    plotter.camera_position = [tuple(apex + 100 * sight), tuple(apex), tuple(up)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = reach
+    plotter.reset_camera_clipping_range()
+    pixels = np.asarray(plotter.screenshot(None, return_img=True))
+    plotter.close()
+    return pixels
+
+
+def _draw_section(axes: "Axes", section: Section, ids: list[str]) -> None:
+    low = section.points[:, 1].min()
+    _draw_outline(axes, section.points, low - 0.3)
+    for mirror, place in zip(section.mirrors, section.apexes, strict=True):
+        axes.annotate(ids[mirror], place, (0, 6), textcoords="offset points", ha="center")
+    for edge, side in zip(section.edges, ("right", "left"), strict=True):
+        axes.annotate(
+            f"{edge.depth:.2f} mm below the crests\n{edge.words}",
+            tuple(edge.bottom),
+            (25 if side == "right" else -25, -30),
+            textcoords="offset points",
+            ha=side,
+            va="top",
+            fontsize=9,
+            arrowprops={"arrowstyle": "-", "lw": 0.7},
+        )
+    axes.set_aspect(STRETCH)
+    axes.set_ylim(low - 1.1, section.points[:, 1].max() + 1.9)
+    axes.set_xlabel("along the section, mm")
+    axes.set_ylabel(f"height, mm ({STRETCH:g} times stretched)")
+    axes.set_title("Section of three mirrors through the camera's pinhole", fontsize=10)
+    _draw_inset(axes, section)
+
+
+def _draw_outline(axes: "Axes", points: Floats, low: float) -> None:
+    """The outline, and the solid below it down to a height; walls may lean over."""
+    axes.plot(*points.T, color="C0", lw=1.5)
+    below = np.array([[points[-1, 0], low], [points[0, 0], low]])
+    axes.fill(*np.concatenate([points, below]).T, color="0.9", lw=0)
+
+
+def _draw_inset(axes: "Axes", section: Section) -> None:
+    """One edge in its own scale."""
+    x, y = section.edges[1].bottom
+    inset = axes.inset_axes((0.3, 0.66, 0.4, 0.32))
+    _draw_outline(inset, section.points, y - 2)
+    inset.set_xlim(x - INSET_MM, x + INSET_MM)
+    inset.set_ylim(y - 0.15, y + 0.85)
+    inset.set_aspect("equal")
+    inset.tick_params(labelsize=7)
+    inset.set_title("the right edge, not stretched", fontsize=8)
+
+
+SUBJECTS = {"edges": _edges, "seam": _seam}
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3]))

@@ -1,0 +1,106 @@
+"""Close-up pictures: a section of the facets, and the fields of both halves of a seam mirror."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tbcad.formats.stl import write_stl
+from tbcad.mirrors.array import design
+from tbcad.mirrors.record import write_record
+from tbcad.mirrors.seam import seam_gaps
+from tbcad.report import close_ups, seam_fields
+from tbcad.report.section import section_of
+from tbcad.shell.files import shell_envelope
+from tbcad.shell.mesh import shell_mesh
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.spec.load import load_spec
+
+GROOVE = 0.3
+RADIUS = 30.0
+FACETS_MM = 0.02  # that facets and a crest between two of their corners may be off
+
+
+def shells(folder: Path, edges: str) -> ExportedDesign:
+    """The record of a small design, with both shells as STL beside it."""
+    made = design(load_spec(None, ["n=8", f"shell.edges={edges}", f"shell.groove_mm={GROOVE}"]))
+    write_record(folder, made, shells=True)
+    array = made.arrays[0]
+    mesh = shell_mesh(made.spec, array.modelled_cells, shell_envelope(made), array.apex_distance)
+    write_stl(folder / "shell_a.stl", mesh)
+    write_stl(folder / "shell_b.stl", mesh.mirrored())
+    return read_export(folder)
+
+
+@pytest.fixture(scope="module")
+def valley(tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
+    return shells(tmp_path_factory.mktemp("valley"), "valley")
+
+
+@pytest.fixture(scope="module")
+def pedestal(tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
+    return shells(tmp_path_factory.mktemp("pedestal"), "pedestal")
+
+
+def test_a_valleys_bottom_is_on_both_spheres(valley: ExportedDesign) -> None:
+    section = section_of(valley, 40)
+    mirrors = valley.reflectors[0].mirrors
+    for edge, pair in zip(section.edges, (section.mirrors[:2], section.mirrors[1:]), strict=True):
+        # In the section's own plane, where a sphere is a circle about a point off the plane.
+        place = placed(valley, section.mirrors, edge.bottom)
+        off = np.linalg.norm(place - mirrors.centre[list(pair)], axis=1)
+        assert off == pytest.approx(1 / mirrors.curvature[list(pair)], abs=FACETS_MM)
+        assert "opening 1" in edge.words
+        assert edge.depth > 0.1
+
+
+def test_a_groove_is_as_wide_as_the_spec_has_it_and_deep(
+    valley: ExportedDesign, pedestal: ExportedDesign
+) -> None:
+    for edge, other in zip(
+        section_of(pedestal, 40).edges, section_of(valley, 40).edges, strict=True
+    ):
+        width = float(edge.words.split()[1])
+        assert GROOVE <= width < 2 * GROOVE
+        assert edge.depth > other.depth + 3 * GROOVE
+
+
+def placed(export: ExportedDesign, mirrors: tuple[int, int, int], point: np.ndarray) -> np.ndarray:
+    """A point of a section in the frame of the design."""
+    apex, pinhole = export.reflectors[0].mirrors.apex, export.reflectors[0].camera.pinhole
+    first, middle, last = (apex[k] for k in mirrors)
+    along = (last - first) / np.linalg.norm(last - first)
+    across = np.cross(along, pinhole - middle)
+    across /= np.linalg.norm(across)
+    return np.asarray(middle + point @ np.stack([along, np.cross(across, along)]))
+
+
+@pytest.mark.parametrize("edges", ["valley", "pedestal"])
+def test_halves_aimed_at_the_origin_leave_a_gap_and_built_ones_none(
+    edges: str, request: pytest.FixtureRequest
+) -> None:
+    export = request.getfixturevalue(edges)
+    reflector, mirror = export.reflectors[0], seam_fields.seam_mirror(export)
+    assert reflector.mirrors.apex[mirror, 0] == pytest.approx(0, abs=1e-9)
+    along = np.linspace(-RADIUS, RADIUS, 2001)
+    before = seam_fields.cells_aimed_at_origin(reflector)
+    gap = seam_gaps(before, reflector.camera.pinhole, RADIUS)
+    assert gap[mirror] == gap.max() > 1
+    for cells, expected in ((before, gap[mirror]), (reflector.cells, 0.0)):
+        edge = seam_fields.edge_of_field(cells, reflector, mirror, along)
+        assert max(0, 2 * edge.max()) == pytest.approx(expected, abs=1e-2)
+
+
+def test_pictures_are_drawn_by_their_command(pedestal: ExportedDesign, tmp_path: Path) -> None:
+    from subprocess import run
+
+    from tbcad.report.drawing import child_command
+
+    for subject in close_ups.SUBJECTS:
+        file = tmp_path / f"{subject}.png"
+        run(child_command(pedestal.folder, file, subject), check=True, capture_output=True)
+        with Image.open(file) as picture:
+            pixels = np.asarray(picture.convert("L"))
+        assert pixels.shape[1] > 1500
+        assert len(np.unique(pixels)) > 100
