@@ -95,6 +95,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("afternoon-print", "... of another"),
     ),
     "study depth-of-field": (("--blur-px 1.5", "another limit of the blur"),),
+    "study balance": (
+        ("--out studies/", "which n is best for matt and glossy objects, near and far"),
+        ("--n 12 --n 18 --n 26 --method blend", "three of them, by a blend"),
+    ),
     "study ssim": (
         ("", "views of the built-in object"),
         ("--object my.ply --method blend", "of your mesh, by the other method"),
