@@ -12,7 +12,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "optimize": (
         ("--out better.toml", "no larger than the paper's design, more pixels where they are few"),
         ("my.toml --for size --for pixels --max-size-mm 600", "two aims, and a larger machine"),
-        ("--for ssim --max-size-mm 500 --candidates 80", "the views themselves; takes an hour"),
+        ("--for ssim --max-size-mm 500 --candidates 80", "for better views; a quarter of an hour"),
     ),
     "build": (
         ("--n 18 --out exports/", "the paper's design, both parts, verified"),

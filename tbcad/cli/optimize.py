@@ -38,7 +38,7 @@ def optimize(
             help="What to make better; repeatable, and then all count alike. minimum: pixels of "
             "the virtual camera with fewest; pixels: mean of the logarithms of the pixels; "
             "evenness: their coefficient of variation; ssim: of 24 views of a knot by nearest "
-            "rays, which takes ten times as long; size: of the machine. By default the first "
+            "rays, which takes several times as long; size: of the machine. By default the first "
             "three.",
         ),
     ] = None,
