@@ -10,6 +10,9 @@ import pytest
 from pydantic import BaseModel
 
 from tbcad.mirrors.array import design
+from tbcad.optimize.candidate import figures_of, size_of
+from tbcad.optimize.views import mean_ssim
+from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of
 from tbcad.spec.load import load_spec
@@ -87,3 +90,34 @@ def keys_with_docstrings(model: type[BaseModel]) -> set[str]:
 def test_every_key_says_what_it_is(section: type[BaseModel]) -> None:
     own = {name for name in section.__annotations__ if not section_of(section.model_fields[name])}
     assert own - keys_with_docstrings(section) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "fewest", "variation"),
+    [("turtleback-even", 972, 0.225), ("turtleback-stretched", 679, 0.355)],
+)
+def test_better_designs_share_out_the_papers_sensor_more_evenly(
+    name: str, fewest: int, variation: float
+) -> None:
+    """docs/optimize.md: same sensor, as many virtual cameras; the paper's have 354 and 0.943."""
+    spec, paper = load_spec(DESIGNS / f"{name}.toml"), load_spec(None)
+    assert spec.camera == paper.camera
+    designed = design(spec)
+    figures = figures_of(designed)
+    assert virtual_cameras(designed.arrays[0]) == 1657
+    assert figures.minimum_px == pytest.approx(fewest, abs=1)
+    assert figures.variation == pytest.approx(variation, abs=0.001)
+
+
+@pytest.mark.slow
+def test_better_designs_make_better_views() -> None:
+    """docs/optimize.md; one is no larger than the paper's, which has 0.8939."""
+    names = ("turtleback", "turtleback-stretched", "turtleback-even")
+    designed = [design(load_spec(DESIGNS / f"{name}.toml")) for name in names]
+    paper, stretched, even = map(mean_ssim, designed)
+    assert paper == pytest.approx(0.8939, abs=2e-4)
+    assert stretched == pytest.approx(0.8985, abs=2e-4)
+    assert even == pytest.approx(0.9041, abs=2e-4)
+    sizes = [size_of(one.arrays[0]) for one in designed]
+    assert sizes[1] == pytest.approx(sizes[0], abs=0.5)
+    assert sizes[2] < 500

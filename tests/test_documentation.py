@@ -175,8 +175,9 @@ FEW_BALLS = ["--set", "prototype.k=2", "--set", "mesh.structure_error_mm=0.2"]
 # What makes a command of the documentation quick; what is added later counts.
 SMALLER = {
     ("build",): ["--n", "3", "--parts", "shell", *SMALL_SENSOR],
-    ("optimize",): ["--set", "n=3", "--candidates", "48"],
+    ("optimize",): ["--set", "n=3", "--candidates", "80", *SMALL_SENSOR],
     ("refocus",): ["--truth-samples", "2", "--frames", "2"],
+    ("study", "balance"): ["--n", "3", "--azimuths", "1", *SMALL_SENSOR],
     ("study", "ssim"): ["--sensor", "416x310", "--azimuths", "1"],
     ("tolerance",): ["--builds", "20", "--yield", "0.9"],
 }

@@ -12,6 +12,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "optimize": (
         ("--out better.toml", "no larger than the paper's design, more pixels where they are few"),
         ("my.toml --for size --for pixels --max-size-mm 600", "two aims, and a larger machine"),
+        ("--for ssim --max-size-mm 500 --candidates 80", "for better views; a quarter of an hour"),
     ),
     "build": (
         ("--n 18 --out exports/", "the paper's design, both parts, verified"),
@@ -95,6 +96,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("afternoon-print", "... of another"),
     ),
     "study depth-of-field": (("--blur-px 1.5", "another limit of the blur"),),
+    "study balance": (
+        ("--out studies/", "which n is best for matt and glossy objects, near and far"),
+        ("--n 12 --n 18 --n 26 --method blend", "three of them, by a blend"),
+    ),
     "study ssim": (
         ("", "views of the built-in object"),
         ("--object my.ply --method blend", "of your mesh, by the other method"),

@@ -165,6 +165,29 @@ def ssim_command(
     return run_study(out, json, plot, partial(ssim, spec, subject, simulated, places, method))
 
 
+@study.command("balance")
+def balance_command(
+    design: Design = None,
+    settings: Settings = None,
+    out: Out = STUDIES,
+    json: JsonResult = False,
+    plot: PlotFormatOption = "png",
+    ns: Annotated[
+        list[int] | None,
+        typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
+    ] = None,
+    method: MethodOption = "nearest",
+    azimuths: Azimuths = 2,
+    distance: Distance = 640.0,
+) -> int:
+    """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
+    from tbcad.simulate.study.balance import balance, parse_subdivisions
+
+    wanted = parse_subdivisions(ns)
+    spec = _spec(design, settings)
+    return run_study(out, json, plot, partial(balance, spec, wanted, azimuths, distance, method))
+
+
 @study.command("prototype")
 def prototype_command(
     folder: Exports,

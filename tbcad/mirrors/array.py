@@ -11,7 +11,7 @@ from tbcad.mirrors.radii import RadiusProblem, solve_radii
 from tbcad.optics import flat
 from tbcad.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.optics.cells import Cells, cell_areas, cells_of
-from tbcad.optics.geodesic import geodesic
+from tbcad.optics.geodesic import geodesic, stretched
 from tbcad.optics.pedestals import PedestalCells
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
@@ -22,6 +22,7 @@ from tbcad.types import Bools, Floats, Ints, Progress
 # Directions that differ by less than rounding have equal heights or azimuths.
 DIRECTION_DIGITS = 9
 HFOV_DIGITS = 12
+UNSTRETCHED = (1.0, 1.0)
 
 
 def mirror_ids(camera_id: str, mirrors: int) -> list[str]:
@@ -147,14 +148,19 @@ def numbering_order(u: Floats) -> Ints:
     return np.lexsort((azimuth, -height))
 
 
-def numbered_directions(n: int) -> tuple[Floats, Ints]:
-    """Directions and faces of the geodesic polyhedron of frequency n, camera a's mirrors first.
+def numbered_directions(n: int, stretch: tuple[float, float] = UNSTRETCHED) -> tuple[Floats, Ints]:
+    """Directions and faces of a stretched geodesic polyhedron, camera a's mirrors first.
+
+    Args:
+        n: frequency of the polyhedron.
+        stretch: along x and y (spec.design.OpticsSpec).
 
     Returns:
         Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and
         the outward triangles over them, (20 n^2, 3).
     """
-    u, faces = geodesic(n)
+    vertices, faces = geodesic(n)
+    u = stretched(vertices, *stretch)
     in_half_a = _in_half_a(u)
     first = np.flatnonzero(in_half_a)[numbering_order(u[in_half_a])]
     order = np.concatenate([first, np.flatnonzero(~in_half_a)])
@@ -171,7 +177,7 @@ def _in_half_a(u: Floats) -> Bools:
 def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
-    every, faces = numbered_directions(optics.n)
+    every, faces = numbered_directions(optics.n, optics.stretch)
     u = every[_in_half_a(every)]
     theta0 = flat.half_angles(ellipsoid, u, every)
     half_width = flat.half_widths(ellipsoid, u, theta0)

@@ -83,3 +83,11 @@ def geodesic(n: int) -> tuple[Floats, Ints]:
         vertices, faces = split(vertices, faces, factor)
     vertices[np.abs(vertices) < ON_PLANE] = 0.0
     return vertices, faces
+
+
+def stretched(u: Floats, x: float, y: float) -> Floats:
+    """Unit vectors (m, 3), stretched along x and y and brought back to the unit sphere.
+
+    Both symmetry planes and the horizon stay where they are. Without a stretch the very same.
+    """
+    return u if x == y == 1 else unit(u * np.array([x, y, 1.0]))

@@ -1,25 +1,28 @@
 """What is varied, and what a candidate is judged by."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import ValidationError
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.optimize.views import mean_ssim
 from tbcad.simulate.study.pixels import Sensor, count_pixels
 from tbcad.simulate.study.sweep import spec_with
 from tbcad.spec.design import FIT, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
-STEP_MM = 0.5  # of all variables: finer changes no figure that counts
-LEAST = 0.4  # of what the first design has, of all variables
+STEP_MM = 0.5  # of lengths: finer changes no figure that counts
+STRETCH_STEP, STRETCH_DIGITS = 0.05, 2
+STRETCH = (0.8, 2.0)  # least and largest that are tried
+LEAST = 0.4  # of what the first design has, of all lengths
 # At most, of the largest machine's longest side; a pinhole is on either side.
 CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
 
-Place = tuple[float, float, float]
-"""Camera's x and z, and the semi-minor axis, mm."""
+Place = tuple[float, float, float, float, float]
+"""Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class Figures:
         variation: standard deviation of the pixels over their mean.
         size_mm: longest side of the box round all mirrors' apices and both pinholes.
         view_angle_deg: that the lenses need, across the columns.
+        ssim: mean over the stated views; None where it was not measured.
     """
 
     minimum_px: float
@@ -41,6 +45,26 @@ class Figures:
     variation: float
     size_mm: float
     view_angle_deg: float
+    ssim: float | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a candidate may need at most.
+
+    Attributes:
+        size_mm: longest side of the machine.
+        view_angle_deg: of the lens.
+    """
+
+    size_mm: float
+    view_angle_deg: float
+
+    def excess(self, figures: Figures) -> float:
+        """By how much figures exceed the limits, relatively; 0 where they hold."""
+        size = figures.size_mm / self.size_mm - 1
+        angle = figures.view_angle_deg / self.view_angle_deg - 1
+        return max(size, 0.0) + max(angle, 0.0)
 
 
 @dataclass(frozen=True)
@@ -61,47 +85,61 @@ class Candidate:
 def place_of(spec: Spec) -> Place:
     """What is varied, as a design has it."""
     x, _, z = spec.optics.camera_mm
-    return x, z, spec.optics.semi_minor_mm
+    return x, z, spec.optics.semi_minor_mm, *spec.optics.stretch
 
 
 def bounds(spec: Spec, size_mm: float) -> list[tuple[float, float]]:
-    """Least and largest of each variable, mm; the place that a search begins from is within.
+    """Least and largest of each variable; the place that a search begins from is within.
 
     Args:
         spec: the first design.
         size_mm: longest side of the largest machine.
     """
-    x, z, semi_minor = place_of(spec)
+    x, z, semi_minor, *stretch = place_of(spec)
     depth = max(CAMERA_Z * size_mm, -z)
     return [
         (LEAST * x, max(CAMERA_X * size_mm, x)),
         (-depth, LEAST * z),
         (LEAST * semi_minor, max(SEMI_MINOR * size_mm, semi_minor)),
+        *((min(STRETCH[0], one), max(STRETCH[1], one)) for one in stretch),
     ]
 
 
 def rounded(place: Floats) -> Place:
     """The nearest place on the grid."""
-    x, z, semi_minor = (np.round(place / STEP_MM) * STEP_MM).tolist()
-    return x, z, semi_minor
+    x, z, semi_minor = (np.round(place[:3] / STEP_MM) * STEP_MM).tolist()
+    steps = np.round(place[3:] / STRETCH_STEP) * STRETCH_STEP
+    along_x, along_y = np.round(steps, STRETCH_DIGITS).tolist()
+    return x, z, semi_minor, along_x, along_y
 
 
 def placed(spec: Spec, place: Place) -> Spec:
-    """A design with its camera and ellipsoid elsewhere, and a lens that fits."""
-    x, z, semi_minor = place
+    """A design with its camera, ellipsoid and directions elsewhere, and a lens that fits."""
+    x, z, semi_minor, *stretch = place
     camera = (x, spec.optics.camera_mm[1], z)
     moved = spec_with(
         spec,
-        optics={"camera_mm": camera, "semi_minor_mm": semi_minor},
+        optics={"camera_mm": camera, "semi_minor_mm": semi_minor, "stretch": tuple(stretch)},
         camera={"hfov_deg": FIT},
     )
     return Spec.model_validate(moved.model_dump(by_alias=True))
 
 
-def evaluate(spec: Spec, place: Place) -> Candidate:
-    """Design the mirrors of a place, and count pixels."""
+def evaluate(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+    """Design the mirrors of a place, and count pixels.
+
+    Args:
+        spec: the first design.
+        ssim_within: limits within which views are compared, too, since it takes longest; None:
+            nowhere.
+        place: what is varied.
+    """
     try:
-        return Candidate(place, figures_of(design(placed(spec, place))))
+        designed = design(placed(spec, place))
+        figures = figures_of(designed)
+        if ssim_within and ssim_within.excess(figures) == 0:
+            figures = replace(figures, ssim=mean_ssim(designed))
+        return Candidate(place, figures)
     except ValidationError as error:
         return Candidate(place, None, error.errors()[0]["msg"])
     except SpecError as error:

@@ -18,7 +18,8 @@ from tbcad.spec.load import spec_dict
 from tbcad.types import Floats
 
 FIGURES = tuple(field.name for field in fields(Figures))
-COLUMNS = ("camera_x_mm", "camera_z_mm", "semi_minor_mm", *FIGURES, "on_front", "reason")
+VARIABLES = ("camera_x_mm", "camera_z_mm", "semi_minor_mm", "stretch_x", "stretch_y")
+COLUMNS = (*VARIABLES, *FIGURES, "on_front", "reason")
 LABELS = {
     "minimum_px": "pixels, minimum",
     "median_px": "pixels, median",
@@ -26,6 +27,7 @@ LABELS = {
     "variation": "coefficient of variation",
     "size_mm": "longest side, mm",
     "view_angle_deg": "angle of view, deg",
+    "ssim": "SSIM of views",
 }
 
 
@@ -53,7 +55,10 @@ def search_files(
 
 def design_text(result: SearchResult, spec: Spec) -> str:
     """The best design as TOML: every key that is not the default, under what it gives."""
-    lines = [f"# {spec.name}, its cameras and mirrors elsewhere: what tbcad optimize found.", "#"]
+    lines = [
+        f"# {spec.name}, with other places and directions: what tbcad optimize found.",
+        "#",
+    ]
     lines += [f"# {line}" for line in comparison(result)]
     changed = placed(spec, result.best.place)
     defaults = Spec.model_validate({"optics": {"n": spec.optics.n}})  # some follow from n
@@ -68,6 +73,8 @@ def comparison(result: SearchResult) -> Iterator[str]:
     yield f"{'':28} {'before':>9} {'after':>9}"
     for name, label in LABELS.items():
         before, after = getattr(start, name), getattr(best, name)
+        if before is None or after is None:
+            continue
         yield f"{label:28} {before:9.4g} {after:9.4g}"
 
 
@@ -80,7 +87,7 @@ def candidate_table(result: SearchResult) -> Table:
 
 
 def panels(result: SearchResult) -> tuple[Panel, ...]:
-    """Candidates by pixels and evenness, and by pixels and size."""
+    """Candidates by pixels and evenness, by pixels and size, and by SSIM where it was measured."""
     figures = [one.figures for one in result.candidates if one.figures]
     kept = [one for one in figures if result.limits.excess(one) == 0]
     front = zip(result.candidates, result.on_front, strict=True)
@@ -94,20 +101,24 @@ def panels(result: SearchResult) -> tuple[Panel, ...]:
         "before": ([result.start.figures], "kx"),
         "after": ([result.best.figures], "k+"),
     }
-    return tuple(
-        _panel(title, groups, (x, y))
-        for title, x, y in (
-            ("Pixels of the virtual cameras", "minimum_px", "variation"),
-            ("Pixels and size", "size_mm", "minimum_px"),
-        )
-    )
+    axes = [
+        ("Pixels of the virtual cameras", "minimum_px", "variation"),
+        ("Pixels and size", "size_mm", "minimum_px"),
+    ]
+    if result.best.figures.ssim is not None:
+        axes.append(("Views and size", "size_mm", "ssim"))
+    return tuple(_panel(title, groups, (x, y)) for title, x, y in axes)
 
 
 def _panel(title: str, groups: Groups, axes: tuple[str, str]) -> Panel:
     x, y = axes
+    measured = {
+        label: ([one for one in some if getattr(one, y) is not None], style)
+        for label, (some, style) in groups.items()
+    }
     series = tuple(
         Series(label, _column(some, x), _column(some, y), style)
-        for label, (some, style) in groups.items()
+        for label, (some, style) in measured.items()
     )
     return Panel(title, LABELS[x], LABELS[y], series, logarithmic="xy")
 

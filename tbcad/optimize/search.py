@@ -1,7 +1,7 @@
 """Differential evolution over places, each judged once: the same on any number of cores."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from hashlib import sha256
@@ -13,40 +13,41 @@ from scipy.optimize import Bounds, differential_evolution
 
 from tbcad.atomic_files import replace_files
 from tbcad.errors import InputError
-from tbcad.optimize.candidate import Candidate, Figures, Place, bounds, evaluate, place_of, rounded
+from tbcad.optimize.candidate import (
+    Candidate,
+    Figures,
+    Limits,
+    Place,
+    bounds,
+    evaluate,
+    place_of,
+    rounded,
+)
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
 from tbcad.types import Floats, Progress
 
-Objective: TypeAlias = Literal["minimum", "pixels", "evenness", "size"]
+Objective: TypeAlias = Literal["minimum", "pixels", "evenness", "ssim", "size"]
 OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 
-POPULATION = 24  # places of a generation: eight for each variable
+POPULATION = 40  # places of a generation: eight for each variable
 SEED = 0
-IMPOSSIBLE = 1e3  # value of a place where nothing can be made
+IMPOSSIBLE = 1e6  # value of a place where nothing can be made
+BEYOND = 1e2  # value of a place beyond the limits: more than any within
 EXCESS = 1e2  # value of a relative excess of 1 over a limit
+ANY_SIZE = Limits(np.inf, np.inf)
 
 Record: TypeAlias = dict[str, object]
 
-
-@dataclass(frozen=True)
-class Limits:
-    """What a candidate may need at most.
-
-    Attributes:
-        size_mm: longest side of the machine.
-        view_angle_deg: of the lens.
-    """
-
-    size_mm: float
-    view_angle_deg: float
-
-    def excess(self, figures: Figures) -> float:
-        """By how much figures exceed the limits, relatively; 0 where they hold."""
-        size = figures.size_mm / self.size_mm - 1
-        angle = figures.view_angle_deg / self.view_angle_deg - 1
-        return max(size, 0.0) + max(angle, 0.0)
+LOSSES: dict[Objective, Callable[[Figures], float]] = {
+    "minimum": lambda one: -np.log(max(one.minimum_px, 1)),
+    "pixels": lambda one: -one.mean_log_px,
+    "evenness": lambda one: np.log(one.variation),
+    "ssim": lambda one: np.log(1 - (one.ssim or 0.0)),
+    "size": lambda one: np.log(one.size_mm),
+}
+"""What is the smaller the better, as a logarithm; of SSIM what is missing to 1."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ def search(
     """
     judged = _read(store, asked) if store else {}
     judge = partial(_judge, asked, judged, store, scheduler, progress)
-    start = judge([place_of(asked.spec)])[0]
+    start = judge(ANY_SIZE, [place_of(asked.spec)])[0]
     if start.figures is None:
         raise InputError(f"the design to begin from cannot be made: {start.reason}")
     limits = asked.limits(start.figures)
@@ -146,7 +147,9 @@ def search(
         rng=np.random.default_rng(SEED),
         polish=False,
         updating="deferred",
-        workers=lambda _, places: [*map(value, judge([rounded(np.array(p)) for p in places]))],
+        workers=lambda _, places: [
+            *map(value, judge(limits, [rounded(np.array(p)) for p in places]))
+        ],
     )
     candidates = tuple(judged.values())
     losses = _losses(asked.objectives, limits, start.figures, candidates)
@@ -164,19 +167,16 @@ def _value(
     """What is minimised: the mean of all objectives, relative to the first design."""
     if one.figures is None:
         return IMPOSSIBLE
-    loss = float(np.mean(objective_losses(objectives, start, one.figures)))
-    return loss + EXCESS * limits.excess(one.figures)
+    if excess := limits.excess(one.figures):
+        return BEYOND + EXCESS * excess
+    if _lacks(objectives, one.figures):
+        return IMPOSSIBLE
+    return float(np.mean(objective_losses(objectives, start, one.figures)))
 
 
 def objective_losses(objectives: Sequence[Objective], start: Figures, one: Figures) -> list[float]:
     """By how much a design is worse than the first, for each objective: logarithms of ratios."""
-    loss = {
-        "minimum": np.log(start.minimum_px) - np.log(max(one.minimum_px, 1)),
-        "pixels": start.mean_log_px - one.mean_log_px,
-        "evenness": np.log(one.variation) - np.log(start.variation),
-        "size": np.log(one.size_mm) - np.log(start.size_mm),
-    }
-    return [float(loss[name]) for name in objectives]
+    return [float(LOSSES[name](one) - LOSSES[name](start)) for name in objectives]
 
 
 def _judge(
@@ -185,16 +185,30 @@ def _judge(
     store: Path | None,
     scheduler: str | None,
     progress: Progress,
+    limits: Limits,
     places: Sequence[Place],
 ) -> list[Candidate]:
-    """Candidates at places, of which only new ones are worked out."""
-    new = [place for place in dict.fromkeys(places) if place not in judged]
-    for one in run_units(partial(evaluate, asked.spec), new, scheduler):
+    """Candidates at places, of which only those are worked out that the store does not have."""
+    wanted = limits if "ssim" in asked.objectives else None
+    new = [p for p in dict.fromkeys(places) if _is_open(asked.objectives, limits, judged.get(p))]
+    for one in run_units(partial(evaluate, asked.spec, wanted), new, scheduler):
         judged[one.place] = one
     if store and new:
         replace_files(store.parent, {store.name: _lines(asked, judged)})
     progress(f"{len(judged)} of about {asked.budget} candidates")
     return [judged[place] for place in places]
+
+
+def _is_open(objectives: Sequence[Objective], limits: Limits, known: Candidate | None) -> bool:
+    """Whether a candidate has to be judged, or judged again."""
+    if known is None or known.figures is None:
+        return known is None
+    return _lacks(objectives, known.figures) and limits.excess(known.figures) == 0
+
+
+def _lacks(objectives: Sequence[Objective], figures: Figures) -> bool:
+    """Whether an earlier search, of other aims, did not measure what is an aim now."""
+    return "ssim" in objectives and figures.ssim is None
 
 
 def _losses(
@@ -208,7 +222,9 @@ def _losses(
     return np.array(
         [
             objective_losses(objectives, start, one.figures)
-            if one.figures and limits.excess(one.figures) == 0
+            if one.figures
+            and limits.excess(one.figures) == 0
+            and not _lacks(objectives, one.figures)
             else none
             for one in candidates
         ]
@@ -246,11 +262,15 @@ def _read(store: Path, asked: Search) -> dict[Place, Candidate]:
 
 
 def _candidate(row: Record) -> Candidate:
-    x, z, semi_minor = np.array(row["place"], dtype=float).tolist()
-    figures = row["figures"]
+    place, figures = row["place"], row["figures"]
+    x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
     if figures is not None and not isinstance(figures, dict):
         raise ValueError("figures are not an object")
-    numbers = {name: float(number) for name, number in (figures or {}).items()}
+    numbers = {
+        name: None if number is None else float(number) for name, number in (figures or {}).items()
+    }
     return Candidate(
-        (x, z, semi_minor), Figures(**numbers) if figures else None, str(row["reason"])
+        (x, z, semi_minor, along_x, along_y),
+        Figures(**numbers) if figures else None,  # type: ignore[arg-type]
+        str(row["reason"]),
     )

@@ -8,12 +8,12 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import Candidate, Figures, Place
+from tbcad.optimize.candidate import Candidate, Figures, Limits, Place
 from tbcad.spec.design import Spec
 from tests.exported_files import read_csv
 
 
-def closed_form(spec: Spec, place: Place) -> Candidate:
+def closed_form(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
     """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
     axis = place[2]
     return Candidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
@@ -26,7 +26,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def words(tmp_path: Path, *more: str) -> list[str]:
     out = str(tmp_path / "found" / "better.toml")
-    return ["optimize", "--set", "n=4", "--candidates", "48", "--out", out, *more]
+    return ["optimize", "--set", "n=4", "--candidates", "80", "--out", out, *more]
 
 
 def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -47,7 +47,7 @@ def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str
 def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(words(tmp_path, "--json", "--for", "minimum")) == 0
     result = json.loads(capsys.readouterr().out)
-    assert result["before"]["place"] == [100, -100, 100]
+    assert result["before"]["place"] == [100, -100, 100, 1, 1]
     assert result["after"]["figures"]["minimum_px"] > 100
     assert result["after"] in result["front"]
 
@@ -55,10 +55,10 @@ def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_search_that_was_stopped_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def stopped(spec: Spec, place: Place) -> Candidate:
+    def stopped(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
         if place[2] > 130:
             raise KeyboardInterrupt
-        return closed_form(spec, place)
+        return closed_form(spec, ssim_within, place)
 
     monkeypatch.setattr(search_module, "evaluate", stopped)
     assert run(words(tmp_path)) == 130
@@ -81,8 +81,8 @@ def test_what_exists_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (("--candidates", "3"), "--candidates is 3, allowed is 48 to 100000: change it"),
-        (("--for", "ssim"), "--for is 'ssim', allowed is one of minimum"),
+        (("--candidates", "3"), "--candidates is 3, allowed is 80 to 100000: change it"),
+        (("--for", "beauty"), "--for is 'beauty', allowed is one of minimum"),
         (("--set", "n=1"), "optics.n"),
         (("--max-size-mm", "-1"), "--max-size-mm is -1, allowed is more than 0: change it"),
         (("--max-view-angle-deg", "nan"), "--max-view-angle-deg is nan"),

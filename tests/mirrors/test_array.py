@@ -42,6 +42,18 @@ def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
     assert array.mirrors.radius.max() == pytest.approx((30 * array.half_width).max(), rel=0.5)
 
 
+@pytest.mark.parametrize("stretch", [(1.6, 1.6), (1.3, 1.1)])
+def test_stretched_directions_are_those_of_the_mirrors(stretch: tuple[float, float]) -> None:
+    array = mirror_array("n=9", f"stretch={list(stretch)}")
+    expected, _ = numbered_directions(9, stretch)
+    assert np.array_equal(array.u, expected[: len(array)])
+    assert array.coverage == pytest.approx(60.6, abs=0.01)
+    plain = mirror_array("n=9")
+    assert len(array) == len(plain)
+    wide = np.average(array.u[:, 2]) < np.average(plain.u[:, 2])
+    assert wide == (stretch[0] > 1)
+
+
 def test_margin_is_added_to_the_target() -> None:
     assert mirror_array("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm
-from tbcad.optics.geodesic import geodesic, icosahedron, prime_factors
+from tbcad.optics.geodesic import geodesic, icosahedron, prime_factors, stretched
 
 
 def test_icosahedron_is_regular_and_z_is_a_two_fold_axis() -> None:
@@ -53,3 +53,23 @@ def test_mirror_symmetry_in_every_coordinate_plane_is_exact_on_the_planes(n: int
         assert {tuple(v) for v in np.round(flipped, 10) + 0.0} == rounded
         size = np.abs(vertices[:, axis])
         assert not np.any((size > 0) & (size < 1e-6))
+
+
+def test_without_a_stretch_directions_are_the_very_same() -> None:
+    u = geodesic(6)[0]
+    assert np.array_equal(stretched(u, 1.0, 1.0), u)
+
+
+def test_stretched_directions_keep_planes_azimuth_and_follow_the_tangent() -> None:
+    """With one factor s for x and y the tangent of the angle from the zenith grows by s."""
+    u = geodesic(6)[0]
+    v = stretched(u, 1.6, 1.6)
+    assert np.allclose(norm(v), 1, rtol=0, atol=1e-15)
+    assert np.array_equal(v == 0, u == 0)
+    assert np.array_equal(np.sign(v), np.sign(u))
+    assert np.allclose(np.arctan2(v[:, 1], v[:, 0]), np.arctan2(u[:, 1], u[:, 0]), atol=1e-12)
+    assert np.allclose(
+        np.hypot(v[:, 0], v[:, 1]) * u[:, 2], 1.6 * np.hypot(u[:, 0], u[:, 1]) * v[:, 2]
+    )
+    across = stretched(u, 2.0, 0.5)
+    assert np.allclose(across[:, 0] * u[:, 1], 4 * u[:, 0] * across[:, 1])

@@ -61,14 +61,15 @@ def test_size_is_the_longest_side_of_a_box(pinhole: tuple[float, ...], size: flo
 
 def test_a_candidate_is_the_design_of_its_place() -> None:
     spec = load_spec(None, FEW_PIXELS)
-    one = evaluate(spec, (110.0, -120.0, 105.0))
-    options = ["camera_mm=[110, 0, -120]", "semi_minor_mm=105", *FEW_PIXELS]
+    one = evaluate(spec, None, (110.0, -120.0, 105.0, 1.2, 1.1))
+    moved = ["camera_mm=[110, 0, -120]", "semi_minor_mm=105", "stretch=[1.2, 1.1]"]
+    options = [*moved, *FEW_PIXELS]
     assert one.figures == figures_of(design(load_spec(None, options)))
     assert one.reason == ""
 
 
 def test_what_cannot_be_made_says_why() -> None:
-    one = evaluate(load_spec(None, FEW_PIXELS), (10.0, -10.0, 1.0))
+    one = evaluate(load_spec(None, FEW_PIXELS), None, (10.0, -10.0, 1.0, 1.0, 1.0))
     assert one.figures is None
     assert one.reason
     assert "\n" not in one.reason
@@ -83,14 +84,14 @@ def test_the_first_place_is_within_the_bounds() -> None:
 
 
 def test_places_are_on_a_grid() -> None:
-    place = rounded(np.array([100.26, -99.8, 87.1]))
-    assert place == (100.5, -100.0, 87.0)
-    assert (np.array(place) % STEP_MM == 0).all()
+    place = rounded(np.array([100.26, -99.8, 87.1, 1.1678, 0.93]))
+    assert place == (100.5, -100.0, 87.0, 1.15, 0.95)
+    assert (np.array(place[:3]) % STEP_MM == 0).all()
 
 
 def test_other_keys_stay() -> None:
     spec = load_spec(None, ["n=4", "shell.wall_mm=4", "camera_mm=[100, 7, -100]"])
-    moved = placed(spec, (120.0, -90.0, 101.0))
+    moved = placed(spec, (120.0, -90.0, 101.0, 1.0, 1.0))
     assert moved.optics.camera_mm == (120.0, 7.0, -90.0)
     assert moved.shell.wall_mm == 4
     assert moved.optics.n == 4

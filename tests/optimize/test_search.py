@@ -1,6 +1,7 @@
 """The search, with candidates whose figures are a closed form: the mirrors themselves take long."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 
 from tbcad.errors import InputError
 from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import STEP_MM, Candidate, Figures, Place
-from tbcad.optimize.files import design_text, search_files
+from tbcad.optimize.candidate import STEP_MM, Candidate, Figures, Limits, Place
+from tbcad.optimize.files import comparison, design_text, search_files
 from tbcad.optimize.search import (
     Search,
     SearchResult,
@@ -24,14 +25,14 @@ from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec
 
 SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])
-BEST = (123.0, -140.0, 111.5)
+BEST = (123.0, -140.0, 111.5, 1.3, 1.15)
 
 
-def closed_form(spec: Spec, place: Place) -> Candidate:
+def closed_form(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
     """Pixels are most at BEST; the machine grows with x; there is none with a small axis."""
     if place[2] < 60:
         return Candidate(place, None, "the ellipsoid is too small: enlarge it")
-    off = float(np.linalg.norm(np.subtract(place, BEST)))
+    off = float(np.linalg.norm(np.subtract(place, BEST) * [1, 1, 1, 50, 50]))
     size = 3 * place[0]
     return Candidate(place, Figures(1000 - off, 2000 - off, 7 - off / 100, 1 + off, size, 89.0))
 
@@ -41,13 +42,14 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search_module, "evaluate", closed_form)
 
 
-def asked(budget: int = 720, size_mm: float | None = 400.0) -> Search:
+def asked(budget: int = 1600, size_mm: float | None = 400.0) -> Search:
     return Search(SPEC, ("minimum", "evenness"), budget, size_mm)
 
 
 def test_the_best_place_is_found() -> None:
     best = search(asked()).best
-    assert np.abs(np.subtract(best.place, BEST)).max() <= 2 * STEP_MM
+    assert np.abs(np.subtract(best.place, BEST))[:3].max() <= 4 * STEP_MM
+    assert np.abs(np.subtract(best.place, BEST))[3:].max() <= 0.1
 
 
 def test_limits_hold() -> None:
@@ -62,38 +64,39 @@ def test_limits_hold() -> None:
 
 
 def test_the_start_where_none_is_better() -> None:
-    spec = load_spec(None, ["n=4", "camera_mm=[123, 0, -140]", "semi_minor_mm=111.5"])
-    result = search(Search(spec, ("minimum",), 48))
+    places = ["camera_mm=[123, 0, -140]", "semi_minor_mm=111.5", "stretch=[1.3, 1.15]"]
+    spec = load_spec(None, ["n=4", *places])
+    result = search(Search(spec, ("minimum",), 80))
     assert result.best == result.start
 
 
 def test_a_search_that_was_stopped_ends_like_one_that_was_not(tmp_path: Path) -> None:
     whole, parted = tmp_path / "whole.jsonl", tmp_path / "parted.jsonl"
-    expected = search(asked(240), whole)
-    search(asked(96), parted)
+    expected = search(asked(280), whole)
+    search(asked(120), parted)
     assert parted.read_bytes() != whole.read_bytes()
-    assert search(asked(240), parted) == expected
+    assert search(asked(280), parted) == expected
     assert parted.read_bytes() == whole.read_bytes()
     assert search_files(expected, SPEC, Path("x.toml")) == search_files(
-        search(asked(240)), SPEC, Path("x.toml")
+        search(asked(280)), SPEC, Path("x.toml")
     )
 
 
 def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = search(asked(96), tmp_path / "store.jsonl")
+    expected = search(asked(120), tmp_path / "store.jsonl")
 
-    def never(spec: Spec, place: Place) -> Candidate:
+    def never(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
         raise AssertionError(place)
 
     monkeypatch.setattr(search_module, "evaluate", never)
-    assert search(asked(96), tmp_path / "store.jsonl") == expected
+    assert search(asked(120), tmp_path / "store.jsonl") == expected
 
 
 def test_a_store_of_another_design_is_refused(tmp_path: Path) -> None:
     store = tmp_path / "store.jsonl"
-    search(asked(48), store)
+    search(asked(80), store)
     before = store.read_bytes()
-    other = Search(load_spec(None, ["n=5"]), ("minimum",), 48)
+    other = Search(load_spec(None, ["n=5"]), ("minimum",), 80)
     with pytest.raises(InputError, match="another design"):
         search(other, store)
     assert store.read_bytes() == before
@@ -107,19 +110,19 @@ def test_a_broken_store_is_refused(tmp_path: Path, text: str) -> None:
     store = tmp_path / "store.jsonl"
     store.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"store.jsonl: (no list of candidates|of another)"):
-        search(asked(48), store)
+        search(asked(80), store)
 
 
 def test_a_first_design_that_cannot_be_made() -> None:
     spec = load_spec(None, ["n=4", "capture_diameter_mm=10", "semi_minor_mm=50"])
     with pytest.raises(InputError, match="cannot be made: the ellipsoid is too small"):
-        search(Search(spec, ("size",), 48))
+        search(Search(spec, ("size",), 80))
 
 
 def test_objectives_by_name() -> None:
     assert parse_objectives(["size", "minimum", "size"]) == ("minimum", "size")
-    with pytest.raises(InputError, match="--for is 'ssim', allowed is one of minimum, pixels"):
-        parse_objectives(["ssim"])
+    with pytest.raises(InputError, match="--for is 'beauty', allowed is one of minimum, pixels"):
+        parse_objectives(["beauty"])
 
 
 @given(arrays(float, st.tuples(st.integers(1, 8), st.integers(1, 3)), elements=st.floats(-2, 2)))
@@ -131,12 +134,44 @@ def test_front_against_brute_force(losses: np.ndarray) -> None:
 
 
 def test_the_design_that_is_written_is_the_best_one(tmp_path: Path) -> None:
-    result: SearchResult = search(asked(96))
+    result: SearchResult = search(asked(120))
     file = tmp_path / "better.toml"
     file.write_text(design_text(result, SPEC), encoding="utf-8")
     spec = load_spec(file)
-    x, z, semi_minor = result.best.place
+    x, z, semi_minor, *stretch = result.best.place
     assert spec.optics.camera_mm == (x, 0.0, z)
     assert spec.optics.semi_minor_mm == semi_minor
+    assert list(spec.optics.stretch) == stretch
     assert (spec.optics.n, spec.shell.wall_mm) == (4, 4)
     assert json.dumps(4.0) in file.read_text(encoding="utf-8")
+
+
+def test_ssim_is_measured_where_an_earlier_search_did_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What that search judged beyond the limits, or found impossible, is not judged again."""
+    store = tmp_path / "store.jsonl"
+    search(asked(80), store)
+    again: list[Place] = []
+
+    def with_ssim(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+        again.append(place)
+        one = closed_form(spec, ssim_within, place)
+        assert ssim_within
+        if one.figures and ssim_within.excess(one.figures) == 0:
+            measured = replace(one.figures, ssim=0.8 + place[3] / 100)
+            return replace(one, figures=measured)
+        return one
+
+    monkeypatch.setattr(search_module, "evaluate", with_ssim)
+    views = Search(SPEC, ("ssim",), 280, 400.0)
+    result = search(views, store)
+    within = [one for one in result.candidates if one.figures and one.figures.ssim]
+    assert all(one.figures and one.figures.size_mm <= 400 for one in within)
+    assert len(within) > 20
+    assert len(again) == len(set(again))
+    assert result.best.place[3] == max(one.place[3] for one in within)
+    kept = [one for one, on in zip(result.candidates, result.on_front, strict=True) if on]
+    assert {one.place[3] for one in kept} == {result.best.place[3]}
+    assert any("SSIM of views" in line for line in comparison(result))
+    assert search(views, store) == result

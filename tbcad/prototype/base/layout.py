@@ -49,6 +49,7 @@ RING_FOOT = 0.3  # of the wall's thickness, where a ring's section begins
 BEHIND_MM = 1.0  # of the hub's outer face from bosses and rings: the zero disc lies on it
 END_POINTS = 9  # across the end of a boss, where its height over the wall is measured
 MAX_ROUNDS = 60  # of lengthening bosses
+HUB_BEHIND_MM = 1.0  # of the hub's front from the wall at the boss that is farthest back
 ROUNDING_MM = 1e-9
 
 
@@ -135,8 +136,7 @@ def base_layout(
     frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype, motion)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)
-    behind_light = float(light.pinhole / 2 - light.level / 2)
-    hub = hub_layout(spec, behind_light - spec.light_clearance_mm)
+    hub = hub_layout(spec, _hub_front(spec, seats, frame, light))
     inner = _inner(spec, seats, frame, light, hub)
     sector, rings = _sector(spec, seats, prototype), _rings(spec, inner)
     protruding = _protruding(spec, seats, frame, offset(inner, spec.thickness_mm))
@@ -191,8 +191,19 @@ def _half_plane(points: Floats) -> Floats:
     return np.stack([points[..., 0], norm(points[..., 1:])], axis=-1)
 
 
-def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hub: Hub) -> Floats:
-    """The wall's inner line: round the light, from the hub's rim to beyond the last boss.
+def _hub_front(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid) -> float:
+    """Z where the hub's disc begins: behind all light and behind the wall at each boss.
+
+    A large ball near the axis lies farther back than the light: a wall that began before it would
+    leave its boss standing free.
+    """
+    behind_light = float(light.pinhole / 2 - light.level / 2) - spec.light_clearance_mm
+    behind_bosses = float(_wall_points(spec, seats, frame)[:, 0].min()) - HUB_BEHIND_MM
+    return min(behind_light, behind_bosses)
+
+
+def _wall_points(spec: BaseSpec, seats: Seats, frame: Floats) -> Floats:
+    """Points (z, r) that the wall's inner line may not lie before, three for each boss, (3 k, 2).
 
     It is behind the fronts of all bosses, and so deep at each that the ribs end where the boss
     does.
@@ -201,8 +212,12 @@ def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hu
     axis, side = seats.axis @ frame.T, seats.boss[:, None] * (seats.axes[:, 0] @ frame.T)
     lengths = (depth, seats.front + OFF_FRONT_MM)
     deep, front = (seats.centre @ frame.T + length[:, None] * axis for length in lengths)
-    points = [_half_plane(one) for one in (deep, front - side, front + side)]
-    behind = np.vstack([*points, light.outline()])
+    return np.vstack([_half_plane(one) for one in (deep, front - side, front + side)])
+
+
+def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hub: Hub) -> Floats:
+    """The wall's inner line: round the light, from the hub's rim to beyond the last boss."""
+    behind = np.vstack([_wall_points(spec, seats, frame), light.outline()])
     rim = np.array([[hub.front, hub.disc]])
     end = _end(seats, frame)
     line = trimmed(hull(np.vstack([rim, behind[behind[:, 0] > hub.front]])), end)

@@ -12,7 +12,7 @@ from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, in_batches
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
-from tbcad.types import Bytes, Colours, Progress
+from tbcad.types import Bytes, Colours, Floats, Progress
 
 Tracer = Callable[[range, Shift], ReflectedRays]
 Samples = int | tuple[Shift, ...]
@@ -95,17 +95,24 @@ def _through(
 ) -> tuple[ReflectedRays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
+    return seen_by(view, rays, unit_directions(view, rows, shift), scene)
+
+
+def seen_by(
+    view: Camera, rays: ReflectedRays, direction: Floats, scene: Scene
+) -> tuple[ReflectedRays, Colours]:
+    """What rays after the mirrors see, (h, w, 3), and those that the object itself does not hide.
+
+    Args:
+        view: the camera.
+        rays: of h x w pixels.
+        direction: unit vectors from the camera through the pixels, (h, w, 3).
+        scene: the object.
+    """
     hits = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
     colour = hits.colour.reshape(*rays.mirror.shape, 3)
-    return _hidden(view, rays, colour, scene, rows, shift), colour
-
-
-def _hidden(
-    view: Camera, rays: ReflectedRays, colour: Colours, scene: Scene, rows: range, shift: Shift
-) -> ReflectedRays:
-    """Paint the object where the camera sees it directly, and remove the rays there."""
-    direction = unit_directions(view, rows, shift).reshape(-1, 3)
     distance = np.where(rays.mirror == 0, np.inf, norm(rays.origin - view.pinhole))
-    front, direct = object_in_front(scene, view.pinhole, direction, distance.ravel())
+    flat = direction.reshape(-1, 3)
+    front, direct = object_in_front(scene, view.pinhole, flat, distance.ravel())
     colour.reshape(-1, 3)[front] = direct[front]
-    return rays.without(front.reshape(rays.mirror.shape))
+    return rays.without(front.reshape(rays.mirror.shape)), colour

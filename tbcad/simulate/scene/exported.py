@@ -121,7 +121,7 @@ def _reflector(
     path: Path, document: _Document, camera: _Camera, mirrors: list[MirrorColumns]
 ) -> Reflector:
     n = document.spec.optics.n
-    every, faces = numbered_directions(n)
+    every, faces = numbered_directions(n, document.spec.optics.stretch)
     kept = (every[:, 0] >= 0) & (every[:, 2] >= 0)
     if len(mirrors) != kept.sum():
         raise InputError(

@@ -21,6 +21,7 @@ GREY = 0.8
 CELL_MM = 6.0  # side of the built-in pattern's cubes
 KNOT = (2, 3)  # turns about the axis and through the hole: a trefoil
 KNOT_FACETS = (240, 40)
+BALL_DIVISIONS = 5  # of an icosahedron: 20,480 facets
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,16 @@ def built_in_object(capture_mm: float) -> SceneObject:
     return SceneObject(
         "trefoil knot", points.reshape(-1, 3), faces, normals, rainbow(hue)[faces], patterned=False
     )
+
+
+def patterned_ball(radius: float) -> SceneObject:
+    """A ball about the origin of this radius (mm) with the built-in pattern."""
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(subdivisions=BALL_DIVISIONS, radius=radius)
+    points, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
+    white = np.ones((len(faces), 3, 3))
+    return SceneObject(f"ball of {radius:g} mm", points, faces, unit(points), white, patterned=True)
 
 
 def rainbow(hue: Floats) -> Floats:

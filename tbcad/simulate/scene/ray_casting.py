@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import dot, unit
 from tbcad.simulate.scene.object import SceneObject, pattern
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
@@ -17,6 +18,8 @@ LAMPS = np.array([[0.48, 0.36, 0.8], [-0.6, 0.64, 0.48]])
 LAMP_LIGHT = np.array([0.55, 0.2])
 SKY_LIGHT = 0.35
 BACKGROUND = 0
+# Of glossy surfaces: Phong's exponent, half the highlight's light within 11 degrees of its middle.
+GLOSS_EXPONENT = 40
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,14 @@ class Scene:
         embree: its facets, committed; queries release the interpreter's lock.
         shade: light at each corner, 0 to 1, (v,).
         radius: of the sphere about the origin that holds it, mm.
+        gloss: share of the lamps' light in highlights, which move with the viewpoint; 0: matt.
     """
 
     subject: SceneObject
     embree: Any
     shade: Floats
     radius: float
+    gloss: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,21 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     depth[rows] = hits["tfar"][hit]
     light = (scene.shade[scene.subject.faces[facet]] * weight).sum(axis=1)
     colour[rows] = 255 * (_albedo(scene.subject, facet, weight) * light[:, None])
+    if scene.gloss:
+        glint = scene.gloss * _highlights(scene.subject, facet, weight, direction[rows])
+        colour[rows] = np.minimum(colour[rows] + 255 * glint[:, None], 255)
     return RayHits(colour, depth)
+
+
+def _highlights(subject: SceneObject, facet: Ints, weight: Floats, direction: Floats) -> Floats:
+    """Light of both lamps (n,) that facets (n,) throw back along unit directions (n, 3).
+
+    Source: B. T. Phong, Communications of the ACM 18(6), 1975.
+    """
+    corners = subject.normals[subject.faces[facet]]
+    normal = unit(np.einsum("nk,nkx->nx", weight, corners))
+    mirrored = direction - 2 * dot(direction, normal)[:, None] * normal
+    return np.asarray(np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
 
 
 def object_in_front(

@@ -107,7 +107,13 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
 
 
 def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays]:
-    """A function that traces rows of a camera's pixels off its exact mirrors.
+    """A function that traces rows of a camera's pixels off its exact mirrors (`part_tracer`)."""
+    trace, columns = part_tracer(reflector), range(reflector.camera.width_px)
+    return lambda rows, shift: trace(rows, columns, shift)
+
+
+def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], ReflectedRays]:
+    """A function that traces some rows and columns of a camera's pixels off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror,
@@ -118,11 +124,14 @@ def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays
     table = _table(reflector.mirrors, camera.pinhole)
     walls = reflector.walls.of_mirrors(len(reflector))
 
-    def trace(rows: range, shift: Shift) -> ReflectedRays:
-        direction = pixel_directions(camera, rows, shift)
-        near = np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start))
-        in_band = boxes - np.array([0, 0, rows.start, rows.start])
-        mirror = _first_mirror(camera.pinhole, direction, table, near, in_band, walls, edges)
+    def trace(rows: range, columns: range, shift: Shift) -> ReflectedRays:
+        direction = pixel_directions(camera, rows, shift)[:, columns.start : columns.stop]
+        in_part = boxes - np.repeat([columns.start, rows.start], 2)
+        in_part[:, :2] = np.clip(in_part[:, :2], 0, len(columns))
+        near = np.flatnonzero(
+            (in_part[:, 2] < len(rows)) & (in_part[:, 3] > 0) & (in_part[:, 0] < in_part[:, 1])
+        )
+        mirror = _first_mirror(camera.pinhole, direction, table, near, in_part, walls, edges)
         rays = reflect_pixels(camera.pinhole, direction, reflector.mirrors, mirror)
         return rays.without(_inside_neighbours(table, neighbours, mirror, rays.origin))
 

@@ -92,7 +92,7 @@ def _record(
 
 
 def _mirror_records(spec: Spec, row: BalancedSensor, pitch: float) -> list[Record]:
-    u = numbered_directions(row.n)[0]
+    u = numbered_directions(row.n, spec.optics.stretch)[0]
     upper = u[:, 2] >= 0
     half_a = upper & (u[:, 0] >= 0)
     values = {

@@ -25,7 +25,8 @@ def apices_in_frame(spec: Spec, n: int, pitch: float) -> int:
     camera = with_lens_of_table_i(spec).camera
     half_width = np.tan(np.radians(camera.hfov_deg) / 2)
     half_height = half_width * camera.height_px / camera.width_px
-    ray = _rays_to_apices(n, tuple(spec.optics.camera_mm), spec.optics.semi_minor_mm)
+    optics = spec.optics
+    ray = _rays_to_apices(n, optics.camera_mm, optics.semi_minor_mm, optics.stretch)
     forward, right = axes_at_pitch(pitch)
     depth, along, across = np.stack([forward, right, np.cross(forward, right)]) @ ray.T
     inside = (np.abs(along) <= half_width * depth) & (np.abs(across) <= half_height * depth)
@@ -52,9 +53,11 @@ def best_pitch(spec: Spec) -> float:
 
 
 @cache
-def _rays_to_apices(n: int, pinhole: tuple[float, ...], semi_minor: float) -> Floats:
+def _rays_to_apices(
+    n: int, pinhole: tuple[float, ...], semi_minor: float, stretch: tuple[float, float]
+) -> Floats:
     """From camera a's pinhole to its mirrors' apices, mm, (m, 3)."""
     ellipsoid = Ellipsoid(np.array(pinhole), semi_minor)
-    u = numbered_directions(n)[0]
+    u = numbered_directions(n, stretch)[0]
     half_a = (u[:, 0] >= 0) & (u[:, 2] >= 0)
     return ellipsoid.apices(u[half_a]) - ellipsoid.pinhole

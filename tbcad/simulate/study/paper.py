@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
+from tbcad.mirrors.array import UNSTRETCHED
 from tbcad.spec.design import FIT, Spec
 
 
@@ -99,11 +100,12 @@ def is_table_i(spec: Spec) -> bool:
 
 
 def has_optics_of_table_i(spec: Spec) -> bool:
-    """Whether cameras, ellipsoids and capture sphere of a design are those of Table I."""
+    """Whether cameras, ellipsoids, directions and capture sphere are those of Table I."""
     optics = spec.optics
     return (
         list(optics.camera_mm) == [claimed("camera_x"), 0.0, claimed("camera_z")]
         and optics.semi_minor_mm == claimed("short_axis")
+        and optics.stretch == UNSTRETCHED
         and optics.capture_diameter_mm == claimed("capture_diameter")
     )
 

@@ -11,6 +11,8 @@ from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.layout import _hub_front as hub_front
+from tbcad.prototype.base.layout import _inner as inner_line
 from tbcad.prototype.base.layout import _sector as sector
 from tbcad.prototype.base.profile import (
     LightSpheroid,
@@ -170,6 +172,24 @@ class TestHub:
         hub = base.hub
         assert base.light.excess(np.array([hub.front, 0.0])) >= 0
         assert hub.front > hub.back > hub.face
+
+    def test_it_is_as_near_to_the_light_as_it_may_be(self, base: BaseLayout) -> None:
+        behind = base.light.pinhole / 2 - base.light.level / 2
+        assert base.hub.front == pytest.approx(behind - SPEC.light_clearance_mm)
+
+    def test_it_begins_behind_a_ball_that_lies_behind_the_light(self, base: BaseLayout) -> None:
+        """Such a ball's boss stood free of a wall that began at the hub before it."""
+        along = base.seats.centre @ base.frame[0]
+        last = int(along.argmin())
+        centre = base.seats.centre.copy()
+        centre[last] += (base.hub.front - 10.0 - along[last]) * base.frame[0]
+        seats = replace(base.seats, centre=centre)
+        hub = hub_layout(SPEC, hub_front(SPEC, seats, base.frame, base.light))
+        assert hub.front < base.hub.front - 10.0
+        line = inner_line(SPEC, seats, base.frame, base.light, hub)
+        front = seats.at_depth(seats.front)[last] @ base.frame.T
+        place = np.array([front[0], norm(front[1:])])
+        assert distance_outside(line, place[None])[0] <= 0
 
     @pytest.mark.parametrize(
         ("drive", "circle", "hole"),

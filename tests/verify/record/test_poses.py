@@ -11,6 +11,7 @@ from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.poses import (
     POSE_MM,
     contradictions,
+    directions,
     figure_errors,
     geodesic,
     malformed,
@@ -78,6 +79,24 @@ def test_the_polyhedron_has_all_vertices(n: int) -> None:
     assert points.shape == (3, 10 * n * n + 2)
     assert np.linalg.norm(points, axis=0) == pytest.approx(np.ones(points.shape[1]))
     assert points.sum(axis=1) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_a_stretch_that_the_mirrors_do_not_have_is_found(sample: Export) -> None:
+    optics = sample.spec.optics.model_copy(update={"stretch": (1.1, 1.0)})
+    other = replace(sample, spec=sample.spec.model_copy(update={"optics": optics}))
+    misplaced, _ = missing_directions(other)
+    u = sample.mirrors.columns("ux", 3)
+    moved = (np.abs(u[0]) > 1e-9) & (np.hypot(u[1], u[2]) > 1e-9)
+    assert misplaced == sorted(np.array(sample.mirrors.ids)[moved])
+    assert figure_errors(other)[moved].min() > POSE_MM
+
+
+def test_directions_are_stretched_along_x_and_y(sample: Export) -> None:
+    optics = sample.spec.optics.model_copy(update={"stretch": (1.5, 0.8)})
+    u, v = geodesic(optics.n), directions(optics)
+    assert np.linalg.norm(v, axis=0) == pytest.approx(np.ones(v.shape[1]))
+    assert v[0] * u[2] == pytest.approx(1.5 * u[0] * v[2])
+    assert v[1] * u[2] == pytest.approx(0.8 * u[1] * v[2])
 
 
 def test_halves_on_the_seam_are_one_virtual_camera(sample: Export) -> None:

@@ -15,7 +15,7 @@ from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM
+from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, OpticsSpec
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -94,7 +94,7 @@ def figure_errors(export: Export) -> Floats:
     Source: DESIGN.md section 2.
     """
     mirrors = export.mirrors
-    vertices = geodesic(export.spec.optics.n)
+    vertices = directions(export.spec.optics)
     errors = np.full(len(mirrors), np.inf)
     for camera in export.cameras.values():
         rows = np.flatnonzero(mirrors.camera == camera.id)
@@ -113,7 +113,7 @@ def missing_directions(export: Export) -> tuple[list[str], int]:
     """
     misplaced: list[str] = []
     missing = 0
-    vertices = geodesic(export.spec.optics.n)
+    vertices = directions(export.spec.optics)
     for camera in export.cameras.values():
         side = np.sign(camera.pinhole[0])
         expected = vertices[:, (vertices[2] > -ON_SEAM) & (side * vertices[0] > -ON_SEAM)]
@@ -148,6 +148,14 @@ def contradictions(export: Export) -> list[str]:
     if sorted(one.camera for one in export.mandrels) != sorted(one.camera for one in shells):
         wrong.append("the mandrels of shell.negative")
     return sorted(wrong)
+
+
+def directions(optics: OpticsSpec) -> Floats:
+    """(3, 10 n^2 + 2) directions that virtual cameras may have.
+
+    Those of the geodesic polyhedron, their x and y times what the spec says, again as unit vectors.
+    """
+    return unit(geodesic(optics.n) * np.array([[*optics.stretch, 1.0]]).T)
 
 
 def geodesic(n: int) -> Floats:

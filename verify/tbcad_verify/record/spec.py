@@ -37,6 +37,11 @@ class OpticsSpec(Strict):
         Annotated[float, Field(ge=-10_000, lt=0)],
     ] = Field(strict=False)
     semi_minor_mm: float = Field(ge=1, le=5000)
+    # Exports of before this key have no stretch.
+    stretch: tuple[
+        Annotated[float, Field(ge=0.5, le=2)],
+        Annotated[float, Field(ge=0.5, le=2)],
+    ] = Field((1.0, 1.0), strict=False)
 
 
 class CameraSpec(Strict):

@@ -1,0 +1,59 @@
+"""How like the truth the views of a design are: the aim `ssim`, without any file or CAD kernel.
+
+Viewpoints, object and method are those of `tbcad study ssim` as it is called without options, so
+that both give the same figure.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from threading import Lock
+
+import numpy as np
+
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.optics.camera import Camera
+from tbcad.simulate.capture.traced_frame import traced_light_field
+from tbcad.simulate.image_quality import image_quality
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, ground_truths, viewpoints_around
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.types import Bytes
+
+AZIMUTHS, DISTANCE_MM = 4, 640.0
+
+_one_at_a_time = Lock()  # candidates that begin together share the truth
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What real cameras would see of the built-in object.
+
+    Attributes:
+        scene: the object.
+        cameras: the viewpoints.
+        pictures: from each, (h, w, 3).
+    """
+
+    scene: Scene
+    cameras: list[Camera]
+    pictures: list[Bytes]
+
+
+def mean_ssim(design: MirrorDesign) -> float:
+    """Mean SSIM of views by nearest rays, over the frame, from the stated viewpoints."""
+    with _one_at_a_time:
+        truth = _truth(design.spec.optics.capture_diameter_mm)
+    tiles = MirrorTiles(traced_light_field(design, truth.scene))
+    views = zip(truth.cameras, truth.pictures, strict=True)
+    return float(
+        np.mean([image_quality(real, synthesise(tiles, at).image).ssim for at, real in views])
+    )
+
+
+@cache
+def _truth(capture_mm: float) -> Truth:
+    scene = prepared_scene(built_in_object(capture_mm))
+    cameras = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM).cameras(capture_mm)
+    return Truth(scene, cameras, ground_truths(scene, cameras, lambda _: None))
