@@ -68,7 +68,7 @@ def view(
     *,
     distance_mm: float = 640.0,
     size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] | None = None,
+    method: Method | Literal["depth"] = "depth",
 ) -> SynthesisedView:
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
@@ -78,8 +78,9 @@ def view(
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
         size: columns and rows of the picture.
-        method: "nearest" rays; "blend" on a plane, or at the "depth" that the light field itself
-            shows; None: nearest or blend, whichever suits the light field.
+        method: "nearest" rays, the quickest; "blend" on a plane; or a blend at the "depth" that
+            the light field itself shows, the best, for which the pictures of all virtual cameras
+            are made first.
 
     Raises:
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
@@ -88,7 +89,6 @@ def view(
 
     from tbcad.depth.view import depth_view
     from tbcad.simulate.scene.viewpoint import camera_around_object
-    from tbcad.simulate.views.method import suitable_method
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import synthesise
 
@@ -97,7 +97,7 @@ def view(
     tiles = MirrorTiles(light_field)
     if method == "depth":
         return depth_view(tiles, camera)[0]
-    return synthesise(tiles, camera, method or suitable_method(tiles).method)
+    return synthesise(tiles, camera, method)
 
 
 @dataclass(frozen=True)
