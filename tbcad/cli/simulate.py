@@ -45,6 +45,18 @@ def capture(
             "those of the shell.",
         ),
     ] = False,
+    lights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also write a reflectance field, a photograph for each lamp: FILE is a table with "
+            "the columns x_mm,y_mm,z_mm, or the word mirrors for a lamp in the place of each "
+            "virtual camera.",
+        ),
+    ] = None,
+    every: Annotated[
+        int, typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors.")
+    ] = 1,
     force: Force = False,
     json: JsonResult = False,
 ) -> int:
@@ -55,23 +67,32 @@ def capture(
     """
     if mesh and prototype:
         raise InputError("--mesh and --prototype exclude each other: leave one out")
+    if lights is not None and samples > 1:
+        raise InputError("--lights follows one ray a pixel: leave out --samples")
+    if every > 1 and lights != "mirrors":
+        raise InputError("--every chooses among the lamps of --lights mirrors: leave it out")
     check_is_export(folder)
     check_is_object(object_file)
-    from tbcad.api import photograph, write_photographs
+    from tbcad.api import WantedLamps, photograph, write_photographs
     from tbcad.output.folder import check_replaceable
 
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, force)
-    with stages(3) as screen:
+    with stages(3 + (lights is not None)) as screen:
         photographs = photograph(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
         )
-        record = write_photographs(photographs, out, force, screen.stage)
+        lamps = None if lights is None else WantedLamps(lights, every)
+        record = write_photographs(photographs, out, force, screen.stage, screen.detail, lamps)
     if json:
         print_json(record)
         return 0
     for camera, counts in record["cameras"].items():
         seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
         typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
+    if reflectance := record.get("reflectance"):
+        size = (out / "reflectance.h5").stat().st_size / 1e6
+        lamps_and_rays = f"{reflectance['lamps']} lamps, {reflectance['rays']} rays"
+        typer.echo(f"{out / 'reflectance.h5'}: {lamps_and_rays}, {size:.0f} MB")
     typer.echo(f"{out}: {photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
     return 0

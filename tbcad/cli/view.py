@@ -32,9 +32,15 @@ from tbcad.screen import stages
 
 if TYPE_CHECKING:
     from tbcad.optics.camera import Camera
+    from tbcad.reflectance.environment import Environment
+    from tbcad.reflectance.relit import Relit
+    from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import Scene
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.types import Bytes, Progress
+
+# Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
+LIT_SAMPLES = 2
 
 Method = Literal["nearest", "blend", "depth"]
 Surface = Literal["plane", "depth", "object"]
@@ -79,6 +85,17 @@ def view(
             "repeatable.",
         ),
     ] = None,
+    light: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show the object in the light of its surroundings, a picture by direction (.hdr), "
+            "by the reflectance field of tbcad capture --lights.",
+        ),
+    ] = None,
+    light_turn: Annotated[
+        float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
+    ] = 0.0,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
@@ -98,24 +115,73 @@ def view(
 
     check_pictures(capture_folder, out, force)
     _check_depth(files, out, choice, force)
+    if light is None and light_turn:
+        raise InputError(f"--light-turn {light_turn:g} turns no light: add --light")
     if choice.surface == "object" and not has_object(capture_folder):
         raise InputError(f"{capture_folder} has no object: leave out --surface object")
+    wanted = None if light is None else _environment(light, light_turn)
     with stages(3) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
         at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
+        relit = None if wanted is None else _relit(capture_folder, source, wanted)
+        shown = tiles if relit is None else MirrorTiles(relit.field)
         screen.stage("view")
         if choice.surface == "depth":
-            picture = _depth_view(tiles, at, files, screen.detail)
+            picture = _depth_view(tiles, shown, at, files, screen.detail)
         else:
-            picture = _view(tiles, at, choice, scene)
+            picture = _view(shown, at, choice, scene)
         screen.stage("truth")
-        truth = None if scene is None else to_bytes(pinhole_picture(scene, at))
+        truth, same_lamps = None, None
+        if scene is not None and relit is not None and wanted is not None:
+            truth, same_lamps = _lit_truths(scene, at, relit, wanted)
+        elif scene is not None:
+            truth = to_bytes(pinhole_picture(scene, at))
     typer.echo(f"method {choice.method}: {choice.reason}")
+    if relit is not None:
+        typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
     write_compared(out, picture, truth, (choice.method, "ray-traced"))
+    if same_lamps is not None:
+        typer.echo(f"SSIM {_ssim(same_lamps, picture):.4f} against one lit by the same lamps")
     for file in files:
         typer.echo(f"{file}: depth")
     return 0
+
+
+def _environment(light: Path, turn_deg: float) -> "Environment":
+    from math import radians
+
+    from tbcad.reflectance.environment import read_environment
+
+    return read_environment(light, radians(turn_deg))
+
+
+def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
+    from tbcad.reflectance.field_file import open_reflectance
+    from tbcad.reflectance.relit import relit
+
+    with open_reflectance(folder) as reflectance:
+        return relit(source, reflectance, wanted)
+
+
+def _lit_truths(
+    scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
+) -> tuple["Bytes", "Bytes"]:
+    """The ray-traced pictures in that light, and in the light of the same lamps."""
+    from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
+    from tbcad.simulate.capture.photograph import to_bytes
+    from tbcad.simulate.scene.ground_truth import pinhole_picture
+
+    lights = wanted.far_lights(TRUE_LIGHTS), relit.lamps
+    scenes = [lit_scene(scene, one, relit.exposure) for one in lights]
+    first, second = (to_bytes(pinhole_picture(one, at, LIT_SAMPLES)) for one in scenes)
+    return first, second
+
+
+def _ssim(truth: "Bytes", picture: "Bytes") -> float:
+    from tbcad.simulate.image_quality import image_quality
+
+    return image_quality(truth, picture).ssim
 
 
 def _choice(method: Method | None, surface: Surface | None) -> _Choice:
@@ -164,13 +230,17 @@ def _view(tiles: "MirrorTiles", at: "Camera", choice: _Choice, scene: "Scene | N
 
 
 def _depth_view(
-    tiles: "MirrorTiles", at: "Camera", files: list[Path], progress: "Progress"
+    tiles: "MirrorTiles",
+    shown: "MirrorTiles",
+    at: "Camera",
+    files: list[Path],
+    progress: "Progress",
 ) -> "Bytes":
-    """The picture at the depth that is found, and files of that depth."""
+    """The picture at the depth that is found, in the colours that are shown; and files of it."""
     from tbcad.atomic_files import replace_files
     from tbcad.depth.view import depth_view
 
-    picture, depth = depth_view(tiles, at, progress)
+    picture, depth = depth_view(tiles, at, progress, shown)
     for file in files:
         content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
         replace_files(file.parent, {file.name: content})

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.geometry.vectors import unit
 from tbcad.simulate.scene.object import SceneObject, pattern
+from tbcad.simulate.scene.point_lights import PointLights, Spots, facet_normals, lamp_light
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
@@ -28,12 +30,14 @@ class Scene:
         embree: its facets, committed; queries release the interpreter's lock.
         shade: light at each corner, 0 to 1, (v,).
         radius: of the sphere about the origin that holds it, mm.
+        lamps: in place of that light, with cast shadows; None: as `shade` says.
     """
 
     subject: SceneObject
     embree: Any
     shade: Floats
     radius: float
+    lamps: PointLights | None = None
 
 
 @dataclass(frozen=True)
@@ -80,24 +84,65 @@ def prepared_scene(subject: SceneObject) -> Scene:
     return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
 
 
-def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
-    """What rays from origins (n, 3) along unit directions (n, 3) see."""
-    colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
-    depth = np.full(len(origin), np.inf)
+@dataclass(frozen=True)
+class SurfaceHits:
+    """Where rays meet the object first.
+
+    Attributes:
+        rows: numbers of the rays that do, ascending, (k,).
+        depth: mm along them, (k,).
+        facet: (k,).
+        weight: barycentric, of the facet's corners, (k, 3).
+    """
+
+    rows: Ints
+    depth: Floats
+    facet: Ints
+    weight: Floats
+
+    def albedo(self, subject: SceneObject) -> Floats:
+        """Colours (k, 3), 0 to 1."""
+        return _albedo(subject, self.facet, self.weight)
+
+    def spots(self, subject: SceneObject) -> Spots:
+        """Places and normals of the surface."""
+        faces = subject.faces[self.facet]
+        corners = subject.points[faces]
+        normal = unit(np.einsum("nk,nkx->nx", self.weight, subject.normals[faces]))
+        place = np.einsum("nk,nkx->nx", self.weight, corners)
+        return Spots(place, normal, facet_normals(corners, normal))
+
+
+def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits:
+    """Where rays from origins (n, 3) along unit directions (n, 3) meet the object."""
     near = np.flatnonzero(meets_sphere(origin, direction, scene.radius))
     if len(near) == 0:
-        return RayHits(colour, depth)
+        return SurfaceHits(near, np.zeros(0), near, np.zeros((0, 3)))
     hits = scene.embree.run(
         origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
     )
     hit = hits["primID"] >= 0
-    rows, facet = near[hit], hits["primID"][hit].astype(np.int64)
     u, v = hits["u"][hit], hits["v"][hit]
     weight = np.column_stack([1 - u - v, u, v]).astype(np.float64)
-    depth[rows] = hits["tfar"][hit]
-    light = (scene.shade[scene.subject.faces[facet]] * weight).sum(axis=1)
-    colour[rows] = 255 * (_albedo(scene.subject, facet, weight) * light[:, None])
+    return SurfaceHits(near[hit], hits["tfar"][hit], hits["primID"][hit].astype(np.int64), weight)
+
+
+def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
+    """What rays from origins (n, 3) along unit directions (n, 3) see."""
+    colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
+    depth = np.full(len(origin), np.inf)
+    hits = surface_hits(scene, origin, direction)
+    depth[hits.rows] = hits.depth
+    colour[hits.rows] = 255 * (hits.albedo(scene.subject) * _light(scene, hits))
     return RayHits(colour, depth)
+
+
+def _light(scene: Scene, hits: SurfaceHits) -> Floats:
+    """Light on what is hit, (k, 1) or by colours (k, 3)."""
+    if scene.lamps is not None:
+        return lamp_light(scene.embree, hits.spots(scene.subject), scene.lamps)
+    light = (scene.shade[scene.subject.faces[hits.facet]] * hits.weight).sum(axis=1)
+    return np.asarray(light[:, None])
 
 
 def object_in_front(
