@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
+import numpy as np
 import pytest
 import trimesh
 import typer
@@ -238,6 +240,9 @@ def test_commands_work_one_after_the_other(
         trimesh.creation.icosphere(2, 20.0).export(tmp_path / name)
     for name, columns in (("my-cameras.csv", CAMERA_COLUMNS), ("my-lenses.csv", LENS_COLUMNS)):
         (tmp_path / name).write_text(",".join(columns) + "\n")
+    (tmp_path / "lamps.csv").write_text("x_mm,y_mm,z_mm\n200,0,120\n-90,150,90\n")
+    sky = np.full((8, 16, 3), 0.5, dtype=np.float32)
+    assert cv2.imwrite(str(tmp_path / "sky.hdr"), sky)
     (tmp_path / "captures").mkdir()
     for shown in EVERY:
         if shown.document != document or not shown.whole or {*NOT_RUN} & {*shown.words}:

@@ -5,7 +5,15 @@ bad input is refused before they are loaded.
 """
 
 from tbcad.api.builds import Build, as_made, build, report_page
-from tbcad.api.captures import Photographs, capture, photograph, view, write_photographs
+from tbcad.api.captures import (
+    Photographs,
+    WantedLamps,
+    capture,
+    photograph,
+    relight,
+    view,
+    write_photographs,
+)
 from tbcad.api.datasets import export
 from tbcad.api.designs import design
 from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
@@ -15,6 +23,7 @@ from tbcad.api.verification import verify, verify_as_built
 __all__ = [
     "Build",
     "Photographs",
+    "WantedLamps",
     "analyse",
     "as_built",
     "as_made",
@@ -26,6 +35,7 @@ __all__ = [
     "inspect",
     "merge",
     "photograph",
+    "relight",
     "report_page",
     "run",
     "simulate_run",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tbcad.api.arguments import silent
+from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
@@ -25,6 +27,8 @@ def capture(
     fit: bool = False,
     paint: Paint = "own",
     samples: int = 1,
+    lights: Path | str | None = None,
+    every: int = 1,
     force: bool = False,
     progress: Progress = silent,
     detail: Progress = silent,
@@ -40,6 +44,9 @@ def capture(
         fit: move and scale the object into the capture sphere.
         paint: colours of the file ("own"), a pattern, or plain grey.
         samples: a pixel is the mean of samples x samples rays.
+        lights: also write a reflectance field to `out`: a table of lamps with the columns x_mm,
+            y_mm, z_mm; or "mirrors" for a lamp in the place of each virtual camera.
+        every: one lamp of so many, of "mirrors".
         force: keep files in the folder that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
@@ -48,13 +55,17 @@ def capture(
         The light field, in memory: for every pixel the ray it sees along and its colour.
 
     Raises:
-        InputError: export or object cannot be read, or the folder cannot be replaced.
+        InputError: export, object or lamps cannot be read, or the folder cannot be replaced.
     """
     from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 
+    if lights is not None and out is None:
+        raise InputError("a reflectance field is written beside the light field: give out")
+
     photographs = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
     if out is not None:
-        write_photographs(photographs, Path(out), force, progress)
+        lamps = None if lights is None else WantedLamps(lights, every)
+        write_photographs(photographs, Path(out), force, progress, detail, lamps)
         return LightField.read(Path(out))
     progress("photographs and light field")
     bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
@@ -68,7 +79,7 @@ def view(
     *,
     distance_mm: float = 640.0,
     size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] | None = None,
+    method: Method | Literal["depth"] = "depth",
 ) -> SynthesisedView:
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
@@ -78,8 +89,9 @@ def view(
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
         size: columns and rows of the picture.
-        method: "nearest" rays; "blend" on a plane, or at the "depth" that the light field itself
-            shows; None: nearest or blend, whichever suits the light field.
+        method: "nearest" rays, the quickest; "blend" on a plane; or a blend at the "depth" that
+            the light field itself shows, the best, for which the pictures of all virtual cameras
+            are made first.
 
     Raises:
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
@@ -88,7 +100,6 @@ def view(
 
     from tbcad.depth.view import depth_view
     from tbcad.simulate.scene.viewpoint import camera_around_object
-    from tbcad.simulate.views.method import suitable_method
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import synthesise
 
@@ -97,7 +108,7 @@ def view(
     tiles = MirrorTiles(light_field)
     if method == "depth":
         return depth_view(tiles, camera)[0]
-    return synthesise(tiles, camera, method or suitable_method(tiles).method)
+    return synthesise(tiles, camera, method)
 
 
 @dataclass(frozen=True)
@@ -150,14 +161,33 @@ def photograph(
     return Photographs(cameras, subject, export.capture_mm, facts)
 
 
+@dataclass(frozen=True)
+class WantedLamps:
+    """The lamps of a reflectance field.
+
+    Attributes:
+        lights: table of their places, or "mirrors" for virtual cameras.
+        every: one virtual camera of so many.
+    """
+
+    lights: Path | str
+    every: int = 1
+
+
 def write_photographs(
-    photographs: Photographs, out: Path, force: bool, progress: Progress
+    photographs: Photographs,
+    out: Path,
+    force: bool,
+    progress: Progress,
+    detail: Progress = silent,
+    lamps: WantedLamps | None = None,
 ) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
     from tbcad.output.folder import replacing
     from tbcad.output.manifest import write_manifest
     from tbcad.simulate.capture.files import write_capture
 
+    write_field = None if lamps is None else _field_writer(photographs, lamps)
     progress("photographs and light field")
     with replacing(out, force) as folder:
         record = write_capture(
@@ -167,5 +197,57 @@ def write_photographs(
             photographs.capture_mm,
             photographs.facts,
         )
+        if write_field is not None:
+            progress("a photograph for each lamp")
+            record["reflectance"] = write_field(folder, detail)
         write_manifest(folder)
     return record
+
+
+def _field_writer(
+    photographs: Photographs, wanted: WantedLamps
+) -> Callable[[Path, Progress], dict[str, Any]]:
+    """What writes the reflectance field; a table of lamps is read at once, before long work."""
+    from tbcad.reflectance.lamp_places import MIRRORS, lamps_of_mirrors, read_lamp_places
+    from tbcad.reflectance.transport import write_reflectance
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.ray_casting import prepared_scene
+
+    table = None
+    if str(wanted.lights) != MIRRORS:
+        table = read_lamp_places(Path(wanted.lights), photographs.capture_mm)
+
+    def write(folder: Path, detail: Progress) -> dict[str, Any]:
+        with LightField.open(folder) as source:
+            lamps = table or lamps_of_mirrors(source, wanted.every)
+            scene = prepared_scene(photographs.subject)
+            return write_reflectance(folder, source, scene, lamps, detail)
+
+    return write
+
+
+def relight(capture_folder: Path | str, light: Path | str, *, turn_deg: float = 0.0) -> LightField:
+    """A light field in the light of its surroundings, as `tbcad view --light` shows it.
+
+    Args:
+        capture_folder: that `capture` wrote with lights.
+        light: picture of the surroundings by direction, Radiance's format (.hdr): longitude along
+            the rows, the zenith at the top, +x in the middle.
+        turn_deg: turns it about z.
+
+    Returns:
+        The light field in memory, with other colours.
+
+    Raises:
+        InputError: the folder has no reflectance field, or the picture cannot be read.
+    """
+    from math import radians
+
+    from tbcad.reflectance.environment import read_environment
+    from tbcad.reflectance.field_file import open_reflectance
+    from tbcad.reflectance.relit import relit
+    from tbcad.simulate.capture.light_field import LightField
+
+    folder, environment = Path(capture_folder), read_environment(Path(light), radians(turn_deg))
+    with open_reflectance(folder) as reflectance:
+        return relit(LightField.read(folder), reflectance, environment).field

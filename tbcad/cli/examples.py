@@ -115,6 +115,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "view": (
         ("captures/knot --azimuth 30 --elevation 15", "a camera anywhere around the object"),
         ("captures/knot --width 1280 --height 960 -o view.png", "a larger picture"),
+        ("captures/lit --light sky.hdr", "in the light of other surroundings"),
     ),
     "refocus": (
         ("captures/knot --aperture 300 --focus 0", "a lens of 300 mm, focused on the centre"),

@@ -9,7 +9,10 @@ from tbcad.types import Progress
 
 
 def depth_view(
-    tiles: MirrorTiles, view: Camera, progress: Progress = lambda _: None
+    tiles: MirrorTiles,
+    view: Camera,
+    progress: Progress = lambda _: None,
+    shown: MirrorTiles | None = None,
 ) -> tuple[SynthesisedView, DepthMap]:
     """The picture that a pinhole camera would see, and its depth.
 
@@ -17,9 +20,10 @@ def depth_view(
         tiles: the light field.
         view: the camera, which looks at the origin.
         progress: called with each virtual camera whose picture is made.
+        shown: another light field of the same rays, whose colours the picture has.
 
     Raises:
         InputError: the camera looks elsewhere.
     """
     found = depth_map(pinhole_pictures(tiles.source, progress), view)
-    return synthesise(tiles, view, "blend", found.along_rays), found
+    return synthesise(shown or tiles, view, "blend", found.along_rays), found

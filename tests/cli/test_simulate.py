@@ -84,7 +84,7 @@ def test_captures_that_cannot_be(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("more", [[], ["--method", "blend"], ["--method", "blend", "--surface",
+@pytest.mark.parametrize("more", [[], ["--surface", "plane"], ["--method", "blend", "--surface",
                                                                "object"]])  # fmt: skip
 def test_view(
     captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str]
@@ -114,7 +114,9 @@ def test_depth_of_a_view(captured: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "wrong"),
     [
-        (["--depth", "d.png"], "add --method depth"),
+        (["--method", "nearest", "--depth", "d.png"], "add --method depth"),
+        (["--surface", "plane", "--depth", "d.png"], "add --method depth"),
+        (["--method", "nearest", "--surface", "depth"], "leave out --surface depth"),
         (["--method", "depth", "--surface", "object"], "leave out --surface object"),
         (["--method", "depth", "--depth", "d.gif"], "ends in .png or .ply"),
         (["--method", "depth", "--depth", "view.png"], "choose another name"),
@@ -165,16 +167,18 @@ def test_pictures_that_exist_are_replaced_on_force_only(
         assert contents(tmp_path) == before
 
 
-def test_method_follows_the_capture_and_says_why(
+def test_the_method_and_why(
     captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With so few pixels the virtual cameras are near enough to each other for a blend."""
+    """Without a mesh a view is blended at the depth that is found, if nothing else is said."""
     view = ["view", str(captured), "--width", "64", "--height", "48", "--force"]
     view += ["--out", str(tmp_path / "v.png")]
     for more, expected in (
-        ([], "method blend: neighbouring virtual cameras"),
+        ([], "method depth: a blend at the depth that is found"),
+        (["--method", "blend"], "method depth: a blend at the depth that is found"),
+        (["--method", "depth"], "method depth: as --method says"),
         (["--surface", "object"], "method blend: --surface object"),
-        (["--method", "blend"], "method blend: as --method says"),
+        (["--method", "blend", "--surface", "plane"], "method blend: as --method says"),
         (["--method", "nearest"], "method nearest: as --method says"),
     ):
         assert run([*view, *more]) == 0
@@ -260,3 +264,12 @@ def test_refocus_and_sweep(
     assert "PSNR" in capsys.readouterr().out
     assert run([*arguments[:2], "--aperture", "-1"]) == 2
     assert "--aperture -1" in capsys.readouterr().err
+
+
+def test_all_in_focus(captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["refocus", str(captured), "--all-in-focus", "--aperture", "80"]
+    words += ["--width", "96", "--height", "72", "--out", str(tmp_path / "f.png")]
+    assert run(words) == 0
+    assert "against the pinhole picture" in capsys.readouterr().out
+    assert run([*words, "--sweep", str(tmp_path / "f.gif")]) == 2
+    assert "leave out --sweep" in capsys.readouterr().err

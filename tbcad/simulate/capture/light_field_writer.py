@@ -81,14 +81,14 @@ def _write_chunks(planes: Mapping[str, h5py.Dataset], band: RowBand) -> None:
 
     def filtered(place: tuple[str, int]) -> bytes:
         name, first = place
-        return _filtered(arrays[name][:, first : first + step], planes[name].chunks)
+        return filtered_chunk(arrays[name][:, first : first + step], planes[name].chunks)
 
     for (name, first), data in zip(places, in_threads(filtered, places), strict=True):
         offset = (band.rows.start, first, 0)[: arrays[name].ndim]
         planes[name].id.write_direct_chunk(offset, data)
 
 
-def _filtered(part: NDArray[Any], shape: tuple[int, ...]) -> bytes:
+def filtered_chunk(part: NDArray[Any], shape: tuple[int, ...]) -> bytes:
     """A chunk after HDF5's filters: filled up, bytes of equal weight side by side, deflated."""
     chunk = np.zeros(shape, dtype=part.dtype)
     chunk[: part.shape[0], : part.shape[1]] = part

@@ -66,8 +66,8 @@ def row_bands(height: int) -> list[range]:
 
 
 def to_bytes(colours: NDArray[np.floating]) -> Bytes:
-    """Colours 0 to 255 as whole numbers."""
-    return np.asarray(np.rint(colours), dtype=np.uint8)
+    """Colours 0 to 255 as whole numbers; brighter ones are 255."""
+    return np.asarray(np.rint(np.minimum(colours, 255)), dtype=np.uint8)
 
 
 def _band(view: Camera, trace: Tracer, scene: Scene, samples: Samples, rows: range) -> RowBand:

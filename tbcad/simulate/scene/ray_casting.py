@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, unit
 from tbcad.simulate.scene.object import SceneObject, pattern
+from tbcad.simulate.scene.point_lights import PointLights, Spots, facet_normals, lamp_light
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
@@ -32,6 +33,7 @@ class Scene:
         shade: light at each corner, 0 to 1, (v,).
         radius: of the sphere about the origin that holds it, mm.
         gloss: share of the lamps' light in highlights, which move with the viewpoint; 0: matt.
+        lamps: in place of all that light, with cast shadows; None: as `shade` says.
     """
 
     subject: SceneObject
@@ -39,6 +41,7 @@ class Scene:
     shade: Floats
     radius: float
     gloss: float = 0.0
+    lamps: PointLights | None = None
 
 
 @dataclass(frozen=True)
@@ -85,38 +88,81 @@ def prepared_scene(subject: SceneObject) -> Scene:
     return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
 
 
-def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
-    """What rays from origins (n, 3) along unit directions (n, 3) see."""
-    colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
-    depth = np.full(len(origin), np.inf)
+@dataclass(frozen=True)
+class SurfaceHits:
+    """Where rays meet the object first.
+
+    Attributes:
+        rows: numbers of the rays that do, ascending, (k,).
+        depth: mm along them, (k,).
+        facet: (k,).
+        weight: barycentric, of the facet's corners, (k, 3).
+    """
+
+    rows: Ints
+    depth: Floats
+    facet: Ints
+    weight: Floats
+
+    def albedo(self, subject: SceneObject) -> Floats:
+        """Colours (k, 3), 0 to 1."""
+        return _albedo(subject, self.facet, self.weight)
+
+    def normals(self, subject: SceneObject) -> Floats:
+        """Unit normals (k, 3) of the smooth surface."""
+        corners = subject.normals[subject.faces[self.facet]]
+        return unit(np.einsum("nk,nkx->nx", self.weight, corners))
+
+    def spots(self, subject: SceneObject) -> Spots:
+        """Places and normals of the surface."""
+        corners, normal = subject.points[subject.faces[self.facet]], self.normals(subject)
+        place = np.einsum("nk,nkx->nx", self.weight, corners)
+        return Spots(place, normal, facet_normals(corners, normal))
+
+
+def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits:
+    """Where rays from origins (n, 3) along unit directions (n, 3) meet the object."""
     near = np.flatnonzero(meets_sphere(origin, direction, scene.radius))
     if len(near) == 0:
-        return RayHits(colour, depth)
+        return SurfaceHits(near, np.zeros(0), near, np.zeros((0, 3)))
     hits = scene.embree.run(
         origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
     )
     hit = hits["primID"] >= 0
-    rows, facet = near[hit], hits["primID"][hit].astype(np.int64)
     u, v = hits["u"][hit], hits["v"][hit]
     weight = np.column_stack([1 - u - v, u, v]).astype(np.float64)
-    depth[rows] = hits["tfar"][hit]
-    light = (scene.shade[scene.subject.faces[facet]] * weight).sum(axis=1)
-    colour[rows] = 255 * (_albedo(scene.subject, facet, weight) * light[:, None])
-    if scene.gloss:
-        glint = scene.gloss * _highlights(scene.subject, facet, weight, direction[rows])
-        colour[rows] = np.minimum(colour[rows] + 255 * glint[:, None], 255)
+    return SurfaceHits(near[hit], hits["tfar"][hit], hits["primID"][hit].astype(np.int64), weight)
+
+
+def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
+    """What rays from origins (n, 3) along unit directions (n, 3) see."""
+    colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
+    depth = np.full(len(origin), np.inf)
+    hits = surface_hits(scene, origin, direction)
+    depth[hits.rows] = hits.depth
+    colour[hits.rows] = 255 * (hits.albedo(scene.subject) * _light(scene, hits))
+    if scene.gloss and scene.lamps is None:
+        glint = scene.gloss * _highlights(scene.subject, hits, direction[hits.rows])
+        colour[hits.rows] = np.minimum(colour[hits.rows] + 255 * glint[:, None], 255)
     return RayHits(colour, depth)
 
 
-def _highlights(subject: SceneObject, facet: Ints, weight: Floats, direction: Floats) -> Floats:
-    """Light of both lamps (n,) that facets (n,) throw back along unit directions (n, 3).
+def _highlights(subject: SceneObject, hits: SurfaceHits, direction: Floats) -> Floats:
+    """Light of both lamps (k,) that the surface throws back along unit directions (k, 3).
 
     Source: B. T. Phong, Communications of the ACM 18(6), 1975.
     """
-    corners = subject.normals[subject.faces[facet]]
-    normal = unit(np.einsum("nk,nkx->nx", weight, corners))
+    normal = hits.normals(subject)
     mirrored = direction - 2 * dot(direction, normal)[:, None] * normal
     return np.asarray(np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
+
+
+def _light(scene: Scene, hits: SurfaceHits) -> Floats:
+    """Light on what is hit, (k, 1) or by colours (k, 3)."""
+    if scene.lamps is not None:
+        return lamp_light(scene.embree, hits.spots(scene.subject), scene.lamps)
+    light = (scene.shade[scene.subject.faces[hits.facet]] * hits.weight).sum(axis=1)
+    return np.asarray(light[:, None])
 
 
 def object_in_front(

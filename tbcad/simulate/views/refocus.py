@@ -2,17 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
+from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import in_batches
 from tbcad.simulate.plausibility import warn_of_wide_lens
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import (
+    DepthFunction,
     Rays,
     SynthesisedView,
     nearby_rays,
@@ -110,18 +113,61 @@ def refocus(
     the mean is of the others.
     """
     places = (lens_pinholes() if pinholes is None else pinholes) * focus.aperture_mm / 2
+    return _mean_of_pinholes(tiles, view, places, partial(lens_rays, view, focus), proceed)
+
+
+def refocus_everywhere(
+    tiles: MirrorTiles, view: Camera, aperture_mm: float, depth: DepthFunction
+) -> SynthesisedView:
+    """The picture of a lens that makes each pixel sharp at its own depth.
+
+    Each pixel is the mean of what the 69 pinholes see of its point of the surface: as bright and
+    as free of noise as the picture of a lens, and as sharp everywhere as that of a pinhole.
+
+    Args:
+        tiles: the light field.
+        view: the middle of the lens, and the picture.
+        aperture_mm: diameter of the lens.
+        depth: the surface; pixels whose rays pass it are made sharp on the plane through the
+            origin.
+    """
+    points = _points_on_surface(view, depth)
+
+    def rays(place: Floats) -> Rays:
+        origin = np.broadcast_to(view.pinhole + place @ view.axes[:2], points.shape)
+        return origin, unit(points - origin)
+
+    return _mean_of_pinholes(tiles, view, lens_pinholes() * aperture_mm / 2, rays)
+
+
+def _points_on_surface(view: Camera, depth: DepthFunction) -> Floats:
+    """What the middle of the lens sees in each pixel, (h, w, 3)."""
+    direction = unit_directions(view, range(view.height_px))
+    flat = direction.reshape(-1, 3)
+    distance = depth(np.broadcast_to(view.pinhole, flat.shape), flat)
+    plane = -float(view.pinhole @ view.forward) / (flat @ view.forward)
+    distance = np.where(np.isfinite(distance), distance, plane)
+    return np.asarray(view.pinhole + distance.reshape(*direction.shape[:2], 1) * direction)
+
+
+def _mean_of_pinholes(
+    tiles: MirrorTiles,
+    view: Camera,
+    places: Floats,
+    rays_from: Callable[[Floats], Rays],
+    proceed: Callable[[], None] = lambda: None,
+) -> SynthesisedView:
+    """The mean of what pinholes at places (n, 2) beside a view's see along rays of each."""
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     square = np.abs(places).max() * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
-    corners = [
-        rays_to_capture_sphere(tiles, lens_rays(view, focus, corner))[1] for corner in square
-    ]
+    corners = [rays_to_capture_sphere(tiles, rays_from(corner))[1] for corner in square]
     origin, direction = (np.concatenate(part) for part in zip(*corners, strict=True))
     bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
     total = np.zeros((view.height_px * view.width_px, 3), dtype=np.float32)
     count = np.full(len(total), len(places), dtype=np.float32)
 
     def one(place: Floats) -> tuple[Ints, Colours, Bools]:
-        pixels, rays = rays_to_capture_sphere(tiles, lens_rays(view, focus, place))
+        pixels, rays = rays_to_capture_sphere(tiles, rays_from(place))
         return pixels, *ray_colours(bundle, rays)
 
     for pixels, colours, seen in in_batches(one, list(places), lambda _: proceed()):

@@ -1,0 +1,94 @@
+"""What commands share that make a picture from a light field: viewpoint, truth, files."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from tbcad.errors import InputError
+
+if TYPE_CHECKING:
+    from tbcad.optics.camera import Camera
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.ray_casting import Scene
+    from tbcad.types import Bytes
+
+WIDEST_DEG = 170
+
+
+def check_pictures(capture: Path, out: Path, force: bool) -> None:
+    """Refuse, before any work, pictures that cannot be written or that exist."""
+    from tbcad.simulate.image_files import check_image_path
+
+    compared = compared_files(out) if has_object(capture) else []
+    for file in (out, *compared):
+        check_image_path(file, force)
+
+
+def compared_files(out: Path) -> list[Path]:
+    """The ground truth and the comparison that are written beside a picture."""
+    return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "and-truth")]
+
+
+def has_object(capture: Path) -> bool:
+    """Whether a capture is simulated: real photographs come without the object."""
+    from tbcad.simulate.capture.files import OBJECT
+
+    return (capture / OBJECT).is_file()
+
+
+def viewpoint_of(
+    source: "LightField",
+    place: tuple[float, float, float],
+    size: tuple[int, int],
+    fov: float | None,
+) -> "Camera":
+    """The camera of a view: azimuth and elevation in degrees, distance in mm; columns and rows.
+
+    Raises:
+        InputError: no light field shows what it would see, or its angle of view cannot be.
+    """
+    from math import radians
+
+    from tbcad.simulate.scene.viewpoint import camera_around_object
+
+    azimuth, elevation, distance = place
+    if fov is not None and not 0 < fov < WIDEST_DEG:
+        raise InputError(f"--fov {fov:g} is no angle of view: allowed is above 0, below 170")
+    wide = None if fov is None else radians(fov)
+    return camera_around_object(
+        radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide
+    )
+
+
+def scene_of(folder: Path) -> "Scene | None":
+    """The object of a simulated capture; None where there is none, as with real photographs."""
+    from tbcad.simulate.capture.files import read_object
+    from tbcad.simulate.scene.ray_casting import prepared_scene
+
+    if not has_object(folder):
+        return None
+    return prepared_scene(read_object(folder))
+
+
+def write_compared(
+    out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]
+) -> None:
+    """Write the picture, and a comparison with the ground truth where it is known."""
+    from tbcad.simulate.image_files import difference, side_by_side, write_images
+    from tbcad.simulate.image_quality import image_quality
+
+    if truth is None:
+        write_images({out: picture})
+        typer.echo(f"{out}: written, without ground truth: the capture names no object")
+        return
+    files = compared_files(out)
+    sheet = side_by_side(
+        {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
+    )
+    write_images({out: picture, files[0]: truth, files[1]: sheet})
+    quality = image_quality(truth, picture)
+    typer.echo(
+        f"PSNR {quality.psnr_db:.2f} dB, SSIM {quality.ssim:.4f} against the {names[1]} picture"
+    )
+    typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

@@ -1,0 +1,133 @@
+"""Refocus a light field."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.cli.app import app
+from tbcad.cli.compared_pictures import check_pictures, scene_of, viewpoint_of, write_compared
+from tbcad.cli.early_checks import check_is_capture
+from tbcad.cli.options import (
+    Azimuth,
+    Capture,
+    Distance,
+    Elevation,
+    ForceFile,
+    Fov,
+    Height,
+    OutPicture,
+    Width,
+)
+from tbcad.errors import InputError
+from tbcad.screen import stages
+
+if TYPE_CHECKING:
+    from tbcad.optics.camera import Camera
+    from tbcad.simulate.scene.ray_casting import Scene
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.simulate.views.refocus import ThinLens
+    from tbcad.types import Bytes, Progress
+
+
+@app.command()
+def refocus(
+    capture_folder: Capture,
+    azimuth: Azimuth = 0.0,
+    elevation: Elevation = 30.0,
+    distance: Distance = 640.0,
+    aperture: Annotated[float, typer.Option(help="Diameter of the lens, mm.")] = 300.0,
+    focus: Annotated[
+        float,
+        typer.Option(
+            help="Position of the focal plane: mm from the centre of the object toward the camera."
+        ),
+    ] = 0.0,
+    all_in_focus: Annotated[
+        bool,
+        typer.Option(
+            "--all-in-focus",
+            help="Make each pixel sharp at its own depth, which is found in the light field, "
+            "instead of at --focus.",
+        ),
+    ] = False,
+    out: OutPicture = Path("refocus.png"),
+    sweep: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also write an animation of the focus through the object: GIF, WebP or PNG."
+        ),
+    ] = None,
+    frames: Annotated[
+        int, typer.Option(min=2, max=500, help="Number of pictures in the animation.")
+    ] = 21,
+    width: Width = 640,
+    height: Height = 480,
+    fov: Fov = None,
+    truth_samples: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Rays per pixel of the ray-traced lens.")
+    ] = 256,
+    force: ForceFile = False,
+) -> int:
+    """Refocus a light field: the picture of a large lens, as the mean of 69 pinhole views.
+
+    For a simulated capture also writes the ray-traced picture of a real lens and a comparison; of a
+    pinhole with --all-in-focus, since no real lens is sharp everywhere.
+    """
+    check_is_capture(capture_folder)
+    if all_in_focus and sweep is not None:
+        raise InputError("--all-in-focus has no focus to move: leave out --sweep")
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.simulate.views.refocus import ThinLens, refocus_sweep
+
+    check_pictures(capture_folder, out, force)
+    if sweep is not None:
+        check_image_path(sweep, force, ANIMATED_SUFFIXES)
+    names = ("69 pinholes", "pinhole" if all_in_focus else "real lens")
+    with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
+        screen.stage("light field")
+        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
+        lens = ThinLens(aperture, focus)
+        lens.check(at, source.capture_mm)
+        tiles, scene = MirrorTiles(source), scene_of(capture_folder)
+        screen.stage(names[0])
+        picture = _picture(tiles, at, lens, all_in_focus, screen.detail)
+        screen.stage(names[1])
+        samples = 0 if all_in_focus else truth_samples
+        truth = None if scene is None else _truth(scene, at, lens, samples, screen.detail)
+        if sweep is not None:
+            screen.stage("sweep")
+            write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, screen.detail))
+    write_compared(out, picture, truth, names)
+    if sweep is not None:
+        typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
+    return 0
+
+
+def _picture(
+    tiles: "MirrorTiles", at: "Camera", lens: "ThinLens", all_in_focus: bool, progress: "Progress"
+) -> "Bytes":
+    """The picture of the lens, sharp at its focus or everywhere."""
+    from tbcad.datasets.pinhole_pictures import pinhole_pictures
+    from tbcad.depth.depth_map import depth_map
+    from tbcad.simulate.views.refocus import refocus as refocused
+    from tbcad.simulate.views.refocus import refocus_everywhere
+
+    if not all_in_focus:
+        return refocused(tiles, at, lens).image
+    depth = depth_map(pinhole_pictures(tiles.source, progress), at)
+    return refocus_everywhere(tiles, at, lens.aperture_mm, depth.along_rays).image
+
+
+def _truth(
+    scene: "Scene", at: "Camera", lens: "ThinLens", samples: int, progress: "Progress"
+) -> "Bytes":
+    """The ray-traced picture of the lens; of a pinhole without samples of one."""
+    from tbcad.simulate.capture.photograph import to_bytes
+    from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
+
+    if samples == 0:
+        return to_bytes(pinhole_picture(scene, at))
+    return to_bytes(lens_picture(scene, at, lens, samples, progress))

@@ -1,0 +1,247 @@
+"""Synthesise views from a light field."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+
+import typer
+
+from tbcad.cli.app import app
+from tbcad.cli.compared_pictures import (
+    check_pictures,
+    compared_files,
+    has_object,
+    scene_of,
+    viewpoint_of,
+    write_compared,
+)
+from tbcad.cli.early_checks import check_is_capture
+from tbcad.cli.options import (
+    METHODS,
+    Azimuth,
+    Capture,
+    Distance,
+    Elevation,
+    ForceFile,
+    Fov,
+    Height,
+    OutPicture,
+    Width,
+)
+from tbcad.errors import InputError
+from tbcad.screen import stages
+
+if TYPE_CHECKING:
+    from tbcad.optics.camera import Camera
+    from tbcad.reflectance.environment import Environment
+    from tbcad.reflectance.relit import Relit
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.ray_casting import Scene
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.types import Bytes, Progress
+
+# Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
+LIT_SAMPLES = 2
+
+Method = Literal["nearest", "blend", "depth"]
+Surface = Literal["plane", "depth", "object"]
+
+
+class _Choice(NamedTuple):
+    """Method and surface of a view, and in words why."""
+
+    method: Method
+    surface: Surface | None
+    reason: str
+
+
+@app.command()
+def view(
+    capture_folder: Capture,
+    azimuth: Azimuth = 0.0,
+    elevation: Elevation = 30.0,
+    distance: Distance = 640.0,
+    out: OutPicture = Path("view.png"),
+    method: Annotated[
+        Method | None,
+        typer.Option(
+            help=f"{METHODS}; depth, the default: a blend at the depth that the light field "
+            "itself shows."
+        ),
+    ] = None,
+    surface: Annotated[
+        Surface | None,
+        typer.Option(
+            help="Surface of the points that are compared by blend: the depth that the light field "
+            "itself shows (the default), the plane through the centre of the object, or the object "
+            "itself."
+        ),
+    ] = None,
+    depth_files: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--depth",
+            metavar="FILE",
+            help="Also write the depth that is found: as PNG of 16 bits, or as points (PLY); "
+            "repeatable.",
+        ),
+    ] = None,
+    light: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show the object in the light of its surroundings, a picture by direction (.hdr), "
+            "by the reflectance field of tbcad capture --lights.",
+        ),
+    ] = None,
+    light_turn: Annotated[
+        float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
+    ] = 0.0,
+    width: Width = 640,
+    height: Height = 480,
+    fov: Fov = None,
+    force: ForceFile = False,
+) -> int:
+    """Synthesise the view of a camera anywhere around the object from a light field.
+
+    For a simulated capture also writes the ray-traced ground truth and a comparison, and prints
+    PSNR and SSIM.
+    """
+    check_is_capture(capture_folder)
+    choice, files = _choice(method, surface), depth_files or []
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.photograph import to_bytes
+    from tbcad.simulate.scene.ground_truth import pinhole_picture
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+
+    check_pictures(capture_folder, out, force)
+    _check_depth(files, out, choice, force)
+    if light is None and light_turn:
+        raise InputError(f"--light-turn {light_turn:g} turns no light: add --light")
+    if choice.surface == "object" and not has_object(capture_folder):
+        raise InputError(f"{capture_folder} has no object: leave out --surface object")
+    wanted = None if light is None else _environment(light, light_turn)
+    with stages(3) as screen, LightField.open(capture_folder) as source:
+        screen.stage("light field")
+        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
+        scene, tiles = scene_of(capture_folder), MirrorTiles(source)
+        relit = None if wanted is None else _relit(capture_folder, source, wanted)
+        shown = tiles if relit is None else MirrorTiles(relit.field)
+        screen.stage("view")
+        if choice.surface == "depth":
+            picture = _depth_view(tiles, shown, at, files, screen.detail)
+        else:
+            picture = _view(shown, at, choice, scene)
+        screen.stage("truth")
+        truth, same_lamps = None, None
+        if scene is not None and relit is not None and wanted is not None:
+            truth, same_lamps = _lit_truths(scene, at, relit, wanted)
+        elif scene is not None:
+            truth = to_bytes(pinhole_picture(scene, at))
+    typer.echo(f"method {choice.method}: {choice.reason}")
+    if relit is not None:
+        typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
+    write_compared(out, picture, truth, (choice.method, "ray-traced"))
+    if same_lamps is not None:
+        typer.echo(f"SSIM {_ssim(same_lamps, picture):.4f} against one lit by the same lamps")
+    for file in files:
+        typer.echo(f"{file}: depth")
+    return 0
+
+
+def _environment(light: Path, turn_deg: float) -> "Environment":
+    from math import radians
+
+    from tbcad.reflectance.environment import read_environment
+
+    return read_environment(light, radians(turn_deg))
+
+
+def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
+    from tbcad.reflectance.field_file import open_reflectance
+    from tbcad.reflectance.relit import relit
+
+    with open_reflectance(folder) as reflectance:
+        return relit(source, reflectance, wanted)
+
+
+def _lit_truths(
+    scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
+) -> tuple["Bytes", "Bytes"]:
+    """The ray-traced pictures in that light, and in the light of the same lamps."""
+    from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
+    from tbcad.simulate.capture.photograph import to_bytes
+    from tbcad.simulate.scene.ground_truth import pinhole_picture
+
+    lights = wanted.far_lights(TRUE_LIGHTS), relit.lamps
+    scenes = [lit_scene(scene, one, relit.exposure) for one in lights]
+    first, second = (to_bytes(pinhole_picture(one, at, LIT_SAMPLES)) for one in scenes)
+    return first, second
+
+
+def _ssim(truth: "Bytes", picture: "Bytes") -> float:
+    from tbcad.simulate.image_quality import image_quality
+
+    return image_quality(truth, picture).ssim
+
+
+def _choice(method: Method | None, surface: Surface | None) -> _Choice:
+    """What is wanted: a blend at the depth that is found, if nothing else is said.
+
+    Raises:
+        InputError: method and surface exclude each other.
+    """
+    if method == "nearest" and surface is not None:
+        raise InputError(f"--method nearest asks for no surface: leave out --surface {surface}")
+    if method == "depth" and surface not in (None, "depth"):
+        raise InputError(
+            f"--method depth finds the surface itself: leave out --surface {surface}, or choose "
+            "--method blend"
+        )
+    if method == "nearest":
+        return _Choice("nearest", None, "as --method says")
+    if surface in ("plane", "object"):
+        reason = f"--surface {surface} is for a blend" if method is None else "as --method says"
+        return _Choice("blend", surface, reason)
+    reason = "as --method says" if method == "depth" else "a blend at the depth that is found"
+    return _Choice("depth", "depth", reason)
+
+
+def _check_depth(files: list[Path], out: Path, choice: _Choice, force: bool) -> None:
+    from tbcad.simulate.image_files import check_image_path
+
+    if choice.surface != "depth" and files:
+        raise InputError(f"--depth {files[0]}: no depth is looked for: add --method depth")
+    for k, file in enumerate(files):
+        check_image_path(file, force, (".png", ".ply"))
+        if file in (out, *compared_files(out), *files[:k]):
+            raise InputError(f"--depth {file}: another file of this command: choose another name")
+
+
+def _view(tiles: "MirrorTiles", at: "Camera", choice: _Choice, scene: "Scene | None") -> "Bytes":
+    """The picture by nearest rays, or blended on the plane or on the object."""
+    from tbcad.simulate.scene.ray_casting import depth_along_rays
+    from tbcad.simulate.views.synthesis import synthesise
+
+    if choice.method == "nearest":
+        return synthesise(tiles, at).image
+    on_object = scene is not None and choice.surface == "object"
+    depth = depth_along_rays(scene) if scene is not None and on_object else None
+    return synthesise(tiles, at, "blend", depth).image
+
+
+def _depth_view(
+    tiles: "MirrorTiles",
+    shown: "MirrorTiles",
+    at: "Camera",
+    files: list[Path],
+    progress: "Progress",
+) -> "Bytes":
+    """The picture at the depth that is found, in the colours that are shown; and files of it."""
+    from tbcad.atomic_files import replace_files
+    from tbcad.depth.view import depth_view
+
+    picture, depth = depth_view(tiles, at, progress, shown)
+    for file in files:
+        content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
+        replace_files(file.parent, {file.name: content})
+    return picture.image

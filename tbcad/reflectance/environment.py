@@ -1,0 +1,97 @@
+"""Light from all around, as a picture by direction, and the lamps that stand for it.
+
+The picture has longitude along its rows and latitude down its columns: the top row is the zenith,
+the middle column is azimuth 0 (+x), and azimuths fall toward the right, as one sees them from the
+inside.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tbcad.errors import InputError
+from tbcad.formats.radiance import read_hdr
+from tbcad.geometry.vectors import norm, unit
+from tbcad.simulate.scene.point_lights import PointLights
+from tbcad.types import Floats
+
+# So far away light from one direction is parallel: 60 mm apart it differs by 0.003 degrees.
+FAR_MM = 1e6
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of red, green, blue: ITU-R BT.709
+
+
+@dataclass(frozen=True)
+class Environment:
+    """Light from above the horizon; what lies below lights no lamp.
+
+    Attributes:
+        direction: unit vectors toward it, (p, 3).
+        light: red, green, blue, times the solid angle it comes from, (p, 3).
+    """
+
+    direction: Floats
+    light: Floats
+
+    def by_nearest(self, direction: Floats) -> Floats:
+        """Sums of light (l, 3) over what is nearest to each of some unit directions (l, 3)."""
+        _, owner = cKDTree(direction).query(self.direction)
+        total = np.zeros((len(direction), 3))
+        np.add.at(total, owner, self.light)
+        return total
+
+    def on_lamps(self, place: Floats) -> PointLights:
+        """Lamps in given places (l, 3), each as bright as what it stands for."""
+        return PointLights(place, self.by_nearest(unit(place)))
+
+    def far_lights(self, count: int) -> PointLights:
+        """So many lamps far away: of each part of the sky one, in the middle of its light."""
+        even = even_directions(count)
+        _, owner = cKDTree(even).query(self.direction)
+        middle = np.zeros((count, 3))
+        np.add.at(middle, owner, self.direction * (self.light @ LUMINANCE)[:, None])
+        direction = np.where(norm(middle)[:, None] > 0, unit(middle), even)
+        return PointLights(FAR_MM * direction, self.by_nearest(even))
+
+
+def even_directions(count: int) -> Floats:
+    """Unit directions (count, 3) spread evenly over the upper hemisphere, on a Fibonacci spiral."""
+    k = np.arange(count)
+    z, azimuth = (k + 0.5) / count, GOLDEN_ANGLE * k
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
+
+
+def environment(picture: Floats, turn: float = 0.0) -> Environment:
+    """The light of a picture (h, w, 3), turned about z by an angle, radians."""
+    height, width = picture.shape[:2]
+    edges = np.pi / 2 - np.pi * np.arange(height + 1) / height
+    solid_angle = (np.sin(edges[:-1]) - np.sin(edges[1:])) * 2 * np.pi / width
+    elevation = (edges[:-1] + edges[1:]) / 2
+    azimuth = turn + np.pi - 2 * np.pi * (np.arange(width) + 0.5) / width
+    above = np.flatnonzero(elevation > 0)
+    level = np.cos(elevation[above])[:, None]
+    direction = np.stack(
+        [
+            level * np.cos(azimuth),
+            level * np.sin(azimuth),
+            np.broadcast_to(np.sin(elevation[above])[:, None], (len(above), width)),
+        ],
+        axis=-1,
+    )
+    light = picture[above] * solid_angle[above, None, None]
+    return Environment(direction.reshape(-1, 3), light.reshape(-1, 3))
+
+
+def read_environment(path: Path, turn: float = 0.0) -> Environment:
+    """The light of a file.
+
+    Raises:
+        InputError: it cannot be read, or is dark above the horizon.
+    """
+    found = environment(read_hdr(path), turn)
+    if not (found.light > 0).any():
+        raise InputError(f"{path} is dark above the horizon: its upper half must have light")
+    return found
