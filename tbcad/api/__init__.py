@@ -7,6 +7,7 @@ bad input is refused before they are loaded.
 from tbcad.api.builds import Build, as_made, build, report_page
 from tbcad.api.captures import (
     Photographs,
+    WantedFrames,
     WantedLamps,
     capture,
     photograph,
@@ -23,6 +24,7 @@ from tbcad.api.verification import verify, verify_as_built
 __all__ = [
     "Build",
     "Photographs",
+    "WantedFrames",
     "WantedLamps",
     "analyse",
     "as_built",

@@ -174,6 +174,19 @@ class WantedLamps:
     every: int = 1
 
 
+@dataclass(frozen=True)
+class WantedFrames:
+    """Photographs of the object while it turns about z.
+
+    Attributes:
+        count: of frames.
+        turn_deg: of the object from the first frame to the one after the last.
+    """
+
+    count: int
+    turn_deg: float
+
+
 def write_photographs(
     photographs: Photographs,
     out: Path,
@@ -181,6 +194,7 @@ def write_photographs(
     progress: Progress,
     detail: Progress = silent,
     lamps: WantedLamps | None = None,
+    frames: WantedFrames | None = None,
 ) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
     from tbcad.output.folder import replacing
@@ -200,8 +214,25 @@ def write_photographs(
         if write_field is not None:
             progress("a photograph for each lamp")
             record["reflectance"] = write_field(folder, detail)
+        if frames is not None:
+            progress("a photograph for each frame")
+            record["sequence"] = _write_frames(folder, photographs, frames, detail)
         write_manifest(folder)
     return record
+
+
+def _write_frames(
+    folder: Path, photographs: Photographs, wanted: WantedFrames, detail: Progress
+) -> dict[str, Any]:
+    from math import radians
+
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.turning import turns, write_turning
+    from tbcad.simulate.scene.ray_casting import prepared_scene
+
+    angles = turns(wanted.count, radians(wanted.turn_deg))
+    with LightField.open(folder) as source:
+        return write_turning(folder, source, prepared_scene(photographs.subject), angles, detail)
 
 
 def _field_writer(

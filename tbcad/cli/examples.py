@@ -118,6 +118,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("captures/knot --to nerfstudio --out data/knot", "all virtual cameras, for ns-train"),
         ("captures/knot --to colmap --every 4 --size 128", "a quarter of them, as a COLMAP model"),
         ("captures/knot --to rays --cameras a --json", "the rays of camera a as numpy arrays"),
+        ("captures/knot --to mitsuba --exports exports/", "the machine, for Mitsuba and Blender"),
     ),
 }
 

@@ -18,7 +18,8 @@ WRITTEN = {
     "nerfstudio": "transforms.json, images, masks and points.ply",
     "colmap": "images, masks and the model in sparse/0, binary and text",
     "ngp-rays": "transforms.json, and images with rays_*.dat and dynamic_mask_*.png",
-    "rays": "rays.npz with origin, direction, colour and camera of every ray",
+    "rays": "rays.npz and rays.h5 with origin, direction, colour and camera of every ray",
+    "mitsuba": "camera_a.xml, camera_b.xml and blender.py with their meshes",
 }
 
 NOTES = {
@@ -31,10 +32,11 @@ NOTES = {
 def export(
     capture: Capture,
     to: Annotated[
-        Literal["nerfstudio", "colmap", "ngp-rays", "rays"] | None,
+        Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"] | None,
         typer.Option(
             help="nerfstudio, colmap: virtual cameras as pinholes, with masks; ngp-rays: crops "
-            "with the ray of every pixel for instant-ngp; rays: all rays as numpy arrays."
+            "with the ray of every pixel for instant-ngp; rays: all rays as numpy arrays and HDF5; "
+            "mitsuba: the machine itself as scenes for Mitsuba and Blender."
         ),
     ] = None,
     out: OutReplaced = Path("data"),
@@ -57,10 +59,18 @@ def export(
             help="a, b, or mirrors by name, as a0001,b0007; by default all.",
         ),
     ] = None,
+    exports: Annotated[
+        Path | None,
+        typer.Option(
+            "--exports",
+            metavar="FOLDER",
+            help="Folder written by tbcad build, with the shells; for --to mitsuba.",
+        ),
+    ] = None,
     force: Force = False,
     json: JsonResult = False,
 ) -> int:
-    """Write the virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, or its rays.
+    """Write virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, rays, or a scene.
 
     Each mirror's crop is resampled to the picture of a pinhole at the point that its rays come
     nearest to, right way round, with a mask. Prints how far rays and pinholes are apart.
@@ -78,13 +88,21 @@ def export(
             every=every,
             size=size,
             cameras=cameras,
+            exports=exports,
             force=force,
             progress=screen.stage,
             detail=screen.detail,
         )
-    files = f"{out}: {WRITTEN[to]}; dataset.json, cameras.csv with these figures"
-    print_result(record, [*_lines(record), files], json)
+    figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
+    files = f"{out}: {WRITTEN[to]}; {figures} with these figures"
+    lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
+    print_result(record, [*lines, files], json)
     return 0
+
+
+def _scene_lines(record: dict[str, Any]) -> Iterator[str]:
+    for part, count in record["facets"].items():
+        yield f"{part}: {count} facets"
 
 
 def _lines(record: dict[str, Any]) -> Iterator[str]:

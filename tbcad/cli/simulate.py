@@ -57,6 +57,18 @@ def capture(
     every: Annotated[
         int, typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors.")
     ] = 1,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Also photograph the object N times while it turns about z, as one file.",
+            metavar="N",
+        ),
+    ] = None,
+    turn: Annotated[
+        float, typer.Option(help="How far the object turns during all frames, degrees.")
+    ] = 360.0,
     force: Force = False,
     json: JsonResult = False,
 ) -> int:
@@ -71,19 +83,24 @@ def capture(
         raise InputError("--lights follows one ray a pixel: leave out --samples")
     if every > 1 and lights != "mirrors":
         raise InputError("--every chooses among the lamps of --lights mirrors: leave it out")
+    if frames is not None and (samples > 1 or prototype):
+        raise InputError("--frames follows one ray a pixel: leave out --samples and --prototype")
     check_is_export(folder)
     check_is_object(object_file)
-    from tbcad.api import WantedLamps, photograph, write_photographs
+    from tbcad.api import WantedFrames, WantedLamps, photograph, write_photographs
     from tbcad.output.folder import check_replaceable
 
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, force)
-    with stages(3 + (lights is not None)) as screen:
+    with stages(3 + (lights is not None) + (frames is not None)) as screen:
         photographs = photograph(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
         )
         lamps = None if lights is None else WantedLamps(lights, every)
-        record = write_photographs(photographs, out, force, screen.stage, screen.detail, lamps)
+        moving = None if frames is None else WantedFrames(frames, turn)
+        record = write_photographs(
+            photographs, out, force, screen.stage, screen.detail, lamps, moving
+        )
     if json:
         print_json(record)
         return 0
@@ -94,5 +111,8 @@ def capture(
         size = (out / "reflectance.h5").stat().st_size / 1e6
         lamps_and_rays = f"{reflectance['lamps']} lamps, {reflectance['rays']} rays"
         typer.echo(f"{out / 'reflectance.h5'}: {lamps_and_rays}, {size:.0f} MB")
+    if frames is not None:
+        size = (out / "sequence.h5").stat().st_size / 1e6
+        typer.echo(f"{out / 'sequence.h5'}: {frames} frames, {size:.0f} MB")
     typer.echo(f"{out}: {photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
     return 0

@@ -96,6 +96,12 @@ def view(
     light_turn: Annotated[
         float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
     ] = 0.0,
+    frame: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
+        ),
+    ] = None,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
@@ -115,13 +121,16 @@ def view(
 
     check_pictures(capture_folder, out, force)
     _check_depth(files, out, choice, force)
+    if frame is not None and (light is not None or surface == "object"):
+        raise InputError("--frame has its own light and place: leave out --light and --surface")
     if light is None and light_turn:
         raise InputError(f"--light-turn {light_turn:g} turns no light: add --light")
     if choice.surface == "object" and not has_object(capture_folder):
         raise InputError(f"{capture_folder} has no object: leave out --surface object")
     wanted = None if light is None else _environment(light, light_turn)
-    with stages(3) as screen, LightField.open(capture_folder) as source:
+    with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
+        source = stored if frame is None else _frame(stored, capture_folder, frame)
         at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
@@ -136,7 +145,8 @@ def view(
         if scene is not None and relit is not None and wanted is not None:
             truth, same_lamps = _lit_truths(scene, at, relit, wanted)
         elif scene is not None:
-            truth = to_bytes(pinhole_picture(scene, at))
+            where = (scene, at) if frame is None else _turned(scene, at, capture_folder, frame)
+            truth = to_bytes(pinhole_picture(*where))
     typer.echo(f"method {choice.method}: {choice.reason}")
     if relit is not None:
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
@@ -146,6 +156,24 @@ def view(
     for file in files:
         typer.echo(f"{file}: depth")
     return 0
+
+
+def _frame(source: "LightField", folder: Path, number: int) -> "LightField":
+    from tbcad.simulate.capture.sequence import sequence_frame
+
+    return sequence_frame(source, folder, number)
+
+
+def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
+    """Object and camera as they are to each other in a frame."""
+    from tbcad.simulate.capture.turning import (
+        camera_before_turn,
+        lit_when_turned,
+        turn_of_frame,
+    )
+
+    angle = turn_of_frame(folder, number)
+    return lit_when_turned(scene, angle), camera_before_turn(at, angle)
 
 
 def _environment(light: Path, turn_deg: float) -> "Environment":

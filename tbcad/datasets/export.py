@@ -9,6 +9,7 @@ import numpy as np
 
 from tbcad.datasets.colmap import write_colmap
 from tbcad.datasets.crops import chosen_mirrors
+from tbcad.datasets.machine_scene import write_machine_scene
 from tbcad.datasets.nerfstudio import write_nerfstudio
 from tbcad.datasets.ngp_rays import write_ngp_rays
 from tbcad.datasets.options import ExportOptions
@@ -19,6 +20,7 @@ from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
 from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.types import Floats, Progress
 
@@ -68,6 +70,53 @@ def write_dataset(
     text = json.dumps(record, indent=1, sort_keys=False, allow_nan=False) + "\n"
     (folder / RECORD).write_text(text, encoding="utf-8")
     return record
+
+
+def write_scene(
+    folder: Path, source: LightField, scene: Scene | None, exports: Path, progress: Progress
+) -> dict[str, Any]:
+    """Write scenes of the machine into a folder, and return their record.
+
+    Args:
+        folder: exists, is empty, and is the caller's to replace.
+        source: the light field.
+        scene: its object.
+        exports: the export that it was captured with.
+        progress: called with each stage.
+
+    Raises:
+        InputError: the capture names no object, or the export has other cameras or no shells.
+    """
+    if scene is None:
+        raise InputError("the capture names no object, so there is none in the scene: capture one")
+    export = read_export(exports)
+    _check_same_cameras(source, export)
+    record = {
+        "schema": SCHEMA,
+        "target": "mitsuba",
+        "capture": source.facts,
+        "capture_mm": source.capture_mm,
+        **write_machine_scene(folder, export, scene, progress),
+    }
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    (folder / RECORD).write_text(text, encoding="utf-8")
+    return record
+
+
+def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
+    """Refuse an export whose mirrors are not those of the capture."""
+    for reflector in export.reflectors:
+        frame = source.frames.get(reflector.camera_id)
+        if (
+            frame is None
+            or len(frame.u) != len(reflector)
+            or frame.camera.width_px != reflector.camera.width_px
+            or not np.allclose(frame.mirrors.apex, reflector.mirrors.apex, atol=1e-6)
+        ):
+            raise InputError(
+                f"{export.folder} is not the export of this capture: its camera "
+                f"{reflector.camera_id} has other mirrors or pixels: name the one it was taken with"
+            )
 
 
 def _written(

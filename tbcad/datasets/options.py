@@ -5,7 +5,7 @@ from typing import Literal
 
 from tbcad.errors import InputError
 
-Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays"]
+Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"]
 AS_CAPTURED: tuple[Target, ...] = ("ngp-rays", "rays")
 SIZES_PX = (8, 4096)
 
@@ -32,6 +32,10 @@ class ExportOptions:
         Raises:
             InputError: a size for pixels that stay as captured, or a number out of range.
         """
+        if self.target == "mitsuba" and (self.size_px, self.cameras, self.every) != (None, None, 1):
+            raise InputError(
+                "--to mitsuba writes the whole machine: leave out --size, --cameras and --every"
+            )
         if self.size_px is not None and self.target in AS_CAPTURED:
             raise InputError(
                 f"--size {self.size_px}: {self.target} keeps every pixel as it was captured: "

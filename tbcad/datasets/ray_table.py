@@ -1,9 +1,10 @@
-"""All rays as numpy arrays in one NPZ file, written array by array so that few are in memory."""
+"""All rays as arrays in one NPZ and one HDF5 file, written in parts so that few are in memory."""
 
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import h5py
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
@@ -12,9 +13,11 @@ from tbcad.datasets.crops import reading_order
 from tbcad.datasets.pictures import crop_of
 from tbcad.datasets.virtual_cameras import VirtualCameras
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL
 from tbcad.types import Progress
 
-RAYS = "rays.npz"
+RAYS, RAYS_H5 = "rays.npz", "rays.h5"
+RAYS_PER_CHUNK = 1 << 16
 # Zip files have times; a fixed one gives the same bytes each time.
 NO_TIME = (1980, 1, 1, 0, 0, 0)
 COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
@@ -45,7 +48,33 @@ def write_ray_table(
         for name, table in _tables(virtual).items():
             with packed.open(_entry(name), "w") as file:
                 npy.write_array(file, table, allow_pickle=False)
+    progress(RAYS_H5)
+    _write_h5(folder / RAYS_H5, source, virtual, total)
     return total
+
+
+def _write_h5(path: Path, source: LightField, virtual: VirtualCameras, total: int) -> None:
+    """The same arrays, of which programs read parts."""
+    with h5py.File(path, "w", libver=("v110", "v110")) as store:
+        stored = {
+            name: store.create_dataset(
+                name,
+                (total, *last),
+                kind,
+                chunks=(min(RAYS_PER_CHUNK, total), *last),
+                shuffle=True,
+                compression=COMPRESSION_LEVEL,
+            )
+            for name, (kind, last) in COLUMNS.items()
+        }
+        for name in COLUMNS:
+            first = 0
+            for values in _values(source, virtual, name):
+                stored[name][first : first + len(values)] = values
+                first += len(values)
+        tables = _tables(virtual)
+        store.create_dataset("name", data=tables["name"].astype("S"))
+        store.create_dataset("centre", data=tables["centre"])
 
 
 def _entry(name: str) -> zipfile.ZipInfo:

@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import trimesh
@@ -319,6 +320,15 @@ class TestRays:
                 found.append(np.sqrt((off**2).sum(axis=1).mean()))
         assert np.median(errors) < 1
         assert np.median(flipped) > 8 * np.median(errors)
+
+    def test_hdf5_has_the_same_arrays(self, exported: dict[str, Path]) -> None:
+        folder = exported["rays"]
+        with np.load(folder / "rays.npz") as table, h5py.File(folder / "rays.h5") as store:
+            assert set(store) == set(table.files)
+            for name in table.files:
+                stored = store[name].asstr()[:] if name == "name" else store[name][:]
+                assert np.array_equal(stored, table[name])
+                assert name == "name" or stored.dtype == table[name].dtype
 
     def test_numpy_reads_all_rays(self, exported: dict[str, Path], field: LightField) -> None:
         with np.load(exported["rays"] / "rays.npz", allow_pickle=False) as table:

@@ -79,9 +79,14 @@ def prepared_scene(subject: SceneObject) -> Scene:
     embree = embree_scene(subject.points, subject.faces)
     if subject.light is not None:
         return Scene(subject, embree, subject.light, subject.radius)
-    lit = np.maximum(subject.normals @ LAMPS.T, 0) @ LAMP_LIGHT
-    sky = SKY_LIGHT * (0.75 + 0.25 * subject.normals[:, 2])
-    return Scene(subject, embree, np.minimum(lit + sky, 1.0), subject.radius)
+    return Scene(subject, embree, built_in_shade(subject.normals), subject.radius)
+
+
+def built_in_shade(normals: Floats) -> Floats:
+    """The built-in light on surfaces with unit normals (v, 3), 0 to 1, (v,)."""
+    lit = np.maximum(normals @ LAMPS.T, 0) @ LAMP_LIGHT
+    sky = SKY_LIGHT * (0.75 + 0.25 * normals[:, 2])
+    return np.asarray(np.minimum(lit + sky, 1.0))
 
 
 @dataclass(frozen=True)

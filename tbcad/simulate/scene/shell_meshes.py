@@ -59,8 +59,8 @@ def read_shell_meshes(export: ExportedDesign) -> ShellMeshes:
     corners, owners, surfaces = [], [], []
     for reflector, sign in zip(export.reflectors, (1, -1), strict=True):
         path = export.folder / f"shell_{reflector.camera_id}.stl"
-        facets = _facets(path)
-        owner = _owners(reflector.mirrors.offset(-coat), facets)
+        facets = read_facets(path)
+        owner = facet_owners(reflector.mirrors.offset(-coat), facets)
         if len(missing := np.setdiff1d(np.arange(len(reflector)), owner)):
             raise InputError(f"{path} has no facets of {len(missing)} recorded mirrors: {REBUILD}")
         corners.append(facets)
@@ -123,7 +123,12 @@ def _frames(normal: Floats) -> Floats:
     return np.stack([across, np.cross(normal, across), normal], axis=1)
 
 
-def _facets(path: Path) -> Floats:
+def read_facets(path: Path) -> Floats:
+    """Corners (f, 3, 3) of the facets of a shell's STL file, mm.
+
+    Raises:
+        InputError: it is not there, or cannot be read.
+    """
     import trimesh
 
     if not path.is_file():
@@ -139,7 +144,7 @@ def _facets(path: Path) -> Floats:
     return corners
 
 
-def _owners(bare: Surfaces, corners: Floats) -> Ints:
+def facet_owners(bare: Surfaces, corners: Floats) -> Ints:
     """The mirror (f,) on whose surface all corners (f, 3, 3) of a facet lie; -1 for none."""
     _, near = cKDTree(bare.apex).query(
         corners.mean(axis=1), k=min(CANDIDATE_MIRRORS, len(bare)), workers=-1

@@ -1,0 +1,140 @@
+"""Many photographs of an object that moves, as one file: the rays stay, only colours change.
+
+One HDF5 file beside the light field's (docs/light-field.md), whose rays it is about:
+
+    a/pixel    (r,)       uint32  row * width + column of the rays that meet the capture sphere
+    a/colour   (t, r, 3)  uint8   red, green, blue in each frame; and the same for b
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
+from tbcad.simulate.capture.photograph import row_bands
+from tbcad.simulate.parallel import chunks, in_threads
+from tbcad.simulate.scene.rays import meets_sphere
+from tbcad.types import Bytes, Ints
+
+NAME = "sequence.h5"
+SCHEMA = "tbcad-sequence/1"
+RAYS_PER_CHUNK = 1 << 16
+AGAIN = "capture again with --frames"
+
+
+@dataclass(frozen=True)
+class SequenceWriter:
+    """A sequence that is being written.
+
+    Attributes:
+        pixel: of each camera, numbers of the rays that are kept, (r,).
+        colour: of each camera, the frames so far, (t, r, 3).
+    """
+
+    pixel: Mapping[str, Ints]
+    colour: Mapping[str, h5py.Dataset]
+
+    def append(self, colours: Mapping[str, Bytes]) -> None:
+        """Add a frame: of each camera the colours of the rays that are kept, (r, 3)."""
+        places = [
+            (name, part)
+            for name, stored in self.colour.items()
+            for part in chunks(stored.shape[1], stored.chunks[1])
+        ]
+
+        def packed(place: tuple[str, slice]) -> bytes:
+            name, part = place
+            return filtered_chunk(colours[name][part][None], self.colour[name].chunks)
+
+        data = in_threads(packed, places)
+        for stored in self.colour.values():
+            stored.resize(len(stored) + 1, axis=0)
+        for (name, part), values in zip(places, data, strict=True):
+            stored = self.colour[name]
+            stored.id.write_direct_chunk((len(stored) - 1, part.start, 0), values)
+
+
+@contextmanager
+def create_sequence(
+    folder: Path, source: LightField, facts: Mapping[str, Any]
+) -> Iterator[SequenceWriter]:
+    """Create the file of a sequence in the folder of a capture."""
+    radius = source.capture_mm / 2
+    with h5py.File(folder / NAME, "w", libver=("v110", "v110")) as store:
+        store.attrs["schema"], store.attrs["facts"] = SCHEMA, json.dumps(dict(facts))
+        pixel, colour = {}, {}
+        for name, frame in source.frames.items():
+            group, pixel[name] = store.create_group(name), kept_pixels(frame, radius)
+            group.create_dataset(
+                "pixel", data=pixel[name].astype(np.uint32), compression=COMPRESSION_LEVEL
+            )
+            rays = len(pixel[name])
+            colour[name] = group.create_dataset(
+                "colour",
+                (0, rays, 3),
+                "u1",
+                maxshape=(None, rays, 3),
+                chunks=(1, min(RAYS_PER_CHUNK, max(rays, 1)), 3),
+                shuffle=True,
+                compression=COMPRESSION_LEVEL,
+            )
+        yield SequenceWriter(pixel, colour)
+
+
+def kept_pixels(frame: Frame, radius: float) -> Ints:
+    """Numbers (r,) of the pixels whose rays meet the capture sphere, ascending."""
+
+    def band(rows: range) -> Ints:
+        part = frame.read(slice(rows.start, rows.stop))
+        origin, direction = (
+            part[name].reshape(-1, 3).astype(np.float64) for name in ("origin", "direction")
+        )
+        meets = meets_sphere(origin, direction, radius) & (part["mirror"].ravel() > 0)
+        return np.flatnonzero(meets) + rows.start * frame.camera.width_px
+
+    return np.concatenate(in_threads(band, row_bands(frame.camera.height_px)))
+
+
+def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:
+    """The light field of one frame of a sequence, its colours in memory.
+
+    Args:
+        source: the light field of the capture.
+        folder: of the capture.
+        number: of the frame, from 0.
+
+    Raises:
+        InputError: there is no sequence or no such frame, or the file is damaged.
+    """
+    file = folder / NAME
+    if not file.is_file():
+        raise InputError(f"{file}: no such file, so there is one frame only: {AGAIN}")
+    try:
+        with h5py.File(file, "r") as store:
+            if store.attrs.get("schema") != SCHEMA:
+                raise ValueError(f"allowed is the schema {SCHEMA!r}")
+            count = min(len(store[name]["colour"]) for name in source.frames)
+            if not 0 <= number < count:
+                raise InputError(f"--frame {number} is not in {file}: allowed is 0 to {count - 1}")
+            frames = {
+                name: _coloured(frame, store[name]["pixel"][:], store[name]["colour"][number])
+                for name, frame in source.frames.items()
+            }
+    except (OSError, KeyError, ValueError, IndexError) as error:
+        raise InputError(f"{file} is a damaged sequence: {error}: {AGAIN}") from error
+    return replace(source, frames=frames)
+
+
+def _coloured(frame: Frame, pixel: Ints, colour: Bytes) -> Frame:
+    shape = frame.camera.height_px, frame.camera.width_px
+    picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
+    picture[pixel] = colour
+    return replace(frame, planes={**frame.planes, "colour": picture.reshape(*shape, 3)})

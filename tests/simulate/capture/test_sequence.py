@@ -1,0 +1,102 @@
+"""Frames of an object that turns, against captures of the turned object."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.simulate.capture.files import read_object
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.capture.sequence import sequence_frame
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import Reflector
+
+FRAMES, TURN_DEG = 4, 120.0
+SMALL = ["--width", "96", "--height", "72"]
+
+
+@pytest.fixture(scope="module")
+def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("captures") / "turning"
+    words = ["capture", str(record), "--frames", str(FRAMES), "--turn", str(TURN_DEG)]
+    assert run([*words, "--out", str(out)]) == 0
+    return out
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_a_frame_is_a_capture_of_the_turned_object(
+    captured: Path, cameras: tuple[Reflector, Reflector], number: int
+) -> None:
+    """In light that stands still: its normals turn, the lamps do not."""
+    angle = np.radians(TURN_DEG) * number / FRAMES
+    about_z = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    subject = read_object(captured)
+    turned = replace(
+        subject, points=subject.points @ about_z.T, normals=subject.normals @ about_z.T
+    )
+    scene = prepared_scene(turned)
+    with LightField.open(captured) as source:
+        found = sequence_frame(source, captured, number)
+        for camera in cameras:
+            bands = photograph(camera.camera, exact_tracer(camera), scene)
+            expected = np.concatenate([band.colour for band in bands]).astype(int)
+            frame = found.frames[camera.camera_id]
+            rays = frame.planes["mirror"][:] > 0
+            apart = np.abs(frame.planes["colour"].astype(int) - expected)[rays].max(axis=1)
+            assert expected[rays].max() > 100
+            assert (apart > 1).mean() < 2e-3  # float32 rays past an edge
+
+
+def test_views_of_frames(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The truth turns with the object: as good as the view of the first frame."""
+    found = []
+    for number in ("0", "2"):
+        words = ["view", str(captured), *SMALL, "--frame", number, "--method", "nearest"]
+        assert run([*words, "--out", str(tmp_path / f"{number}.png")]) == 0
+        found.append(float(capsys.readouterr().out.split("SSIM ")[1].split()[0]))
+    assert abs(found[1] - found[0]) < 0.03
+    first, other = (tmp_path / f"{number}.png" for number in "02")
+    assert first.read_bytes() != other.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        (["--frame", "4"], "allowed is 0 to 3"),
+        (["--frame", "1", "--surface", "object"], "leave out --light and --surface"),
+    ],
+)
+def test_frames_that_cannot_be(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
+) -> None:
+    assert run(["view", str(captured), *SMALL, *more, "--out", str(tmp_path / "v.png")]) == 2
+    assert wrong in capsys.readouterr().err
+
+
+def test_captures_that_cannot_have_frames(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["capture", str(record), "--frames", "2", "--samples", "2"]
+    assert run([*words, "--out", str(tmp_path / "out")]) == 2
+    assert "leave out --samples" in capsys.readouterr().err
+
+
+def test_damaged_sequences_are_refused(captured: Path, tmp_path: Path) -> None:
+    with LightField.open(captured) as source:
+        with pytest.raises(InputError, match="one frame only"):
+            sequence_frame(source, tmp_path, 0)
+        (tmp_path / "sequence.h5").write_bytes((captured / "sequence.h5").read_bytes())
+        with h5py.File(tmp_path / "sequence.h5", "r+") as store:
+            del store["a/pixel"]
+        with pytest.raises(InputError, match="damaged sequence"):
+            sequence_frame(source, tmp_path, 0)
