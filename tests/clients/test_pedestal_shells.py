@@ -1,0 +1,34 @@
+"""Shells with mirrors on pedestals, in a CAD program and in a slicer."""
+
+from pathlib import Path
+
+import pytest
+from tbcad_verify.programs import check_with_programs, is_skipped
+from tbcad_verify.report.checks import Check
+
+from tbcad.cli import run
+from tests.clients.test_programs import PROGRAMS, wanted
+
+pytestmark = [pytest.mark.clients, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def checks(tmp_path_factory: pytest.TempPathFactory) -> list[Check]:
+    """Of both halves of the paper's design, on pedestals."""
+    out: Path = tmp_path_factory.mktemp("clients") / "exports"
+    build = ["build", "--parts", "shell", "--set", "shell.edges=pedestal", "--no-verify"]
+    assert run([*build, "--out", str(out)]) == 0
+    parts = wanted(out, 5e-3)
+    assert [(part.name, part.spheres) for part in parts] == [("shell_a", 847), ("shell_b", 847)]
+    return list(check_with_programs(out, parts))
+
+
+@pytest.mark.parametrize("program", ["freecad", "prusa", "admesh"])
+def test_each_program_takes_both_halves(checks: list[Check], program: str) -> None:
+    mine = [check for check in checks if check.name.split()[0] == program]
+    if all(map(is_skipped, mine)):
+        pytest.skip(mine[0].detail)
+    names = [f"{program} {question}" for question in PROGRAMS[program]]
+    assert [check.name for check in mine if "listed" not in check.name] == 2 * names
+    for check in mine:
+        assert check.passed is True, check
