@@ -208,10 +208,10 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {
         "SEARCH_BUILDS": 10,
         "PHOTOGRAPHED_BUILDS": 1,
-        "VIEWPOINTS": ((60.0,), 1, 640.0),
         "BUILT_IN": ("diamond",),
     }.items():
         monkeypatch.setattr(f"tbcad.tolerance.analysis.{name}", value)
+    monkeypatch.setattr("tbcad.tolerance.view_quality.VIEWPOINTS", ((60.0,), 1, 640.0))
 
 
 def smaller(words: tuple[str, ...]) -> list[str]:

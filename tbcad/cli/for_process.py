@@ -44,10 +44,14 @@ def with_margins(spec: "Spec", process: "Process", wanted: float, screen: "Stage
         design_for_process,
         margins_text,
         pixel_costs,
+        ssim_costs,
+        ssim_text,
     )
 
     found = design_for_process(spec, process, wanted, screen.detail)
     screen.note(f"{margins_text(found)}, for {wanted:.1%} by {process.name}")
     screen.detail("pixels")
     screen.note(costs_text(pixel_costs(found)))
+    screen.detail("views")
+    screen.note(ssim_text(ssim_costs(found)))
     return found.spec

@@ -12,7 +12,6 @@ from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
 from tbcad.tolerance.margin import Margin, SolvedDesigns, margin
 from tbcad.tolerance.montecarlo.builds import (
     AnyResult,
@@ -33,7 +32,7 @@ from tbcad.tolerance.montecarlo.sensitivity import (
     one_at_a_time,
     shell_kinds,
 )
-from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, Sharpness, sharpness
+from tbcad.tolerance.montecarlo.sharpness import Sharpness, sharpness
 from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
 from tbcad.tolerance.prototype.wind_up import read_wind_up
@@ -46,14 +45,14 @@ from tbcad.tolerance.stages import (
     SINGLE_ERRORS,
     builds_stage,
 )
+from tbcad.tolerance.view_quality import reference_views
 from tbcad.tolerance.yield_text import yield_sentence
 from tbcad.types import Floats, Progress
 
 # Simulated builds in each step of a search; the process itself has as many as asked for.
 SEARCH_BUILDS = 100
-# Builds whose pictures are simulated; elevations, azimuths and distance of their viewpoints.
+# Builds whose pictures are simulated.
 PHOTOGRAPHED_BUILDS = 2
-VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
 
 
 @dataclass(frozen=True)
@@ -280,8 +279,7 @@ def _sharpness(
 ) -> Sharpness:
     export, options = simulator.export, simulator.options
     scene = prepared_scene(scene_object)
-    views = viewpoints_around(*VIEWPOINTS).cameras(export.capture_mm)
-    reference = ReferenceViews(export.capture_mm, views, ground_truths(scene, views, detail))
+    reference = reference_views(scene, export.capture_mm, detail)
     case = MonteCarloCase(simulator.edge_models, errors, options.seed)
     builds = case.draws(range(PHOTOGRAPHED_BUILDS))
     residual = options.calibration_residual

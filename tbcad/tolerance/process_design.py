@@ -15,6 +15,7 @@ from tbcad.tolerance.montecarlo.edge_model import EdgeModels
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.own_margins import own_margins, with_own_margins
 from tbcad.tolerance.process.process import Process, process_errors
+from tbcad.tolerance.view_quality import view_ssims
 from tbcad.tolerance.wanted_yield import check_yield
 from tbcad.types import Floats, Progress
 
@@ -108,6 +109,21 @@ def costs_text(costs: dict[str, SeeingPixels]) -> str:
     """The same in words."""
     each = (f"{pixels} {words}" for words, pixels in costs.items())
     return f"pixels of a virtual camera that see the object, median: {', '.join(each)}"
+
+
+def ssim_costs(made: ProcessDesign) -> dict[str, float]:
+    """Mean SSIM of views as designed: with these margins, and with none.
+
+    Raises:
+        SpecError: one of these designs cannot be made.
+    """
+    return view_ssims({"with these margins": made.spec, "with none": with_margin(made.spec, 0.0)})
+
+
+def ssim_text(costs: dict[str, float]) -> str:
+    """The same in words."""
+    each = (f"{ssim:.3f} {words}" for words, ssim in costs.items())
+    return f"SSIM of views of the knot, designed: {', '.join(each)}"
 
 
 def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:

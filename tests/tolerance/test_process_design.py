@@ -23,6 +23,8 @@ from tbcad.tolerance.process_design import (
     design_for_process,
     margins_text,
     pixel_costs,
+    ssim_costs,
+    ssim_text,
 )
 
 SMALL = ["n=4", "mirrors.margin_mm=0"]
@@ -112,6 +114,15 @@ def test_what_margins_cost() -> None:
     assert costs["with these margins"].minimum == each.min()
     assert len(each) == 2 * len(half) - (half.u[:, 0] == 0).sum()
     assert costs_text(costs).count("minimum") == 2
+
+
+def test_what_margins_cost_in_views() -> None:
+    """Many more pixels lost, worse views; what is said are the figures."""
+    sensor = ["n=6", "camera.width_px=832", "camera.height_px=620"]
+    costs = ssim_costs(ProcessDesign(load_spec(None, [*sensor, "margin_mm=18"]), 18.0))
+    assert list(costs) == ["with these margins", "with none"]
+    assert 0.3 < costs["with these margins"] < costs["with none"] < 1
+    assert ssim_text(costs).count(f"{costs['with none']:.3f} with none") == 1
 
 
 def test_margins_in_words() -> None:

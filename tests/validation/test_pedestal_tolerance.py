@@ -203,11 +203,14 @@ def record(small: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Exp
     return read_record(folder)
 
 
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (5, 10, 15))]
+)
 def test_random_builds_against_the_verification_of_their_meshes(
-    halves: EdgeModels, small: MirrorDesign, record: Export
+    halves: EdgeModels, small: MirrorDesign, record: Export, first: int
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured by rays: within 0.05 mm."""
-    draws = drawn(halves, scaled(COARSE, 0.5), range(5))
+    draws = drawn(halves, scaled(COARSE, 0.5), range(first, first + 5))
     fast, _ = coverage(halves, draws)
     for k in range(5):
         write_meshes(small, draws, k, record.folder)

@@ -92,6 +92,13 @@ def sharpness(
     return Sharpness(table[0], table[1::2], table[2::2])
 
 
+def designed_ssim(
+    cameras: tuple[Reflector, Reflector], scene: Scene, reference: ReferenceViews
+) -> Floats:
+    """SSIM of each view of a shell as designed, (v,)."""
+    return _ssim(_light_field(cameras, scene, reference.capture_mm), reference)
+
+
 @dataclass(frozen=True)
 class BuiltReflector(SubstitutedReflector):
     """A camera and its mirrors at their places in a build.
