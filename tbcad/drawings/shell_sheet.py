@@ -70,12 +70,11 @@ def mandrel_job(export: Export, name: str) -> ShellJob:
     Raises:
         InputError: its file is missing, or not as it was written.
     """
-    spec, camera = export.design["spec"], name[-1]
+    coat, camera = export.design["spec"]["mirrors"]["coating_um"], name[-1]
     record = next(one for one in export.design["mandrels"] if one["name"] == name)
     text = (
-        f"Negative of shell_{camera}: concave mirrors, named alike in {name}.step.",
-        f"Centres, and radii with the coat of {spec['mirrors']['coating_um']:g} um: mirrors.csv",
-        f"(camera {camera}).",
+        f"Negative of shell_{camera}. Concave mirrors, of the same names: centres and radii, the",
+        f"latter with the coat of {coat:g} um, in mirrors.csv (camera {camera}).",
         _release(record),
         "x = 0 and z = foot flat; blind holes. Dot: O, centre of the capture sphere.",
     )

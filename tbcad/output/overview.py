@@ -16,6 +16,7 @@ from tbcad.prototype.arrangement import Arrangement, arrange
 from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.shell.files import camera_a_mesh
+from tbcad.shell.mandrel_files import design_mandrel
 from tbcad.spec.design import MeshSpec, Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -136,6 +137,8 @@ def overview(
 
 
 def _shells(design: MirrorDesign) -> PrintEstimate:
+    if design.spec.shell.negative:
+        design_mandrel(design)  # refuses holes that do not fit
     spec = design.spec.model_copy(update={"mesh": COARSE})
     mesh = camera_a_mesh(MirrorDesign(spec, design.arrays))
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)

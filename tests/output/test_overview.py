@@ -8,6 +8,7 @@ import trimesh
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.output.overview import Overview, overview
+from tbcad.output.parts import SHELL
 from tbcad.prototype.model import build_prototype_model
 from tbcad.shell.files import camera_a_mesh
 from tbcad.spec.load import load_spec
@@ -79,3 +80,9 @@ class TestWithoutPrototype:
 
     def test_of_shells_alone(self, small_design: MirrorDesign) -> None:
         assert overview(small_design, ["shell"]).prototype is None
+
+
+def test_a_mandrel_without_room_is_refused_before_a_build() -> None:
+    settings = ["n=3", "shell.negative=true", "shell.wall_mm=50"]
+    with pytest.raises(InputError, match=r"mandrel has no room .* make shell\.wall_mm smaller"):
+        overview(design(load_spec(None, settings)), [SHELL])

@@ -52,6 +52,7 @@ from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.run import stages
 from tbcad_verify.run import verify as verification
 from tbcad_verify.run.child import Limits
+from tbcad_verify.shell import measured_shell
 from tbcad_verify.step import shell_checks, step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
@@ -61,9 +62,9 @@ MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
 # Functions of their arguments alone, by module.
 PURE: dict[Any, tuple[str, ...]] = {
-    stages: (
+    stages: ("same_check", "measure", "assess", "_set_up", "casing_checks"),
+    measured_shell: (
         *("mesh_from_facets", "examine_topology", "mass_properties", "measure_edges", "recover"),
-        *("same_check", "measure", "assess", "_set_up", "casing_checks"),
     ),
     stages.coverage: ("measure",),
     stages.pixels: ("checks",),
