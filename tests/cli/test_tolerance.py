@@ -30,12 +30,12 @@ def _quick() -> Iterator[None]:
     """Fewer machines, pictures, viewpoints and processes."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in {
-            "SEARCH_BUILDS": 10,
-            "PHOTOGRAPHED_BUILDS": 1,
-            "VIEWPOINTS": ((60.0,), 1, 640.0),
-            "BUILT_IN": ("sla", "diamond"),
+            "analysis.SEARCH_BUILDS": 10,
+            "analysis.PHOTOGRAPHED_BUILDS": 1,
+            "view_quality.VIEWPOINTS": ((60.0,), 1, 640.0),
+            "analysis.BUILT_IN": ("sla", "diamond"),
         }.items():
-            patch.setattr(f"tbcad.tolerance.analysis.{name}", value)
+            patch.setattr(f"tbcad.tolerance.{name}", value)
         yield
 
 

@@ -66,7 +66,7 @@ def test_the_sum_of_the_lamps_is_one_capture_with_all(
 
 
 def lit(scene: Scene, lights: PointLights) -> Scene:
-    return Scene(scene.subject, scene.embree, scene.shade, scene.radius, lights)
+    return Scene(scene.subject, scene.embree, scene.shade, scene.radius, lamps=lights)
 
 
 def test_rays_that_meet_nothing_are_left_out(

@@ -38,7 +38,7 @@ def cut(
 ) -> tuple[BaseLayout, BaseSplit]:
     at = {
         "small in two": (small_prototype, 150.0),
-        "small in three": (small_prototype, 130.0),
+        "small in three": (small_prototype, 127.0),
         "paper in two": (paper_prototype, 190.0),
     }
     chosen, bed = at[request.param]

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from io import BytesIO
+from typing import Literal
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import tbcad
+from tbcad.depth.view import depth_view
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
@@ -17,7 +19,6 @@ from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.simulate.views.method import suitable_method
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, lens_rays, refocus, refocus_sweep
 from tbcad.simulate.views.synthesis import horizon_search_radius, synthesise
@@ -46,12 +47,17 @@ def test_views_resemble_the_truth_and_blends_more_so(
     assert blended.psnr_db > plain.psnr_db
 
 
+@pytest.mark.parametrize("method", ["nearest", "blend", "depth"])
 def test_from_python_it_is_the_view_of_the_command(
-    tiles: MirrorTiles, light_field: LightField
+    tiles: MirrorTiles, light_field: LightField, method: Literal["nearest", "blend", "depth"]
 ) -> None:
-    """`tbcad.view`, and what a notebook shows of it."""
-    expected = synthesise(tiles, view_from(20, 60), suitable_method(tiles).method)
-    found = tbcad.view(light_field, 20, 60, size=SIZE)
+    """`tbcad.view`, by default at the depth that is found, and what a notebook shows of it."""
+    view = view_from(20, 60)
+    if method == "depth":
+        expected, found = depth_view(tiles, view)[0], tbcad.view(light_field, 20, 60, size=SIZE)
+    else:
+        expected = synthesise(tiles, view, method)
+        found = tbcad.view(light_field, 20, 60, size=SIZE, method=method)
     assert np.array_equal(found.colour, expected.colour)
     assert repr(found).startswith("<SynthesisedView: 160 x 120, ")
     with Image.open(BytesIO(found._repr_png_())) as shown:
