@@ -179,7 +179,7 @@ SMALLER = {
     ("build",): ["--n", "3", "--parts", "shell", *SMALL_SENSOR],
     ("optimize",): ["--set", "n=3", "--candidates", "80", *SMALL_SENSOR],
     ("refocus",): ["--truth-samples", "2", "--frames", "2"],
-    ("study", "balance"): ["--n", "3", "--azimuths", "1", *SMALL_SENSOR],
+    ("study", "balance"): ["--n", "3", "--views", "1", *SMALL_SENSOR],
     ("study", "ssim"): ["--sensor", "416x310", "--azimuths", "1"],
     ("tolerance",): ["--builds", "20", "--yield", "0.9"],
 }

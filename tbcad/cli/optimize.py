@@ -56,6 +56,14 @@ def optimize(
         float | None,
         typer.Option(help="Angle of view of the lens, degrees; by default that of the design."),
     ] = None,
+    front: Annotated[
+        bool,
+        typer.Option(
+            "--front",
+            help="With several aims: search also where each of them counts most, so that more "
+            "candidates are found that no other betters (the Pareto front).",
+        ),
+    ] = False,
     candidates: Annotated[int, typer.Option(help="Number of candidates, about.")] = 480,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a search that was stopped.")
@@ -82,7 +90,7 @@ def optimize(
     _check_files(out, store, resume, force)
     with stages(2) as screen:
         screen.stage("optimize: candidates")
-        asked = Search(spec, wanted, candidates, max_size_mm, max_view_angle_deg)
+        asked = Search(spec, wanted, candidates, max_size_mm, max_view_angle_deg, front)
         result = search(asked, store, scheduler, screen.detail)
         screen.stage("optimize: files")
         files = replace_files(out.parent, search_files(result, spec, out, plot))

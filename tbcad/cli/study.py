@@ -177,7 +177,9 @@ def balance_command(
         typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
     ] = None,
     method: MethodOption = "nearest",
-    azimuths: Azimuths = 2,
+    views: Annotated[
+        int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
+    ] = 12,
     distance: Distance = 640.0,
 ) -> int:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
@@ -185,7 +187,7 @@ def balance_command(
 
     wanted = parse_subdivisions(ns)
     spec = _spec(design, settings)
-    return run_study(out, json, plot, partial(balance, spec, wanted, azimuths, distance, method))
+    return run_study(out, json, plot, partial(balance, spec, wanted, views, distance, method))
 
 
 @study.command("prototype")

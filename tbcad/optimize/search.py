@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -23,6 +23,7 @@ from tbcad.optimize.candidate import (
     place_of,
     rounded,
 )
+from tbcad.optimize.store import read_store, store_bytes
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
@@ -36,9 +37,8 @@ SEED = 0
 IMPOSSIBLE = 1e6  # value of a place where nothing can be made
 BEYOND = 1e2  # value of a place beyond the limits: more than any within
 EXCESS = 1e2  # value of a relative excess of 1 over a limit
+MOST = 0.7  # weight that one objective has at least, where it counts most
 ANY_SIZE = Limits(np.inf, np.inf)
-
-Record: TypeAlias = dict[str, object]
 
 LOSSES: dict[Objective, Callable[[Figures], float]] = {
     "minimum": lambda one: -np.log(max(one.minimum_px, 1)),
@@ -60,6 +60,7 @@ class Search:
         budget: number of places that are judged at most.
         max_size_mm: longest side of the machine; None: of the first design's.
         max_view_angle_deg: of the lens; None: what the first design needs.
+        front: whether places are searched, too, where one of several objectives counts most.
     """
 
     spec: Spec
@@ -67,6 +68,7 @@ class Search:
     budget: int
     max_size_mm: float | None = None
     max_view_angle_deg: float | None = None
+    front: bool = False
 
     def limits(self, start: Figures) -> Limits:
         """What candidates must keep, by the figures of the first design."""
@@ -130,19 +132,60 @@ def search(
     Raises:
         InputError: the first design cannot be made; the store is of another design.
     """
-    judged = _read(store, asked) if store else {}
+    judged = read_store(store, asked.key()) if store else {}
     judge = partial(_judge, asked, judged, store, scheduler, progress)
     start = judge(ANY_SIZE, [place_of(asked.spec)])[0]
     if start.figures is None:
         raise InputError(f"the design to begin from cannot be made: {start.reason}")
     limits = asked.limits(start.figures)
     value = partial(_value, asked.objectives, limits, start.figures)
+    every = weightings(len(asked.objectives)) if asked.front else [_even(len(asked.objectives))]
+    generations = asked.budget // len(every) // POPULATION
+    for weights in every:
+        _evolve(asked, limits, start.place, max(1, generations - 1), judge, partial(value, weights))
+    candidates = tuple(judged.values())
+    losses = _losses(asked.objectives, limits, start.figures, candidates)
+    best = min(candidates, key=partial(value, _even(len(asked.objectives))))
+    return SearchResult(
+        start,
+        limits,
+        best,
+        candidates,
+        _front(losses),
+    )
+
+
+def weightings(objectives: int) -> list[Floats]:
+    """How much each of k objectives counts, in one search after the other, (k,) each.
+
+    First all alike, then one after the other most: places between the extremes of a Pareto front,
+    and near them.
+    """
+    even = _even(objectives)
+    if objectives == 1:
+        return [even]
+    return [even, *(even * (1 - MOST) + MOST * np.eye(objectives))]
+
+
+def _even(objectives: int) -> Floats:
+    return np.full(objectives, 1 / objectives)
+
+
+def _evolve(
+    asked: Search,
+    limits: Limits,
+    start: Place,
+    generations: int,
+    judge: Callable[[Limits, Sequence[Place]], list[Candidate]],
+    value: Callable[[Candidate], float],
+) -> None:
+    """Judge generations of places, each nearer to the lowest value."""
     differential_evolution(
         _never_called,
         Bounds(*np.transpose(bounds(asked.spec, limits.size_mm))),
-        x0=np.array(start.place),
-        maxiter=max(1, asked.budget // POPULATION - 1),
-        popsize=POPULATION // len(start.place),
+        x0=np.array(start),
+        maxiter=generations,
+        popsize=POPULATION // len(start),
         tol=0,
         rng=np.random.default_rng(SEED),
         polish=False,
@@ -151,9 +194,6 @@ def search(
             *map(value, judge(limits, [rounded(np.array(p)) for p in places]))
         ],
     )
-    candidates = tuple(judged.values())
-    losses = _losses(asked.objectives, limits, start.figures, candidates)
-    return SearchResult(start, limits, min(candidates, key=value), candidates, _front(losses))
 
 
 def _never_called(place: Floats) -> float:
@@ -162,16 +202,20 @@ def _never_called(place: Floats) -> float:
 
 
 def _value(
-    objectives: Sequence[Objective], limits: Limits, start: Figures, one: Candidate
+    objectives: Sequence[Objective],
+    limits: Limits,
+    start: Figures,
+    weights: Floats,
+    one: Candidate,
 ) -> float:
-    """What is minimised: the mean of all objectives, relative to the first design."""
+    """What is minimised: the weighted mean of all objectives, relative to the first design."""
     if one.figures is None:
         return IMPOSSIBLE
     if excess := limits.excess(one.figures):
         return BEYOND + EXCESS * excess
     if _lacks(objectives, one.figures):
         return IMPOSSIBLE
-    return float(np.mean(objective_losses(objectives, start, one.figures)))
+    return float(weights @ objective_losses(objectives, start, one.figures))
 
 
 def objective_losses(objectives: Sequence[Objective], start: Figures, one: Figures) -> list[float]:
@@ -194,7 +238,7 @@ def _judge(
     for one in run_units(partial(evaluate, asked.spec, wanted), new, scheduler):
         judged[one.place] = one
     if store and new:
-        replace_files(store.parent, {store.name: _lines(asked, judged)})
+        replace_files(store.parent, {store.name: store_bytes(asked.key(), judged)})
     progress(f"{len(judged)} of about {asked.budget} candidates")
     return [judged[place] for place in places]
 
@@ -238,39 +282,3 @@ def _front(losses: Floats) -> tuple[bool, ...]:
     dominated = np.any(no_worse & better, axis=1)
     on_front = np.isfinite(losses).all(axis=1) & ~dominated
     return tuple(bool(one) for one in on_front)
-
-
-def _lines(asked: Search, judged: dict[Place, Candidate]) -> bytes:
-    head = {"schema": "tbcad-candidates/1", "design": asked.key()}
-    rows = [head, *map(asdict, judged.values())]
-    return "".join(json.dumps(row) + "\n" for row in rows).encode()
-
-
-def _read(store: Path, asked: Search) -> dict[Place, Candidate]:
-    """Judgements of an earlier search; none where there is no file."""
-    if not store.exists():
-        return {}
-    try:
-        head, *rows = map(json.loads, store.read_text(encoding="utf-8").splitlines())
-        known = head["design"] == asked.key()
-        found = [_candidate(row) for row in rows]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
-    if not known:
-        raise InputError(f"{store}: of another design: name another --out, or remove the file")
-    return {one.place: one for one in found}
-
-
-def _candidate(row: Record) -> Candidate:
-    place, figures = row["place"], row["figures"]
-    x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
-    if figures is not None and not isinstance(figures, dict):
-        raise ValueError("figures are not an object")
-    numbers = {
-        name: None if number is None else float(number) for name, number in (figures or {}).items()
-    }
-    return Candidate(
-        (x, z, semi_minor, along_x, along_y),
-        Figures(**numbers) if figures else None,  # type: ignore[arg-type]
-        str(row["reason"]),
-    )

@@ -20,6 +20,7 @@ from tbcad.optimize.search import (
     _front,
     parse_objectives,
     search,
+    weightings,
 )
 from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec
@@ -175,3 +176,27 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
     assert {one.place[3] for one in kept} == {result.best.place[3]}
     assert any("SSIM of views" in line for line in comparison(result))
     assert search(views, store) == result
+
+
+def test_weights_of_a_front() -> None:
+    assert [one.tolist() for one in weightings(1)] == [[1.0]]
+    every = np.array(weightings(3))
+    assert every.shape == (4, 3)
+    assert every.sum(axis=1) == pytest.approx(np.ones(4))
+    assert every.argmax(axis=1).tolist() == [0, 0, 1, 2]
+    assert every[1:].max(axis=1) == pytest.approx(np.full(3, 0.8))
+
+
+def test_a_front_reaches_farther_towards_each_aim() -> None:
+    """Pixels are most at x = 123, the machine is smallest at the smallest x."""
+    one = Search(SPEC, ("minimum", "size"), 480, 600.0)
+    searches = [search(one), search(replace(one, budget=3 * one.budget, front=True))]
+    fronts = [
+        [c.figures for c, on in zip(r.candidates, r.on_front, strict=True) if on and c.figures]
+        for r in searches
+    ]
+    assert len(fronts[1]) > len(fronts[0])
+    assert min(f.size_mm for f in fronts[1]) <= min(f.size_mm for f in fronts[0])
+    assert max(f.minimum_px for f in fronts[1]) >= max(f.minimum_px for f in fronts[0])
+    shared = {c.place for c in searches[0].candidates}
+    assert shared <= {c.place for c in searches[1].candidates}

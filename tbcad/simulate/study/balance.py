@@ -25,7 +25,7 @@ from tbcad.simulate.study.tables import Record, Table
 from tbcad.simulate.study.viewpoints import (
     ground_truths,
     object_masks,
-    viewpoints_around,
+    viewpoints_over_hemisphere,
 )
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method, synthesise
@@ -33,13 +33,13 @@ from tbcad.spec.design import Spec
 from tbcad.types import Bools, Bytes, Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
-ELEVATIONS_DEG = (15.0, 45.0, 75.0)
 NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
 GLOSS = 1.0  # highlights as bright as the lamps
 COLUMNS = ("n", "virtual_cameras", "pixels", "surface", "radius_mm", "ssim_on_object", "reason")
 NOTES = (
     "ssim_on_object: mean of the local SSIM where the truth shows the object, over all views of "
-    "640 x 480 pixels. pixels: mean number that a virtual camera has on the capture sphere.",
+    "640 x 480 pixels, evenly over the hemisphere. pixels: mean number that a virtual camera has "
+    "on the capture sphere.",
     "The sensor is that of the design, n is varied: more virtual cameras have fewer pixels each. "
     "Lens of Table I for the paper's design.",
     "radius_mm: of a ball about the origin with the built-in pattern; its surface is as far from "
@@ -88,7 +88,7 @@ def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
 def balance(
     spec: Spec,
     ns: tuple[int, ...],
-    azimuths: int,
+    views: int,
     distance_mm: float,
     method: Method,
     progress: Progress = lambda _: None,
@@ -98,13 +98,13 @@ def balance(
     Args:
         spec: the design.
         ns: subdivisions.
-        azimuths: number of viewpoints at each elevation.
+        views: number of viewpoints, evenly over the hemisphere.
         distance_mm: of the viewpoints.
         method: how views are made.
         progress: called with each step.
     """
     spec = with_lens_of_table_i(spec)
-    viewpoints = viewpoints_around(ELEVATIONS_DEG, azimuths, distance_mm)
+    viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
     seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
     records = [one for n in ns for one in _of_n(spec, n, seen, cameras, method, progress)]

@@ -9,7 +9,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import equivalent_blur_px, image_quality_map
-from tbcad.simulate.scene.ground_truth import pinhole_picture
+from tbcad.simulate.scene.ground_truth import GOLDEN_ANGLE, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
@@ -17,7 +17,7 @@ from tbcad.simulate.views.synthesis import DepthFunction, Method, synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
-MAX_AZIMUTHS = 360
+MAX_AZIMUTHS, MAX_VIEWS = 360, 1000
 # What is measured of a view: SSIM over the frame and where the object is; standard deviation of
 # the Gaussian that blurs the truth as the view is blurred, at the object's centre; object's share.
 QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
@@ -61,6 +61,19 @@ def viewpoints_around(
     around = np.arange(azimuths) * 360.0 / azimuths
     elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, around, indexing="ij"))
     return Viewpoints(elevation, azimuth, distance_mm)
+
+
+def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
+    """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral).
+
+    Raises:
+        InputError: there are none or too many.
+    """
+    if not 1 <= count <= MAX_VIEWS:
+        raise InputError(f"--views {count}: allowed is 1 to {MAX_VIEWS} viewpoints")
+    step = np.arange(count) + 0.5
+    elevation = np.degrees(np.arcsin(step / count))
+    return Viewpoints(elevation, np.degrees(GOLDEN_ANGLE * step) % 360, distance_mm)
 
 
 def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:

@@ -11,6 +11,7 @@ from tbcad.simulate.scene.object import patterned_ball
 from tbcad.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
 from tbcad.simulate.study.balance import SUBDIVISIONS, balance, parse_subdivisions
 from tbcad.simulate.study.study import Study
+from tbcad.simulate.study.viewpoints import viewpoints_over_hemisphere
 from tbcad.spec.load import load_spec
 
 SMALL = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])
@@ -18,7 +19,7 @@ SMALL = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return balance(SMALL, (4, 8), 1, 640.0, "nearest")
+    return balance(SMALL, (4, 8), 3, 640.0, "nearest")
 
 
 @pytest.mark.slow
@@ -75,3 +76,15 @@ def test_subdivisions() -> None:
 def test_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["study", "balance", "--n", "1"]) == 2
     assert "--n is 1" in capsys.readouterr().err
+
+
+def test_viewpoints_are_even_over_the_hemisphere() -> None:
+    """As many on each belt of equal area: of equal height (Archimedes)."""
+    views = viewpoints_over_hemisphere(200, 640.0)
+    height = np.sin(np.radians(views.elevation_deg))
+    assert np.histogram(height, 10, (0, 1))[0].tolist() == [20] * 10
+    quarter, _ = np.histogram(views.azimuth_deg, 4, (0, 360))
+    assert np.ptp(quarter) <= 2
+    assert np.abs(np.sin(2 * np.radians(views.azimuth_deg[:50]))).min() > 0.01
+    with pytest.raises(InputError, match="--views 0: allowed is 1 to 1000"):
+        viewpoints_over_hemisphere(0, 640.0)
