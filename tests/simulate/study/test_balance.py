@@ -84,7 +84,7 @@ def test_viewpoints_are_even_over_the_hemisphere() -> None:
     height = np.sin(np.radians(views.elevation_deg))
     assert np.histogram(height, 10, (0, 1))[0].tolist() == [20] * 10
     quarter, _ = np.histogram(views.azimuth_deg, 4, (0, 360))
-    assert np.ptp(quarter) <= 2
+    assert np.ptp(quarter) <= 4
     assert np.abs(np.sin(2 * np.radians(views.azimuth_deg[:50]))).min() > 0.01
     with pytest.raises(InputError, match="--views 0: allowed is 1 to 1000"):
         viewpoints_over_hemisphere(0, 640.0)
