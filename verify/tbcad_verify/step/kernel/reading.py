@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.STEPControl import STEPControl_Reader
@@ -22,8 +20,6 @@ from tbcad_verify.step.kernel.topology import corners_of, count, faces_of, open_
 
 Row = dict[str, Any]
 
-# Modes of the kernel's reader; the kernel finds the file by an environment variable of its name.
-RESOURCES = Path(__file__).with_name("tbcad_verify_step")
 MAXIMUM = 1  # of all tolerances: a mode of the kernel
 
 
@@ -61,15 +57,8 @@ def transferred(path: Path) -> TopoDS_Shape:
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Alarm)
     reader = STEPControl_Reader()
-    _read_without_repair()
     if reader.ReadFile(str(path)) != IFSelect_RetDone:
         raise ValueError("the kernel cannot read it as STEP")
     if reader.TransferRoots() < 1:
         raise ValueError("the kernel finds no shape in it")
     return reader.OneShape()
-
-
-def _read_without_repair() -> None:
-    """Have the kernel repair nothing that it reads: repairs hide faults, and take time."""
-    os.environ[f"CSF_{RESOURCES.name}Defaults"] = str(RESOURCES.parent)
-    Interface_Static.SetCVal_s("read.step.resource.name", RESOURCES.name)
