@@ -144,6 +144,8 @@ def set_up(
 
 def _symmetric(export: Export, matches: Match, patches: int) -> bool:
     """Whether two cameras see mirror images, given as many patches in each half."""
+    if len(export.cameras) != 2:
+        return False
     (name, one), (other_name, other) = sorted(export.cameras.items())
     own, others = (matches.segment[export.mirrors.camera == key] for key in (name, other_name))
     return is_image_of_camera(other, one) and np.array_equal(

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.report.checks import Check, CheckName, at_most, each_at_most, short_list
-from tbcad_verify.step.part_checks import Checks, PartComparison
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    attempt,
+    each_at_most,
+    guarded,
+    short_list,
+)
+from tbcad_verify.step.part_checks import Checks, PartComparison, names_of, run_checks
 from tbcad_verify.step.pedestal_faces import wall_errors
 from tbcad_verify.step.pedestals import PedestalWalls
 from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export, walls_of_export
-from tbcad_verify.step.step_file import StepFile
+from tbcad_verify.step.step_file import StepFile, known
 from tbcad_verify.types import Floats, Ints
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
@@ -48,6 +59,10 @@ class FrontComparison(PartComparison):
     walls: PedestalWalls | None
     export: Export
     camera: Camera
+
+
+AnyPart = TypeVar("AnyPart", bound=Part)
+AnyComparison = TypeVar("AnyComparison", bound=FrontComparison)
 
 
 def front_fields(export: Export, part: Part, file: StepFile) -> dict[str, Any]:
@@ -159,6 +174,40 @@ def worst_of(name: CheckName, ids: Sequence[str], error: Floats, limit: float, u
     """The worst mirror; one without a face counts as infinitely wrong."""
     error = np.where(np.isnan(error), np.inf, error)
     return each_at_most(name, ids, error, limit, unit)
+
+
+def each_compared(
+    parts: Iterable[AnyPart],
+    files: Mapping[str, StepFile | Unknown],
+    compare: Callable[[AnyPart, StepFile | Unknown], AnyComparison],
+) -> dict[str, AnyComparison | Unknown]:
+    """What `compare` gives for each part with a STEP file, or why not, by part."""
+    found: dict[str, AnyComparison | Unknown] = {}
+    for part in parts:
+        if part.step:
+            comparison, reason = attempt(partial(compare, part, files[part.name]))
+            found[part.name] = comparison or Unknown(reason)
+    return found
+
+
+def each_checked(
+    parts: Iterable[Part],
+    chosen: Checks,
+    masses: Mapping[str, MassProperties],
+    comparisons: Mapping[str, AnyComparison | Unknown],
+) -> list[Check]:
+    """The chosen checks of each part with a STEP file, with its mesh; unknown where they break."""
+
+    def of_part(part: Part) -> list[Check]:
+        comparison = known(comparisons[part.name])
+        return run_checks(chosen, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
+
+    return [
+        check
+        for part in parts
+        if part.step
+        for check in guarded(names_of(chosen, part.step), partial(of_part, part))
+    ]
 
 
 WALLS: Checks = {"step walls": ("mm", walls)}

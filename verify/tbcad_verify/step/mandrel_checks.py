@@ -17,19 +17,22 @@ from tbcad_verify.report.checks import (
     CheckName,
     Unknown,
     at_most,
-    attempt,
-    guarded,
     short_list,
 )
 from tbcad_verify.step.casing import read_bores
-from tbcad_verify.step.front_checks import CELL_SHARE, WALLS, FrontComparison, front_fields
+from tbcad_verify.step.front_checks import (
+    CELL_SHARE,
+    WALLS,
+    FrontComparison,
+    each_checked,
+    each_compared,
+    front_fields,
+)
 from tbcad_verify.step.front_checks import CHECKS as FRONT_CHECKS
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
     Checks,
-    names_of,
-    run_checks,
 )
 from tbcad_verify.step.pedestal_faces import fronts
 from tbcad_verify.step.step_file import StepFaces, StepFile, known, load
@@ -54,13 +57,7 @@ def mandrel_comparisons(
     export: Export, files: dict[str, StepFile | Unknown]
 ) -> dict[str, MandrelComparison | Unknown]:
     """Each negative's STEP file with all that it is compared with but its mesh, or why not."""
-    found: dict[str, MandrelComparison | Unknown] = {}
-    for mandrel in export.mandrels:
-        if mandrel.step:
-            work = partial(_comparison, export, mandrel, files[mandrel.name])
-            comparison, reason = attempt(work)
-            found[mandrel.name] = comparison or Unknown(reason)
-    return found
+    return each_compared(export.mandrels, files, partial(_comparison, export))
 
 
 def mandrel_step_checks(
@@ -76,19 +73,7 @@ def mandrel_step_checks(
         comparisons: by part.
     """
     chosen = {**CHECKS, **(TURNED_WALLS if export.spec.shell.edges == "pedestal" else {})}
-
-    def checked(mandrel: Mandrel) -> list[Check]:
-        comparison = known(comparisons[mandrel.name])
-        return run_checks(
-            chosen, mandrel.step, replace(comparison, mesh_mass=masses.get(mandrel.name))
-        )
-
-    return [
-        check
-        for mandrel in export.mandrels
-        if mandrel.step
-        for check in guarded(names_of(chosen, mandrel.step), partial(checked, mandrel))
-    ]
+    return each_checked(export.mandrels, chosen, masses, comparisons)
 
 
 def _comparison(export: Export, part: Mandrel, read: StepFile | Unknown) -> MandrelComparison:

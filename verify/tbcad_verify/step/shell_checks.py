@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -27,6 +27,8 @@ from tbcad_verify.step.front_checks import (
     CELL_SHARE,
     WALLS,
     FrontComparison,
+    each_checked,
+    each_compared,
     front_fields,
     worst_of,
 )
@@ -35,8 +37,6 @@ from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
     Checks,
-    names_of,
-    run_checks,
 )
 from tbcad_verify.step.pedestal_faces import fronts
 from tbcad_verify.step.sphere_union import cells_of_export
@@ -72,13 +72,7 @@ def shell_comparisons(
         export: the record.
         files: as read, by part.
     """
-    found = {}
-    for part in export.parts:
-        if part.step:
-            work = partial(_comparison, export, part, files[part.name])
-            comparison, reason = attempt(work)
-            found[part.name] = comparison or Unknown(reason)
-    return found
+    return each_compared(export.parts, files, partial(_comparison, export))
 
 
 def shell_step_checks(
@@ -97,18 +91,8 @@ def shell_step_checks(
         coverage: (M,) mm, as measured on spheres.
         areas: what `area_checks` gives; None: it is called.
     """
-
-    def of_part(part: Part) -> list[Check]:
-        comparison = known(comparisons[part.name])
-        return run_checks(chosen, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
-
     chosen = {**CHECKS, **(WALLS if export.spec.shell.edges == "pedestal" else {})}
-    checks = [
-        check
-        for part in export.parts
-        if part.step
-        for check in guarded(names_of(chosen, part.step), partial(of_part, part))
-    ]
+    checks = each_checked(export.parts, chosen, masses, comparisons)
     recorded = [*(area_checks(export) if areas is None else areas)]
     recorded += guarded([RULE], lambda: [rule_check(export)])
     recorded += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
