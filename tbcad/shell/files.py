@@ -34,10 +34,14 @@ def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -
     """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
     mesh = camera_a_mesh(design, envelope)
     for array in design.arrays:
-        files = shell_record(array)
-        own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
-        write_stl(folder / files["stl"], own_mesh)
-        write_3mf(folder / files["3mf"], files["name"], own_mesh)
+        write_half_mesh(folder, shell_record(array), mesh, array)
+
+
+def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: MirrorArray) -> None:
+    """Write one camera's half as STL and 3MF, given camera a's mesh and the files' names."""
+    own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
+    write_stl(folder / files["stl"], own_mesh)
+    write_3mf(folder / files["3mf"], files["name"], own_mesh)
 
 
 def write_shell_solids(

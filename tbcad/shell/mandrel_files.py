@@ -9,12 +9,10 @@ from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import one_solid
 from tbcad.formats.step import write_step
-from tbcad.formats.stl import write_stl
-from tbcad.formats.threemf import write_3mf
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import mandrel_files
-from tbcad.shell.files import shell_properties, wall_names
+from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
 from tbcad.shell.front import front_edges
 from tbcad.shell.mandrel import Mandrel, mandrel_of
 from tbcad.shell.mandrel_mesh import mandrel_mesh
@@ -47,9 +45,7 @@ def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None
     mesh = camera_a_mandrel_mesh(design, mandrel)
     for array in design.arrays:
         files = mandrel_files(array)
-        own_mesh = mesh.mirrored() if array.camera_id == "b" else mesh
-        write_stl(folder / files["stl"], own_mesh)
-        write_3mf(folder / files["3mf"], files["name"], own_mesh)
+        write_half_mesh(folder, files, mesh, array)
         solid = mandrel_solid(design, array, mandrel)
         known = shell_properties(solid, array, negative=True)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
