@@ -5,6 +5,14 @@ from tbcad.optics.pedestals import PedestalCells, flattened, pedestal_cells
 from tbcad.spec.load import load_spec
 
 GROOVE = 0.1
+# Of small shells on any edges: few mirrors, planar ones, a coat, a camera beside the axis.
+OPTIONS = [
+    ["n=2"],
+    ["n=5"],
+    ["n=4", "radius_rule=flat"],
+    ["n=5", "coating_um=100"],
+    ["n=5", "camera_mm=[120, 15, -90]"],
+]
 
 
 def pedestals(array: MirrorArray, groove: float = GROOVE) -> PedestalCells:

@@ -17,14 +17,8 @@ from tbcad.shell.mesh import front_facets
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tests.helpers import area, bounds, volume
+from tests.pedestal_designs import OPTIONS
 
-OPTIONS = [
-    ["n=2"],
-    ["n=5"],
-    ["n=4", "radius_rule=flat"],
-    ["n=5", "coating_um=100"],
-    ["n=5", "camera_mm=[120, 15, -90]"],
-]
 EDGES = ["valley", "pedestal"]
 
 

@@ -13,15 +13,7 @@ from OCP.TopoDS import TopoDS
 from tbcad.cad.solids import properties
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tests.helpers import area, volume
-from tests.pedestal_designs import pedestal_design
-
-OPTIONS = [
-    ["n=2"],
-    ["n=5"],
-    ["n=4", "radius_rule=flat"],
-    ["n=5", "coating_um=100"],
-    ["n=5", "camera_mm=[120, 15, -90]"],
-]
+from tests.pedestal_designs import OPTIONS, pedestal_design
 
 
 @pytest.mark.parametrize("options", [*OPTIONS, ["n=13"]], ids=str)
