@@ -1,7 +1,8 @@
 """Designs whose mirrors stand on pedestals, for tests."""
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.optics.pedestals import PedestalCells, flattened, pedestal_cells
+from tbcad.optics.pedestals.cells import PedestalCells, pedestal_cells
+from tbcad.optics.pedestals.plan import pedestal_plan
 from tbcad.spec.load import load_spec
 
 GROOVE = 0.1
@@ -18,8 +19,8 @@ OPTIONS = [
 def pedestals(array: MirrorArray, groove: float = GROOVE) -> PedestalCells:
     """Pedestals below mirrors whose radii were found without grooves."""
     pinhole = array.camera.pinhole
-    flat = flattened(array.cells.surfaces, array.cells.triangles, pinhole)
-    return pedestal_cells(flat, array.mirrors, pinhole, groove)
+    plan = pedestal_plan(array.cells.surfaces, array.cells.triangles, pinhole, groove)
+    return pedestal_cells(plan, array.mirrors)
 
 
 def pedestal_design(*settings: str) -> MirrorDesign:

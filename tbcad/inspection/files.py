@@ -20,7 +20,7 @@ from tbcad.inspection.read_back import check_read_back
 from tbcad.inspection.sensitivity import Sensitivities
 from tbcad.mirrors.array import mirror_ids
 from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import wall_names

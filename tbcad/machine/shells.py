@@ -15,7 +15,7 @@ from tbcad.machine.built import BuiltPrototype, built_camera, draw_other_errors
 from tbcad.machine.designed import designed_shell
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS
-from tbcad.optics.groove_walls import GrooveWalls
+from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.runs.exposure import Frame
 from tbcad.runs.record import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan

@@ -12,7 +12,7 @@ from tbcad.optics import flat
 from tbcad.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.optics.cells import Cells, cell_areas, cells_of
 from tbcad.optics.geodesic import geodesic, stretched
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec

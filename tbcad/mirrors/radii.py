@@ -1,12 +1,15 @@
 """Radius rules: what curvature each mirror gets."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tbcad.mirrors.seam import aimed, cut_positions, seam_gaps
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.pedestals import flattened, pedestal_cells
+from tbcad.optics.pedestals.cells import pedestal_cells
+from tbcad.optics.pedestals.plan import PedestalPlan, pedestal_plan
 from tbcad.optics.power_diagram import NotRegularError
 from tbcad.optics.surfaces import Surfaces
 from tbcad.optics.trace import coverage_diameters
@@ -18,6 +21,8 @@ CONVERGED_MM = 1e-4
 MAX_ITERATIONS = 400
 # Designs that settle need none; each costs as much as a step, and further ones have never helped.
 MAX_HALVINGS = 4
+# How often a groove that is too wide is halved in search of one that is not.
+GROOVE_HALVINGS = 5
 # Mirrors that an error names at most.
 NAMED_MIRRORS = 5
 
@@ -66,11 +71,34 @@ class RadiusProblem:
         start = self.triangles if triangles is None else triangles
         if self.groove is None:
             return cells_of(mirrors.joined(self.planes), start)
-        flat = flattened(mirrors.joined(self.planes), start, self.pinhole)
         try:
-            return pedestal_cells(flat, mirrors, self.pinhole, self.groove)
+            return pedestal_cells(self.plan, mirrors)
         except NotRegularError as error:
-            raise SpecError(f"{error}: make shell.groove_mm or optics.n smaller") from None
+            raise SpecError(f"{error}: {self._narrower_groove()}") from None
+
+    @cached_property
+    def plan(self) -> PedestalPlan:
+        """Of pedestals, which depends neither on curvatures nor on aims.
+
+        Raises:
+            NotRegularError: the grooves leave no outline of a mirror.
+        """
+        return self._plan(self.groove or 0.0)
+
+    def _plan(self, groove: float) -> PedestalPlan:
+        surfaces = self.mirrors.joined(self.planes)
+        return pedestal_plan(surfaces, self.triangles, self.pinhole, groove)
+
+    def _narrower_groove(self) -> str:
+        """What to set so that mirrors on pedestals have room; it was tried with the paper's."""
+        mirrors = self.mirrors.with_curvature(self.paper_curvature)
+        for narrower in (self.groove or 0.0) * 0.5 ** np.arange(1, GROOVE_HALVINGS):
+            with suppress(NotRegularError):
+                pedestal_cells(self._plan(narrower), mirrors)
+                return (
+                    f"set shell.groove_mm to {narrower:g}, which was tried with mirrors like these"
+                )
+        return "make optics.n smaller"
 
     def coverage(self, cells: Cells) -> Floats:
         """Coverage diameter of each mirror's virtual camera, mm, (m,).

@@ -163,7 +163,7 @@ def _flip_in_rounds(surfaces: Surfaces, triangles: Ints) -> Floats:
         edge, twin = _flips(surfaces, triangles, points)
         if not len(edge):
             break
-        changed = _flip(triangles, edge, twin)
+        changed = flip_edges(triangles, edge, twin)
         points[changed] = corners(surfaces, triangles[changed])
     lowest = lowest_value(surfaces, points)
     if not lowest > -ROUNDING_MM:
@@ -191,7 +191,7 @@ def _flips(surfaces: Surfaces, triangles: Ints, points: Floats) -> tuple[Ints, I
     ends, twin = half_edges(triangles)
     edge = np.flatnonzero(np.arange(len(ends)) < twin)
     twin = twin[edge]
-    one, other = _opposite(triangles, edge), _opposite(triangles, twin)
+    one, other = opposite(triangles, edge), opposite(triangles, twin)
     value = np.minimum(
         surfaces.value(other, points[edge // 3]), surfaces.value(one, points[twin // 3])
     )
@@ -219,15 +219,25 @@ def _first_in_both(one: Ints, other: Ints) -> Bools:
     return np.asarray((rank[one] == order) & (rank[other] == order))
 
 
-def _opposite(triangles: Ints, edge: Ints) -> Ints:
+def opposite(triangles: Ints, edge: Ints) -> Ints:
+    """The face opposite each directed edge in its triangle, (e,)."""
     return np.asarray(triangles[edge // 3, (edge + 2) % 3])
 
 
-def _flip(triangles: Ints, edge: Ints, twin: Ints) -> Ints:
-    """Replace triangles (i, j, k) and (j, i, l) by (k, i, l) and (l, j, k), in place."""
+def flip_edges(triangles: Ints, edge: Ints, twin: Ints) -> Ints:
+    """Replace triangles (i, j, k) and (j, i, l) by (k, i, l) and (l, j, k), in place.
+
+    Args:
+        triangles: of which edges are flipped, (t, 3).
+        edge: directed edges i to j, at most one in any triangle, (e,).
+        twin: the same edges from j to i, (e,).
+
+    Returns:
+        The triangles that changed: those with i, then those with j, (2 e,).
+    """
     t, s = edge // 3, twin // 3
     i, j = triangles[t, edge % 3], triangles[t, (edge + 1) % 3]
-    k, far = _opposite(triangles, edge), _opposite(triangles, twin)
+    k, far = opposite(triangles, edge), opposite(triangles, twin)
     triangles[t] = np.column_stack([k, i, far])
     triangles[s] = np.column_stack([far, j, k])
     return np.concatenate([t, s])

@@ -8,7 +8,7 @@ import numpy as np
 from tbcad.geometry.vectors import unit
 from tbcad.mirrors.seam import cut_images, seam_gaps
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.reflector import Reflector

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista
 
 from tbcad.geometry.vectors import unit
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.reflector import Reflector

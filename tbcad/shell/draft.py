@@ -7,7 +7,7 @@ from scipy.optimize import nnls
 
 from tbcad.geometry.vectors import unit
 from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.types import Floats
 

@@ -9,7 +9,7 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
 from tbcad.cad.brep import Maker, Side
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Arcs, Cells
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.shell.boundary import boundary_chain
 from tbcad.types import Floats, Ints

@@ -8,7 +8,7 @@ from tbcad.geometry.conics import EllipseArc, Spheroid
 from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.shell.boundary import boundary_chain
 from tbcad.shell.casing_edges import ARC_ENDS, casing_lines, outline
 from tbcad.shell.cell_outlines import CellOutlines

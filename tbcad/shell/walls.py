@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
 from tbcad.types import Ints
 

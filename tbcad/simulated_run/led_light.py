@@ -6,10 +6,10 @@ import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
-from tbcad.optics.groove_walls import GrooveWalls
 from tbcad.optics.highlights import reflection_points
 from tbcad.optics.led_dome import disc_images, dome_samples
 from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.simulate.prototype.ball_rays import (
     ON_BALL_MM,
     ball_hits,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tbcad.optics.groove_walls import NO_WALLS, GrooveWalls
 from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.simulate.capture.photograph import row_bands
 from tbcad.simulate.prototype.ball_rays import ball_hits, reflected_colours
 from tbcad.simulate.prototype.plan import HALF_TURN

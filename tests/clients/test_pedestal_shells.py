@@ -38,27 +38,9 @@ def test_each_program_takes_both_halves(checks: list[Check], program: str) -> No
         assert check.passed is True, check
 
 
-def test_the_slicer_reads_both_halves(checks: list[Check]) -> None:
-    """It reads them whole, but slices none: see docs/construction.md, the tips below the foot."""
+def test_the_slicer_takes_both_halves(checks: list[Check]) -> None:
     mine = [check for check in checks if check.name.startswith("prusa")]
     if all(map(is_skipped, mine)):
         pytest.skip(mine[0].detail)
-    read = [check for check in mine if check.name.split()[1] in ("manifold", "parts", "volume")]
-    assert len(read) == 12
-    assert all(check.passed is True for check in read)
-
-
-@pytest.mark.xfail(strict=True, reason="six tips of 0.16 mm below the foot plane at n = 18")
-def test_the_slicer_slices_both_halves(checks: list[Check]) -> None:
-    slices = [check for check in checks if check.name == "prusa slices"]
-    assert [check.passed for check in slices] == [True, True]
-
-
-def test_the_slicer_slices_a_small_design(tmp_path: Path) -> None:
-    """No corner of three mirrors lies near its foot plane."""
-    slices = [
-        one for one in checked(tmp_path / "exports", "--n", "6") if one.name == "prusa slices"
-    ]
-    if all(map(is_skipped, slices)):
-        pytest.skip(slices[0].detail)
-    assert [one.passed for one in slices] == [True, True]
+    assert sum(check.name == "prusa slices" for check in mine) == 2
+    assert [check for check in mine if check.passed is not True] == []

@@ -21,7 +21,7 @@ from tbcad.inspection.read_back import check_read_back
 from tbcad.inspection.sensitivity import Sensitivities, sensitivities
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
-from tbcad.optics.groove_walls import groove_walls
+from tbcad.optics.pedestals.walls import groove_walls
 from tbcad.shell.files import shell_envelope, wall_names, write_shell_solids
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tests.pedestal_designs import pedestal_design

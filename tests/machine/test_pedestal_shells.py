@@ -10,7 +10,7 @@ from tbcad.machine.built import BuiltPrototype
 from tbcad.machine.photographed import machine_run
 from tbcad.machine.shells import designed_half, perfect_half, random_half, shell_frame, shell_plan
 from tbcad.mirrors.record import write_record
-from tbcad.optics.groove_walls import NO_WALLS
+from tbcad.optics.pedestals.walls import NO_WALLS
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.prototype.ball_rays import BallHits, ball_hits
 from tbcad.simulate.prototype.merge import merge_plan, merged_pixels

@@ -29,7 +29,7 @@ def test_a_coat_leaves_the_pedestals_where_they_are() -> None:
 
 
 def test_a_groove_wider_than_the_mirrors_is_refused_in_one_line() -> None:
-    with pytest.raises(SpecError, match=r"make shell\.groove_mm"):
+    with pytest.raises(SpecError, match=r"set shell\.groove_mm to 0"):
         pedestal_design("n=30", "shell.groove_mm=5")
 
 

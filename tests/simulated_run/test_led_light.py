@@ -7,9 +7,9 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
 from tbcad.machine.machine import Machine
 from tbcad.optics.camera import Camera
-from tbcad.optics.groove_walls import NO_WALLS
 from tbcad.optics.led_dome import dome_images
 from tbcad.optics.lens_camera import without_distortion
+from tbcad.optics.pedestals.walls import NO_WALLS
 from tbcad.simulate.prototype.ball_rays import balls_between
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene

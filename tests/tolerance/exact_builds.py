@@ -22,7 +22,7 @@ from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics import trace
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.reflection import miss_distances, reflected_rays
 from tbcad.optics.surfaces import Surfaces

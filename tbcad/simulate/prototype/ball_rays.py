@@ -10,8 +10,8 @@ from typing import TypeAlias
 import numpy as np
 
 from tbcad.geometry.vectors import dot
-from tbcad.optics.groove_walls import NO_WALLS, GrooveWalls
 from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.optics.reflection import reflect
 from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
 from tbcad.simulate.parallel import compiled, in_threads

@@ -21,7 +21,8 @@ from tbcad.mirrors.array import numbered_directions
 from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE, SCHEMA
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.pedestals import flattened, pedestal_cells
+from tbcad.optics.pedestals.cells import pedestal_cells
+from tbcad.optics.pedestals.plan import pedestal_plan
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.simulate.scene.reflector import Reflector
@@ -139,8 +140,8 @@ def _reflector(
         start = triangles[:, ::-1] if mirrored else triangles
         if document.spec.shell.edges == "pedestal":
             pinhole, groove = np.array(camera.pinhole_mm), document.spec.shell.groove_mm
-            flat = flattened(surfaces.joined(walls), start, pinhole)
-            cells: Cells = pedestal_cells(flat, surfaces, pinhole, groove)
+            plan = pedestal_plan(surfaces.joined(walls), start, pinhole, groove)
+            cells: Cells = pedestal_cells(plan, surfaces)
         else:
             cells = cells_of(surfaces.joined(walls), start)
     except NotRegularError as error:

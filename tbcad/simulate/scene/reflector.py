@@ -7,8 +7,8 @@ import numpy as np
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells
-from tbcad.optics.groove_walls import GrooveWalls, groove_walls
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
+from tbcad.optics.pedestals.walls import GrooveWalls, groove_walls
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 

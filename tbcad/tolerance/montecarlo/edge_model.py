@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import dot, perpendicular_axes, unit
 from tbcad.optics.camera import Camera
-from tbcad.optics.groove_walls import GrooveWalls, groove_walls
+from tbcad.optics.pedestals.walls import GrooveWalls, groove_walls
 from tbcad.optics.power_diagram import PLANES
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.draws import ShellDraws

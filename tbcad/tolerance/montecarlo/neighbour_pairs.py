@@ -8,7 +8,7 @@ from scipy.sparse import coo_array, csr_array
 
 from tbcad.geometry.vectors import norm
 from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints

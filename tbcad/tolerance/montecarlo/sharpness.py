@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.optics.camera import Camera
-from tbcad.optics.groove_walls import GrooveWalls
+from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import BAND_ROWS, photograph

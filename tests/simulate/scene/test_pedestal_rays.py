@@ -10,7 +10,7 @@ from tbcad.formats.stl import write_stl
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import write_record
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh

@@ -14,13 +14,15 @@ import numpy as np
 
 from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.cells import Cells
-from tbcad.optics.power_diagram import PLANES, half_edges
+from tbcad.optics.power_diagram import PLANES, NotRegularError, half_edges
 from tbcad.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
 # Depth of a groove below the lowest mirror at its corners, in widths of the groove: walls lean by 1
 # in 8 or little more, so the groove drains, and a mirror that is off moves its edge little.
 DEPTH_WIDTHS = 4.0
+# Corners on a bounding plane lie within rounding of it.
+ON_PLANE_MM = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class PedestalLayout:
     """Where pedestals stand, whatever mirrors they carry.
 
     Attributes:
-        flat: cells of planar mirrors with the same apices.
+        flat: cells of planar mirrors with the same apices, see also `pedestal_rims`.
         mirrors: as designed, (m,).
         pinhole: that the grooves are seen from, mm, (3,).
         groove: width of the grooves at the mirrors' corners, mm.
@@ -99,6 +101,25 @@ class PedestalLayout:
     pairs: CellPairs
     corners: Corners
     borders: Borders
+
+    def with_planes(self, mirrors: Surfaces) -> Surfaces:
+        """Mirrors (m of them), followed by the two bounding planes."""
+        return mirrors.joined(self.flat.surfaces.subset(slice(self.flat.mirrors, None)))
+
+    @property
+    def on_planes(self) -> Bools:
+        """Which corners (c,) lie on a bounding plane."""
+        return np.asarray((np.abs(self._heights(self.corners.flat)) < ON_PLANE_MM).any(axis=1))
+
+    def near_planes(self, limit: float) -> Bools:
+        """Which ends of grooves (c,) are nearer to a bounding plane than a limit, mm, not on it."""
+        near = (self._heights(self.corners.bottom) < limit).any(axis=1)
+        return np.asarray(near & ~self.on_planes)
+
+    def _heights(self, points: Floats) -> Floats:
+        """Distances (c, 2) of points (c, 3) from the bounding planes, inward, mm."""
+        planes = self.flat.mirrors + np.arange(PLANES)
+        return self.flat.surfaces.value(planes, points[:, None])
 
 
 def cell_pairs(cells: Cells) -> CellPairs:
@@ -121,6 +142,9 @@ def pedestal_layout(
         corner: that each triangle's corner becomes, of c corners, (t,).
         pinhole: of the camera, mm, (3,).
         groove: width of the grooves, mm.
+
+    Raises:
+        NotRegularError: there is no mirror above the end of a groove.
     """
     between = corner[pairs.triangles]
     pair = np.flatnonzero(between[:, 0] != between[:, 1])
@@ -128,7 +152,10 @@ def pedestal_layout(
     grooved = (faces < flat.mirrors).all(axis=1)
     point, plane = _joined_points(flat, corner)
     down = _downward(flat, corner, point, plane, ends[grooved], pinhole)
-    top = point + _sag(flat, mirrors, corner, point, down)[:, None] * down
+    sag = _sag(flat, mirrors, corner, point, down)
+    if not np.isfinite(sag).all():
+        raise NotRegularError(f"grooves of {groove:g} mm end where a mirror has no surface")
+    top = point + sag[:, None] * down
     bounded = ~np.isin(np.arange(len(top)), ends[grooved])
     corners = Corners(
         point, top, np.where(bounded[:, None], top, top + groove * DEPTH_WIDTHS * down)
@@ -140,16 +167,20 @@ def pedestal_layout(
 
 
 def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floats) -> Floats:
-    """Distance (c,) down from the planar mirrors' corners to the lowest of the mirrors there."""
+    """Distance (c,) down from the planar mirrors' corners to the lowest of the mirrors there.
+
+    NaN where the line down misses a mirror's sphere.
+    """
     triangle, column = np.nonzero(flat.triangles < flat.mirrors)
     mirror, at = flat.triangles[triangle, column], corner[triangle]
     value, slope = (
         mirrors.value(mirror, point[at]),
         dot(down[at], mirrors.gradient(mirror, point[at])),
     )
-    root = np.sqrt(slope**2 - 2 * mirrors.curvature[mirror] * value)
     lowest = np.zeros(len(point))
-    np.maximum.at(lowest, at, 2 * value / (root - slope))
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(slope**2 - 2 * mirrors.curvature[mirror] * value)
+        np.maximum.at(lowest, at, 2 * value / (root - slope))
     return lowest
 
 

@@ -2,26 +2,22 @@
 
 Each cell is cut from its sphere by planes, so its sides are circular arcs; below them planar walls
 with straight edges reach down to the bottoms of the grooves, which are straight lines (see
-`pedestal_borders`). All of it has a closed form.
+`borders`). All of it has a closed form.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from tbcad.geometry.vectors import FLIP_X, dot, norm, unit
-from tbcad.optics.cells import Arcs, Cells, cells_of, plane_sections, rings_of
-from tbcad.optics.pedestal_borders import PedestalLayout, cell_pairs, pedestal_layout
+from tbcad.geometry.vectors import FLIP_X
+from tbcad.optics.cells import Arcs, Cells, plane_sections
+from tbcad.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout
+from tbcad.optics.pedestals.plan import PedestalPlan, planned
+from tbcad.optics.pedestals.sides import Sides, outline_sides
 from tbcad.optics.power_diagram import PLANES, NotRegularError
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.types import Bools, Floats, Ints
-
-# Borders that are too short are joined to a corner of four cells or more; each round joins some.
-MAX_ROUNDS = 20
-MIN_SIDES = 3
 
 
 @dataclass(frozen=True)
@@ -63,12 +59,8 @@ class PedestalCells(Cells):
     def mirrored(self) -> "PedestalCells":
         """The other camera's cells: mirror image in the plane x = 0."""
         layout = self.layout
-        other = pedestal_cells(
-            layout.flat.mirrored(),
-            layout.mirrors.mirrored(),
-            layout.pinhole * FLIP_X,
-            layout.groove,
-        )
+        plan = planned(layout.flat.mirrored(), layout.pinhole * FLIP_X, layout.groove)
+        other = pedestal_cells(plan, layout.mirrors.mirrored())
         return other.with_mirrors(self.mirror_surfaces.mirrored())
 
     def with_mirrors(self, mirrors: Surfaces) -> "PedestalCells":
@@ -78,131 +70,33 @@ class PedestalCells(Cells):
             NotRegularError: a mirror lies below the bottom of its grooves.
         """
         bounding = self.surfaces.subset(slice(self.mirrors, self.mirrors + PLANES))
-        return _standing(self.layout, mirrors.joined(bounding))
+        return _cells(self.layout, mirrors.joined(bounding))
 
 
-def pedestal_cells(flat: Cells, mirrors: Surfaces, pinhole: Floats, groove: float) -> PedestalCells:
+def pedestal_cells(plan: PedestalPlan, mirrors: Surfaces) -> PedestalCells:
     """Cells of mirrors on pedestals.
 
     Args:
-        flat: cells of planar mirrors with the same apices (`flattened`).
+        plan: of pedestals for mirrors with these apices.
         mirrors: m of them.
-        pinhole: of the camera, mm, (3,).
-        groove: width at the mirrors' corners, mm, above 0.
 
     Raises:
-        NotRegularError: the grooves leave no outline of a mirror.
+        NotRegularError: the grooves leave no outline of a mirror, or a pedestal sticks out beyond
+            a bounding plane.
     """
-    pairs, surfaces = (
-        cell_pairs(flat),
-        mirrors.joined(flat.surfaces.subset(slice(flat.mirrors, None))),
-    )
-    start, end = pairs.triangles.T
-    short = norm(flat.corners[start] - flat.corners[end]) < groove
-    for _ in range(MAX_ROUNDS):
-        corner = _joined_corners(len(flat.triangles), start[short], end[short])
-        kept = pairs.faces[corner[start] != corner[end]]
-        if np.bincount(kept.ravel(), minlength=flat.mirrors)[: flat.mirrors].min() < MIN_SIDES:
-            break
-        layout = pedestal_layout(flat, mirrors, pairs, corner, pinhole, groove)
-        sides = _outline_sides(layout, surfaces)
-        added = layout.borders.pair[sides.border[sides.length < groove]]
-        if not len(added):
-            return _Assembly(layout, surfaces, sides).cells()
-        short[added] = True
-    raise NotRegularError(f"grooves of {groove:g} mm leave no outline of a mirror")
+    layout = plan.layout_for(mirrors)
+    cells = _cells(layout, layout.with_planes(mirrors))
+    planes = np.arange(cells.mirrors, cells.mirrors + PLANES)
+    lowest = cells.surfaces.value(planes, cells.corners[:, None]).min()
+    if lowest < -ON_PLANE_MM:
+        beyond = f"{-lowest:.3g} mm beyond the seam or the foot"
+        raise NotRegularError(f"grooves of {layout.groove:g} mm reach {beyond}")
+    return cells
 
 
-def flattened(surfaces: Surfaces, triangles: Ints, pinhole: Floats) -> Cells:
-    """Cells of planar mirrors that send the rays to their apices on to the origin.
-
-    Args:
-        surfaces: the m mirrors, then the two bounding planes.
-        triangles: a dual triangulation that is right or nearly so, (t, 3).
-        pinhole: of the camera, mm, (3,).
-
-    Raises:
-        NotRegularError: when the planes bound no proper cells.
-    """
-    m = len(surfaces) - PLANES
-    apex, normal = surfaces.apex, surfaces.normal.copy()
-    normal[:m] = unit(unit(pinhole - apex[:m]) - unit(apex[:m]))
-    return cells_of(Surfaces(apex, normal, np.zeros(len(surfaces))), triangles)
-
-
-def _standing(layout: PedestalLayout, surfaces: Surfaces) -> PedestalCells:
-    """Mirrors, followed by the two bounding planes, on pedestals."""
-    return _Assembly(layout, surfaces, _outline_sides(layout, surfaces)).cells()
-
-
-def _joined_corners(triangles: int, start: Ints, end: Ints) -> Ints:
-    """Numbers of corners, one for each triangle (t,), when pairs of triangles share theirs."""
-    graph = coo_array((np.ones(len(start)), (start, end)), shape=(triangles, triangles))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
-@dataclass(frozen=True)
-class _Sides:
-    """Sides of all cells, one cell after another, counter-clockwise from outside, q of them.
-
-    Attributes:
-        offsets: where each cell's sides start, (m + 1,).
-        cell: (q,).
-        border: (q,).
-        back: whether the cell follows the border from end to start, (q,).
-        following: next side of the cell, (q,).
-        corner: at which each side starts, (q,).
-        normal: of the plane that ends the cell, into the cell, (q, 3).
-        point: where the side starts on the mirror, mm, (q, 3).
-        length: along the border, mm, (q,).
-    """
-
-    offsets: Ints
-    cell: Ints
-    border: Ints
-    back: Ints
-    following: Ints
-    corner: Ints
-    normal: Floats
-    point: Floats
-    length: Floats
-
-
-def _outline_sides(layout: PedestalLayout, surfaces: Surfaces) -> _Sides:
-    """Sides of the cells of mirrors, which are followed by the two bounding planes."""
-    cells, corners, borders = layout.flat, layout.corners, layout.borders
-    side = np.full(3 * len(cells.triangles), -1)
-    side[layout.pairs.half_edges[borders.pair]] = np.arange(2 * len(borders.pair)).reshape(-1, 2)
-    offsets, sides = rings_of(cells.triangles, cells.mirrors, side)
-    border, back = sides // 2, sides % 2
-    cell = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
-    following = np.arange(len(sides)) + 1
-    following[offsets[1:] - 1] = offsets[:-1]
-    corner, normal = borders.ends[border, back], borders.normal[border, back]
-    before = np.empty_like(normal)
-    before[following] = normal
-    point = _above(surfaces, cell, corners.bottom[corner], np.cross(before, normal))
-    height = np.where(_grooved(layout)[corner], -surfaces.value(cell, corners.bottom[corner]), 1)
-    if not height.min() > 0:
-        raise NotRegularError(f"a groove ends {-height.min():.3g} mm above a mirror")
-    along = unit(corners.flat[corner[following]] - corners.flat[corner])
-    length = dot(point[following] - point, along)
-    return _Sides(offsets, cell, border, back, following, corner, normal, point, length)
-
-
-def _grooved(layout: PedestalLayout) -> Bools:
-    """At which corners (c,) a groove ends."""
-    inner = layout.borders.between_mirrors(layout.flat.mirrors)
-    return np.isin(np.arange(len(layout.corners.top)), layout.borders.ends[inner])
-
-
-def _above(surfaces: Surfaces, mirror: Ints, bottom: Floats, line: Floats) -> Floats:
-    """Where lines (q, 3) through points (q, 3) below surfaces (q,), or near them, leave them."""
-    line, value = unit(line), surfaces.value(mirror, bottom)
-    slope = dot(line, surfaces.gradient(mirror, bottom))
-    line *= np.where(slope < 0, -1.0, 1.0)[:, None]
-    root = np.abs(slope) + np.sqrt(slope**2 - 2 * surfaces.curvature[mirror] * value)
-    return np.asarray(bottom - (2 * value / root)[:, None] * line)
+def _cells(layout: PedestalLayout, surfaces: Surfaces) -> PedestalCells:
+    """Cells of mirrors, followed by the two bounding planes, on pedestals."""
+    return _Assembly(layout, surfaces, outline_sides(layout, surfaces)).cells()
 
 
 @dataclass(frozen=True)
@@ -211,7 +105,7 @@ class _Assembly:
 
     layout: PedestalLayout
     surfaces: Surfaces
-    sides: _Sides
+    sides: Sides
 
     def cells(self) -> PedestalCells:
         """All faces and edges."""

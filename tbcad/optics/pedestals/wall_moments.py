@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cell_moments import arc_steps
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.types import Floats, Ints
 

@@ -6,7 +6,7 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.cells import Cells, cell_areas, cells_of
-from tbcad.optics.pedestals import PedestalCells
+from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES, NotRegularError
 from tbcad.optics.reflection import reflect
 from tbcad.optics.surfaces import Surfaces
