@@ -169,7 +169,7 @@ def pedestal_layout(
 def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floats) -> Floats:
     """Distance (c,) down from the planar mirrors' corners to the lowest of the mirrors there.
 
-    NaN where the line down misses a mirror's sphere.
+    Not finite where the line down misses a mirror's sphere.
     """
     triangle, column = np.nonzero(flat.triangles < flat.mirrors)
     mirror, at = flat.triangles[triangle, column], corner[triangle]
@@ -178,7 +178,7 @@ def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floa
         dot(down[at], mirrors.gradient(mirror, point[at])),
     )
     lowest = np.zeros(len(point))
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(slope**2 - 2 * mirrors.curvature[mirror] * value)
         np.maximum.at(lowest, at, 2 * value / (root - slope))
     return lowest

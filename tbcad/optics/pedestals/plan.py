@@ -23,6 +23,9 @@ MIN_SIDES = 3
 # bounding planes, where sides change with a mirror's height, by this share of the mirrors' pitch.
 PLANAR_WIDTHS = 1.2
 PLANAR_SHARE = 0.05
+# A corner that is too near to a plane moves from it in steps of this share of the shortest side
+# there.
+RISE_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -127,9 +130,10 @@ def _joined(
         share: those at a bounding plane are longer by this share of the mirrors' pitch.
     """
     more = share * plan.pitch
+    rise = RISE_SHARE * (plan.groove + more)
     for _ in range(MAX_ROUNDS):
         corner, flat = plan.corner, plan.flat
-        eased = without_crowded_rims(flat, corner, plan.groove)
+        eased = without_crowded_rims(flat, corner, rise)
         if eased is flat:
             layout = pedestal_layout(flat, mirrors, plan.pairs, corner, plan.pinhole, plan.groove)
             short = _short_pairs(layout, mirrors, widths * plan.groove, more)
@@ -137,7 +141,7 @@ def _joined(
                 plan = replace(plan, short=plan.short | np.isin(np.arange(len(plan.short)), short))
                 continue
             near = layout.near_planes((plan.groove + more) / 2)[corner]
-            eased = with_longer_grooves_to_planes(flat, near, plan.groove)
+            eased = with_longer_grooves_to_planes(flat, near, rise)
             if eased is flat:
                 return plan, layout
         plan = PedestalPlan.of(eased, plan.pinhole, plan.groove)

@@ -14,18 +14,14 @@ from tbcad.optics.cells import Cells
 from tbcad.optics.power_diagram import flip_edges, half_edges, opposite
 from tbcad.types import Bools, Ints
 
-# The corner in which such a mirror ends moves this far from the plane, in widths of the groove,
-# whenever the groove from there to the plane proves to be too short.
-RISE_WIDTHS = 0.5
 
-
-def without_crowded_rims(cells: Cells, corner: Ints, groove: float) -> Cells:
+def without_crowded_rims(cells: Cells, corner: Ints, rise: float) -> Cells:
     """Cells in which fewer joined corners on a bounding plane have a third mirror.
 
     Args:
         cells: of planar mirrors.
         corner: that each triangle's corner becomes when short borders' corners are joined, (t,).
-        groove: width of the grooves, mm.
+        rise: how much longer a groove to a plane becomes, mm.
 
     Returns:
         The same object when there is no such corner.
@@ -33,28 +29,33 @@ def without_crowded_rims(cells: Cells, corner: Ints, groove: float) -> Cells:
     short = _first_of_each(_vanishing(_borders_with_planes(cells), cells, corner), corner)
     flipped = _flipped(cells, short) if len(short) else cells
     grooves = _vanishing(_grooves_to_planes(flipped), flipped, corner)
-    return _raised(flipped, _first_of_each(grooves, corner), groove)
+    return _raised(flipped, _first_of_each(grooves, corner), rise)
 
 
-def with_longer_grooves_to_planes(cells: Cells, too_near: Bools, groove: float) -> Cells:
+def with_longer_grooves_to_planes(cells: Cells, too_near: Bools, rise: float) -> Cells:
     """Cells whose corners that are too near to a bounding plane (t,) are farther from it.
+
+    Args:
+        cells: of planar mirrors.
+        too_near: which triangles' corners are, (t,).
+        rise: how much longer the groove from there to the plane becomes, mm.
 
     Returns:
         The same object when no groove runs from such a corner to a plane.
     """
     _, twin = half_edges(cells.triangles)
     edge = _grooves_to_planes(cells)
-    return _raised(cells, edge[too_near[twin[edge] // 3]], groove)
+    return _raised(cells, edge[too_near[twin[edge] // 3]], rise)
 
 
 def _borders_with_planes(cells: Cells) -> Ints:
     """Edges from mirrors to a plane, between two mirrors that could meet instead, (e,)."""
     ends, twin = half_edges(cells.triangles)
     third = opposite(cells.triangles, np.arange(len(ends)))
-    between = np.column_stack([third, third[twin]])
+    between, key = np.column_stack([third, third[twin]]), [len(cells.surfaces), 1]
     borders = (ends[:, 0] < cells.mirrors) & (ends[:, 1] >= cells.mirrors)
     borders &= (between < cells.mirrors).all(axis=1)
-    borders &= ~np.isin(between @ [cells.mirrors, 1], ends @ [cells.mirrors, 1])
+    borders &= ~np.isin(between @ key, ends @ key)
     return np.flatnonzero(borders)
 
 
@@ -87,7 +88,7 @@ def _flipped(cells: Cells, edge: Ints) -> Cells:
     return replace(cells, triangles=triangles, corners=corners)
 
 
-def _raised(cells: Cells, edge: Ints, groove: float) -> Cells:
+def _raised(cells: Cells, edge: Ints, rise: float) -> Cells:
     """Cells whose grooves to a plane (e,) begin farther from it, toward the mirror above.
 
     Returns:
@@ -98,6 +99,6 @@ def _raised(cells: Cells, edge: Ints, groove: float) -> Cells:
     _, twin = half_edges(cells.triangles)
     corners, on_plane, above = cells.corners.copy(), edge // 3, twin[edge] // 3
     apex = cells.surfaces.apex[opposite(cells.triangles, twin[edge])]
-    rise = norm(corners[above] - corners[on_plane]) + RISE_WIDTHS * groove
-    corners[above] = corners[on_plane] + rise[:, None] * unit(apex - corners[on_plane])
+    length = norm(corners[above] - corners[on_plane]) + rise
+    corners[above] = corners[on_plane] + length[:, None] * unit(apex - corners[on_plane])
     return replace(cells, corners=corners)
