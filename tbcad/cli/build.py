@@ -9,7 +9,7 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_are_printers, check_is_calibration, check_is_folder
-from tbcad.cli.for_process import DEFAULT_YIELD, asked_process, with_margins
+from tbcad.cli.for_process import DEFAULT_YIELD, asked_process, design_for
 from tbcad.cli.options import Design, Exports, Force, ForceFile, JsonResult, OutReplaced, Settings
 from tbcad.cli.output_mode import Full, Json, Quiet, output_mode, print_json
 from tbcad.errors import InputError
@@ -55,8 +55,9 @@ def build(
             "--for-process",
             "--process",
             metavar="NAME|FILE",
-            help="Add the coverage margins that a manufacturing process needs, and say what they "
-            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance.",
+            help="Choose edges and coverage margins for a manufacturing process, and say what they "
+            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance. A design that "
+            "names its edges keeps them.",
         ),
     ] = None,
     share: Annotated[
@@ -113,7 +114,7 @@ def build(
     with stages(times, silent=quiet) as screen:
         if process is not None:
             screen.stage(margin_stage(process.name))
-            spec = with_margins(spec, process, wanted_yield, screen)
+            spec = design_for(spec, process, wanted_yield, screen)
         if dry_run:
             from tbcad.cli.dry_run import show_overview
 

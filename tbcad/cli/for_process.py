@@ -1,4 +1,4 @@
-"""Build for a manufacturing process: its margins, and what they cost."""
+"""Build for a manufacturing process: the edges and margins that suit it, and what they cost."""
 
 from typing import TYPE_CHECKING
 
@@ -37,21 +37,23 @@ def asked_process(name: str | None, share: float | None) -> "tuple[Process | Non
     return load_process(name), DEFAULT_YIELD if share is None else share
 
 
-def with_margins(spec: "Spec", process: "Process", wanted: float, screen: "Stages") -> "Spec":
-    """The design with the margins that a process needs for a yield; notes say what they cost."""
+def design_for(spec: "Spec", process: "Process", wanted: float, screen: "Stages") -> "Spec":
+    """The design with edges and margins for a process and a yield; notes say what they cost."""
     from tbcad.tolerance.process_design import (
         costs_text,
-        design_for_process,
         margins_text,
         pixel_costs,
         ssim_costs,
         ssim_text,
     )
+    from tbcad.tolerance.process_edges import edges_for_process, edges_text
 
-    found = design_for_process(spec, process, wanted, screen.detail)
+    choice = edges_for_process(spec, process, wanted, screen.detail)
+    found = choice.made
+    screen.note(edges_text(choice))
     screen.note(f"{margins_text(found)}, for {wanted:.1%} by {process.name}")
     screen.detail("pixels")
-    screen.note(costs_text(pixel_costs(found)))
+    screen.note(costs_text(pixel_costs(found, choice.pixels)))
     screen.detail("views")
     screen.note(ssim_text(ssim_costs(found)))
     return found.spec

@@ -89,8 +89,8 @@ def report_times(folder: Path) -> Seconds:
 
 
 def margin_stage(process: str) -> str:
-    """Title of the search for the margin of a process."""
-    return f"margin for {process}"
+    """Title of the search for edges and margins for a process."""
+    return f"edges and margins for {process}"
 
 
 def verify_times(n: int, parts: Sequence[str]) -> Seconds:

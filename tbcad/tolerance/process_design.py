@@ -59,12 +59,7 @@ def design_for_process(
     Raises:
         InputError: no margin is enough, or the radii do not follow a target.
     """
-    check_yield(wanted_yield)
-    if spec.mirrors.radius_rule != "traced":
-        raise InputError(
-            f"--for-process sets margins, which radii of rule {spec.mirrors.radius_rule} do not "
-            "follow: use --radius-rule traced"
-        )
+    check_margins_can_be_set(spec, wanted_yield)
     spec = spec_with(spec, mirrors={"own_margins_mm": ()})
     errors, designs = process_errors(process, spec.mirrors.coating_um), SolvedDesigns()
     needed = margin(spec, errors, wanted_yield, _worst_coverage, progress, designs)
@@ -81,6 +76,20 @@ def design_for_process(
     return ProcessDesign(with_own_margins(spec, own.mm), needed.mm)
 
 
+def check_margins_can_be_set(spec: Spec, wanted_yield: float) -> None:
+    """Refuse what no margins lead to: a share that is none, and radii that follow no target.
+
+    Raises:
+        InputError: one of these.
+    """
+    check_yield(wanted_yield)
+    if spec.mirrors.radius_rule != "traced":
+        raise InputError(
+            f"--for-process sets margins, which radii of rule {spec.mirrors.radius_rule} do not "
+            "follow: use --radius-rule traced"
+        )
+
+
 def margins_text(made: ProcessDesign) -> str:
     """The margins in words."""
     if made.is_even:
@@ -92,17 +101,21 @@ def margins_text(made: ProcessDesign) -> str:
     )
 
 
-def pixel_costs(made: ProcessDesign) -> dict[str, SeeingPixels]:
+def pixel_costs(made: ProcessDesign, seen: SeeingPixels | None = None) -> dict[str, SeeingPixels]:
     """Pixels of a virtual camera that see the object: with these margins, with others, with none.
+
+    Args:
+        made: the design.
+        seen: its pixels, where they are known.
 
     Raises:
         SpecError: one of these designs cannot be made.
     """
-    specs = {"with these margins": made.spec}
+    specs = {"with none": with_margin(made.spec, 0.0)}
     if not made.is_even:
-        specs["with one for all"] = with_margin(made.spec, made.even_mm)
-    specs["with none"] = with_margin(made.spec, 0.0)
-    return {words: seeing_pixels(one) for words, one in specs.items()}
+        specs = {"with one for all": with_margin(made.spec, made.even_mm)} | specs
+    others = {words: seeing_pixels(one) for words, one in specs.items()}
+    return {"with these margins": seen or seeing_pixels(made.spec)} | others
 
 
 def costs_text(costs: dict[str, SeeingPixels]) -> str:

@@ -168,7 +168,7 @@ def test_piped_stages_are_lines_with_seconds(capsys: pytest.CaptureFixture[str])
 def test_expected_times_grow_with_the_mirrors() -> None:
     small, large = (build_times(n, PARTS, verify=True, process="cnc") for n in (6, 36))
     assert list(small) == list(large)
-    assert next(iter(small)) == "margin for cnc"
+    assert next(iter(small)) == "edges and margins for cnc"
     measured = verify_times(18, PARTS)["verification: STEP"]
     assert 3 * measured < large["verification: STEP"] < 4 * measured
     assert small["prototype: base"] == large["prototype: base"]

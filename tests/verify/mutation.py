@@ -49,6 +49,7 @@ TESTS: dict[str, list[str]] = {
     "prototype/seats.py": PROTOTYPE,
     "record/columns.py": ["tests/verify/record/test_bad_input.py"],
     "record/flange_holes.py": ["tests/verify/record/test_flange_holes.py"],
+    "record/joining_planes.py": ["tests/verify/shell/test_seam_and_foot.py"],
     "record/poses.py": ["tests/verify/record/test_poses.py"],
     "record/radius_rule.py": ["tests/verify/record/test_radius_rule.py"],
     "record/spec.py": ["tests/verify/record/test_spec.py"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.verify.corpus.facets import HALVES
-from tests.verify.corpus.mesh_casings import aside, closed, dented_back, widened
+from tests.verify.corpus.mesh_casings import aside, closed, dented_back, hanging, widened
 from tests.verify.corpus.mesh_casings import grown as grown_back
 from tests.verify.corpus.mesh_changes import (
     INCH,
@@ -68,6 +68,7 @@ MESHES: tuple[Mutation, ...] = (
     only(fails("a bolt hole 50 um aside", BOTH, mesh(aside), "mesh holes", "0.05 mm from its")),
     only(fails("a bolt hole missing", BOTH, mesh(closed), "mesh holes", "4 holes of 4.3 mm")),
     only(fails("a dent in the back", BOTH, mesh(dented_back), "mesh wall", "the spec has 3")),
+    fails("a tip below the foot", BOTH, mesh(hanging), "mesh seam and foot", "beyond the foot"),
     fails("a wall of 1 mm in the mesh", BOTH, mesh(grown_back(-2)), "mesh wall", "spec has 3"),
     fails("a wall of 9 mm in the mesh", BOTH, mesh(grown_back(6)), "mesh wall", "spec has 3"),
     fails("a crack, one last place wide", BOTH, mesh(cracked), "watertight", "open"),

@@ -15,6 +15,7 @@ from tests.verify.corpus.step_changes import (
     cut,
     cut_with_end,
     dropped,
+    foot_low,
     hole,
     hole_aside,
     inches,
@@ -102,6 +103,9 @@ STEPS: tuple[Mutation, ...] = (
     fails("STEP: an edge 1 mm beside its corners", KIND, whole(crooked), "step gaps"),
     fails("STEP: a hole 20 um too wide", KIND, whole(hole), "step properties", "volume"),
     fails("STEP: a hole 50 um aside", KIND, whole(hole_aside), "step holes", "0.05 mm from its"),
+    fails(
+        "STEP: the foot 50 um low", KIND, whole(foot_low), "step seam and foot", "beyond the foot"
+    ),
     fails("STEP: the back 5 um off", KIND, whole(back), "step properties", "volume"),
     fails(
         "STEP claims another volume",

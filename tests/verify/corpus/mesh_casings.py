@@ -1,4 +1,4 @@
-"""Changes to what closes a half's mesh: one bolt hole of its foot flange, and its back."""
+"""Changes to what closes a half's mesh: one bolt hole of its foot flange, its foot, its back."""
 
 from __future__ import annotations
 
@@ -61,6 +61,14 @@ def _flange(corners: Corners) -> tuple[np.float32, np.float32]:
 
 def _axis(rims: Corners) -> Floats:
     return np.asarray((rims.min(axis=0) + rims.max(axis=0)) / 2, dtype=float)
+
+
+def hanging(corners: Corners, _: list[Ball]) -> Corners:
+    """A tip below the foot: the corner of its flange that is farthest along x."""
+    points = np.unique(corners.reshape(-1, 3), axis=0)
+    foot = points[points[:, 2] == points[:, 2].min()]
+    tip = foot[[foot[:, 0].argmax()]]
+    return replaced(corners, tip, tip - np.array([0, 0, WAY_MM]))
 
 
 def grown(way: float) -> Change:

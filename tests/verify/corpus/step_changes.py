@@ -191,6 +191,18 @@ def below(entities: Entities, owner: int, kind: str) -> set[int]:
     return found
 
 
+def foot_low(entities: Entities) -> None:
+    """All points of the foot 50 micrometres lower."""
+    plane = references(entities[face(entities, "foot")])[-1]
+    foot = float(NUMBER.findall(entities[down(entities, plane, 0, 0)])[2])
+    for number in all_of(entities, "CARTESIAN_POINT"):
+        if (
+            len(found := NUMBER.findall(entities[number])) == 3
+            and abs(float(found[2]) - foot) < 1e-9
+        ):
+            shift(entities, number, -0.05, 2)
+
+
 def back(entities: Entities) -> None:
     """The back 5 micrometres too far out."""
     shift(entities, down(entities, all_of(entities, "SURFACE_OF_REVOLUTION")[0], 0), 0.005)

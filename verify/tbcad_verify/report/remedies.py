@@ -61,6 +61,7 @@ REMEDIES = {
     "mirrors found": _MESH,
     "mesh wall": _MESH,
     "mesh holes": _MESH,
+    "mesh seam and foot": _MESH,
     "mandrel": _MESH,
     "mandrel draft, deviation from record": _RECORD,
     "form error": _MIRROR,

@@ -27,6 +27,7 @@ from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
     MANIFEST,
     manifest_checks,
+    mesh_ends_checks,
     record_checks,
 )
 from tbcad_verify.shell.mandrel import mandrel_results
@@ -172,7 +173,8 @@ def _measure_shells(export: Export, stls: list[Facets], sink: ResultSink) -> lis
     shells = measure_shells(export, stls)
     for shell in shells:
         masses = {} if shell.mass is None else {shell.part.name: shell.mass}
-        sink(Results(checks=shell.checks, masses=masses))
+        ends = mesh_ends_checks(export, shell.part, shell.mass, shell.reason)
+        sink(Results(checks=shell.checks + ends, masses=masses))
     return shells
 
 

@@ -8,11 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
+import numpy as np
+
 from tbcad_verify.errors import BadExport
+from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Topology
 from tbcad_verify.record.camera_sheet import sheet_check
-from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.files import digest, listing
+from tbcad_verify.record.joining_planes import ends_check, has_joining_planes
 from tbcad_verify.record.poses import (
     POSE_MM,
     contradictions,
@@ -28,8 +32,10 @@ from tbcad_verify.report.checks import (
     at_most,
     check_names,
     each_at_most,
+    guarded,
     guarded_each,
     informative,
+    require,
     short_list,
 )
 from tbcad_verify.report.report import NAME
@@ -47,6 +53,7 @@ TOPOLOGY = {
     "manifold3d": "complaints",
 }
 FOLDS = {"folds": "edges"}
+ENDS = {"mesh seam and foot": "mm"}
 
 
 def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
@@ -128,6 +135,32 @@ def fold_check(file: str, folds: int) -> Check:
     """No facet lies back to back with its neighbour."""
     (name,) = check_names(FOLDS, file)
     return at_most(name, folds, 0, "the surface is folded onto itself")
+
+
+def mesh_ends_checks(
+    export: Export, part: Part, mass: MassProperties | None, reason: str
+) -> list[Check]:
+    """A half's mesh ends at seam and foot; none for other parts.
+
+    Both planes are exact in a mesh, whatever its chords: only float32 moves a corner, by half a
+    step of its largest coordinates.
+
+    Args:
+        export: the record.
+        part: the half.
+        mass: of its mesh.
+        reason: why the mass is None.
+    """
+    if not has_joining_planes(export, part):
+        return []
+    (name,) = check_names(ENDS, part.stl)
+
+    def work() -> list[Check]:
+        low, high = require(mass, reason).low, require(mass, reason).high
+        step = float(np.spacing(np.float32(np.abs([low, high]).max())))
+        return [ends_check(name, export, part, (low, high), step)]
+
+    return guarded([name], work)
 
 
 def _found(export: Export, name: str) -> tuple[int, str] | None:

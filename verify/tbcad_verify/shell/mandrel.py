@@ -36,7 +36,13 @@ from tbcad_verify.report.checks import (
     worst_offenders,
 )
 from tbcad_verify.run.results import Results
-from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
+from tbcad_verify.shell.integrity import (
+    FOLDS,
+    TOPOLOGY,
+    fold_check,
+    mesh_checks,
+    mesh_ends_checks,
+)
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -93,8 +99,11 @@ def mandrel_results(
         check_names(CHECKS, mandrel.stl),
         lambda: mandrel_checks(export, mandrel, require(mesh, no_mesh), setup()),
     )
-    mass, _ = attempt(lambda: mass_properties(require(mesh, no_mesh)))
-    return Results(checks=[*topology, *folds, *checks], masses={mandrel.name: mass} if mass else {})
+    mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
+    ends = mesh_ends_checks(export, mandrel, mass, no_mass)
+    return Results(
+        checks=[*topology, *folds, *ends, *checks], masses={mandrel.name: mass} if mass else {}
+    )
 
 
 def mandrel_checks(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.record.export import Camera, Export, Part
+from tbcad_verify.record.joining_planes import ends_check
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.report.checks import (
     Check,
@@ -34,6 +35,7 @@ from tbcad_verify.types import Floats, Ints
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
 CELL_SHARE = 1e-6  # of a cell's area
 MIDDLE_MM = 1e-5
+ENDS_MM = 1e-6  # ten times the precision to which the kernel joins corners and planes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,7 @@ class FrontComparison(PartComparison):
         face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
         cells: (m,) in closed form.
         walls: of pedestals, by the record.
+        part: its record.
         export: the record.
         camera: that the part is for.
     """
@@ -57,6 +60,7 @@ class FrontComparison(PartComparison):
     face: Ints
     cells: ClosedFormCells
     walls: PedestalWalls | None
+    part: Part
     export: Export
     camera: Camera
 
@@ -82,6 +86,7 @@ def front_fields(export: Export, part: Part, file: StepFile) -> dict[str, Any]:
         "face": np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
         "cells": cells_of_export(export, part.camera),
         "walls": walls_of_export(export, part.camera),
+        "part": part,
         "export": export,
         "camera": export.cameras[part.camera],
     }
@@ -162,6 +167,12 @@ def walls(name: CheckName, part: FrontComparison) -> Check:
     return worst_of(name, *errors, SURFACE_MM, "mm")
 
 
+def ends(name: CheckName, part: FrontComparison) -> Check:
+    """Corners, edges and faces end in the planes of seam and foot."""
+    solid = part.file.mass
+    return ends_check(name, part.export, part.part, (solid.low, solid.high), ENDS_MM)
+
+
 def _of(part: FrontComparison, column: NDArray[Any]) -> NDArray[Any]:
     """(m, ...) the faces' figures in the order of the mirrors; NaN or empty for none."""
     values = column[part.face].copy()
@@ -218,4 +229,5 @@ CHECKS: Checks = {
     "step cells": ("of the area", areas),
     "step cell centroids": ("mm", centroids),
     "step front volume": ("of the volume", front_volume),
+    "step seam and foot": ("mm", ends),
 }

@@ -1,0 +1,155 @@
+"""Halves end in the planes of seam and foot: what sticks out, or stops short, is refused."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pnt
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from tbcad_verify.mesh.stl import read_facets
+from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.report.checks import Check
+from tbcad_verify.run.child import Limits
+from tbcad_verify.run.verify import verify
+from tbcad_verify.shell.integrity import mesh_ends_checks
+from tbcad_verify.shell.measured_shell import measure_shells
+from tbcad_verify.step.kernel.reading import transferred
+from tbcad_verify.step.shell_checks import shell_comparisons, shell_step_checks
+from tbcad_verify.step.step_file import read_step_files
+
+from tests.verify.optical_setups import IN_PROCESS
+from tests.verify.synthetic_export import FOOT, facets_of, mirrored, sign, stl
+
+SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
+X, Z = 0, 2
+STEP_OF_FLOAT32 = 1.6e-5  # mm, of coordinates between 128 and 256
+
+
+def tipped(facets: np.ndarray, axis: int, way: float) -> np.ndarray:
+    """One corner of the plane x = 0 or z = foot moved along its axis, mm; the others stay."""
+    plane = np.float32(FOOT if axis == Z else 0.0)
+    corners = facets.reshape(-1, 3)
+    tip = corners[np.flatnonzero(corners[:, axis] == plane)[0]].copy()
+    facets = facets.copy()
+    facets[(facets == tip).all(axis=2), axis] += np.float32(way)
+    return facets
+
+
+def ends(record: Export) -> dict[str, Check]:
+    """The check of each half's mesh, by its file; the second may be known by the first."""
+    stls = [read_facets(record.folder, part.stl)[0] for part in record.parts]
+    shells = measure_shells(record, stls)
+    every = [mesh_ends_checks(record, one.part, one.mass, one.reason) for one in shells]
+    return {check.file: check for (check,) in every}
+
+
+def test_halves_end_in_both_planes(export_folder: Path) -> None:
+    checks = ends(read_export(export_folder))
+    assert [check.passed for check in checks.values()] == [True, True]
+    assert all((check.limit or 1) < STEP_OF_FLOAT32 for check in checks.values())
+
+
+@pytest.mark.parametrize(
+    ("axis", "way", "said"),
+    [
+        (Z, -0.16, "0.16 mm beyond the foot"),
+        (Z, -2e-4, "0.0002 mm beyond the foot"),
+        (X, -0.05, "0.05 mm beyond the seam"),
+    ],
+)
+@pytest.mark.parametrize("image", [True, False], ids=["mirror image", "one half"])
+def test_a_tip_is_told(export_folder: Path, axis: int, way: float, said: str, image: bool) -> None:
+    broken = tipped(facets_of(export_folder / "shell_a.stl"), axis, way)
+    (export_folder / "shell_a.stl").write_bytes(stl(broken))
+    if image:
+        (export_folder / "shell_b.stl").write_bytes(stl(mirrored(broken)))
+    one, other = ends(read_export(export_folder)).values()
+    assert one.passed is False
+    assert one.measured == pytest.approx(abs(way), abs=STEP_OF_FLOAT32)
+    assert said in one.detail
+    assert other.passed is not image
+    assert not image or ("shell_b" in other.detail and said in other.detail)
+
+
+@pytest.mark.parametrize(("axis", "said"), [(Z, "short of the foot"), (X, "short of the seam")])
+def test_a_half_that_stops_short_is_refused(export_folder: Path, axis: int, said: str) -> None:
+    record = read_export(export_folder)
+    facets = facets_of(export_folder / "shell_a.stl")
+    facets[:, :, axis] += np.float32(0.02)
+    (export_folder / "shell_a.stl").write_bytes(stl(facets))
+    assert f"0.02 mm {said}" in ends(record)["shell_a.stl"].detail
+
+
+def test_the_whole_verification_refuses_tips_that_are_mirror_images(export_folder: Path) -> None:
+    broken = tipped(facets_of(export_folder / "shell_a.stl"), Z, -0.16)
+    (export_folder / "shell_a.stl").write_bytes(stl(broken))
+    (export_folder / "shell_b.stl").write_bytes(stl(mirrored(broken)))
+    report = verify(sign(export_folder), options=IN_PROCESS)
+    failed = [(one.name, one.file) for one in report.checks if one.passed is False]
+    assert [one for one in failed if one[0] == "mesh seam and foot"] == [
+        ("mesh seam and foot", f"shell_{half}.stl") for half in "ab"
+    ]
+
+
+def test_parts_that_are_no_halves_may_be_anywhere(export_folder: Path) -> None:
+    record = read_export(export_folder)
+    stand = record.parts[0].model_copy(update={"camera": ""})
+    assert mesh_ends_checks(record, stand, None, "not measured") == []
+    (check,) = mesh_ends_checks(record, record.parts[0], None, "not measured")
+    assert (check.passed, check.detail) == (None, "not measured")
+
+
+def step_ends(folder: Path) -> Check:
+    """The check of the first half's STEP file."""
+    record = read_export(folder)
+    record = replace(record, parts=record.parts[:1])
+    comparisons = shell_comparisons(record, read_step_files(record, Limits(120)))
+    checks = shell_step_checks(record, {}, comparisons, areas=())
+    return next(check for check in checks if check.name == "step seam and foot")
+
+
+def with_a_tip(folder: Path, axis: int, way: float) -> None:
+    """A cube of 1 mm that ends so far beyond a plane, joined to the first half by the kernel."""
+    shell, foot = transferred(folder / "shell_a.step"), read_export(folder).foot_z_mm
+    low = shell_corner(folder, foot)
+    low[axis] = (foot if axis == Z else 0.0) - way
+    cube = BRepPrimAPI_MakeBox(gp_Pnt(*low.tolist()), 1.0, 1.0, 1.0).Shape()
+    writer = STEPControl_Writer()
+    writer.Transfer(BRepAlgoAPI_Fuse(shell, cube).Shape(), STEPControl_AsIs)
+    (folder / "shell_a.step").unlink()
+    writer.Write(str(folder / "shell_a.step"))
+
+
+def shell_corner(folder: Path, foot: float) -> np.ndarray:
+    """A place in the half's wall, at both planes: behind the mirrors, before the back."""
+    corners = facets_of(folder / "shell_a.stl").reshape(-1, 3).astype(float)
+    both = corners[(corners[:, X] == 0) & (np.abs(corners[:, Z] - foot) < 1e-5)]
+    right = both[both[:, 1] > 0]
+    return np.array([0.0, right[:, 1].mean(), foot])
+
+
+@pytest.mark.parametrize(
+    ("axis", "way", "said"),
+    [
+        (Z, 0.16, "0.16 mm beyond the foot"),
+        (X, 0.05, "0.05 mm beyond the seam"),
+        (Z, 1e-5, "1e-05 mm beyond the foot"),
+    ],
+)
+def test_a_tip_in_the_step_file_is_told(tmp_path: Path, axis: int, way: float, said: str) -> None:
+    folder = Path(shutil.copytree(SAMPLE, tmp_path / "copy"))
+    good = step_ends(folder)
+    assert good.passed
+    assert good.measured is not None
+    assert good.measured < 1e-9
+    with_a_tip(folder, axis, way)
+    bad = step_ends(folder)
+    assert bad.passed is False
+    assert bad.measured == pytest.approx(way, rel=1e-3)
+    assert said in bad.detail
