@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.cells import Cells, cells_of
@@ -66,9 +67,10 @@ class PedestalPlan:
 
     @property
     def pitch(self) -> float:
-        """Median distance of neighbouring mirrors' apices, mm."""
-        pairs = self.pairs.faces[(self.pairs.faces < self.flat.mirrors).all(axis=1)]
-        return float(np.median(norm(np.diff(self.flat.surfaces.apex[pairs], axis=1)[:, 0])))
+        """Median distance of apices from the nearest other, mm."""
+        apex = self.flat.mirror_surfaces.apex
+        distances, _ = KDTree(apex).query(apex, k=[2])
+        return float(np.median(distances))
 
     @property
     def corner(self) -> Ints:

@@ -12,7 +12,7 @@ import numpy as np
 from tbcad.geometry.vectors import norm, unit
 from tbcad.optics.cells import Cells
 from tbcad.optics.power_diagram import flip_edges, half_edges, opposite
-from tbcad.types import Bools, Ints
+from tbcad.types import Bools, Floats, Ints
 
 
 def without_crowded_rims(cells: Cells, corner: Ints, rise: float) -> Cells:
@@ -26,10 +26,10 @@ def without_crowded_rims(cells: Cells, corner: Ints, rise: float) -> Cells:
     Returns:
         The same object when there is no such corner.
     """
-    short = _first_of_each(_vanishing(_borders_with_planes(cells), cells, corner), corner)
+    short = _vanishing(_borders_with_planes(cells), cells, corner)
+    short = _shortest_of_each(short, cells, corner[short // 3])
     flipped = _flipped(cells, short) if len(short) else cells
-    grooves = _vanishing(_grooves_to_planes(flipped), flipped, corner)
-    return _raised(flipped, _first_of_each(grooves, corner), rise)
+    return _raised(flipped, _vanishing(_grooves_to_planes(flipped), flipped, corner), rise)
 
 
 def with_longer_grooves_to_planes(cells: Cells, too_near: Bools, rise: float) -> Cells:
@@ -73,9 +73,16 @@ def _vanishing(edge: Ints, cells: Cells, corner: Ints) -> Ints:
     return np.asarray(edge[corner[edge // 3] == corner[twin[edge] // 3]])
 
 
-def _first_of_each(edge: Ints, corner: Ints) -> Ints:
-    """One of the directed edges (e,) for each joined corner that they lie in."""
-    return np.asarray(edge[np.unique(corner[edge // 3], return_index=True)[1]])
+def _shortest_of_each(edge: Ints, cells: Cells, group: Ints) -> Ints:
+    """The edge with the shortest border of each group, of directed edges in groups (e,)."""
+    _, twin = half_edges(cells.triangles)
+    order = np.argsort(_lengths(cells, edge // 3, twin[edge] // 3), kind="stable")
+    return np.asarray(edge[order][np.unique(group[order], return_index=True)[1]])
+
+
+def _lengths(cells: Cells, one: Ints, other: Ints) -> Floats:
+    """Distances of the corners of triangles (e,) and others, mm, (e,)."""
+    return np.asarray(norm(cells.corners[one] - cells.corners[other]))
 
 
 def _flipped(cells: Cells, edge: Ints) -> Cells:
@@ -97,8 +104,9 @@ def _raised(cells: Cells, edge: Ints, rise: float) -> Cells:
     if not len(edge):
         return cells
     _, twin = half_edges(cells.triangles)
+    edge = _shortest_of_each(edge, cells, twin[edge] // 3)
     corners, on_plane, above = cells.corners.copy(), edge // 3, twin[edge] // 3
     apex = cells.surfaces.apex[opposite(cells.triangles, twin[edge])]
-    length = norm(corners[above] - corners[on_plane]) + rise
+    length = _lengths(cells, above, on_plane) + rise
     corners[above] = corners[on_plane] + length[:, None] * unit(apex - corners[on_plane])
     return replace(cells, corners=corners)

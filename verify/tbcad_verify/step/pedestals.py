@@ -6,7 +6,7 @@ ray as a groove is deep below the lowest mirror there; on the seam and the foot 
 the line in which these meet the plane of groove and pinhole. The wall on either side of a groove
 contains the bottom and leans away from the plane through bottom and pinhole, by half the groove's
 width at the height of the lower of its corners. Borders that would be shorter than the groove is
-wide end in one corner.
+wide end in one corner. At the bounding planes see `pedestal_rims`.
 """
 
 from __future__ import annotations
@@ -15,64 +15,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.pedestal_graph import Graph, Mirrors, graph_of, means, unit
+from tbcad_verify.step.pedestal_rims import with_corners_farther_off, without_crowded_corners
 from tbcad_verify.types import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from tbcad_verify.step.sphere_union import CellEdges
 
 DEPTH_WIDTHS = 4.0  # depth of a groove, in its width
-SAME_MM = 1e-6  # ends of edges that are one corner
-MAX_ROUNDS = 20
-
-
-@dataclass(frozen=True)
-class Mirrors:
-    """M mirrors as they reflect, and the planes that bound them all.
-
-    Attributes:
-        point: (M, 3) mm, apices.
-        normal: (M, 3) unit, toward the light.
-        curvature: (M,) 1/mm.
-        bounds: (2, 4) planes of the seam and the foot: kept is x . (first three) >= fourth.
-        pinhole: (3,) mm.
-        groove: width, mm.
-    """
-
-    point: Floats
-    normal: Floats
-    curvature: Floats
-    bounds: Floats
-    pinhole: Floats
-    groove: float
-
-    def drop(self, mirror: Ints, start: Floats, down: Floats) -> Floats:
-        """(N,) mm along unit vectors (N, 3) from places (N, 3) to where they enter mirrors (N,)."""
-        k, offset = self.curvature[mirror], start - self.point[mirror]
-        height = (offset * self.normal[mirror]).sum(axis=1) + k / 2 * (offset**2).sum(axis=1)
-        slope = ((self.normal[mirror] + k[:, None] * offset) * down).sum(axis=1)
-        return np.asarray(2 * height / (np.sqrt(slope**2 - 2 * k * height) - slope))
-
-
-@dataclass(frozen=True)
-class Graph:
-    """Borders of planar mirrors.
-
-    Attributes:
-        place: (C, 3) mm, corners.
-        weight: (C,) number of mirrors and planes that meet there, less two.
-        faces: (B, 2) the mirrors on both sides; M + w for bounding plane w.
-        ends: (B, 2) corners; the first face lies to the left, seen from the light.
-    """
-
-    place: Floats
-    weight: Floats
-    faces: Ints
-    ends: Ints
+MAX_ROUNDS = 100
+# Sides of planar mirrors are longer than so many grooves, and at the bounding planes by this share
+# of the mirrors' pitch; a corner too near to a plane moves by a share of the shortest side there.
+PLANAR_WIDTHS, PLANAR_SHARE, RISE_SHARE = 1.2, 0.05, 0.25
 
 
 @dataclass(frozen=True)
@@ -94,57 +50,68 @@ class PedestalWalls:
     bottom: Floats
 
 
-def pedestal_walls(mirrors: Mirrors, flat: CellEdges) -> PedestalWalls:
+def pedestal_walls(mirrors: Mirrors, planar: Mirrors, flat: CellEdges) -> PedestalWalls:
     """Walls of all pedestals; `flat` are the edges of planar mirrors in the same places.
 
     Raises:
         Unknown: no outline is left of a mirror.
     """
-    graph = _graph(flat, len(mirrors.point))
-    joined = np.linalg.norm(np.diff(graph.place[graph.ends], axis=1)[:, 0], axis=1) < mirrors.groove
+    graph = graph_of(flat, len(mirrors.point))
+    more = PLANAR_SHARE * planar.pitch
     for _ in range(MAX_ROUNDS):
-        standing = _Standing(mirrors, graph, joined)
-        short = standing.short()
-        if not short.any():
+        settled = _settled(_Rule(planar, PLANAR_WIDTHS, more), graph, None)
+        standing = _settled(_Rule(mirrors, 1.0, 0.0), settled.graph, settled.joined)
+        if standing.graph is settled.graph:
             return standing.walls()
-        joined |= short
-    raise Unknown("grooves leave no outline of a mirror")
+        graph = standing.graph
+    raise Unknown("grooves do not end at seam and foot")
 
 
-def _graph(flat: CellEdges, count: int) -> Graph:
-    mirror, other, points = flat.mirror, flat.other, flat.points
-    ends = np.concatenate([points[:, 0], points[:, 2]])
-    pairs = cKDTree(ends).query_pairs(SAME_MM, output_type="ndarray")
-    number, corner = _components(len(ends), pairs)
-    place = _means(corner, ends, np.ones(len(ends)))
-    tied = (
-        np.column_stack([corner, np.tile(mirror, 2)]),
-        np.column_stack([corner, np.tile(other, 2)]),
-    )
-    meeting = np.unique(np.concatenate(tied), axis=0)
-    once = (mirror < other) | (other >= count)
-    both = corner.reshape(2, -1).T
-    return Graph(
-        place,
-        np.asarray(np.bincount(meeting[:, 0], minlength=number), dtype=np.float64) - 2,
-        np.column_stack([mirror, other])[once],
-        both[once],
-    )
+@dataclass(frozen=True)
+class _Rule:
+    """Which sides are too short: of which mirrors, in widths of the groove, and more at planes."""
+
+    mirrors: Mirrors
+    widths: float
+    more: float
 
 
-def _components(count: int, pairs: Ints) -> tuple[int, Ints]:
-    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
-    return int(number), np.asarray(label)
+def _settled(rule: _Rule, graph: Graph, joined: Bools | None) -> _Standing:
+    """Grooves and pedestals without short sides, nor ends of grooves too near to a plane.
+
+    Args:
+        rule: what too short is.
+        graph: of planar mirrors.
+        joined: (B,) borders whose ends are one corner; None: those shorter than a groove.
+    """
+    mirrors, groove = rule.mirrors, rule.mirrors.groove
+    rise = RISE_SHARE * (groove + rule.more)
+    for _ in range(MAX_ROUNDS):
+        joined = graph.length < groove if joined is None else joined
+        group = graph.groups(joined)
+        eased = without_crowded_corners(mirrors, graph, group, rise)
+        if eased is graph:
+            standing = _Standing(mirrors, graph, joined)
+            short = standing.short(rule.widths * groove, rule.more)
+            if short.any():
+                joined = joined | short
+                continue
+            near = standing.near_planes((groove + rule.more) / 2)[group]
+            eased = with_corners_farther_off(mirrors, graph, near, rise)
+            if eased is graph:
+                return standing
+        graph, joined = eased, None
+    raise Unknown("grooves do not end at seam and foot")
 
 
 class _Standing:
     """Grooves and pedestals for some borders joined to corners."""
 
     def __init__(self, mirrors: Mirrors, graph: Graph, joined: Bools) -> None:
-        self.mirrors, self.graph = mirrors, graph
+        self.mirrors, self.graph, self.joined = mirrors, graph, joined
         self.count = len(mirrors.point)
-        number, self.group = _components(len(graph.place), graph.ends[joined])
+        self.group = graph.groups(joined)
+        number = int(self.group.max()) + 1
         ends = self.group[graph.ends]
         self.kept = np.flatnonzero(ends[:, 0] != ends[:, 1])
         self.faces, self.ends = graph.faces[self.kept], ends[self.kept]
@@ -156,7 +123,7 @@ class _Standing:
 
     def _places(self, number: int) -> tuple[Floats, Ints]:
         """Joined corners, and the bounding plane that each lies on, -1 for none."""
-        place = _means(self.group, self.graph.place, self.graph.weight)
+        place = means(self.group, self.graph.place, self.graph.weight)
         plane = np.full(number, -1)
         for w, bound in enumerate(self.mirrors.bounds):
             ends = self.graph.ends[self.graph.faces[:, 1] == self.count + w]
@@ -167,7 +134,7 @@ class _Standing:
 
     def _bottoms(self, number: int) -> None:
         mirrors, bounds = self.mirrors, self.mirrors.bounds[:, :3]
-        down = _unit(self.flat - mirrors.pinhole)
+        down = unit(self.flat - mirrors.pinhole)
         corner, mirror = self._meeting()
         light = np.zeros((number, 3))
         np.add.at(light, corner, mirrors.normal[mirror])
@@ -177,12 +144,12 @@ class _Standing:
         along = np.zeros((number, 3))
         for end in grooves.T:
             on = self.plane[end] >= 0
-            line = _unit(np.cross(across[on], bounds[self.plane[end[on]]]))
+            line = unit(np.cross(across[on], bounds[self.plane[end[on]]]))
             into = -np.sign((line * light[end[on]]).sum(axis=1))
             np.add.at(along, end[on], into[:, None] * line)
         deep = np.isin(np.arange(number), grooves)
         both = np.cross(*bounds)
-        along = np.where(deep[:, None], _unit(along), -np.sign(light @ both)[:, None] * both)
+        along = np.where(deep[:, None], unit(along), -np.sign(light @ both)[:, None] * both)
         down = np.where((self.plane >= 0)[:, None], along, down)
         drop = np.zeros(number)
         np.maximum.at(drop, corner, mirrors.drop(mirror, self.flat[corner], down[corner]))
@@ -210,15 +177,15 @@ class _Standing:
         self.normal[bounded, 0] = mirrors.bounds[self.faces[bounded, 1] - self.count, :3]
         ends, faces = self.ends[self.grooved], self.faces[self.grooved]
         start, end = self.bottom[ends[:, 0]], self.bottom[ends[:, 1]]
-        along = _unit(end - start)
-        middle = _unit(np.cross(start - mirrors.pinhole, along))
+        along = unit(end - start)
+        middle = unit(np.cross(start - mirrors.pinhole, along))
         apart = mirrors.point[faces[:, 0]] - mirrors.point[faces[:, 1]]
         middle *= np.sign((middle * apart).sum(axis=1))[:, None]
         view = mirrors.pinhole - start
-        up = _unit(view - (view * along).sum(axis=1)[:, None] * along)
+        up = unit(view - (view * along).sum(axis=1)[:, None] * along)
         rise = np.min([((self.top - self.bottom)[e] * up).sum(axis=1) for e in ends.T], axis=0)
         lean = (mirrors.groove / 2 / rise)[:, None] * up
-        self.normal[self.grooved] = _unit(np.stack([middle - lean, -middle - lean], axis=1))
+        self.normal[self.grooved] = unit(np.stack([middle - lean, -middle - lean], axis=1))
 
     def _rings(self) -> list[list[tuple[int, int]]]:
         """Borders round each mirror in order, and which of their faces it is."""
@@ -243,8 +210,14 @@ class _Standing:
             rings.append(ring)
         return rings
 
-    def short(self) -> Bools:
-        """(B,) borders along which a mirror's side would be shorter than the groove."""
+    def near_planes(self, limit: float) -> Bools:
+        """(G,) corners off the bounding planes whose bottoms are nearer to one than a limit, mm."""
+        bounds = self.mirrors.bounds
+        height = self.bottom @ bounds[:, :3].T - bounds[:, 3]
+        return np.asarray((height < limit).any(axis=1) & (self.plane < 0))
+
+    def short(self, limit: float, more: float) -> Bools:
+        """(B,) borders along which a side is shorter than a limit, at bounding planes by more."""
         mirror = np.repeat(np.arange(self.count), [len(ring) for ring in self.ring])
         here = np.array([side for ring in self.ring for side in ring])
         before = np.array([side for ring in self.ring for side in [ring[-1], *ring[:-1]]])
@@ -252,7 +225,7 @@ class _Standing:
             [np.roll(np.arange(len(ring)), -1) + shift for ring, shift in self._shifted()]
         )
         corner = self.ends[here[:, 0], here[:, 1]]
-        line = _unit(
+        line = unit(
             np.cross(self.normal[before[:, 0], before[:, 1]], self.normal[here[:, 0], here[:, 1]])
         )
         k, offset = self.mirrors.curvature[mirror], self.bottom[corner] - self.mirrors.point[mirror]
@@ -262,10 +235,11 @@ class _Standing:
             self.bottom[corner]
             + self.mirrors.drop(mirror, self.bottom[corner], line)[:, None] * line
         )
-        along = _unit(self.flat[corner[after]] - self.flat[corner])
+        along = unit(self.flat[corner[after]] - self.flat[corner])
         length = ((point[after] - point) * along).sum(axis=1)
         short = np.zeros(len(self.graph.faces), dtype=np.bool_)
-        short[self.kept[here[length < self.mirrors.groove, 0]]] = True
+        at_plane = (self.plane[self.ends[here[:, 0]]] >= 0).any(axis=1)
+        short[self.kept[here[length < limit + more * at_plane, 0]]] = True
         return short
 
     def _shifted(self) -> list[tuple[list[tuple[int, int]], int]]:
@@ -286,15 +260,3 @@ class _Standing:
             across[mirror, :n] = self.faces[border, 1 - face]
             real[mirror, :n] = True
         return PedestalWalls(point, normal, real, across, self.bottom[self.deep])
-
-
-def _means(group: Ints, place: Floats, weight: Floats) -> Floats:
-    """(G, 3) means of places (N, 3) with weights (N,) by groups (N,)."""
-    total = np.zeros((int(group.max()) + 1, 4))
-    np.add.at(total, group, weight[:, None] * np.column_stack([place, np.ones(len(place))]))
-    return np.asarray(total[:, :3] / total[:, 3:])
-
-
-def _unit(v: Floats) -> Floats:
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.asarray(v / np.where(length > 0, length, 1))

@@ -22,7 +22,8 @@ from tbcad_verify.step.arc_loops import arc_loops, front_pieces
 from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
 from tbcad_verify.step.cell_moments import cell_moments
 from tbcad_verify.step.map_arcs import MapArcs, free_arcs
-from tbcad_verify.step.pedestals import Mirrors, PedestalWalls, pedestal_walls
+from tbcad_verify.step.pedestal_graph import Mirrors
+from tbcad_verify.step.pedestals import PedestalWalls, pedestal_walls
 from tbcad_verify.step.stereographic import plane_circles, surface_maps, to_surface
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -148,8 +149,9 @@ def walls_of_export(export: Export, camera: str) -> PedestalWalls | None:
     # Planar mirrors that send the rays to their apices on to the origin.
     between = unit(unit(pinhole[:, None] - light.point) - unit(light.point)).T
     flat = closed_form_cells(point, between, np.zeros_like(light.curvature), walls)
-    groove = export.spec.shell.groove_mm
-    return pedestal_walls(Mirrors(point, normal, light.curvature, walls, pinhole, groove), flat.rim)
+    mirrors = Mirrors(point, normal, light.curvature, walls, pinhole, export.spec.shell.groove_mm)
+    planar = replace(mirrors, normal=between, curvature=np.zeros_like(light.curvature))
+    return pedestal_walls(mirrors, planar, flat.rim)
 
 
 def _mirrors_and_bounds(export: Export, camera: str) -> tuple[Surfaces, Floats]:
