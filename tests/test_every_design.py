@@ -6,6 +6,8 @@ import pytest
 
 import tbcad
 
+DESIGNS = Path(__file__).parents[1] / "designs"
+
 pytestmark = pytest.mark.designs
 
 
@@ -16,3 +18,18 @@ def test_subdivisions(n: int, tmp_path: Path) -> None:
     assert built.report is not None
     assert built.passed, built.report
     assert (built.parts, built.note) == (("shell", "prototype"), "")
+
+
+# Grooves that are narrow and wide for the mirrors: at n = 9 a mirror's border with the foot is as
+# long as the wide groove, but the bottoms at its ends meet. Narrow mirrors of turtleback-even reach
+# the seam.
+@pytest.mark.parametrize(
+    ("name", "n", "groove"),
+    [(None, 9, 0.4), (None, 3, 0.05), ("turtleback-even", 13, 0.1), (None, 24, 0.1)],
+)
+def test_pedestals(name: str | None, n: int, groove: float, tmp_path: Path) -> None:
+    path = DESIGNS / f"{name}.toml" if name else None
+    spec = tbcad.load_spec(path, [f"n={n}", "shell.edges=pedestal", f"groove_mm={groove}"])
+    built = tbcad.build(spec, tmp_path / "exports", parts="shell")
+    assert built.report is not None
+    assert built.passed, built.report

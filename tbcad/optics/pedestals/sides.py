@@ -27,7 +27,8 @@ class Sides:
         corner: at which each side starts, (q,).
         normal: of the plane that ends the cell, into the cell, (q, 3).
         point: where the side starts on the mirror, mm, (q, 3).
-        length: along the border, mm, (q,).
+        length: along the border, mm, on the mirror or between the bottoms of the grooves at its
+            ends, whichever is shorter, (q,).
     """
 
     offsets: Ints
@@ -62,12 +63,13 @@ def outline_sides(layout: PedestalLayout, surfaces: Surfaces) -> Sides:
     corner, normal = borders.ends[border, back], borders.normal[border, back]
     before = np.empty_like(normal)
     before[following] = normal
-    point = _above(surfaces, cell, corners.bottom[corner], np.cross(before, normal))
-    height = np.where(_grooved(layout)[corner], -surfaces.value(cell, corners.bottom[corner]), 1)
+    bottom = corners.bottom[corner]
+    point = _above(surfaces, cell, bottom, np.cross(before, normal))
+    height = np.where(_grooved(layout)[corner], -surfaces.value(cell, bottom), 1)
     if not height.min() > 0:
         raise NotRegularError(f"a groove ends {-height.min():.3g} mm above a mirror")
     along = unit(corners.flat[corner[following]] - corners.flat[corner])
-    length = dot(point[following] - point, along)
+    length = np.minimum(*(dot(line[following] - line, along) for line in (point, bottom)))
     return Sides(offsets, cell, border, back, following, corner, normal, point, length)
 
 

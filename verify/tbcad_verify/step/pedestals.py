@@ -236,7 +236,8 @@ class _Standing:
             + self.mirrors.drop(mirror, self.bottom[corner], line)[:, None] * line
         )
         along = unit(self.flat[corner[after]] - self.flat[corner])
-        length = ((point[after] - point) * along).sum(axis=1)
+        bottom = self.bottom[corner]
+        length = np.min([((at[after] - at) * along).sum(axis=1) for at in (point, bottom)], axis=0)
         short = np.zeros(len(self.graph.faces), dtype=np.bool_)
         at_plane = (self.plane[self.ends[here[:, 0]]] >= 0).any(axis=1)
         short[self.kept[here[length < limit + more * at_plane, 0]]] = True
