@@ -61,8 +61,8 @@ VERIFY_PROTOTYPE: Seconds = {
 VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 0.3}
 VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 0.2}
 AS_MADE: Seconds = {"simulated builds by each process": 3.0}
-# A search for edges and margins by cnc, and what they cost in pixels and SSIM; by sla, sls and fdm it
-# takes two or three times as long, as margins for pedestals are searched for too.
+# A search for edges and margins by cnc, and what they cost in pixels and SSIM; by sla, sls and fdm
+# it takes two or three times as long, as margins for pedestals are searched for too.
 MARGIN_SECONDS = 100.0
 
 
