@@ -60,8 +60,7 @@ def without_crowded_corners(mirrors: Mirrors, graph: Graph, group: Ints, rise: f
     vanishing = [one for one in _short_borders(graph, count) if np.ptp(corner[one.row]) == 0]
     # Of each group the shortest: it is put in last.
     best = {
-        int(corner[one.row, 0]): one
-        for one in sorted(vanishing, key=lambda short: -short.length)
+        int(corner[one.row, 0]): one for one in sorted(vanishing, key=lambda short: -short.length)
     }
     for one in best.values():
         graph = _met(graph, one)
