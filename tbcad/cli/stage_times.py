@@ -61,7 +61,9 @@ VERIFY_PROTOTYPE: Seconds = {
 VERIFY_SHELL_STEP: Seconds = {"verification: STEP": 0.3}
 VERIFY_PROTOTYPE_STEP: Seconds = {"verification: STEP of the prototype": 0.2}
 AS_MADE: Seconds = {"simulated builds by each process": 3.0}
-MARGIN_SECONDS = 100.0  # a search for the margins of a process, and what they cost in pixels
+# A search for edges and margins by cnc, and what they cost in pixels and SSIM; by sla, sls and fdm
+# it takes two or three times as long, as margins for pedestals are searched for too.
+MARGIN_SECONDS = 100.0
 
 
 def build_times(n: int, parts: Sequence[str], verify: bool, process: str | None) -> Seconds:

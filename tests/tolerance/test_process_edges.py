@@ -45,7 +45,7 @@ def test_pedestals_where_mirrors_err_by_themselves() -> None:
     assert choice.pixels == seeing_pixels(pedestal.spec)
     assert choice.other is not None
     assert (choice.other.edges, choice.other.pixels) == ("valley", seeing_pixels(valley.spec))
-    assert choice.pixels.median > 1.05 * choice.other.pixels.median
+    assert choice.pixels.median > 1.05 * seeing_pixels(valley.spec).median
 
 
 def test_valleys_where_pedestals_cannot_leave_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,6 +74,23 @@ def test_edges_that_the_design_names_stay(edges: str) -> None:
     assert (choice.made.spec.shell.edges, choice.other) == (edges, None)
     assert choice.pixels == seeing_pixels(choice.made.spec)
     assert edges_text(choice) == f"edges: {edges}, as the design says"
+
+
+@pytest.mark.parametrize(
+    ("more", "taken"), [(1.0, "valley"), (1.009, "valley"), (1.01, "pedestal")]
+)
+def test_pedestals_must_leave_a_per_cent_more(
+    monkeypatch: pytest.MonkeyPatch, more: float, taken: str
+) -> None:
+    def pixels(spec):  # type: ignore[no-untyped-def]
+        return SeeingPixels(1000 * (more if spec.shell.edges == "pedestal" else 1.0), 100)
+
+    monkeypatch.setattr(edges_module, "seeing_pixels", pixels)
+    monkeypatch.setattr(
+        edges_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
+    )
+    choice = edges_for_process(load_spec(None, SMALL), inserts(), WANTED)
+    assert choice.made.spec.shell.edges == taken
 
 
 def test_edges_that_a_file_names_stay(tmp_path: Path) -> None:
