@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tbcad.api.arguments import silent
 from tbcad.errors import InputError
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.object import Paint, SceneObject
-    from tbcad.simulate.views.synthesis import Method, SynthesisedView
     from tbcad.types import Progress
 
 
@@ -70,45 +69,6 @@ def capture(
     progress("photographs and light field")
     bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
     return light_field_in_memory(bands, photographs.capture_mm, photographs.facts)
-
-
-def view(
-    light_field: LightField,
-    azimuth_deg: float = 0.0,
-    elevation_deg: float = 30.0,
-    *,
-    distance_mm: float = 640.0,
-    size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] = "depth",
-) -> SynthesisedView:
-    """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
-
-    Args:
-        light_field: in memory, or in an open file.
-        azimuth_deg: of the camera about z, from x.
-        elevation_deg: of the camera above the plane z = 0, 0 to 90.
-        distance_mm: of the camera from the centre of the object.
-        size: columns and rows of the picture.
-        method: "nearest" rays, the quickest; "blend" on a plane; or a blend at the "depth" that
-            the light field itself shows, the best, for which the pictures of all virtual cameras
-            are made first.
-
-    Raises:
-        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
-    """
-    from math import radians
-
-    from tbcad.depth.view import depth_view
-    from tbcad.simulate.scene.viewpoint import camera_around_object
-    from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.simulate.views.synthesis import synthesise
-
-    angles = radians(azimuth_deg), radians(elevation_deg)
-    camera = camera_around_object(*angles, distance_mm, light_field.capture_mm, size)
-    tiles = MirrorTiles(light_field)
-    if method == "depth":
-        return depth_view(tiles, camera)[0]
-    return synthesise(tiles, camera, method)
 
 
 @dataclass(frozen=True)

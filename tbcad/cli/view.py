@@ -16,7 +16,6 @@ from tbcad.cli.compared_pictures import (
 )
 from tbcad.cli.early_checks import check_is_capture
 from tbcad.cli.options import (
-    METHODS,
     Azimuth,
     Capture,
     Distance,
@@ -24,6 +23,7 @@ from tbcad.cli.options import (
     ForceFile,
     Fov,
     Height,
+    MethodOfView,
     OutPicture,
     Width,
 )
@@ -42,14 +42,13 @@ if TYPE_CHECKING:
 # Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
 LIT_SAMPLES = 2
 
-Method = Literal["nearest", "blend", "depth"]
 Surface = Literal["plane", "depth", "object"]
 
 
 class _Choice(NamedTuple):
     """Method and surface of a view, and in words why."""
 
-    method: Method
+    method: str
     surface: Surface | None
     reason: str
 
@@ -61,13 +60,7 @@ def view(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     out: OutPicture = Path("view.png"),
-    method: Annotated[
-        Method | None,
-        typer.Option(
-            help=f"{METHODS}; depth, the default: a blend at the depth that the light field "
-            "itself shows."
-        ),
-    ] = None,
+    method: MethodOfView = None,
     surface: Annotated[
         Surface | None,
         typer.Option(
@@ -212,7 +205,7 @@ def _ssim(truth: "Bytes", picture: "Bytes") -> float:
     return image_quality(truth, picture).ssim
 
 
-def _choice(method: Method | None, surface: Surface | None) -> _Choice:
+def _choice(method: str | None, surface: Surface | None) -> _Choice:
     """What is wanted: a blend at the depth that is found, if nothing else is said.
 
     Raises:
@@ -266,9 +259,9 @@ def _depth_view(
 ) -> "Bytes":
     """The picture at the depth that is found, in the colours that are shown; and files of it."""
     from tbcad.atomic_files import replace_files
-    from tbcad.depth.view import depth_view
+    from tbcad.depth.view import depth_views
 
-    picture, depth = depth_view(tiles, at, progress, shown)
+    picture, depth = depth_views(tiles, progress=progress).of(at, shown)
     for file in files:
         content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
         replace_files(file.parent, {file.name: content})
