@@ -44,8 +44,9 @@ def capture(
         paint: colours of the file ("own"), a pattern, or plain grey.
         samples: a pixel is the mean of samples x samples rays.
         lights: also write a reflectance field to `out`: a table of lamps with the columns x_mm,
-            y_mm, z_mm; or "mirrors" for a lamp in the place of each virtual camera.
-        every: one lamp of so many, of "mirrors".
+            y_mm, z_mm; "mirrors" for a lamp in the place of each virtual camera; or "projectors"
+            for the light that each mirror throws of a projector in its camera's place.
+        every: one lamp of so many, of "mirrors" or "projectors".
         force: keep files in the folder that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
@@ -126,7 +127,7 @@ class WantedLamps:
     """The lamps of a reflectance field.
 
     Attributes:
-        lights: table of their places, or "mirrors" for virtual cameras.
+        lights: table of their places, "mirrors" for virtual cameras, or "projectors".
         every: one virtual camera of so many.
     """
 
@@ -200,19 +201,25 @@ def _field_writer(
 ) -> Callable[[Path, Progress], dict[str, Any]]:
     """What writes the reflectance field; a table of lamps is read at once, before long work."""
     from tbcad.reflectance.lamp_places import MIRRORS, lamps_of_mirrors, read_lamp_places
+    from tbcad.reflectance.projectors import PROJECTORS
     from tbcad.reflectance.transport import write_reflectance
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    table = None
-    if str(wanted.lights) != MIRRORS:
+    table, thrown = None, str(wanted.lights) == PROJECTORS
+    if thrown and photographs.facts["geometry"] == "prototype":
+        raise InputError(
+            "--lights projectors is light from the mirrors of shells: leave out --prototype, or "
+            "give --lights mirrors"
+        )
+    if str(wanted.lights) not in (MIRRORS, PROJECTORS):
         table = read_lamp_places(Path(wanted.lights), photographs.capture_mm)
 
     def write(folder: Path, detail: Progress) -> dict[str, Any]:
         with LightField.open(folder) as source:
             lamps = table or lamps_of_mirrors(source, wanted.every)
             scene = prepared_scene(photographs.subject)
-            return write_reflectance(folder, source, scene, lamps, detail)
+            return write_reflectance(folder, source, scene, lamps, detail, thrown)
 
     return write
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from tbcad.reflectance.environment import Environment
     from tbcad.reflectance.relit import Relit
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.point_lights import PointLights
     from tbcad.simulate.scene.ray_casting import Scene
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.types import Bytes, Progress
@@ -187,16 +188,17 @@ def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit"
 
 def _lit_truths(
     scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
-) -> tuple["Bytes", "Bytes"]:
-    """The ray-traced pictures in that light, and in the light of the same lamps."""
+) -> tuple["Bytes", "Bytes | None"]:
+    """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
     from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
     from tbcad.simulate.capture.photograph import to_bytes
     from tbcad.simulate.scene.ground_truth import pinhole_picture
 
-    lights = wanted.far_lights(TRUE_LIGHTS), relit.lamps
-    scenes = [lit_scene(scene, one, relit.exposure) for one in lights]
-    first, second = (to_bytes(pinhole_picture(one, at, LIT_SAMPLES)) for one in scenes)
-    return first, second
+    def truth(lights: "PointLights") -> "Bytes":
+        lit = lit_scene(scene, lights, relit.exposure)
+        return to_bytes(pinhole_picture(lit, at, LIT_SAMPLES))
+
+    return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
 
 
 def _ssim(truth: "Bytes", picture: "Bytes") -> float:
