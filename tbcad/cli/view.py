@@ -11,6 +11,7 @@ from tbcad.cli.compared_pictures import (
     compared_files,
     has_object,
     scene_of,
+    true_picture,
     viewpoint_of,
     write_compared,
 )
@@ -109,8 +110,6 @@ def view(
     check_is_capture(capture_folder)
     choice, files = _choice(method, surface), depth_files or []
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import pinhole_picture
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
     check_pictures(capture_folder, out, force)
@@ -140,7 +139,7 @@ def view(
             truth, same_lamps = _lit_truths(scene, at, relit, wanted)
         elif scene is not None:
             where = (scene, at) if frame is None else _turned(scene, at, capture_folder, frame)
-            truth = to_bytes(pinhole_picture(*where))
+            truth = true_picture(*where)
     typer.echo(f"method {choice.method}: {choice.reason}")
     if relit is not None:
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
@@ -191,12 +190,9 @@ def _lit_truths(
 ) -> tuple["Bytes", "Bytes | None"]:
     """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
     from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
-    from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import pinhole_picture
 
     def truth(lights: "PointLights") -> "Bytes":
-        lit = lit_scene(scene, lights, relit.exposure)
-        return to_bytes(pinhole_picture(lit, at, LIT_SAMPLES))
+        return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
 
     return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
 
