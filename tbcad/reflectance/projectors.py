@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.datasets.crops import MirrorId
-from tbcad.geometry.vectors import norm
+from tbcad.geometry.vectors import dot, norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.parallel import compiled_loop
@@ -26,7 +26,8 @@ PROJECTORS = "projectors"
 LEAST_CURVATURE = 1e-7
 # Both halves of a mirror on the seam have one direction.
 SAME_DIRECTION = 1e-9
-STEPS, ANGLE = 60, 1e-15
+# Newton's steps at most, and the last one's share of the whole angle.
+STEPS, LAST_STEP = 60, 1e-12
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,15 @@ class MirrorPixels:
 
     def light(self, embree: Any, spots: Spots) -> Floats:
         """Light on spots (k,), if a white surface at the origin that faces it gets 1."""
-        place = np.ascontiguousarray(spots.place)
-        known, spread = reflected(self.centre, self.radius, self.camera.pinhole, place)
-        toward = known - place
-        cosine = lit_cosine(embree, spots, toward / norm(toward)[:, None])
-        return np.asarray(np.where(self._owns(known), cosine * self.at_origin / spread, 0.0))
+        light = np.zeros(len(spots.place))
+        height = dot(self.centre - spots.place, spots.normal)
+        faces = np.flatnonzero(height + self.radius > 0)  # the sphere is not all below the horizon
+        some = Spots(spots.place[faces], spots.normal[faces], spots.facet_normal[faces])
+        known, spread = reflected(self.centre, self.radius, self.camera.pinhole, some.place)
+        toward = known - some.place
+        cosine = lit_cosine(embree, some, toward / norm(toward)[:, None])
+        light[faces] = np.where(self._owns(known), cosine * self.at_origin / spread, 0.0)
+        return light
 
     def _owns(self, points: Floats) -> NDArray[np.bool_]:
         """Whether a pixel of this mirror is where points (k, 3) of its sphere appear."""
@@ -170,7 +175,7 @@ def _turn(p: float, q: float, whole: float, radius: float) -> float:
         after = turn - value / slope
         if not low <= after <= high:
             after = (low + high) / 2
-        done = abs(after - turn) <= ANGLE * whole
+        done = abs(after - turn) <= LAST_STEP * whole
         turn = after
         if done:
             break
