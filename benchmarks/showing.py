@@ -1,4 +1,4 @@
-"""Views a second of `tbcad show`: python benchmarks/showing.py captures/knot."""
+"""Views a second: python benchmarks/showing.py captures/knot."""
 
 from __future__ import annotations
 
@@ -13,21 +13,58 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from functools import partial
 from http.client import HTTPConnection
 from pathlib import Path
+from typing import Literal
 
 from circumstances import RESULTS, circumstances
 from timing import Figure, Row, at_least, measured
 
+from tbcad import Views
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.viewer.query import Query
 from tbcad.viewer.render import Renderer
 from tbcad.viewer.server import HOST, ViewServer
 
+Method = Literal["nearest", "blend", "depth"]
 VIEWS = 90  # once around, in steps of 4 degrees
 IN_FLIGHT = 2  # as the page
 BROWSER_S = 5.0
+MS = 1000  # of a second
+
+
+def synthesised(capture: Path, rounds: int) -> list[Row]:
+    """Views by rays, one after the other, in turns so that all meet the same load."""
+    with LightField.open(capture) as source:
+        views, fine = Views(source, quick=True), Views(source)
+        works: dict[str, tuple[Views, Method, float | None]] = {
+            "nearest rays": (views, "nearest", 30),
+            "blend on the plane": (views, "blend", 10),
+            "blend at the depth found, quick": (views, "depth", 10),
+            "blend at the depth found": (fine, "depth", None),
+        }
+        found: dict[str, list[tuple[float, float]]] = {name: [] for name in works}
+        for turn in range(rounds + 1):
+            for name, (of, method, _) in works.items():
+                one = rates(partial(few, of, method))
+                if turn > 0:  # the first compiles and reads
+                    found[name].append(one)
+    rows = []
+    for name, (_, _, limit) in works.items():
+        views_a_second, cpu = _rows(f"views a second, 640 x 480, {name}", found[name])
+        rows.append(views_a_second)
+        # Of two cores: what others do on them does not lengthen it.
+        rows.append(cpu if limit is None else replace(cpu, limit=round(2 * MS / limit, 1)))
+    return rows
+
+
+def few(views: Views, method: Method) -> int:
+    """A quarter of the views of a turn, spread evenly; their number."""
+    for k in range(0, VIEWS, 4):
+        _ = views.view(360 * k / VIEWS, method=method).image
+    return len(range(0, VIEWS, 4))
 
 
 def showing(capture: Path, rounds: int) -> list[Row]:
@@ -68,7 +105,7 @@ def rates(work: Callable[[], int]) -> tuple[float, float]:
     start, used = time.perf_counter(), time.process_time()
     count = work()
     taken, cpu = time.perf_counter() - start, time.process_time() - used
-    return count / taken, 1000 * cpu / count
+    return count / taken, MS * cpu / count
 
 
 @contextmanager
@@ -126,10 +163,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure tbcad show and write a JSON file.")
     parser.add_argument("capture", type=Path, help="folder written by tbcad capture, n = 18")
     parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
+    parser.add_argument("--alone", action="store_true", help="leave out `tbcad show`")
     parser.add_argument("--out", type=Path, default=RESULTS / "showing.json")
     options = parser.parse_args()
     about = {**circumstances(), "rounds": options.rounds}
-    rows = showing(options.capture, options.rounds)
+    rows = synthesised(options.capture, options.rounds)
+    if not options.alone:
+        rows += showing(options.capture, options.rounds)
     sys.stdout.writelines(f"{row}\n" for row in rows)
     print(f"load after: {os.getloadavg()[0]:.1f}")
     record = {**about, "rows": [asdict(row) for row in rows]}

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tbcad.api import (
         Build,
+        Views,
         analyse,
         build,
         capture,
@@ -51,6 +52,7 @@ __all__ = [
     "MirrorArray",
     "Report",
     "Spec",
+    "Views",
     "__version__",
     "analyse",
     "build",

@@ -12,7 +12,6 @@ from tbcad.api.captures import (
     capture,
     photograph,
     relight,
-    view,
     write_photographs,
 )
 from tbcad.api.datasets import export
@@ -20,10 +19,12 @@ from tbcad.api.designs import design
 from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
 from tbcad.api.tolerances import analyse, inspect
 from tbcad.api.verification import verify, verify_as_built
+from tbcad.api.views import Views, view
 
 __all__ = [
     "Build",
     "Photographs",
+    "Views",
     "WantedFrames",
     "WantedLamps",
     "analyse",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tbcad.api.arguments import silent
 from tbcad.errors import InputError
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.object import Paint, SceneObject
-    from tbcad.simulate.views.synthesis import Method, SynthesisedView
     from tbcad.types import Progress
 
 
@@ -45,8 +44,9 @@ def capture(
         paint: colours of the file ("own"), a pattern, or plain grey.
         samples: a pixel is the mean of samples x samples rays.
         lights: also write a reflectance field to `out`: a table of lamps with the columns x_mm,
-            y_mm, z_mm; or "mirrors" for a lamp in the place of each virtual camera.
-        every: one lamp of so many, of "mirrors".
+            y_mm, z_mm; "mirrors" for a lamp in the place of each virtual camera; or "projectors"
+            for the light that each mirror throws of a projector in its camera's place.
+        every: one lamp of so many, of "mirrors" or "projectors".
         force: keep files in the folder that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
@@ -70,45 +70,6 @@ def capture(
     progress("photographs and light field")
     bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
     return light_field_in_memory(bands, photographs.capture_mm, photographs.facts)
-
-
-def view(
-    light_field: LightField,
-    azimuth_deg: float = 0.0,
-    elevation_deg: float = 30.0,
-    *,
-    distance_mm: float = 640.0,
-    size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] = "depth",
-) -> SynthesisedView:
-    """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
-
-    Args:
-        light_field: in memory, or in an open file.
-        azimuth_deg: of the camera about z, from x.
-        elevation_deg: of the camera above the plane z = 0, 0 to 90.
-        distance_mm: of the camera from the centre of the object.
-        size: columns and rows of the picture.
-        method: "nearest" rays, the quickest; "blend" on a plane; or a blend at the "depth" that
-            the light field itself shows, the best, for which the pictures of all virtual cameras
-            are made first.
-
-    Raises:
-        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
-    """
-    from math import radians
-
-    from tbcad.depth.view import depth_view
-    from tbcad.simulate.scene.viewpoint import camera_around_object
-    from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.simulate.views.synthesis import synthesise
-
-    angles = radians(azimuth_deg), radians(elevation_deg)
-    camera = camera_around_object(*angles, distance_mm, light_field.capture_mm, size)
-    tiles = MirrorTiles(light_field)
-    if method == "depth":
-        return depth_view(tiles, camera)[0]
-    return synthesise(tiles, camera, method)
 
 
 @dataclass(frozen=True)
@@ -166,7 +127,7 @@ class WantedLamps:
     """The lamps of a reflectance field.
 
     Attributes:
-        lights: table of their places, or "mirrors" for virtual cameras.
+        lights: table of their places, "mirrors" for virtual cameras, or "projectors".
         every: one virtual camera of so many.
     """
 
@@ -240,19 +201,25 @@ def _field_writer(
 ) -> Callable[[Path, Progress], dict[str, Any]]:
     """What writes the reflectance field; a table of lamps is read at once, before long work."""
     from tbcad.reflectance.lamp_places import MIRRORS, lamps_of_mirrors, read_lamp_places
+    from tbcad.reflectance.projectors import PROJECTORS
     from tbcad.reflectance.transport import write_reflectance
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    table = None
-    if str(wanted.lights) != MIRRORS:
+    table, thrown = None, str(wanted.lights) == PROJECTORS
+    if thrown and photographs.facts["geometry"] == "prototype":
+        raise InputError(
+            "--lights projectors is light from the mirrors of shells: leave out --prototype, or "
+            "give --lights mirrors"
+        )
+    if str(wanted.lights) not in (MIRRORS, PROJECTORS):
         table = read_lamp_places(Path(wanted.lights), photographs.capture_mm)
 
     def write(folder: Path, detail: Progress) -> dict[str, Any]:
         with LightField.open(folder) as source:
             lamps = table or lamps_of_mirrors(source, wanted.every)
             scene = prepared_scene(photographs.subject)
-            return write_reflectance(folder, source, scene, lamps, detail)
+            return write_reflectance(folder, source, scene, lamps, detail, thrown)
 
     return write
 

@@ -71,6 +71,14 @@ def scene_of(folder: Path) -> "Scene | None":
     return prepared_scene(read_object(folder))
 
 
+def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
+    """What a pinhole camera would see, ray-traced with samples x samples rays a pixel."""
+    from tbcad.simulate.capture.photograph import to_bytes
+    from tbcad.simulate.scene.ground_truth import pinhole_picture
+
+    return to_bytes(pinhole_picture(scene, at, samples))
+
+
 def write_compared(
     out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]
 ) -> None:

@@ -90,14 +90,13 @@ METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
     "virtual cameras that see the same point"
 )
-DEFAULT_METHOD = (
-    "By default blend, but nearest where the virtual cameras are so far apart that their pictures "
-    "of one point differ."
-)
 MethodOption = Annotated[Literal["nearest", "blend"], typer.Option(help=f"{METHODS}.")]
 MethodOfView = Annotated[
-    Literal["nearest", "blend"] | None,
-    typer.Option(help=f"{METHODS}. {DEFAULT_METHOD}"),
+    Literal["nearest", "blend", "depth"] | None,
+    typer.Option(
+        help=f"{METHODS}; depth, the default: a blend at the depth that the light field itself "
+        "shows."
+    ),
 ]
 Scheduler = Annotated[
     str | None,

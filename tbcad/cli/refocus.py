@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.compared_pictures import check_pictures, scene_of, viewpoint_of, write_compared
+from tbcad.cli.compared_pictures import (
+    check_pictures,
+    scene_of,
+    true_picture,
+    viewpoint_of,
+    write_compared,
+)
 from tbcad.cli.early_checks import check_is_capture
 from tbcad.cli.options import (
     Azimuth,
@@ -126,8 +132,8 @@ def _truth(
 ) -> "Bytes":
     """The ray-traced picture of the lens; of a pinhole without samples of one."""
     from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
+    from tbcad.simulate.scene.ground_truth import lens_picture
 
     if samples == 0:
-        return to_bytes(pinhole_picture(scene, at))
+        return true_picture(scene, at)
     return to_bytes(lens_picture(scene, at, lens, samples, progress))

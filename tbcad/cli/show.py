@@ -22,8 +22,8 @@ from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.simulate.views.synthesis import Method
     from tbcad.viewer.query import Query
+    from tbcad.viewer.render import MethodAtRest
     from tbcad.viewer.server import ViewServer
 
 REPORT_FILE = "report.html"
@@ -120,7 +120,12 @@ def _show_report(folder: Path, open_page: bool, json: bool) -> int:
 
 
 def _show_light_field(
-    file: Path, start: "Query", method: "Method | None", port: int, open_page: bool, json: bool
+    file: Path,
+    start: "Query",
+    method: "MethodAtRest | None",
+    port: int,
+    open_page: bool,
+    json: bool,
 ) -> int:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.viewer.render import Renderer
@@ -130,7 +135,7 @@ def _show_light_field(
         start.check(source.capture_mm)
         with stages(1) as screen:
             screen.stage("pictures of the virtual cameras")
-            renderer = Renderer(source, method, screen.detail)
+            renderer = Renderer(source, method or "depth", screen.detail)
         with ViewServer(renderer, _title(file), start, port) as server:
             if json:
                 print_json({"address": server.address})
@@ -155,12 +160,11 @@ def _write_turntable(
     out: Path,
     start: "Query",
     views: tuple[int, int],
-    method: "Method | None",
+    method: "MethodAtRest | None",
     force: bool,
     json: bool,
 ) -> int:
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.views.method import suitable_method
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.viewer.turntable import (
         Turntable,
@@ -179,7 +183,7 @@ def _write_turntable(
             even_elevations(rows, start.elevation),
             start.distance,
             (start.width, start.height),
-            method or suitable_method(tiles).method,
+            method or "depth",
         )
         screen.stage("turntable")
         size = write_turntable(out, tiles, table, _title(file), screen.detail)

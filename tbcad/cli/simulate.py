@@ -50,12 +50,13 @@ def capture(
         typer.Option(
             metavar="FILE",
             help="Also write a reflectance field, a photograph for each lamp: FILE is a table with "
-            "the columns x_mm,y_mm,z_mm, or the word mirrors for a lamp in the place of each "
-            "virtual camera.",
+            "the columns x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual "
+            "camera, projectors what each mirror throws of a projector in its camera's place.",
         ),
     ] = None,
     every: Annotated[
-        int, typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors.")
+        int,
+        typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors or projectors."),
     ] = 1,
     frames: Annotated[
         int | None,
@@ -81,8 +82,14 @@ def capture(
         raise InputError("--mesh and --prototype exclude each other: leave one out")
     if lights is not None and samples > 1:
         raise InputError("--lights follows one ray a pixel: leave out --samples")
-    if every > 1 and lights != "mirrors":
-        raise InputError("--every chooses among the lamps of --lights mirrors: leave it out")
+    if every > 1 and lights not in ("mirrors", "projectors"):
+        raise InputError(
+            "--every chooses among the lamps of --lights mirrors or projectors: leave it out"
+        )
+    if lights == "projectors" and prototype:
+        raise InputError(
+            "--lights projectors is light from the mirrors of shells: leave out --prototype"
+        )
     if frames is not None and (samples > 1 or prototype):
         raise InputError("--frames follows one ray a pixel: leave out --samples and --prototype")
     check_is_export(folder)

@@ -11,12 +11,12 @@ from tbcad.cli.compared_pictures import (
     compared_files,
     has_object,
     scene_of,
+    true_picture,
     viewpoint_of,
     write_compared,
 )
 from tbcad.cli.early_checks import check_is_capture
 from tbcad.cli.options import (
-    METHODS,
     Azimuth,
     Capture,
     Distance,
@@ -24,6 +24,7 @@ from tbcad.cli.options import (
     ForceFile,
     Fov,
     Height,
+    MethodOfView,
     OutPicture,
     Width,
 )
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from tbcad.reflectance.environment import Environment
     from tbcad.reflectance.relit import Relit
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.scene.point_lights import PointLights
     from tbcad.simulate.scene.ray_casting import Scene
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.types import Bytes, Progress
@@ -42,14 +44,13 @@ if TYPE_CHECKING:
 # Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
 LIT_SAMPLES = 2
 
-Method = Literal["nearest", "blend", "depth"]
 Surface = Literal["plane", "depth", "object"]
 
 
 class _Choice(NamedTuple):
     """Method and surface of a view, and in words why."""
 
-    method: Method
+    method: str
     surface: Surface | None
     reason: str
 
@@ -61,13 +62,7 @@ def view(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     out: OutPicture = Path("view.png"),
-    method: Annotated[
-        Method | None,
-        typer.Option(
-            help=f"{METHODS}; depth, the default: a blend at the depth that the light field "
-            "itself shows."
-        ),
-    ] = None,
+    method: MethodOfView = None,
     surface: Annotated[
         Surface | None,
         typer.Option(
@@ -115,8 +110,6 @@ def view(
     check_is_capture(capture_folder)
     choice, files = _choice(method, surface), depth_files or []
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import pinhole_picture
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
     check_pictures(capture_folder, out, force)
@@ -146,7 +139,7 @@ def view(
             truth, same_lamps = _lit_truths(scene, at, relit, wanted)
         elif scene is not None:
             where = (scene, at) if frame is None else _turned(scene, at, capture_folder, frame)
-            truth = to_bytes(pinhole_picture(*where))
+            truth = true_picture(*where)
     typer.echo(f"method {choice.method}: {choice.reason}")
     if relit is not None:
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
@@ -194,16 +187,14 @@ def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit"
 
 def _lit_truths(
     scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
-) -> tuple["Bytes", "Bytes"]:
-    """The ray-traced pictures in that light, and in the light of the same lamps."""
+) -> tuple["Bytes", "Bytes | None"]:
+    """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
     from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
-    from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import pinhole_picture
 
-    lights = wanted.far_lights(TRUE_LIGHTS), relit.lamps
-    scenes = [lit_scene(scene, one, relit.exposure) for one in lights]
-    first, second = (to_bytes(pinhole_picture(one, at, LIT_SAMPLES)) for one in scenes)
-    return first, second
+    def truth(lights: "PointLights") -> "Bytes":
+        return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
+
+    return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
 
 
 def _ssim(truth: "Bytes", picture: "Bytes") -> float:
@@ -212,7 +203,7 @@ def _ssim(truth: "Bytes", picture: "Bytes") -> float:
     return image_quality(truth, picture).ssim
 
 
-def _choice(method: Method | None, surface: Surface | None) -> _Choice:
+def _choice(method: str | None, surface: Surface | None) -> _Choice:
     """What is wanted: a blend at the depth that is found, if nothing else is said.
 
     Raises:
@@ -266,9 +257,9 @@ def _depth_view(
 ) -> "Bytes":
     """The picture at the depth that is found, in the colours that are shown; and files of it."""
     from tbcad.atomic_files import replace_files
-    from tbcad.depth.view import depth_view
+    from tbcad.depth.view import depth_views
 
-    picture, depth = depth_view(tiles, at, progress, shown)
+    picture, depth = depth_views(tiles, progress=progress).of(at, shown)
     for file in files:
         content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
         replace_files(file.parent, {file.name: content})

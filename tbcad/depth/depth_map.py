@@ -6,17 +6,15 @@ from io import BytesIO
 import numpy as np
 import trimesh
 from PIL import Image
-from scipy.ndimage import map_coordinates
 
 from tbcad.datasets.pinhole_pictures import PinholePictures
-from tbcad.depth.plane_sweep import swept_depth
+from tbcad.depth.plane_sweep import FINE, Sweep, swept_depth
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
+from tbcad.simulate.parallel import compiled_loop
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bytes, Floats
 
-# Pixels of a view for one of its depth: mirrors show a tenth of a view's resolution at most.
-STEP_PX = 4
 # A plane that is less different than a middling one, by colour, is no surface but empty or even.
 MIN_CONFIDENCE = 3.0
 BLACK = 8  # of 255: no brighter is the background, which is matt black
@@ -42,10 +40,9 @@ class DepthMap:
 
     def along_rays(self, origin: Floats, direction: Floats) -> Floats:
         """Distance (n,) along rays (n, 3) of the view's pinhole to the surface, mm."""
-        place = self.view.project(origin + direction)
-        depth = map_coordinates(np.nan_to_num(self.depth), place.T[::-1], order=1, mode="nearest")
         plane = -float(self.view.pinhole @ self.view.forward)
-        return np.asarray((plane + depth) / (direction @ self.view.forward))
+        away = plane + np.nan_to_num(self.depth)
+        return _along(away, self.view.axes, self.view.pixel_pitch, np.ascontiguousarray(direction))
 
     def points(self) -> Floats:
         """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
@@ -79,8 +76,42 @@ class DepthMap:
         return content if isinstance(content, bytes) else content.encode("ascii")
 
 
-def depth_map(pictures: PinholePictures, view: Camera) -> DepthMap:
+@compiled_loop
+def _along(away: Floats, axes: Floats, pitch: float, direction: Floats) -> Floats:
+    """Distance (n,) along rays from a pinhole to a surface, between four of its known points.
+
+    Args:
+        away: of the surface along the view, for each pixel, mm, (h, w).
+        axes: of the view, (3, 3).
+        pitch: width of a pixel at unit distance.
+        direction: of the rays, (n, 3).
+    """
+    height, width = away.shape
+    result = np.empty(len(direction))
+    for k in range(len(direction)):
+        x = y = ahead = 0.0
+        for j in range(3):
+            x += axes[0, j] * direction[k, j]
+            y += axes[1, j] * direction[k, j]
+            ahead += axes[2, j] * direction[k, j]
+        column = min(max(x / ahead / pitch + (width - 1) / 2, 0.0), width - 1.0)
+        row = min(max(y / ahead / pitch + (height - 1) / 2, 0.0), height - 1.0)
+        left, top = min(int(column), max(width - 2, 0)), min(int(row), max(height - 2, 0))
+        right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
+        u, v = column - left, row - top
+        above = (1 - u) * away[top, left] + u * away[top, right]
+        below = (1 - u) * away[bottom, left] + u * away[bottom, right]
+        result[k] = ((1 - v) * above + v * below) / ahead
+    return result
+
+
+def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> DepthMap:
     """The depth of a view.
+
+    Args:
+        pictures: of all virtual cameras.
+        view: a camera that looks at the origin.
+        sweep: how fine it is.
 
     Raises:
         InputError: the camera does not look at the origin, so planes across it mean nothing.
@@ -88,7 +119,7 @@ def depth_map(pictures: PinholePictures, view: Camera) -> DepthMap:
     aside = np.linalg.norm(np.cross(view.pinhole, view.forward))
     if aside > pictures.capture_mm / 2:
         raise InputError("the view does not look at the object: turn its camera to the origin")
-    size = -(-view.width_px // STEP_PX), -(-view.height_px // STEP_PX)
+    size = -(-view.width_px // sweep.step_px), -(-view.height_px // sweep.step_px)
     smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
-    depth, confidence = swept_depth(pictures, smaller)
+    depth, confidence = swept_depth(pictures, smaller, sweep)
     return DepthMap(smaller, depth, confidence, pictures.capture_mm)

@@ -6,7 +6,6 @@ pixel is looked up in the pictures of the nearest virtual cameras, and the plane
 colours differ least, summed over a window, is taken.
 """
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,14 +13,11 @@ from scipy.ndimage import median_filter, uniform_filter
 
 from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import chunks, compiled, first_then_threads
+from tbcad.simulate.parallel import chunks, compiled_loop, first_then_threads
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
-# docs/depth.md has what other numbers give.
-PLANES = 64
 CAMERAS = 16
-WINDOW_PX = 5
 # Pixels along the sides of blocks that are looked up in the same virtual cameras.
 BLOCK_PX = 4
 # Cameras that see something else in front are left out: this share, with the best colours, counts,
@@ -30,6 +26,26 @@ SHARE, MOST_DIFFERENT = 0.7, 60.0
 # The colour that others are compared with is the mean of so many cameras, nearest to the ray.
 REFERENCE = 3
 ROWS_PER_CHUNK = 8
+
+
+class Sweep(NamedTuple):
+    """How fine a sweep is. docs/depth.md has what other numbers give.
+
+    Attributes:
+        step_px: pixels of a view for one of its depth.
+        planes: that are tried.
+        window_px: over which differences are averaged, pixels of the depth.
+    """
+
+    step_px: int
+    planes: int
+    window_px: int
+
+
+# Mirrors show a tenth of a view's resolution at most.
+FINE = Sweep(4, 64, 5)
+# A tenth of the time, for views that have to be quick.
+QUICK = Sweep(8, 32, 3)
 
 
 class _Cameras(NamedTuple):
@@ -45,12 +61,15 @@ def _seen_from(pictures: PinholePictures, view: Camera) -> _Cameras:
     return _Cameras(number, place, projections(pictures, view, number))
 
 
-def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats]:
+def swept_depth(
+    pictures: PinholePictures, view: Camera, sweep: Sweep = FINE
+) -> tuple[Floats, Floats]:
     """Depth of a view's pixels, and its confidence.
 
     Args:
         pictures: of all virtual cameras.
-        view: a camera that looks at the origin.
+        view: a camera that looks at the origin, with the pixels of the depth.
+        sweep: how many planes, and how wide a window.
 
     Returns:
         Depth (h, w), mm behind the plane through the origin that faces the view; NaN where rays
@@ -58,30 +77,32 @@ def swept_depth(pictures: PinholePictures, view: Camera) -> tuple[Floats, Floats
         colours differ more on a middling plane than on that one (h, w), 0 to MOST_DIFFERENT.
     """
     radius = pictures.capture_mm / 2
-    planes = np.linspace(-radius, radius, PLANES)
+    planes = np.linspace(-radius, radius, sweep.planes)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
     cameras = _seen_from(pictures, view)
-    rows = chunks(view.height_px, ROWS_PER_CHUNK)
-    middle = len(rows) // 2  # there rays meet the capture sphere, so the loop is compiled
-    first_then_threads(
-        partial(_compare_rows, pictures, cameras, view, planes, inside, difference),
-        [*rows[middle:], *rows[:middle]],
-    )
+    known = pictures.picture, pictures.mask
+    distance = planes - float(view.pinhole @ view.forward)
+
+    def compare(rows: slice) -> None:
+        ends = rows.start, rows.stop
+        _compare_rows(cameras, known, distance, view.pixel_pitch, inside, difference, ends)
+
+    first_then_threads(compare, chunks(view.height_px, ROWS_PER_CHUNK))
     compared = np.isfinite(difference)
     for plane, counted in zip(difference, compared, strict=True):
-        _average(plane, counted)
-    depth = median_filter(_lowest(difference, planes), WINDOW_PX)
+        _average(plane, counted, sweep.window_px)
+    depth = median_filter(_lowest(difference, planes), sweep.window_px)
     confidence = np.where(
         compared.any(axis=0), _median(difference, compared) - difference.min(axis=0), 0.0
     )
     return np.where(compared.any(axis=0), depth, np.nan), confidence
 
 
-def _average(plane: Colours, compared: Bools) -> None:
+def _average(plane: Colours, compared: Bools, window_px: int) -> None:
     """Replace the differences of a plane (h, w) by their means over the window."""
-    share = np.maximum(uniform_filter(compared.astype(np.float32), WINDOW_PX), 1e-6)
-    mean = uniform_filter(np.where(compared, plane, 0), WINDOW_PX) / share
+    share = np.maximum(uniform_filter(compared.astype(np.float32), window_px), 1e-6)
+    mean = uniform_filter(np.where(compared, plane, 0), window_px) / share
     plane[...] = np.where(compared, mean, MOST_DIFFERENT)
 
 
@@ -97,44 +118,75 @@ def _inside(view: Camera, planes: Floats, radius: float) -> Bools:
     along = view_directions(view)
     along /= (along @ view.forward)[..., None]
     distance = planes - view.pinhole @ view.forward
-    points = view.pinhole + distance[:, None, None, None] * along
-    return np.asarray(np.linalg.norm(points, axis=3) <= radius)
+    # |pinhole + t along|^2 <= radius^2
+    squared, mixed = (along**2).sum(axis=2), along @ view.pinhole
+    t = distance[:, None, None]
+    return np.asarray(t * (t * squared + 2 * mixed) <= radius**2 - view.pinhole @ view.pinhole)
 
 
+@compiled_loop
 def _compare_rows(
-    pictures: PinholePictures,
     cameras: _Cameras,
-    view: Camera,
-    planes: Floats,
+    pictures: tuple[Bytes, Bools],
+    distance: Floats,
+    pitch: float,
     inside: Bools,
     difference: Colours,
-    rows: slice,
+    rows: tuple[int, int],
 ) -> None:
-    """Fill in the differences (d, h, w) of some rows, whose first is the first of a block."""
-    distance = planes - float(view.pinhole @ view.forward)
-    half = np.array([view.width_px - 1, view.height_px - 1]) / 2
-    for top in range(rows.start, min(rows.stop, view.height_px), BLOCK_PX):
-        for left in range(0, view.width_px, BLOCK_PX):
-            block = np.s_[:, top : top + BLOCK_PX, left : left + BLOCK_PX]
-            if not inside[block].any():
+    """Fill in the differences (d, h, w) of some rows, whose first is the first of a block.
+
+    Args:
+        cameras: that may show them.
+        pictures: of all cameras (m, s, s, 3), and where they are known, (m, s, s).
+        distance: of the planes along the view from its pinhole, mm, (d,).
+        pitch: width of the view's pixels at unit distance.
+        inside: where to compare, (d, h, w).
+        difference: is filled.
+        rows: the first, and the one behind the last.
+    """
+    _, height, width = inside.shape
+    for top in range(rows[0], rows[1], BLOCK_PX):
+        for left in range(0, width, BLOCK_PX):
+            part = inside[:, top : min(top + BLOCK_PX, rows[1]), left : left + BLOCK_PX]
+            if not part.any():
                 continue
-            first = np.array([left, top]) - half
-            middle = (first + (BLOCK_PX - 1) / 2) * view.pixel_pitch
-            across = cameras.place[:, :2] - cameras.place[:, 2:] * middle
-            order = np.argsort((across**2).sum(axis=1))[:CAMERAS]
+            column, row = left - (width - 1) / 2, top - (height - 1) / 2
+            half = (BLOCK_PX - 1) / 2
+            x, y = (column + half) * pitch, (row + half) * pitch
+            near = _nearest_cameras(cameras.place, x, y, CAMERAS)
             _compare(
-                cameras.matrix[order],
-                cameras.number[order],
+                cameras.matrix[near],
+                cameras.number[near],
                 distance,
-                np.array([*first, view.pixel_pitch]),
-                inside[block],
-                difference[block],
-                pictures.picture,
-                pictures.mask,
+                np.array([column, row, pitch]),
+                part,
+                difference[:, top : min(top + BLOCK_PX, rows[1]), left : left + BLOCK_PX],
+                pictures[0],
+                pictures[1],
             )
 
 
-@compiled
+@compiled_loop
+def _nearest_cameras(place: Floats, x: float, y: float, most: int) -> Ints:
+    """So many of some cameras, at weighted places (k, 3), the nearest to a target ray first."""
+    kept, squared = np.empty(most, dtype=np.int64), np.empty(most)
+    count = 0
+    for k in range(len(place)):
+        across, down = place[k, 0] - place[k, 2] * x, place[k, 1] - place[k, 2] * y
+        one = across * across + down * down
+        if count == most and one >= squared[-1]:
+            continue
+        j = min(count, most - 1)
+        count = min(count + 1, most)
+        while j > 0 and squared[j - 1] > one:
+            kept[j], squared[j] = kept[j - 1], squared[j - 1]
+            j -= 1
+        kept[j], squared[j] = k, one
+    return kept[:count]
+
+
+@compiled_loop
 def _compare(
     matrix: Floats,
     cameras: Ints,
@@ -157,62 +209,94 @@ def _compare(
         picture: of all cameras, (m, s, s, 3).
         mask: where they are known, (m, s, s).
     """
-    colours, apart = np.empty((len(cameras), 3)), np.empty(len(cameras))
-    for p in range(inside.shape[0]):
-        for i in range(inside.shape[1]):
-            for j in range(inside.shape[2]):
-                if not inside[p, i, j]:
-                    continue
-                x, y = (lens[0] + j) * lens[2] * distance[p], (lens[1] + i) * lens[2] * distance[p]
-                count = 0
-                for c in range(len(cameras)):
-                    if _look_up(
-                        matrix[c], x, y, distance[p], picture[cameras[c]], mask[cameras[c]],
-                        colours[count],
-                    ):  # fmt: skip
-                        count += 1
-                if count >= REFERENCE:
-                    difference[p, i, j] = _difference(colours[:count], apart[:count])
+    planes, rows, columns = inside.shape
+    colours, apart = np.empty((planes, len(cameras), 3)), np.empty(len(cameras))
+    count = np.empty(planes, dtype=np.int64)
+    for i in range(rows):
+        for j in range(columns):
+            x, y = (lens[0] + j) * lens[2], (lens[1] + i) * lens[2]
+            count[:] = 0
+            for c in range(len(cameras)):
+                _look_along(
+                    matrix, c, (x, y), distance, inside[:, i, j], picture[cameras[c]],
+                    mask[cameras[c]], (colours, count),
+                )  # fmt: skip
+            for p in range(planes):
+                if inside[p, i, j] and count[p] >= REFERENCE:
+                    difference[p, i, j] = _difference(colours, p, count[p], apart)
 
 
-@compiled
-def _look_up(
-    matrix: Floats, x: float, y: float, z: float, picture: Bytes, mask: Bools, colour: Floats
-) -> bool:
-    """Fill in the colour of a point between four pixels of a picture; whether all are known."""
-    depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-    column = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) / depth
-    row = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) / depth
+@compiled_loop
+def _look_along(
+    matrix: Floats,
+    c: int,
+    ray: tuple[float, float],
+    distance: Floats,
+    inside: Bools,
+    picture: Bytes,
+    mask: Bools,
+    found: tuple[Floats, Ints],
+) -> None:
+    """Add one camera's colours of a ray's points on all planes, where all of four pixels are known.
+
+    Numbers instead of parts of arrays, also below: numba counts who uses an array, which takes
+    longer than the colours.
+
+    Args:
+        matrix: into the cameras' pictures, (c, 3, 4).
+        c: which camera.
+        ray: across, across, at unit distance.
+        distance: of the planes, (d,).
+        inside: on which planes to look, (d,).
+        picture: of the camera, (s, s, 3).
+        mask: where it is known, (s, s).
+        found: colours (d, c, 3) and their numbers (d,), are added to.
+    """
+    colours, count = found
     last = mask.shape[0] - 1
-    if not (0 <= column < last and 0 <= row < last):
-        return False
-    i, j = int(row), int(column)
-    if not (mask[i, j] and mask[i, j + 1] and mask[i + 1, j] and mask[i + 1, j + 1]):
-        return False
-    down, right = row - i, column - j
-    for k in range(3):
-        above = (1 - right) * picture[i, j, k] + right * picture[i, j + 1, k]
-        below = (1 - right) * picture[i + 1, j, k] + right * picture[i + 1, j + 1, k]
-        colour[k] = (1 - down) * above + down * below
-    return True
-
-
-@compiled
-def _difference(colours: Floats, apart: Floats) -> float:
-    """Mean difference of colours (c, 3) from the first ones, of those that differ least."""
-    for c in range(len(colours)):
-        apart[c] = 0.0
+    away = matrix[c, 2, 0] * ray[0] + matrix[c, 2, 1] * ray[1] + matrix[c, 2, 2]
+    across = matrix[c, 0, 0] * ray[0] + matrix[c, 0, 1] * ray[1] + matrix[c, 0, 2]
+    down = matrix[c, 1, 0] * ray[0] + matrix[c, 1, 1] * ray[1] + matrix[c, 1, 2]
+    for p in range(len(distance)):
+        if not inside[p]:
+            continue
+        z = distance[p]
+        scale = 1 / (away * z + matrix[c, 2, 3])
+        column, row = (across * z + matrix[c, 0, 3]) * scale, (down * z + matrix[c, 1, 3]) * scale
+        if not (0 <= column < last and 0 <= row < last):
+            continue
+        i, j = int(row), int(column)
+        if not (mask[i, j] and mask[i, j + 1] and mask[i + 1, j] and mask[i + 1, j + 1]):
+            continue
+        lower, right = row - i, column - j
         for k in range(3):
-            reference = 0.0
-            for first in range(REFERENCE):
-                reference += colours[first, k] / REFERENCE
-            apart[c] += abs(colours[c, k] - reference)
-    apart.sort()
-    count = max(REFERENCE, int(SHARE * len(colours)))
-    total = 0.0
+            above = (1 - right) * picture[i, j, k] + right * picture[i, j + 1, k]
+            below = (1 - right) * picture[i + 1, j, k] + right * picture[i + 1, j + 1, k]
+            colours[p, count[p], k] = (1 - lower) * above + lower * below
+        count[p] += 1
+
+
+@compiled_loop
+def _difference(colours: Floats, p: int, count: int, apart: Floats) -> float:
+    """Mean difference of a plane's colours from the first ones, of those that differ least."""
+    red = green = blue = 0.0
+    for c in range(REFERENCE):
+        red += colours[p, c, 0] / REFERENCE
+        green += colours[p, c, 1] / REFERENCE
+        blue += colours[p, c, 2] / REFERENCE
     for c in range(count):
+        one = abs(colours[p, c, 0] - red) + abs(colours[p, c, 1] - green)
+        one += abs(colours[p, c, 2] - blue)
+        place = c
+        while place > 0 and apart[place - 1] > one:
+            apart[place] = apart[place - 1]
+            place -= 1
+        apart[place] = one
+    counted = max(REFERENCE, int(SHARE * count))
+    total = 0.0
+    for c in range(counted):
         total += min(apart[c], MOST_DIFFERENT)
-    return total / count
+    return total / counted
 
 
 def _lowest(difference: Colours, planes: Floats) -> Floats:

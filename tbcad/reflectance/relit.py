@@ -27,11 +27,13 @@ class Relit:
     Attributes:
         field: with other colours, in memory; its rays stay in the file.
         lamps: that it is lit by.
+        points: whether these shine alike in all directions.
         exposure: by which light was multiplied to be shown, 1 as white.
     """
 
     field: LightField
     lamps: PointLights
+    points: bool
     exposure: float
 
 
@@ -53,7 +55,8 @@ def relit(source: LightField, reflectance: ReflectanceField, light: Environment)
             raise InputError(f"the reflectance field is not of this light field: {AGAIN}")
         colour = _picture(255 * exposure * lit[name], reflectance.pixel[name], shape)
         frames[name] = replace(frame, planes={**frame.planes, "colour": colour})
-    return Relit(replace(source, frames=frames), lamps, exposure)
+    points = reflectance.facts.get("light", "points") == "points"
+    return Relit(replace(source, frames=frames), lamps, points, exposure)
 
 
 def _picture(colours: Colours, pixel: Any, shape: tuple[int, int]) -> Any:

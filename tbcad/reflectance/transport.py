@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import h5py
 import numpy as np
 
+from tbcad.datasets.crops import MirrorId
 from tbcad.errors import InputError
 from tbcad.reflectance.field_file import NAME, RAYS_PER_CHUNK, SCHEMA
 from tbcad.reflectance.lamp_places import LampPlaces
+from tbcad.reflectance.projectors import projectors
 from tbcad.simulate.capture.light_field import Frame, LightField
 from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands
@@ -21,6 +24,8 @@ from tbcad.simulate.scene.ray_casting import Scene, surface_hits
 from tbcad.types import Colours, Floats, Ints, Progress
 
 BYTES_PER_VALUE = 2
+Light = Callable[[int, Spots], Floats]
+"""Light (k,) of a lamp by its number on spots (k,)."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,12 @@ class SeenSpots:
 
 
 def write_reflectance(
-    folder: Path, source: LightField, scene: Scene, lamps: LampPlaces, progress: Progress
+    folder: Path,
+    source: LightField,
+    scene: Scene,
+    lamps: LampPlaces,
+    progress: Progress,
+    thrown: bool = False,
 ) -> dict[str, Any]:
     """Write the file into the folder of a capture, and return what is in it.
 
@@ -49,6 +59,7 @@ def write_reflectance(
         scene: the object.
         lamps: one picture of each.
         progress: called with each lamp.
+        thrown: lamps are mirrors by name, that throw the light of projectors.
 
     Raises:
         InputError: the file does not fit on the disk.
@@ -61,14 +72,16 @@ def write_reflectance(
             f"{len(lamps.name)} lamps for {rays} rays are {size / 1e9:.1f} GB, more than the disk "
             "has free: choose fewer lamps, as by --every"
         )
-    facts = {"lamps": len(lamps.name), "rays": rays, "unpacked_bytes": size}
+    kind = "projectors" if thrown else "points"
+    facts = {"lamps": len(lamps.name), "rays": rays, "unpacked_bytes": size, "light": kind}
+    light = thrown_light(scene, source, lamps) if thrown else point_lamps(scene, lamps)
     with h5py.File(folder / NAME, "w", libver=("v110", "v110")) as store:
         store.attrs["schema"], store.attrs["facts"] = SCHEMA, json.dumps(facts)
         group = store.create_group("lamps")  # by name and create_dataset: without times
         group.create_dataset("place", data=lamps.place)
         group.create_dataset("name", data=np.array(lamps.name, dtype="S"))
         for name, one in seen.items():
-            _write_camera(store.create_group(name), one, scene, lamps, progress)
+            _write_camera(store.create_group(name), one, light, lamps, progress)
     return facts
 
 
@@ -94,14 +107,25 @@ def seen_spots(frame: Frame, scene: Scene) -> SeenSpots:
     )
 
 
-def transport(seen: SeenSpots, scene: Scene, lamp: Floats, rays: slice) -> Colours:
-    """Light (r, 3) along some of the rays from a lamp (3,)."""
-    light = received_light(scene.embree, seen.spots.part(rays), lamp)
-    return np.asarray(seen.albedo[rays] * light[:, None], dtype=np.float32)
+def point_lamps(scene: Scene, lamps: LampPlaces) -> Light:
+    """The light of lamps that shine alike in all directions."""
+    return lambda k, spots: received_light(scene.embree, spots, lamps.place[k])
+
+
+def thrown_light(scene: Scene, source: LightField, lamps: LampPlaces) -> Light:
+    """The light of projectors in the places of the cameras, by the mirrors of the lamps' names."""
+    found = projectors(source, tuple(MirrorId(one[0], int(one[1:]) - 1) for one in lamps.name))
+    return lambda k, spots: found.light(scene.embree, k, spots)
+
+
+def transport(seen: SeenSpots, light: Light, lamp: int, rays: slice) -> Colours:
+    """Light (r, 3) along some of the rays from a lamp by its number."""
+    received = light(lamp, seen.spots.part(rays))
+    return np.asarray(seen.albedo[rays] * received[:, None], dtype=np.float32)
 
 
 def _write_camera(
-    group: h5py.Group, seen: SeenSpots, scene: Scene, lamps: LampPlaces, progress: Progress
+    group: h5py.Group, seen: SeenSpots, light: Light, lamps: LampPlaces, progress: Progress
 ) -> None:
     """Write a picture for each lamp, as HDF5 would, but compress in several threads."""
     group.create_dataset("pixel", data=seen.pixel.astype(np.uint32), compression=COMPRESSION_LEVEL)
@@ -119,9 +143,7 @@ def _write_camera(
 
     def packed(item: tuple[int, slice]) -> bytes:
         k, part = item
-        return filtered_chunk(
-            transport(seen, scene, lamps.place[k], part).astype("<f2")[None], chunk
-        )
+        return filtered_chunk(transport(seen, light, k, part).astype("<f2")[None], chunk)
 
     def begin(item: tuple[int, slice]) -> None:
         progress(f"camera {group.name[1:]}, lamp {lamps.name[item[0]]}")

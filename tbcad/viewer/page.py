@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 
-from tbcad.simulate.views.synthesis import Method
 from tbcad.viewer.query import Query, limits
 
 
-def viewer_page(title: str, start: Query, capture_mm: float, method: Method) -> str:
+def viewer_page(title: str, start: Query, capture_mm: float, method: str) -> str:
     """The page that asks a server for views.
 
     Args:

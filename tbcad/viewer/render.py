@@ -5,13 +5,15 @@ from dataclasses import replace
 from io import BytesIO
 from itertools import count
 from threading import Lock
+from typing import Literal
 
 import numpy as np
 from PIL import Image
 
 from tbcad.datasets.pinhole_pictures import pinhole_pictures
+from tbcad.depth.view import DepthViews
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.views.method import suitable_method
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
 from tbcad.simulate.views.synthesis import (
@@ -24,6 +26,7 @@ from tbcad.types import Bytes, Progress
 from tbcad.viewer.moving import moving_view
 from tbcad.viewer.query import Query
 
+MethodAtRest = Method | Literal["depth"]
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
 MOVING_RADIUS2 = 2
@@ -40,26 +43,27 @@ class Renderer:
     Attributes:
         tiles: the light field.
         pictures: of its virtual cameras, for views that move.
-        method: of views that do not move: nearest rays, or a blend where that is better.
+        method: of views that do not move: at the depth that is found, a blend on the plane, or
+            nearest rays.
     """
 
     def __init__(
         self,
         source: LightField,
-        method: Method | None = None,
+        method: MethodAtRest = "depth",
         progress: Progress = lambda _: None,
     ) -> None:
         """Make the pictures of all virtual cameras.
 
         Args:
             source: a light field, whose file stays open.
-            method: None for the one that suits it.
+            method: of views that do not move.
             progress: called with each step.
         """
         self.tiles = MirrorTiles(source)
         self.pictures = pinhole_pictures(source, progress)
         self._limits = search_radius(self.tiles), horizon_search_radius(self.tiles)
-        self.method: Method = method or suitable_method(self.tiles).method
+        self.method: MethodAtRest = method
         self._lock = Lock()
         self._numbers = count(1)
         self._latest = 0
@@ -94,7 +98,7 @@ class Renderer:
         """
         view = query.camera(self.capture_mm)
         if query.aperture == 0 and query.still:
-            return synthesise(self.tiles, view, self.method).image
+            return self._at_rest(view)
         if query.aperture == 0:
             return moving_view(self.pictures, view, self._limits)
         lens = ThinLens(query.aperture, query.focus)
@@ -102,6 +106,11 @@ class Renderer:
             return refocus(self.tiles, view, lens, proceed=proceed).image
         smaller = _smaller(query).camera(self.capture_mm)
         return refocus(self.tiles, smaller, lens, lens_pinholes(MOVING_RADIUS2)).image
+
+    def _at_rest(self, view: Camera) -> Bytes:
+        if self.method == "depth":
+            return DepthViews(self.tiles, self.pictures).of(view)[0].image
+        return synthesise(self.tiles, view, self.method).image
 
 
 def _smaller(query: Query) -> Query:

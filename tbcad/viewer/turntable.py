@@ -1,7 +1,7 @@
 """A turntable: one page with pictures from all around the object, which opens from disk."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -10,12 +10,16 @@ import numpy as np
 from PIL import Image
 
 from tbcad.atomic_files import refuse_existing, replace_files
+from tbcad.depth.plane_sweep import QUICK
+from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
+from tbcad.optics.camera import Camera
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.simulate.views.synthesis import synthesise
 from tbcad.types import Bytes, Progress
 from tbcad.viewer.page import filled
+from tbcad.viewer.render import MethodAtRest
 
 MAX_BYTES = 6_000_000
 BEGIN = "<!doctype html>\n<!-- tbcad turntable -->"
@@ -41,7 +45,7 @@ class Turntable:
     elevations_deg: tuple[float, ...]
     distance: float
     size: tuple[int, int]
-    method: Method
+    method: MethodAtRest
 
 
 def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
@@ -70,10 +74,10 @@ def write_turntable(
     Raises:
         InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
     """
-    pictures = []
+    picture, pictures = _maker(tiles, table, progress), []
     for k, elevation in enumerate(table.elevations_deg):
         progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
-        pictures.append([_picture(tiles, table, elevation, i) for i in range(table.columns)])
+        pictures.append([picture(elevation, i) for i in range(table.columns)])
     page = smallest_loss(pictures, table, title)
     replace_files(file.parent, {file.name: page})
     return len(page)
@@ -114,11 +118,21 @@ def turntable_page(
     return filled("turntable", title, data, begin=BEGIN, about=about)
 
 
-def _picture(tiles: MirrorTiles, table: Turntable, elevation: float, column: int) -> Bytes:
-    azimuth = 2 * np.pi * column / table.columns
+def _maker(
+    tiles: MirrorTiles, table: Turntable, progress: Progress
+) -> Callable[[float, int], Bytes]:
+    """What makes the picture of an elevation, degrees, and a column."""
     capture = tiles.source.capture_mm
-    view = camera_around_object(azimuth, np.radians(elevation), table.distance, capture, table.size)
-    return synthesise(tiles, view, table.method).image
+
+    def camera(elevation: float, column: int) -> Camera:
+        place = 2 * np.pi * column / table.columns, float(np.radians(elevation)), table.distance
+        return camera_around_object(*place, capture, table.size)
+
+    method = table.method
+    if method == "depth":
+        views = depth_views(tiles, QUICK, progress)
+        return lambda elevation, column: views.of(camera(elevation, column))[0].image
+    return lambda elevation, column: synthesise(tiles, camera(elevation, column), method).image
 
 
 def _webp(image: Bytes, quality: int) -> str:

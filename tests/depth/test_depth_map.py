@@ -9,7 +9,7 @@ from PIL import Image
 
 from tbcad.datasets.pinhole_pictures import pinhole_pictures
 from tbcad.depth.depth_map import DepthMap, depth_map
-from tbcad.depth.view import depth_view
+from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.optics.camera import Camera
@@ -88,7 +88,7 @@ def test_views_are_as_good_as_with_the_true_surface(tiles: MirrorTiles, knot: Sc
         images = (
             synthesise(tiles, view).image,
             synthesise(tiles, view, "blend", depth_along_rays(knot)).image,
-            depth_view(tiles, view)[0].image,
+            depth_views(tiles).of(view)[0].image,
         )
         rows.append([image_quality(truth, image).ssim for image in images])
     nearest, true, found = np.mean(rows, axis=0)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.simulate.views.refocus import ThinLens, refocus
-from tbcad.simulate.views.synthesis import synthesise
 from tbcad.viewer.query import Query
 from tbcad.viewer.render import Renderer, Superseded
 from tbcad.viewer.server import HOST, ViewServer
@@ -59,7 +59,8 @@ def test_a_view_is_that_of_the_library(server: ViewServer, renderer: Renderer) -
     assert answer.headers["Content-Type"] == "image/jpeg"
     query = Query(azimuth=40, elevation=20, width=160, height=120)
     view = query.camera(renderer.capture_mm)
-    image = synthesise(renderer.tiles, view, renderer.method).image
+    assert renderer.method == "depth"
+    image = depth_views(renderer.tiles).of(view)[0].image
     shown = np.asarray(Image.open(BytesIO(body)))
     assert shown.shape == image.shape
     assert np.abs(shown.astype(float) - image).mean() < 3

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.depth.plane_sweep import QUICK
+from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.viewer.query import Query
@@ -49,8 +51,22 @@ def test_views_are_those_of_the_library(renderer: Renderer, tmp_path: Path) -> N
     assert [len(row) for row in frames] == [4, 4]
     shown = np.asarray(Image.open(BytesIO(base64.b64decode(frames[1][2]))).convert("RGB"))
     view = Query(azimuth=180, elevation=60, width=160, height=120).camera(renderer.capture_mm)
-    image = synthesise(renderer.tiles, view, TABLE.method).image
+    image = synthesise(renderer.tiles, view, "nearest").image
     assert np.abs(shown.astype(float) - image).mean() < 4
+
+
+def test_views_at_the_depth_that_is_found(renderer: Renderer, tmp_path: Path) -> None:
+    table = Turntable(1, (40.0,), 640.0, (160, 120), "depth")
+    write_turntable(tmp_path / "knot.html", renderer.tiles, table, "knot", lambda _: None)
+    frames = data_of((tmp_path / "knot.html").read_text(encoding="utf-8"))["frames"]
+    assert isinstance(frames, list)
+    shown = np.asarray(Image.open(BytesIO(base64.b64decode(frames[0][0]))).convert("RGB"))
+    view = Query(elevation=40, width=160, height=120).camera(renderer.capture_mm)
+    expected = depth_views(renderer.tiles, QUICK).of(view)[0].image
+    other = synthesise(renderer.tiles, view, "nearest").image
+    differ = [np.abs(shown.astype(float) - image).mean() for image in (expected, other)]
+    assert differ[0] < 4
+    assert differ[0] < differ[1] - 0.5
 
 
 def test_the_same_views_give_the_same_file(renderer: Renderer, tmp_path: Path) -> None:

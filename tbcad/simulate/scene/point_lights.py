@@ -53,15 +53,19 @@ def received_light(embree: Any, spots: Spots, lamp: Floats) -> Floats:
     """
     toward = lamp - spots.place
     distance = norm(toward)
-    direction = toward / distance[:, None]
+    cosine = lit_cosine(embree, spots, toward / distance[:, None])
+    return np.asarray(cosine * (lamp @ lamp) / distance**2)
+
+
+def lit_cosine(embree: Any, spots: Spots, direction: Floats) -> Floats:
+    """Cosine (k,) of the angle between normals and unit directions (k, 3) to light; 0 in shadow."""
     cosine = dot(direction, spots.normal)
-    light = np.zeros(len(distance))
     faces = np.flatnonzero((cosine > 0) & (dot(direction, spots.facet_normal) > 0))
     start = spots.place[faces] + ABOVE_FACET_MM * spots.facet_normal[faces]
-    free = _free(embree, start, direction[faces])
-    lit = faces[free]
-    light[lit] = cosine[lit] * (lamp @ lamp) / distance[lit] ** 2
-    return light
+    lit = faces[_free(embree, start, direction[faces])]
+    result = np.zeros(len(cosine))
+    result[lit] = cosine[lit]
+    return result
 
 
 def _free(embree: Any, start: Floats, direction: Floats) -> Any:

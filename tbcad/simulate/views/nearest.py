@@ -70,7 +70,9 @@ def _nearest(
 def _descend(
     points: Floats, width: int, start: int, x: float, y: float, a: float, b: float
 ) -> tuple[int, float]:
-    """As `greedy_descent`, to the target (x, y, a, b), with the squared distance that it ends at.
+    """The pixel nearer to (x, y, a, b) than all its neighbours, and its squared distance.
+
+    By steps from pixel to pixel.
 
     Numbers instead of parts of arrays: numba counts who uses an array, which takes longer than
     the distances.

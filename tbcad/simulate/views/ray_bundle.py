@@ -127,38 +127,3 @@ def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
                 count += 1
                 break
     return kept[:count]
-
-
-@compiled
-def squared_distance(
-    points: Floats, pixel: int, target: Floats, depth: float, slopes: float
-) -> float:
-    """Squared distance of a pixel's ray from a target ray; NaN where there is no ray.
-
-    At a depth (over s) and, with that weight, of their slopes: depth 0 and weight 1 make it the
-    distance in two-plane coordinates, weight 0 the distance at the depth alone.
-    """
-    a, b = points[pixel, 2] - target[2], points[pixel, 3] - target[3]
-    x, y = points[pixel, 0] - target[0] + depth * a, points[pixel, 1] - target[1] + depth * b
-    result: float = x * x + y * y + slopes * (a * a + b * b)
-    return result
-
-
-@compiled
-def greedy_descent(
-    points: Floats, tile: Ints, start: int, target: Floats, depth: float, slopes: float
-) -> int:
-    """The pixel of a tile that is nearer than all its neighbours, by steps from a pixel on."""
-    width = tile[2]
-    best = squared_distance(points, start, target, depth, slopes)
-    pixel = start
-    while True:
-        nearer = pixel
-        for row in (pixel - width, pixel, pixel + width):
-            for other in (row - 1, row, row + 1):
-                distance = squared_distance(points, other, target, depth, slopes)
-                if distance < best:  # never so for NaN
-                    best, nearer = distance, other
-        if nearer == pixel:
-            return pixel
-        pixel = nearer

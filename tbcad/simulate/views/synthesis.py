@@ -12,7 +12,6 @@ from tbcad.optics.camera import Camera
 from tbcad.picture_bytes import png_bytes
 from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.rays import meets_sphere
-from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.blend import blend_cameras
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
@@ -79,9 +78,7 @@ def synthesise(
         depth: the surface that a blend takes the object for; without, the plane through the
             origin that faces the camera.
     """
-    direction = view_directions(view)
-    origin = np.broadcast_to(view.pinhole, direction.shape)
-    pixels, rays = rays_to_capture_sphere(tiles, (origin, direction))
+    pixels, rays = _rays_of_view(tiles, view)
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
     colours, seen = ray_colours(bundle, rays, method, depth)
@@ -89,11 +86,60 @@ def synthesise(
         rest = (rays[0][~seen], rays[1][~seen])
         bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
         colours[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
-    colour = np.zeros(direction.shape, dtype=np.float32)
-    complete = np.ones(direction.shape[:2], dtype=bool)
-    colour.reshape(-1, 3)[pixels] = colours
-    complete.reshape(-1)[pixels] = seen
-    return SynthesisedView(colour, complete)
+    return SynthesisedView(*_picture(view.height_px, view.width_px, pixels, colours, seen))
+
+
+def _rays_of_view(tiles: MirrorTiles, view: Camera) -> tuple[Ints, Rays]:
+    """As `rays_to_capture_sphere`, of a pinhole."""
+    order = pixels_in_blocks(view.height_px, view.width_px)
+    lens = np.array([view.pixel_pitch, (view.width_px - 1) / 2, (view.height_px - 1) / 2])
+    pinhole, radius = np.asarray(view.pinhole, dtype=np.float64), tiles.source.capture_mm / 2
+    pixels, directions = _through_sphere(order, view.width_px, lens, view.axes, pinhole, radius)
+    return pixels, (np.broadcast_to(pinhole, directions.shape), directions)
+
+
+@compiled
+def _through_sphere(
+    order: Ints, width: int, lens: Floats, axes: Floats, pinhole: Floats, radius: float
+) -> tuple[Ints, Floats]:
+    """Those numbers of pixels whose rays meet the sphere round the origin, and unit directions.
+
+    Args:
+        order: numbers of all pixels, (p,).
+        width: columns of the picture.
+        lens: width of a pixel at unit distance; column and row of the middle.
+        axes: of the view, (3, 3).
+        pinhole: mm, (3,).
+        radius: mm.
+    """
+    pixels, directions = np.empty(len(order), dtype=np.int64), np.empty((len(order), 3))
+    squared = (pinhole**2).sum() - radius**2  # the power of the pinhole
+    count = 0
+    for pixel in order:
+        y, x = (pixel // width - lens[2]) * lens[0], (pixel % width - lens[1]) * lens[0]
+        length, along = np.sqrt(x * x + y * y + 1), 0.0
+        for j in range(3):
+            directions[count, j] = (x * axes[0, j] + y * axes[1, j] + axes[2, j]) / length
+            along += directions[count, j] * pinhole[j]
+        if squared <= 0 or (along < 0 and squared <= along * along):
+            pixels[count] = pixel
+            count += 1
+    return pixels[:count], directions[:count]
+
+
+@compiled
+def _picture(
+    height: int, width: int, pixels: Ints, colours: Colours, seen: Bools
+) -> tuple[Colours, Bools]:
+    """Pixels with their colours as a picture, and what is seen: those, and all others."""
+    colour = np.zeros((height, width, 3), dtype=np.float32)
+    complete = np.ones((height, width), dtype=np.bool_)
+    for i in range(len(pixels)):
+        row, column = divmod(pixels[i], width)
+        complete[row, column] = seen[i]
+        for j in range(3):
+            colour[row, column, j] = colours[i, j]
+    return colour, complete
 
 
 def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Ints, Rays]:
@@ -203,10 +249,17 @@ def _near_mirrors(tiles: MirrorTiles, two_plane: TwoPlane, targets: Floats, limi
 
 def _depths(two_plane: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:
     """Where rays meet the surface, along the view over s, (n,); 0 where they do not."""
-    origin, direction = rays
     if depth is None:
-        return np.zeros(len(direction))
-    distance = depth(origin, direction)
-    hit = np.isfinite(distance)
-    points = origin + np.where(hit, distance, 0)[:, None] * direction
-    return np.where(hit, two_plane.place(points)[:, 2], 0.0)
+        return np.zeros(len(rays[0]))
+    return _places(two_plane.axes[2] / two_plane.scale, *rays, depth(*rays))
+
+
+@compiled
+def _places(along: Floats, origin: Floats, direction: Floats, distance: Floats) -> Floats:
+    """Where points at distances (n,) on rays (n, 3) are along a vector (3,); 0 if at infinity."""
+    result = np.zeros(len(distance))
+    for i in range(len(distance)):
+        if np.isfinite(distance[i]):
+            for j in range(3):
+                result[i] += along[j] * (origin[i, j] + distance[i] * direction[i, j])
+    return result

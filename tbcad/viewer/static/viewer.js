@@ -193,7 +193,9 @@ byId("turn").addEventListener("click", () => turn(!viewer.turning));
 byId("home").addEventListener("click", home);
 
 [canvas.width, canvas.height] = [data.start.width, data.start.height];
-const atRest = data.method === "blend" ? "a blend of virtual cameras" : "nearest rays";
+const atRest = {
+  depth: "a blend at the depth that is found", blend: "a blend on the plane", nearest: "nearest rays",
+}[data.method];
 byId("how").textContent = `While it moves: the nearest virtual cameras, or 9 pinholes of the lens at half size; `
   + `smaller where this computer is slow. At rest: ${atRest}, or 69 pinholes.`;
 show();

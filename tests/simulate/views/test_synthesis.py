@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import tbcad
-from tbcad.depth.view import depth_view
+from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
@@ -54,7 +54,7 @@ def test_from_python_it_is_the_view_of_the_command(
     """`tbcad.view`, by default at the depth that is found, and what a notebook shows of it."""
     view = view_from(20, 60)
     if method == "depth":
-        expected, found = depth_view(tiles, view)[0], tbcad.view(light_field, 20, 60, size=SIZE)
+        expected, found = depth_views(tiles).of(view)[0], tbcad.view(light_field, 20, 60, size=SIZE)
     else:
         expected = synthesise(tiles, view, method)
         found = tbcad.view(light_field, 20, 60, size=SIZE, method=method)
