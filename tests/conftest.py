@@ -10,6 +10,7 @@ import pytest
 # threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from tbcad.cli import run
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
@@ -66,6 +67,14 @@ def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPat
     folder = tmp_path_factory.mktemp("record")
     write_record(folder, low_resolution_design, shells=False)
     return folder
+
+
+@pytest.fixture(scope="session")
+def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a capture with nothing but defaults; tests leave it as it is."""
+    out = tmp_path_factory.mktemp("captures") / "knot"
+    assert run(["capture", str(record), "--out", str(out)]) == 0
+    return out
 
 
 @pytest.fixture(scope="session")
