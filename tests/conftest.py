@@ -1,18 +1,24 @@
 """What several test files build once."""
 
+import os
 import shutil
 from pathlib import Path
 
 import pytest
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+# As tbcad's commands do, before numpy is loaded: each core has a process of tests already, in which
+# threads of the linear algebra would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from tbcad.cli import run
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope
 from tbcad.simulate.prototype.plan import Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_design
 from tests.prototype_exports import write_export, write_wind_up
 
 
@@ -24,7 +30,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def paper_design() -> MirrorDesign:
     """The paper's design with exact radii: n = 18, target 60 mm plus the default margin."""
-    return design(load_spec(None))
+    return mirror_design()
 
 
 @pytest.fixture(scope="session")
@@ -35,7 +41,7 @@ def paper_array(paper_design: MirrorDesign) -> MirrorArray:
 @pytest.fixture(scope="session")
 def small_design() -> MirrorDesign:
     """A quick one with everything in it: few mirrors, both flanges, halved mirrors."""
-    return design(load_spec(None, ["n=6"]))
+    return mirror_design("n=6")
 
 
 @pytest.fixture(scope="session")
@@ -52,7 +58,7 @@ def small_envelope(small_design: MirrorDesign) -> Envelope:
 def low_resolution_design() -> MirrorDesign:
     """The small one for photographs of few pixels, with five balls."""
     options = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
-    return design(load_spec(None, options))
+    return mirror_design(*options)
 
 
 @pytest.fixture(scope="session")
@@ -61,6 +67,14 @@ def record(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPat
     folder = tmp_path_factory.mktemp("record")
     write_record(folder, low_resolution_design, shells=False)
     return folder
+
+
+@pytest.fixture(scope="session")
+def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a capture with nothing but defaults; tests leave it as it is."""
+    out = tmp_path_factory.mktemp("captures") / "knot"
+    assert run(["capture", str(record), "--out", str(out)]) == 0
+    return out
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import lib3mf
 import numpy as np
+import pytest
 import trimesh
 from manifold3d import Manifold, Mesh64
 from OCP.Bnd import Bnd_Box
@@ -22,6 +23,7 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
+from tbcad.cad.brep import Solid
 from tbcad.cad.solids import faces, meshed
 
 
@@ -59,6 +61,17 @@ def read_step(path: Path) -> StepContent:
     return StepContent(
         shape, count(shape, TopAbs_SOLID), BRepCheck_Analyzer(shape).IsValid(), faces, kinds
     )
+
+
+def check_step(path: Path, built: Solid) -> StepContent:
+    """A STEP file holds one solid, valid, with the faces and the size of that which was built."""
+    content = read_step(path)
+    assert content.solids == 1
+    assert content.valid
+    assert volume(content.shape) == pytest.approx(volume(built.shape), rel=1e-9)
+    assert area(content.shape) == pytest.approx(area(built.shape), rel=1e-9)
+    assert set(content.faces) == {name for name, _ in built.faces}
+    return content
 
 
 def count(shape: TopoDS_Shape, kind: object) -> int:

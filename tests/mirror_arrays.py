@@ -1,9 +1,23 @@
 """Mirrors of designs that tests ask for."""
 
-from tbcad.mirrors.array import MirrorArray, design
+from functools import lru_cache
+
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec
 
 
+@lru_cache(maxsize=16)
+def designed(spec: Spec) -> MirrorDesign:
+    """The mirrors of a spec, made once for all who ask for them."""
+    return design(spec)
+
+
+def mirror_design(*settings: str) -> MirrorDesign:
+    """The paper's design with other settings ("key=value")."""
+    return designed(load_spec(None, settings))
+
+
 def mirror_array(*settings: str) -> MirrorArray:
-    """Camera a's mirrors of the paper's design with other settings ("key=value")."""
-    return design(load_spec(None, settings)).arrays[0]
+    """Camera a's mirrors of such a design."""
+    return mirror_design(*settings).arrays[0]

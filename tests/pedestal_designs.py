@@ -1,9 +1,9 @@
 """Designs whose mirrors stand on pedestals, for tests."""
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.optics.pedestals.cells import PedestalCells, pedestal_cells
 from tbcad.optics.pedestals.plan import pedestal_plan
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_design
 
 GROOVE = 0.1
 # Of small shells on any edges: few mirrors, planar ones, a coat, a camera beside the axis.
@@ -25,4 +25,4 @@ def pedestals(array: MirrorArray, groove: float = GROOVE) -> PedestalCells:
 
 def pedestal_design(*settings: str) -> MirrorDesign:
     """The paper's design with other settings ("key=value"), its mirrors on pedestals."""
-    return design(load_spec(None, ["shell.edges=pedestal", *settings]))
+    return mirror_design("shell.edges=pedestal", *settings)

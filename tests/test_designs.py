@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from tbcad.mirrors.array import design
 from tbcad.optimize.candidate import figures_of, size_of
 from tbcad.optimize.views import mean_ssim
 from tbcad.simulate.study.pixels import virtual_cameras
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of
 from tbcad.spec.load import load_spec
+from tests.mirror_arrays import designed
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 PAPER = DESIGNS / "turtleback.toml"
@@ -49,11 +49,11 @@ class TestEveryDesign:
 
     def test_mirrors_see_the_capture_sphere(self, path: Path) -> None:
         spec = load_spec(path)
-        assert design(spec).arrays[0].coverage.min() >= spec.optics.capture_diameter_mm
+        assert designed(spec).arrays[0].coverage.min() >= spec.optics.capture_diameter_mm
 
 
 def test_the_flat_baseline_sees_what_its_comment_says() -> None:
-    array = design(load_spec(DESIGNS / "mukaigawa-flat.toml")).arrays[0]
+    array = designed(load_spec(DESIGNS / "mukaigawa-flat.toml")).arrays[0]
     assert array.coverage.min() == pytest.approx(21.1, abs=0.05)
 
 
@@ -62,7 +62,7 @@ def test_the_sensor_design_keeps_the_papers_balance() -> None:
     paper, larger = load_spec(None), load_spec(DESIGNS / "sensor-10mp.toml")
     pixels = [spec.camera.width_px * spec.camera.height_px for spec in (paper, larger)]
     mirrors = [847, 1489]
-    assert [len(design(spec).arrays[0]) for spec in (paper, larger)] == mirrors
+    assert [len(designed(spec).arrays[0]) for spec in (paper, larger)] == mirrors
     growth = mirrors[1] / mirrors[0]
     assert pixels[1] / pixels[0] / growth == pytest.approx(growth, rel=0.02)
 
@@ -102,9 +102,9 @@ def test_better_designs_share_out_the_papers_sensor_more_evenly(
     """docs/optimize.md: same sensor, as many virtual cameras; the paper's have 354 and 0.943."""
     spec, paper = load_spec(DESIGNS / f"{name}.toml"), load_spec(None)
     assert spec.camera == paper.camera
-    designed = design(spec)
-    figures = figures_of(designed)
-    assert virtual_cameras(designed.arrays[0]) == 1657
+    mirrors = designed(spec)
+    figures = figures_of(mirrors)
+    assert virtual_cameras(mirrors.arrays[0]) == 1657
     assert figures.minimum_px == pytest.approx(fewest, abs=1)
     assert figures.variation == pytest.approx(variation, abs=0.001)
 
@@ -113,11 +113,11 @@ def test_better_designs_share_out_the_papers_sensor_more_evenly(
 def test_better_designs_make_better_views() -> None:
     """docs/optimize.md; one is no larger than the paper's, which has 0.8939."""
     names = ("turtleback", "turtleback-stretched", "turtleback-even")
-    designed = [design(load_spec(DESIGNS / f"{name}.toml")) for name in names]
-    paper, stretched, even = map(mean_ssim, designed)
+    mirrors = [designed(load_spec(DESIGNS / f"{name}.toml")) for name in names]
+    paper, stretched, even = map(mean_ssim, mirrors)
     assert paper == pytest.approx(0.8939, abs=2e-4)
     assert stretched == pytest.approx(0.8985, abs=2e-4)
     assert even == pytest.approx(0.9041, abs=2e-4)
-    sizes = [size_of(one.arrays[0]) for one in designed]
+    sizes = [size_of(one.arrays[0]) for one in mirrors]
     assert sizes[1] == pytest.approx(sizes[0], abs=0.5)
     assert sizes[2] < 500

@@ -1,6 +1,7 @@
 """All commands of tbcad with their options, as the command line knows them."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import typer.main
@@ -10,6 +11,7 @@ from tbcad.cli.app import app
 Words = tuple[str, ...]
 
 
+@cache
 def commands() -> dict[Words, Any]:
     """Every command and group of commands by the words that call it; () is tbcad itself."""
     return dict(_below((), typer.main.get_command(app)))
@@ -21,6 +23,7 @@ def _below(words: Words, command: Any) -> Iterator[tuple[Words, Any]]:
         yield from _below((*words, name), inner)
 
 
+@cache
 def leaves() -> dict[Words, Any]:
     """The commands that do something."""
     return {words: one for words, one in commands().items() if not hasattr(one, "commands")}

@@ -13,13 +13,6 @@ from tbcad.cli import run
 from tests.exported_files import contents
 
 
-@pytest.fixture(scope="module")
-def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("captures") / "knot"
-    assert run(["capture", str(record), "--out", str(out)]) == 0
-    return out
-
-
 def files(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()

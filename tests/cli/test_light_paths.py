@@ -1,8 +1,9 @@
 """Help and bad input are answered before any heavy library is loaded, so that they take no time."""
 
+import json
 import subprocess
 import sys
-from pathlib import Path
+from dataclasses import dataclass
 
 import pytest
 
@@ -44,37 +45,60 @@ BAD_INPUT = (
     ("study", "prototype", "absent"),
     ("study", "low-pass", ".", "--object", "absent.ply"),
 )
-LOADED = """
-import sys
+# Answers commands one after another in one process, each with its exit code, the heavy libraries
+# that were loaded until then, and the files of its folder. What was loaded once stays loaded, so
+# none must be loaded to the end.
+ANSWERS = """
+import json, os, sys
 from tbcad.cli import run
-code = run(sys.argv[1:])
-print(code, *sys.modules)
+asked, heavy = json.load(sys.stdin)
+answers = []
+for words in asked:
+    code = run(words)
+    answers.append((words, code, sorted({*heavy} & sys.modules.keys()), sorted(os.listdir())))
+print(json.dumps(answers))
 """
+GIVEN = {"broken.toml": "[optics\nn = 3\n", "design.json": "{}"}
 
 
-def code_and_modules(words: Words, folder: Path) -> tuple[int, set[str]]:
-    """Exit code of a command in a process of its own, and the modules that it has loaded."""
+@dataclass(frozen=True)
+class Answer:
+    """Of one command.
+
+    Attributes:
+        code: with which it ends.
+        heavy: libraries that are loaded after it.
+        files: in its folder.
+    """
+
+    code: int
+    heavy: list[str]
+    files: list[str]
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[Words, Answer]:
+    """By the words of each command."""
+    folder = tmp_path_factory.mktemp("light")
+    for name, text in GIVEN.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    asked = [*BAD_INPUT, *((*words, "--help") for words in commands())]
     done = subprocess.run(
-        [sys.executable, "-c", LOADED, *words],
+        [sys.executable, "-c", ANSWERS],
+        input=json.dumps([asked, HEAVY]),
         capture_output=True, encoding="utf-8", check=True, cwd=folder,
     )  # fmt: skip
-    code, *modules = done.stdout.splitlines()[-1].split()
-    return int(code), {name.partition(".")[0] for name in modules}
+    return {
+        tuple(words): Answer(*rest) for words, *rest in json.loads(done.stdout.splitlines()[-1])
+    }
 
 
 @pytest.mark.parametrize("words", commands(), ids=lambda words: " ".join(["tbcad", *words]))
-def test_help_loads_no_heavy_library(words: Words, tmp_path: Path) -> None:
-    code, modules = code_and_modules((*words, "--help"), tmp_path)
-    assert code == 0
-    assert not modules & set(HEAVY)
+def test_help_loads_no_heavy_library(words: Words, answers: dict[Words, Answer]) -> None:
+    answer = answers[*words, "--help"]
+    assert (answer.code, answer.heavy) == (0, [])
 
 
 @pytest.mark.parametrize("words", BAD_INPUT, ids=" ".join)
-def test_bad_input_loads_no_heavy_library(words: Words, tmp_path: Path) -> None:
-    given = {"broken.toml": "[optics\nn = 3\n", "design.json": "{}"}
-    for name, text in given.items():
-        (tmp_path / name).write_text(text)
-    code, modules = code_and_modules(words, tmp_path)
-    assert code == 2
-    assert not modules & set(HEAVY)
-    assert {path.name for path in tmp_path.iterdir()} == given.keys()
+def test_bad_input_loads_no_heavy_library(words: Words, answers: dict[Words, Answer]) -> None:
+    assert answers[words] == Answer(2, [], sorted(GIVEN))

@@ -14,6 +14,7 @@ import pytest
 import tbcad.cli  # noqa: F401 - adds all commands
 from tbcad.cli import run
 from tbcad.cli.examples import EXAMPLES
+from tbcad.doctor import Finding
 from tests.cli.commands import Words, leaves, long_name, options
 
 EXPORT = Path(__file__).parents[2] / "docs" / "sample"
@@ -103,8 +104,11 @@ def test_completion_is_there_for_every_shell(shell: str) -> None:
     assert "tbcad" in completed({"_TBCAD_COMPLETE": f"source_{shell}"})
 
 
-def test_doctor_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    run(["doctor", "--json"])
+def test_doctor_as_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tbcad.doctor.diagnose", lambda: [Finding("numba", True, "works")])
+    assert run(["doctor", "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert {"name", "ok", "detail", "remedy"} == set(record["findings"][0])
 

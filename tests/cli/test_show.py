@@ -15,13 +15,6 @@ from tbcad.cli import run
 from tbcad.output.manifest import REPORT_BEGIN
 
 
-@pytest.fixture(scope="module")
-def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("captures") / "knot"
-    assert run(["capture", str(record), "--out", str(out)]) == 0
-    return out
-
-
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Addresses that the browser is to open."""

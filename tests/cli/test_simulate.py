@@ -1,6 +1,7 @@
 """tbcad capture, view and refocus from the command line."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,6 @@ from PIL import Image
 from tbcad.cli import run
 from tbcad.simulate.capture.light_field import LightField
 from tests.exported_files import contents
-
-
-@pytest.fixture(scope="module")
-def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("captures") / "knot"
-    assert run(["capture", str(record), "--out", str(out)]) == 0
-    return out
 
 
 def test_capture_writes_pictures_and_light_field(captured: Path) -> None:
@@ -35,21 +29,25 @@ def test_capture_writes_pictures_and_light_field(captured: Path) -> None:
             assert record["cameras"][camera]["pixels_on_mirrors"] == on
 
 
-def test_capture_repeats_and_replaces(captured: Path, record: Path) -> None:
-    before = contents(captured)
-    assert run(["capture", str(record), "--out", str(captured)]) == 0
-    assert contents(captured) == before
+@pytest.fixture
+def copied(captured: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(captured, tmp_path / "copy"))
+
+
+def test_capture_repeats_and_replaces(copied: Path, record: Path) -> None:
+    before = contents(copied)
+    assert run(["capture", str(record), "--out", str(copied)]) == 0
+    assert contents(copied) == before
 
 
 def test_capture_keeps_what_is_not_its_own(
-    captured: Path, record: Path, capsys: pytest.CaptureFixture[str]
+    copied: Path, record: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    mine = captured / "notes.txt"
+    mine = copied / "notes.txt"
     mine.write_text("mine")
-    assert run(["capture", str(record), "--out", str(captured)]) == 2
+    assert run(["capture", str(record), "--out", str(copied)]) == 2
     assert "notes.txt" in capsys.readouterr().err
     assert mine.read_text() == "mine"
-    mine.unlink()
 
 
 def test_capture_of_a_mesh_that_is_too_large(

@@ -31,13 +31,6 @@ MIDDLE = """(() => {
 
 
 @pytest.fixture(scope="module")
-def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("captures") / "knot"
-    assert run(["capture", str(record), "--out", str(out)]) == 0
-    return out
-
-
-@pytest.fixture(scope="module")
 def server(captured: Path) -> Iterator[ViewServer]:
     with served(captured, Query(width=320, height=240)) as running:
         yield running

@@ -7,18 +7,9 @@ from typing import Any
 import pytest
 
 from tbcad.cli import run
-from tbcad.simulate.capture.files import read_object
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tests.captures import field, scene  # noqa: F401
 
 TARGETS = ("nerfstudio", "colmap", "ngp-rays", "rays")
-
-
-@pytest.fixture(scope="session")
-def captured(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("captures") / "knot"
-    assert run(["capture", str(record), "--out", str(out)]) == 0
-    return out
 
 
 @pytest.fixture(scope="session")
@@ -28,16 +19,6 @@ def exported(captured: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     for target in TARGETS:
         assert run(["export", str(captured), "--to", target, "--out", str(parent / target)]) == 0
     return {target: parent / target for target in TARGETS}
-
-
-@pytest.fixture(scope="session")
-def scene(captured: Path) -> Scene:
-    return prepared_scene(read_object(captured))
-
-
-@pytest.fixture(scope="session")
-def field(captured: Path) -> LightField:
-    return LightField.read(captured)
 
 
 @pytest.fixture(scope="session")

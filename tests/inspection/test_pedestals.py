@@ -13,8 +13,8 @@ from OCP.TopoDS import TopoDS_Face
 from tbcad.api import inspect
 from tbcad.formats.step import StepError
 from tbcad.formats.step_named import read_named_solid
-from tbcad.formats.step_tolerances import read_tolerances, write_tolerances
-from tbcad.inspection.files import dowel_face, halves, tolerances
+from tbcad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
+from tbcad.inspection.files import Half, dowel_face, halves, tolerances
 from tbcad.inspection.inspect import found_limits, minimum_at_limits
 from tbcad.inspection.limits import Limits
 from tbcad.inspection.read_back import check_read_back
@@ -137,25 +137,39 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(
         assert abs((point - at) @ axis) < 1e-8
 
 
+@pytest.fixture(scope="module")
+def half(export: ExportedDesign, found: tuple[Sensitivities, Limits]) -> Half:
+    return halves(export, found[1])[0]
+
+
+@pytest.fixture(scope="module")
+def given(folder: Path, half: Half) -> FaceTolerances:
+    """Written beside the shell."""
+    solid = read_named_solid(folder / "shell_a.step")
+    result = tolerances(half, dowel_face(solid, half.dowel_mm))
+    write_tolerances(folder / "toleranced.step", solid, result)
+    return result
+
+
+def read_back(folder: Path, half: Half, given: FaceTolerances) -> None:
+    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for one in half.walls for name, plane in one.items()}
+    check_read_back(folder / "toleranced.step", given, centres, walls)
+
+
+def test_zones_of_walls_as_given_are_read_back(
+    folder: Path, half: Half, given: FaceTolerances
+) -> None:
+    read_back(folder, half, given)
+
+
 @pytest.mark.parametrize(
     ("fault", "message"),
     [("narrower", "read otherwise"), ("swapped", "zones of walls"), ("missing", "zones of walls")],
 )
 def test_zones_of_walls_that_are_not_as_given_are_refused(
-    folder: Path,
-    export: ExportedDesign,
-    found: tuple[Sensitivities, Limits],
-    tmp_path: Path,
-    fault: str,
-    message: str,
+    folder: Path, half: Half, given: FaceTolerances, fault: str, message: str
 ) -> None:
-    half = halves(export, found[1])[0]
-    solid = read_named_solid(folder / "shell_a.step")
-    given = tolerances(half, dowel_face(solid, half.dowel_mm))
-    write_tolerances(tmp_path / "a.step", solid, given)
-    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
-    walls = {name: plane for one in half.walls for name, plane in one.items()}
-    check_read_back(tmp_path / "a.step", given, centres, walls)
     (first, width), (second, other), *rest = given.common_profile.items()
     changed = {
         "narrower": {first: width / 2, second: other, **dict(rest)},
@@ -163,4 +177,4 @@ def test_zones_of_walls_that_are_not_as_given_are_refused(
         "missing": {second: other, **dict(rest)},
     }[fault]
     with pytest.raises(StepError, match=message):
-        check_read_back(tmp_path / "a.step", replace(given, common_profile=changed), centres, walls)
+        read_back(folder, half, replace(given, common_profile=changed))

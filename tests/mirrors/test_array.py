@@ -139,18 +139,28 @@ def test_mirrors_that_no_lens_takes_in_are_refused_before_their_radii_are_search
         mirror_array("n=18", "camera_mm=[100, 0, -20]", "capture_diameter_mm=20")
 
 
-@settings(max_examples=30, deadline=None)
-@given(
-    n=st.integers(2, 10),
-    x=st.floats(60, 250),
-    y=st.floats(-30, 30),
-    z=st.floats(-250, -60),
-    b=st.floats(70, 160),
-    capture=st.floats(10, 60),
+SIZES = st.tuples(
+    *(st.floats(60, 250), st.floats(-30, 30), st.floats(-250, -60)),
+    *(st.floats(70, 160), st.floats(10, 60)),
 )
+
+
+@settings(max_examples=10, deadline=None)
+@given(n=st.integers(2, 4), sizes=SIZES)
 def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
-    n: int, x: float, y: float, z: float, b: float, capture: float
+    n: int, sizes: tuple[float, ...]
 ) -> None:
+    check_any_geometry(n, *sizes)
+
+
+@pytest.mark.slow
+@settings(max_examples=30, deadline=None)
+@given(n=st.integers(2, 10), sizes=SIZES)
+def test_so_does_one_of_more_mirrors(n: int, sizes: tuple[float, ...]) -> None:
+    check_any_geometry(n, *sizes)
+
+
+def check_any_geometry(n: int, x: float, y: float, z: float, b: float, capture: float) -> None:
     options = [
         f"n={n}",
         f"camera_mm=[{x}, {y}, {z}]",

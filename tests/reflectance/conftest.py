@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.cli import run
-from tbcad.simulate.capture.files import read_object
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tests.captures import field, scene  # noqa: F401
 from tests.simulate.conftest import cameras, knot, light_field  # noqa: F401
 
 LAMPS = "x_mm,y_mm,z_mm\n200,0,120\n-150,120,90\n20,-40,240\n"
@@ -28,16 +26,6 @@ def captured(record: Path, table: Path, tmp_path_factory: pytest.TempPathFactory
     out = tmp_path_factory.mktemp("captures") / "few"
     assert run(["capture", str(record), "--lights", str(table), "--out", str(out)]) == 0
     return out
-
-
-@pytest.fixture(scope="session")
-def scene(captured: Path) -> Scene:
-    return prepared_scene(read_object(captured))
-
-
-@pytest.fixture(scope="session")
-def field(captured: Path) -> LightField:
-    return LightField.read(captured)
 
 
 def sky(height: int = 32) -> np.ndarray:

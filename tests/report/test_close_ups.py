@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import write_record
 from tbcad.mirrors.seam import seam_gaps
 from tbcad.report import close_ups, seam_fields
 from tbcad.report.section import section_of
-from tbcad.shell.files import shell_envelope
-from tbcad.shell.mesh import shell_mesh
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.spec.load import load_spec
+from tbcad.simulate.scene.exported import ExportedDesign
+from tests.mirror_arrays import mirror_design
+from tests.shell_meshes import export_with_meshes
 
 GROOVE = 0.3
 RADIUS = 30.0
@@ -23,14 +19,9 @@ FACETS_MM = 0.02  # that facets and a crest between two of their corners may be 
 
 
 def shells(folder: Path, edges: str) -> ExportedDesign:
-    """The record of a small design, with both shells as STL beside it."""
-    made = design(load_spec(None, ["n=8", f"shell.edges={edges}", f"shell.groove_mm={GROOVE}"]))
-    write_record(folder, made, shells=True)
-    array = made.arrays[0]
-    mesh = shell_mesh(made.spec, array.modelled_cells, shell_envelope(made), array.apex_distance)
-    write_stl(folder / "shell_a.stl", mesh)
-    write_stl(folder / "shell_b.stl", mesh.mirrored())
-    return read_export(folder)
+    """Of a small design."""
+    made = mirror_design("n=8", f"shell.edges={edges}", f"shell.groove_mm={GROOVE}")
+    return export_with_meshes(folder, made)
 
 
 @pytest.fixture(scope="module")

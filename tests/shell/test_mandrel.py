@@ -8,22 +8,22 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 
 from tbcad.cad.solids import properties
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.shell.draft import best_pull, draft_of
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tbcad.shell.mandrel import Mandrel, distances
 from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
 from tbcad.shell.mesh import front_facets
 from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 from tests.helpers import area, bounds, volume
+from tests.mirror_arrays import mirror_design
 from tests.pedestal_designs import OPTIONS
 
 EDGES = ["valley", "pedestal"]
 
 
 def made(edges: str, *options: str) -> MirrorDesign:
-    return design(load_spec(None, [f"shell.edges={edges}", "shell.negative=true", *options]))
+    return mirror_design(f"shell.edges={edges}", "shell.negative=true", *options)
 
 
 @pytest.mark.parametrize("edges", EDGES)

@@ -3,11 +3,11 @@ import pytest
 import trimesh
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.reflection import miss_distances
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.shell.files import camera_a_mesh, shell_envelope
-from tbcad.spec.load import load_spec
+from tests.mirror_arrays import mirror_design
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ from tbcad.spec.load import load_spec
     ids=str,
 )
 def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
-    mesh = camera_a_mesh(design(load_spec(None, options)))
+    mesh = camera_a_mesh(mirror_design(*options))
     every = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     assert every.is_watertight
     assert every.is_winding_consistent
@@ -67,7 +67,7 @@ def test_all_facets_face_the_light(options: list[str]) -> None:
     In long ellipsoids a cell's side at the foot bends so far inward that not all of the outline is
     in sight of its points' mean.
     """
-    mirrors = design(load_spec(None, options))
+    mirrors = mirror_design(*options)
     facets, surfaces = facets_of(mirrors), mirrors.arrays[0].modelled_cells.surfaces
     corner = facets.vertices[facets.triangles]
     toward_light = surfaces.gradient(facets.mirror, corner.mean(axis=1))
@@ -88,7 +88,7 @@ def test_rim_facets_keep_the_ray_error(error_mm: float) -> None:
     and hardly from the centre: what counts for coverage is the distance from the centre.
     """
     options = ["n=12", f"ray_error_mm={error_mm}", "chord_error_mm=0.002"]
-    mirrors = design(load_spec(None, options))
+    mirrors = mirror_design(*options)
     mirror, edge, normal = rim_facets(mirrors, np.float64)
     array, point = mirrors.arrays[0], edge.mean(axis=1)
     exact = unit(array.modelled_cells.surfaces.gradient(mirror, point))
@@ -129,7 +129,7 @@ def test_facets_cost_less_than_the_margin(options: list[str]) -> None:
 
     Off long mirrors far from the camera a facet's rays shift toward the object's centre.
     """
-    mirrors = design(load_spec(None, options))
+    mirrors = mirror_design(*options)
     array, (mirror, edge, normal) = mirrors.arrays[0], rim_facets(mirrors, np.float32)
     cut = array.cells.halved[mirror] & (edge[:, :, 0] == 0).all(axis=1)
     pinhole = array.camera.pinhole

@@ -150,7 +150,8 @@ def test_a_process_for_which_there_is_no_margin() -> None:
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The design in the record gives the same mirrors again, without the process."""
     out = tmp_path / "exports"
-    arguments = ["build", "--n", "4", "--parts", "shell", "--no-verify", "--out", str(out)]
+    arguments = ["build", "--n", "4", "--parts", "shell", "--no-verify"]
+    arguments += ["--set", "width_px=416", "--set", "height_px=310", "--out", str(out)]
     arguments += ["--set", "margin_mm=0.2"]
     assert run([*arguments, "--for-process", "cnc", "--yield", "0.9"]) == 0
     mirrors = json.loads((out / "design.json").read_text())["spec"]["mirrors"]

@@ -285,7 +285,14 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
     return read_record(folder)
 
 
-@pytest.mark.parametrize(("errors", "builds"), [(COARSE, range(20)), (POSED, range(20, 24))])
+@pytest.mark.parametrize(
+    ("errors", "builds"),
+    [
+        (COARSE, range(4)),
+        pytest.param(COARSE, range(4, 20), marks=pytest.mark.slow),
+        (POSED, range(20, 24)),
+    ],
+)
 def test_random_builds_against_the_verification_of_their_meshes(
     halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, builds: range
 ) -> None:

@@ -12,6 +12,7 @@ import io
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,7 @@ def unit(v):
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
+@cache
 def vertices(n: int) -> np.ndarray:
     """Geodesic vertices for n = 1 or a power of two: midpoints, pushed out, again."""
     phi = (1 + 5**0.5) / 2
@@ -85,7 +87,9 @@ def vertices(n: int) -> np.ndarray:
         faces = [t for f in faces for t in quartered(*f)]
     points = np.array(faces).reshape(-1, 3)
     keep = np.unique(np.round(points, 8) + 0.0, axis=0, return_index=True)[1]
-    return points[np.sort(keep)]
+    points = points[np.sort(keep)]
+    points.flags.writeable = False
+    return points
 
 
 def quartered(a, b, c):

@@ -1,23 +1,18 @@
 """Pixels' rays off mirrors on pedestals: a search over all solids, and the mesh of a shell."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tbcad.formats.stl import write_stl
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import write_record
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
-from tbcad.shell.files import shell_envelope
-from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph, to_bytes
 from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
@@ -33,6 +28,7 @@ from tbcad.tolerance.montecarlo.edge_model import edge_model
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sharpness import built_reflector
 from tests.pedestal_designs import pedestal_design
+from tests.shell_meshes import export_with_meshes
 
 SETTINGS = ("n=6", "width_px=416", "height_px=310", "shell.groove_mm=0.4")
 CENTRE = (0.0, 0.0)
@@ -50,14 +46,7 @@ def cameras(made: MirrorDesign) -> tuple[Reflector, Reflector]:
 
 @pytest.fixture(scope="module")
 def exported(made: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
-    """The record, with both shells beside it as STL."""
-    folder: Path = tmp_path_factory.mktemp("pedestals")
-    write_record(folder, made, shells=True)
-    array = made.arrays[0]
-    mesh = shell_mesh(made.spec, array.modelled_cells, shell_envelope(made), array.apex_distance)
-    write_stl(folder / "shell_a.stl", mesh)
-    write_stl(folder / "shell_b.stl", mesh.mirrored())
-    return read_export(folder)
+    return export_with_meshes(tmp_path_factory.mktemp("pedestals"), made)
 
 
 def every_row(at: Reflector) -> ReflectedRays:

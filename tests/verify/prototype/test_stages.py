@@ -334,12 +334,12 @@ PROTOTYPES: dict[str, tuple[SyntheticPrototype, tuple[str, ...], str]] = {
         "blocked by",
     ),
     "frame where the base swings": (
-        SyntheticPrototype(more={"bar": ("frame", [-150, -150, 60], [150, 150, 62])}),
+        SyntheticPrototype(more={"bar": ("frame", [90, -4, 60], [150, 4, 62])}),
         ("swing", "light paths, balls"),
         "share",
     ),
     "motor where the base swings": (
-        SyntheticPrototype(motor=([-150, -150, 60], [150, 150, 62])),
+        SyntheticPrototype(motor=([90, -4, 60], [150, 4, 62])),
         ("swing",),
         "motor",
     ),

@@ -13,6 +13,8 @@ import pytest
 import tbcad_verify
 from tbcad_verify import main, verify
 from tbcad_verify.mesh import rays
+from tbcad_verify.mesh.stl import read_facets
+from tbcad_verify.record.export import read_export
 from tbcad_verify.record.poses import geodesic
 from tbcad_verify.report.checks import (
     Check,
@@ -25,6 +27,7 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
+from tbcad_verify.shell.integrity import manifest_checks
 
 from tests.verify.corpus.broken_meshes import MESHES
 from tests.verify.corpus.broken_records import RECORDS
@@ -143,26 +146,20 @@ def test_too_little_coverage_names_the_worst(
     assert all(check["detail"] for check in bad)
 
 
+# One for each check that fails first; marked corpus, all others are tried on real exports.
 BROKEN = (
     "inside out",
     "a facet turned",
-    "a facet missing",
     "in inches",
     "shifted by 20 um",
-    "the halves exchanged",
     "a facet without area",
     "a mirror dented by 10 um",
     "a loose piece in the wall",
     "a centre 10 nm off the normal",
     "a direction without its mirror",
-    "a mirror not in the record",
-    "cameras and spec 0.1 mm lower",
     "camera b 0.1 mm aside",
-    "a lower target than the spec's",
-    "an id twice in the record",
     "an odd id",
     "a mirror's polar_deg",
-    "a mirror 1 um further out",
 )
 
 
@@ -204,15 +201,27 @@ def test_changed_files_are_noticed(export_folder: Path) -> None:
     assert "shell_a.stl" in detail(report, "manifest")
 
 
+def manifest_of(folder: Path) -> tuple[Check, ...]:
+    """Whether the files are those of the manifest, and how many others there are."""
+    record = read_export(folder)
+    meshes = {part.stl: read_facets(folder, part.stl)[1].digest for part in record.parts}
+    return tuple(manifest_checks(record, {**record.digests, **meshes}))
+
+
 def test_listed_but_missing_and_unlisted_files(export_folder: Path) -> None:
-    (export_folder / "notes.csv").write_text("x")
-    assert verify(sign(export_folder), options=IN_PROCESS).passed
+    (export_folder / "notes.csv").write_text("x", encoding="utf-8")
+    assert all(check.passed for check in manifest_of(sign(export_folder)))
     (export_folder / "notes.csv").unlink()
-    assert failed(verify(export_folder, options=IN_PROCESS)) == {"manifest"}
-    sign(export_folder, NAMES)
-    assert "shell_b.stl" in detail(verify(export_folder, options=IN_PROCESS), "manifest")
-    sign(export_folder)
-    (export_folder / "notes.txt").write_text("mine")
+    missing, _ = manifest_of(export_folder)
+    assert not missing.passed
+    assert "notes.csv" in missing.detail
+    unlisted, _ = manifest_of(sign(export_folder, NAMES))
+    assert not unlisted.passed
+    assert "shell_b.stl" in unlisted.detail
+
+
+def test_other_files_are_counted_and_do_no_harm(export_folder: Path) -> None:
+    (export_folder / "notes.txt").write_text("mine", encoding="utf-8")
     report = verify(export_folder, options=IN_PROCESS)
     assert report.passed
     assert next(c.measured for c in report.checks if c.name == "other files") == 1

@@ -174,7 +174,10 @@ def oracle(cells: Cells) -> dict[int, float]:
     return found
 
 
-FINE = Cells(Design(arc=80), poses(Design()))
+@pytest.fixture(scope="module")
+def fine() -> Cells:
+    """The good export's, their arcs with many more points."""
+    return Cells(Design(arc=80), poses(Design()))
 
 
 @pytest.fixture(scope="module")
@@ -192,9 +195,9 @@ def check_fitted(
 
 
 def test_every_mirror_against_brute_force(
-    optical_setup: OpticalSetup, found: coverage.Coverage
+    optical_setup: OpticalSetup, found: coverage.Coverage, fine: Cells
 ) -> None:
-    expected = oracle(FINE)
+    expected = oracle(fine)
     check_fitted(optical_setup, found, expected, 0.08)
     check_fitted(optical_setup, replace(found, fitted=found.facet), expected, 3.0)
     assert not found.hidden.any()
@@ -248,13 +251,15 @@ def test_a_lost_half_is_no_coverage(optical_setup: OpticalSetup) -> None:
 
 
 @pytest.mark.parametrize("coating", [0.0, 0.05])
-def test_a_coated_export_is_verified_like_a_bare_one(tmp_path: Path, coating: float) -> None:
+def test_a_coated_export_is_verified_like_a_bare_one(
+    tmp_path: Path, coating: float, fine: Cells
+) -> None:
     """The record speaks of the coated spheres: with the coat on, the same mirrors see the same."""
     folder, _ = export(tmp_path / "x", Design(coating=coating))
     optical_setup = optical_setup_of(folder)
     assert optical_setup.match.radius_error.max() < 1e-3
     found = coverage.measure(optical_setup)
-    check_fitted(optical_setup, found, oracle(FINE), 0.1)
+    check_fitted(optical_setup, found, oracle(fine), 0.1)
 
 
 def test_the_coat_matters(tmp_path: Path) -> None:
@@ -310,9 +315,9 @@ def test_seam_gap_against_brute_force(tmp_path: Path) -> None:
 
 
 def test_halves_aimed_beyond_the_seam_leave_no_gap(
-    optical_setup: OpticalSetup, found: coverage.Coverage
+    optical_setup: OpticalSetup, found: coverage.Coverage, fine: Cells
 ) -> None:
-    assert max(brute_force_gaps(FINE, optical_setup.radius).values()) == 0
+    assert max(brute_force_gaps(fine, optical_setup.radius).values()) == 0
     assert (found.gap == 0).all()
     lines = {c.name: c for c in coverage.checks(optical_setup, found, "x")}
     assert lines["seam gap"].passed is True

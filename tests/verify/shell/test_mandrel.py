@@ -37,6 +37,10 @@ from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 
 SETTINGS = ["n=4", "shell.negative=true", "width_px=200", "height_px=150"]
 STL, STEP = "mandrel_a.stl", "mandrel_a.step"
+# Meshes and good STEP files of both edges are read in other tests; these take long for each.
+ON_VALLEYS = pytest.mark.parametrize(
+    "edges", ["valley", pytest.param("pedestal", marks=pytest.mark.slow)], indirect=True
+)
 
 
 def made(*options: str) -> MirrorDesign:
@@ -93,6 +97,7 @@ def step_failing(folder: Path) -> dict[str, str]:
     return {check.name: check.detail for check in mine}
 
 
+@ON_VALLEYS
 def test_a_whole_export_passes(folder: Path, edges: str) -> None:
     report = verify(folder, options=IN_PROCESS)
     about = [check for check in report.checks if check.file.startswith("mandrel")]
@@ -263,6 +268,7 @@ class TestStep:
     def test_good_ones_pass(self, good: Path) -> None:
         assert step_failing(good) == {}
 
+    @ON_VALLEYS
     def test_the_shells_is_refused(self, folder: Path) -> None:
         text = (folder / "shell_a.step").read_text(encoding="utf-8")
         (folder / STEP).write_text(text.replace("shell_a", "mandrel_a"), encoding="utf-8")
@@ -270,11 +276,13 @@ class TestStep:
             *step_failing(folder)
         }
 
+    @ON_VALLEYS
     def test_the_other_cameras_is_refused(self, folder: Path) -> None:
         text = (folder / "mandrel_b.step").read_text(encoding="utf-8")
         (folder / STEP).write_text(text.replace("mandrel_b", "mandrel_a"), encoding="utf-8")
         assert {"step names", "step surfaces"} <= {*step_failing(folder)}
 
+    @ON_VALLEYS
     def test_a_larger_sphere_is_named(self, folder: Path) -> None:
         text = (folder / STEP).read_text(encoding="utf-8")
         sphere = re.search(r"SPHERICAL_SURFACE\('',#\d+,([0-9.]+)\)", text)
@@ -283,6 +291,7 @@ class TestStep:
         (folder / STEP).write_text(text.replace(sphere[0], larger), encoding="utf-8")
         assert "a0001" in step_failing(folder)["step surfaces"]
 
+    @ON_VALLEYS
     def test_a_face_that_is_not_turned_is_named(self, folder: Path) -> None:
         """Kernels repair it: only the text tells."""
         text = (folder / STEP).read_text(encoding="utf-8")

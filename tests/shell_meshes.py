@@ -1,0 +1,18 @@
+"""Exports of shells without their solids: the record, and both meshes."""
+
+from pathlib import Path
+
+from tbcad.formats.stl import write_stl
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.mirrors.record import write_record
+from tbcad.shell.files import camera_a_mesh
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+
+
+def export_with_meshes(folder: Path, made: MirrorDesign) -> ExportedDesign:
+    """Write the record of a design, with both shells as STL beside it, and read it."""
+    write_record(folder, made, shells=True)
+    mesh = camera_a_mesh(made)
+    write_stl(folder / "shell_a.stl", mesh)
+    write_stl(folder / "shell_b.stl", mesh.mirrored())
+    return read_export(folder)
