@@ -114,6 +114,7 @@ def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
     """A program for Blender's own Python that builds the same scene."""
     data = {
         "parts": parts,
+        "samples": SAMPLES,
         "cameras": {name: _blender_camera(camera) for name, camera in cameras.items()},
     }
     script = files("tbcad.datasets") / "blender_scene.py.txt"

@@ -1,11 +1,13 @@
-"""Scenes of the machine: what Mitsuba renders of them is what a capture shows."""
+"""Scenes of the machine: what Mitsuba and Blender render of them is what a capture shows."""
 
 import ast
 import io
+import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -62,25 +64,69 @@ def test_the_meshes(scenes: Path, built: Path) -> None:
     ast.parse(lines)
 
 
-@pytest.mark.slow
-@pytest.mark.clients
-@pytest.mark.parametrize("camera", ["a", "b"])
-def test_mitsuba_sees_what_the_capture_shows(
-    scenes: Path, shown: Path, built: Path, camera: str
-) -> None:
-    """The same crop: the same colours but at edges, and mirrors in the same places."""
+class Crop(NamedTuple):
+    """A square of a photograph: where, colours (s, s, 3), and where a mirror is seen (s, s)."""
+
+    left: int
+    top: int
+    colours: np.ndarray
+    seen: np.ndarray
+
+    def of(self, picture: np.ndarray) -> np.ndarray:
+        """The same square of another picture or map."""
+        return picture[self.top : self.top + CROP_PX, self.left : self.left + CROP_PX]
+
+
+def crop_at_the_object(shown: Path, built: Path, camera: str) -> Crop:
+    """Amid the pixels that see the object by a mirror."""
     picture = np.asarray(Image.open(shown / f"camera_{camera}.png")).astype(float)
     reflector = read_export(built).reflectors["ab".index(camera)]
     mirror = exact_tracer(reflector)(range(SIZE_PX[1]), (0.0, 0.0)).mirror
     rows, columns = np.nonzero((picture.max(axis=2) > 30) & (mirror > 0))
     top = int(np.clip(np.median(rows) - CROP_PX / 2, 0, SIZE_PX[1] - CROP_PX))
     left = int(np.clip(np.median(columns) - CROP_PX / 2, 0, SIZE_PX[0] - CROP_PX))
-    rendered = crop_by_mitsuba(scenes / f"camera_{camera}.xml", left, top)
-    expected = picture[top : top + CROP_PX, left : left + CROP_PX]
-    seen = mirror[top : top + CROP_PX, left : left + CROP_PX] > 0
-    assert (expected.max(axis=2) > 30).mean() > 0.1
-    assert np.abs(rendered - expected)[seen].mean() < 1.5  # with the facets' own normals: 4
-    assert edge_shift(rendered, expected, seen) < 0.005
+    place = Crop(left, top, picture, mirror > 0)
+    return place._replace(colours=place.of(picture), seen=place.of(mirror > 0))
+
+
+def check_same(rendered: np.ndarray, crop: Crop) -> None:
+    """The same colours but at edges, and mirrors in the same places."""
+    assert (crop.colours.max(axis=2) > 30).mean() > 0.1
+    # With the facets' own normals: more than 4.
+    assert np.abs(rendered - crop.colours)[crop.seen].mean() < 1.5
+    assert edge_shift(rendered, crop.colours, crop.seen) < 0.005
+
+
+@pytest.mark.slow
+@pytest.mark.clients
+@pytest.mark.parametrize("camera", ["a", "b"])
+def test_mitsuba_sees_what_the_capture_shows(
+    scenes: Path, shown: Path, built: Path, camera: str
+) -> None:
+    crop = crop_at_the_object(shown, built, camera)
+    check_same(crop_by_mitsuba(scenes / f"camera_{camera}.xml", crop.left, crop.top), crop)
+
+
+@pytest.fixture(scope="module")
+def by_blender(scenes: Path) -> Path:
+    """The folder that Blender has written its photographs to."""
+    command = shlex.split(os.environ.get("BLENDER", ""))
+    if not command:
+        pytest.skip("BLENDER does not name a Python with bpy")
+    subprocess.run([*command, scenes / "blender.py"], check=True)
+    return scenes
+
+
+@pytest.mark.slow
+@pytest.mark.clients
+@pytest.mark.parametrize("camera", ["a", "b"])
+def test_blender_sees_what_the_capture_shows(
+    by_blender: Path, shown: Path, built: Path, camera: str
+) -> None:
+    crop = crop_at_the_object(shown, built, camera)
+    picture = np.asarray(Image.open(by_blender / f"camera_{camera}.png")).astype(float)
+    assert picture.shape == (SIZE_PX[1], SIZE_PX[0], 3)
+    check_same(crop.of(picture), crop)
 
 
 RENDER = """
