@@ -17,6 +17,8 @@ from tbcad.spec.section import OrWord, Reason
 
 _MAX_VALUE_LENGTH = 60
 _MIN_LIKENESS = 0.6
+_PLURALS = {int: "whole numbers", float: "numbers", str: "texts"}
+_COUNTS = {2: "two", 3: "three"}
 _ORDER = {Gt: "above", Ge: "from", Lt: "below", Le: "to"}
 
 
@@ -61,20 +63,33 @@ def _allowed_value(kind: Any, limits: Iterable[object]) -> str:
     if get_origin(kind) is Literal:
         return " or ".join(str(choice) for choice in get_args(kind))
     if get_origin(kind) in (Union, UnionType):
-        return ", or ".join(_allowed_item(choice) for choice in get_args(kind))
+        return ", or ".join(allowed_text(*_kind_and_limits(choice)) for choice in get_args(kind))
     words = {int: "a whole number", float: "a number", bool: "true or false", str: "text"}
     return " ".join([words.get(kind, "a table"), *_limits(limits)])
 
 
 def _allowed_list(items: tuple[Any, ...]) -> str:
-    shown = ["..." if item is Ellipsis else _allowed_item(item) for item in items]
-    return "[" + ", ".join(shown) + "]"
+    """A list whose entries are of one kind: "two numbers in brackets, each from 0.5 to 2"."""
+    entries = [_entries(*_kind_and_limits(item)) for item in items if item is not Ellipsis]
+    name, rule = entries[0]
+    count = "" if Ellipsis in items else f"{_COUNTS[len(entries)]} "
+    head = f"{count}{name} in brackets"
+    if len(set(entries)) > 1:
+        return f"{head}: {', '.join(rule for _, rule in entries)}"
+    return f"{head}, each {rule}" if rule else head
 
 
-def _allowed_item(item: Any) -> str:
+def _entries(kind: Any, limits: list[object]) -> tuple[str, str]:
+    """Plural of an entry of a list, and what each must be."""
+    if get_origin(kind) is tuple:
+        return "lists", f"with {_allowed_list(get_args(kind))}"
+    return _PLURALS[kind], " ".join(_limits(limits))
+
+
+def _kind_and_limits(item: Any) -> tuple[Any, list[object]]:
     kind, *metadata = get_args(item) if get_origin(item) is Annotated else (item,)
     fields = [field for field in metadata if isinstance(field, FieldInfo)]
-    return allowed_text(kind, [limit for field in fields for limit in field.metadata])
+    return kind, [limit for field in fields for limit in field.metadata]
 
 
 def _limits(limits: Iterable[object]) -> Iterator[str]:

@@ -220,6 +220,31 @@ class TestValue:
         message = refusal(None, "radius_rule=exact")
         assert "mirrors.radius_rule is 'exact', allowed is traced or paper or flat" in message
 
+    @pytest.mark.parametrize(
+        ("given", "said"),
+        [
+            ("stretch=[3, 1]", "stretch[0] is 3, allowed is two numbers in brackets, each"),
+            ("stretch=[1]", "stretch[1] is missing, allowed is two numbers in brackets, each"),
+            ("stretch=1.2,1.3", "stretch is '1.2,1.3', allowed is two numbers in brackets, each"),
+            ("bed_mm=[9, 200, 200]", "bed_mm[0] is 9, allowed is three numbers in brackets, each"),
+            (
+                "camera_mm=[0, 0, -1]",
+                "three numbers in brackets: above 0 to 10000, from -10000 to 10000, from -10000 ",
+            ),
+            ("own_margins_mm=[21]", "allowed is numbers in brackets, each from 0 to 20: change"),
+        ],
+    )
+    def test_lists_in_words(self, given: str, said: str) -> None:
+        assert said in refusal(None, given)
+
+    def test_lists_of_lists_and_of_text_in_words(self) -> None:
+        """As `tbcad explain` shows them; their errors have words of their own."""
+        fields = dict(dotted_fields(Spec))
+        texts = {key: allowed_text(one.annotation, one.metadata) for key, one in fields.items()}
+        assert texts["prototype.catalogues"] == "texts in brackets"
+        each = "three numbers in brackets, each from -1000 to 1000"
+        assert texts["prototype.stage.leds_mm"] == f"lists in brackets, each with {each}, or auto"
+
     @pytest.mark.parametrize("value", ["''", "'a\\nb'", "'../x'", "7", "'" + "a" * 81 + "'"])
     def test_names_are_plain(self, value: str) -> None:
         assert "name is " in refusal(None, f"name={value}")
@@ -239,7 +264,7 @@ class TestValue:
     def test_camera_below_on_its_side(self, value: str, place: str) -> None:
         message = refusal(None, f"camera_mm={value}")
         assert f"optics.camera_mm{place} is " in message
-        assert "a number above 0 to 10000" in message
+        assert "three numbers in brackets: above 0 to 10000, from -10000" in message
 
     def test_long_values_are_cut(self) -> None:
         assert len(refusal(None, f"optics.n='{'a' * 5000}'")) < 200
