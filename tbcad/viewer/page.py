@@ -1,11 +1,10 @@
 """The pages: HTML, styles, scripts and data in one file."""
 
-import json
 from collections.abc import Mapping
-from html import escape
 from importlib.resources import files
 
 from tbcad.viewer.query import Query, limits
+from tbcad.web_page import BEGIN, web_page
 
 
 def viewer_page(title: str, start: Query, capture_mm: float, method: str) -> str:
@@ -19,26 +18,36 @@ def viewer_page(title: str, start: Query, capture_mm: float, method: str) -> str
     """
     allowed = limits(capture_mm)
     first = {name: getattr(start, name) for name in allowed}
-    return filled("viewer", title, {"start": first, "limits": allowed, "method": method})
+    data = {"start": first, "limits": allowed, "method": method}
+    return filled("viewer", title, data, kind=": light field")
 
 
-def filled(name: str, title: str, data: Mapping[str, object], **more: str) -> str:
+def filled(
+    name: str,
+    title: str,
+    data: Mapping[str, object],
+    *,
+    kind: str = "",
+    begin: str = BEGIN,
+    images: str = "",
+    **more: str,
+) -> str:
     """A page with its styles, script and data.
 
     Args:
         name: of its HTML and script.
         title: text.
         data: what the script reads, as JSON.
+        kind: what the browser shows behind the title.
+        begin: the first lines.
+        images: where pictures come from when there is no server.
         more: other HTML by the names of its places.
     """
     static = files("tbcad.viewer") / "static"
-    parts = {
-        "title": escape(title),
+    blocks = {
         "style": (static / "page.css").read_text(encoding="utf-8"),
-        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
         "script": (static / f"{name}.js").read_text(encoding="utf-8"),
         **more,
     }
-    begin, *rest = (static / f"{name}.html").read_text(encoding="utf-8").split("{{")
-    places = (piece.split("}}", 1) for piece in rest)
-    return begin + "".join(parts[place] + text for place, text in places)
+    body = (static / f"{name}.html").read_text(encoding="utf-8")
+    return web_page(body, blocks, title=title, kind=kind, data=data, begin=begin, images=images)

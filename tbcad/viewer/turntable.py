@@ -115,7 +115,7 @@ def turntable_page(
     }
     views = sum(map(len, frames))
     about = f"{views} views of {table.size[0]} x {table.size[1]} pixels from a light field."
-    return filled("turntable", title, data, begin=BEGIN, about=about)
+    return filled("turntable", title, data, begin=BEGIN, images="data: blob:", about=about)
 
 
 def _maker(

@@ -31,7 +31,7 @@ TABLE = Turntable(4, (20.0, 60.0), 640.0, (160, 120), "nearest")
 
 
 def data_of(page: str) -> dict[str, object]:
-    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', page)
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page)
     assert found
     record: dict[str, object] = json.loads(found[1])
     return record

@@ -1,8 +1,7 @@
 """report.html of an export: verdict, 3D view, map of the virtual cameras, tables, pictures."""
 
-import json
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from functools import partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -34,6 +33,7 @@ from tbcad.report.page.verdict import (
     verdict_html,
 )
 from tbcad.simulate.scene.exported import MISSING, ExportedDesign, read_export
+from tbcad.web_page import web_page
 
 MAX_BYTES = 6_000_000
 RECORDS = ("design.json", "mirrors.csv")
@@ -122,21 +122,26 @@ def page(
     balls = len(data["mirrors"]["balls"])
     static = files("tbcad.report.page") / "static"
     blocks = {
-        "begin": REPORT_BEGIN,
-        "title": escape(export.spec.name),
-        "subtitle": _subtitle(export, views, balls),
         "style": (static / "page.css").read_text(encoding="utf-8"),
+        "script": "\n".join((static / name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "subtitle": _subtitle(export, views, balls),
         "verdict": _joined(verdict_html(verdict, as_made, views, balls, export.capture_mm)),
         "checks": _joined(checks_html(verdict)),
         "printing": _joined(printing_html(verdict.printing if verdict else ())),
         "parts": _joined(parts_html(parts)),
         "files": _joined(files_html({n: e.size for n, e in manifest.files.items()}, linked)),
-        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
-        "script": "\n".join((static / name).read_text(encoding="utf-8") for name in SCRIPTS),
     }
-    template = (static / "page.html").read_text(encoding="utf-8")
-    room = MAX_BYTES - len(_filled(template, {**blocks, "pictures": ""}).encode("utf-8"))
-    return _filled(template, {**blocks, "pictures": _pictures(read_pictures(folder), room)})
+    fixed = partial(
+        web_page,
+        (static / "page.html").read_text(encoding="utf-8"),
+        title=export.spec.name,
+        kind=": report",
+        data=data,
+        begin=REPORT_BEGIN,
+        images="data:",
+    )
+    room = MAX_BYTES - len(fixed({**blocks, "pictures": ""}).encode("utf-8"))
+    return fixed({**blocks, "pictures": _pictures(read_pictures(folder), room)})
 
 
 def _checked_manifest(folder: Path) -> Manifest:
@@ -216,8 +221,3 @@ def _pictures(pictures: list[Picture], room: int) -> str:
 
 def _joined(lines: Iterable[str]) -> str:
     return "\n".join(lines)
-
-
-def _filled(template: str, blocks: Mapping[str, str]) -> str:
-    """The template with each {{name}} replaced; what is put in is not looked through again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: blocks[found[1]], template)
