@@ -7,23 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import (
-    Design,
-    Distance,
-    Exports,
-    JsonResult,
-    MethodOption,
-    ObjectFile,
-    Out,
-    PaintOption,
-    PlotFormatOption,
-    Scheduler,
-    Settings,
-)
-from tbcad.cli.study_output import run_study
+from tbcad.cli.early_checks import check_is_object
+from tbcad.cli.options import Distance, MethodOption, ObjectFile, PaintOption, Scheduler
+from tbcad.cli.study_command import Work, of_design, of_export
 
 if TYPE_CHECKING:
+    from tbcad.simulate.study.pixels import Sensor
     from tbcad.spec.design import Spec
 
 study = typer.Typer(
@@ -45,16 +34,12 @@ Sensors = Annotated[
     ),
 ]
 Azimuths = Annotated[int, typer.Option(help="Number of azimuths at each elevation.")]
-STUDIES = Path("studies")
 
 
 @study.command("resolution")
+@of_design
 def resolution_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    spec: "Spec",
     first: First = 2,
     last: Last = 40,
     sensors: Sensors = None,
@@ -67,111 +52,83 @@ def resolution_command(
         ),
     ] = None,
     scheduler: Scheduler = None,
-) -> int:
+) -> Work:
     """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
-    from tbcad.simulate.study.pixels import parse_sensor
-    from tbcad.simulate.study.resolution import default_sensors, parse_ratio, resolution
+    from tbcad.simulate.study.resolution import parse_ratio, resolution
     from tbcad.simulate.study.sweep import n_range
 
-    ns = n_range(first, last)
-    given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
+    ns, counted = n_range(first, last), _sensors(sensors, spec)
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
-    spec = _spec(design, settings)
-    counted = given or default_sensors(spec)
-    return run_study(
-        out, json, plot, partial(resolution, spec, ns, counted, wanted, scheduler=scheduler)
-    )
+    return partial(resolution, spec, ns, counted, wanted, scheduler=scheduler)
 
 
 @study.command("capture-area")
+@of_design
 def capture_area_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    spec: "Spec",
     first: First = 2,
     last: Last = 36,
     scheduler: Scheduler = None,
-) -> int:
+) -> Work:
     """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
     from tbcad.simulate.study.capture_area import capture_area
     from tbcad.simulate.study.sweep import n_range
 
     ns = n_range(first, last)
-    spec = _spec(design, settings)
-    return run_study(out, json, plot, partial(capture_area, spec, ns, scheduler=scheduler))
+    return partial(capture_area, spec, ns, scheduler=scheduler)
 
 
 @study.command("elevation")
-def elevation_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
-) -> int:
+@of_design
+def elevation_command(spec: "Spec") -> Work:
     """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
     from tbcad.simulate.study.elevation import elevation
 
-    return run_study(out, json, plot, partial(elevation, _spec(design, settings)))
+    return partial(elevation, spec)
 
 
 @study.command("depth-of-field")
+@of_design
 def depth_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    spec: "Spec",
     blur_px: Annotated[float, typer.Option(help="Largest blur circle, in pixels.")] = 1.0,
     pixel_um: Annotated[float, typer.Option(help="Width of a pixel, micrometres.")] = 3.45,
     wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
-) -> int:
+) -> Work:
     """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
     from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
 
     optics = LensOptions(blur_px, pixel_um, wide_open).checked()
-    return run_study(out, json, plot, partial(depth_of_field, _spec(design, settings), optics))
+    return partial(depth_of_field, spec, optics)
 
 
 @study.command("ssim")
+@of_design
 def ssim_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    spec: "Spec",
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     sensors: Sensors = None,
     method: MethodOption = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
-) -> int:
+) -> Work:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
     check_is_object(object_file)
     from tbcad.simulate.scene.object import load_or_built_in
-    from tbcad.simulate.study.pixels import parse_sensor
-    from tbcad.simulate.study.resolution import default_sensors
     from tbcad.simulate.study.ssim import ssim
     from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
 
-    given = tuple(parse_sensor(text) for text in dict.fromkeys(sensors or ()))
+    simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
-    spec = _spec(design, settings)
     subject = load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint)
-    simulated = given or default_sensors(spec)
-    return run_study(out, json, plot, partial(ssim, spec, subject, simulated, places, method))
+    return partial(ssim, spec, subject, simulated, places, method)
 
 
 @study.command("balance")
+@of_design
 def balance_command(
-    design: Design = None,
-    settings: Settings = None,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    spec: "Spec",
     ns: Annotated[
         list[int] | None,
         typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
@@ -181,21 +138,18 @@ def balance_command(
         int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
     ] = 12,
     distance: Distance = 640.0,
-) -> int:
+) -> Work:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
     from tbcad.simulate.study.balance import balance, parse_subdivisions
 
     wanted = parse_subdivisions(ns)
-    spec = _spec(design, settings)
-    return run_study(out, json, plot, partial(balance, spec, wanted, views, distance, method))
+    return partial(balance, spec, wanted, views, distance, method)
 
 
 @study.command("prototype")
+@of_export
 def prototype_command(
-    folder: Exports,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    folder: Path,
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     method: MethodOption = "nearest",
@@ -204,9 +158,8 @@ def prototype_command(
     samples: Annotated[
         int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
     ] = 3,
-) -> int:
+) -> Work:
     """Compare views from the prototype's merged photographs with those of the full shell."""
-    check_is_export(folder)
     check_is_object(object_file)
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
@@ -216,17 +169,13 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
-    return run_study(
-        out, json, plot, partial(prototype_vs_shell, export, subject, places, method, samples)
-    )
+    return partial(prototype_vs_shell, export, subject, places, method, samples)
 
 
 @study.command("low-pass")
+@of_export
 def low_pass_command(
-    folder: Exports,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
+    folder: Path,
     object_file: ObjectFile = None,
     paint: PaintOption = "own",
     azimuths: Azimuths = 4,
@@ -250,9 +199,8 @@ def low_pass_command(
     samples: Annotated[
         int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
     ] = 2,
-) -> int:
+) -> Work:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
-    check_is_export(folder)
     check_is_object(object_file)
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object import load_or_built_in
@@ -266,26 +214,23 @@ def low_pass_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
-    return run_study(out, json, plot, partial(low_pass, export, subject, places, options))
+    return partial(low_pass, export, subject, places, options)
 
 
 @study.command("calibration")
-def calibration_command(
-    folder: Exports,
-    out: Out = STUDIES,
-    json: JsonResult = False,
-    plot: PlotFormatOption = "png",
-) -> int:
+@of_export
+def calibration_command(folder: Path) -> Work:
     """Find how well rays are known after calibration, by LEDs, noise and process (5.2)."""
-    check_is_export(folder)
     from tbcad.calibration.study import calibration_study
     from tbcad.simulate.scene.exported import read_export
 
     export = read_export(folder)
-    return run_study(out, json, plot, partial(calibration_study, export))
+    return partial(calibration_study, export)
 
 
-def _spec(design: Path | None, settings: list[str] | None) -> "Spec":
-    from tbcad.spec.load import load_spec
+def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
+    """The sensors that are wanted, each once; by default those of Table II for the design."""
+    from tbcad.simulate.study.pixels import parse_sensor
+    from tbcad.simulate.study.resolution import default_sensors
 
-    return load_spec(design, settings or ())
+    return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)
