@@ -24,7 +24,8 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.brep import Solid
-from tbcad.cad.solids import faces, meshed
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import faces
 
 
 def bounds(shape: TopoDS_Shape) -> np.ndarray:

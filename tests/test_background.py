@@ -32,7 +32,8 @@ def die() -> None:
 
 def joined_cylinders() -> float:
     """Volume of more cylinders than the kernel joins in one thread."""
-    from tbcad.cad.solids import FEW, cylinder, fused, volume
+    from tbcad.cad.measures import volume
+    from tbcad.cad.solids import FEW, cylinder, fused
 
     up, count = np.array([0.0, 0.0, 1.0]), 2 * FEW
     return volume(fused([cylinder(np.array([i, 0.0, 0.0]), up, 0.8, 1.0) for i in range(count)]))

@@ -4,8 +4,10 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.measures import plane_faces, volume
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, one_solid, plane_faces, volume, without_cavities
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import one_solid, without_cavities
 from tbcad.geometry.vectors import norm
 from tbcad.types import Floats
 

@@ -18,7 +18,8 @@ from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import faces, meshed
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import faces
 from tbcad.types import Bools, Floats
 
 SAME_MM, SAME_COS = 1e-3, 1e-6

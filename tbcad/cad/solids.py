@@ -1,18 +1,15 @@
-"""Solids by revolution, extrusion and booleans, and their meshes: a thin layer over the kernel.
+"""Solids by revolution, extrusion and booleans: a thin layer over the kernel.
 
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
 import multiprocessing
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 import numpy as np
-from manifold3d import Manifold, Mesh64, OpType
 from OCP.BinTools import BinTools
-from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_BooleanOperation,
@@ -21,7 +18,6 @@ from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_Fuse,
 )
 from OCP.BRepBuilderAPI import (
-    BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_MakeSolid,
@@ -30,8 +26,6 @@ from OCP.BRepBuilderAPI import (
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepClass3d import BRepClass3d
-from OCP.BRepGProp import BRepGProp, BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
-from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeCylinder,
@@ -39,53 +33,35 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeRevol,
     BRepPrimAPI_MakeSphere,
 )
-from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane
+from OCP.GeomAbs import GeomAbs_Cylinder
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
-from OCP.GProp import GProp_GProps
 from OCP.TopAbs import (
     TopAbs_EDGE,
     TopAbs_FACE,
-    TopAbs_REVERSED,
     TopAbs_ShapeEnum,
     TopAbs_SOLID,
     TopAbs_VERTEX,
 )
 from OCP.TopExp import TopExp
-from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
+from OCP.TopoDS import (
+    TopoDS,
+    TopoDS_Edge,
+    TopoDS_Face,
+    TopoDS_Shape,
+    TopoDS_Solid,
+    TopoDS_Vertex,
+    TopoDS_Wire,
+)
 from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.mesh import Mesh
-from tbcad.types import Floats, Ints
+from tbcad.types import Floats
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
-# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
-ANGLE = 0.2
 # With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
 SAME_MM = 1e-6
 # Booleans of more shapes than this are done in threads.
 FEW = 8
-
-
-@dataclass(frozen=True)
-class SolidProperties:
-    """What integrals over a homogeneous solid give.
-
-    Attributes:
-        volume: mm^3.
-        area: of the surface, mm^2.
-        centroid: x, y and z, mm.
-    """
-
-    volume: float
-    area: float
-    centroid: tuple[float, float, float]
-
-    def mirrored(self) -> "SolidProperties":
-        """Those of the mirror image in the plane x = 0."""
-        x, y, z = self.centroid
-        return SolidProperties(self.volume, self.area, (-x, y, z))
 
 
 def polygon(points: Floats) -> TopoDS_Face:
@@ -224,6 +200,11 @@ def edges(shape: TopoDS_Shape) -> list[TopoDS_Edge]:
     return [TopoDS.Edge_s(edge) for edge in _parts(shape, TopAbs_EDGE)]
 
 
+def vertices(shape: TopoDS_Shape) -> list[TopoDS_Vertex]:
+    """All vertices of a shape, each once."""
+    return [TopoDS.Vertex_s(vertex) for vertex in _parts(shape, TopAbs_VERTEX)]
+
+
 def cylinder_radius(face: TopoDS_Face) -> float:
     """Radius of the cylinder that a face is on, mm; 0 for other faces."""
     surface = BRepAdaptor_Surface(face)
@@ -256,153 +237,3 @@ def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
     Bodies that touch can close in a crumb of air between them, which no printer could empty.
     """
     return BRepBuilderAPI_MakeSolid(BRepClass3d.OuterShell_s(solid)).Solid()
-
-
-def volume(shape: TopoDS_Shape) -> float:
-    """Volume, mm^3."""
-    inside = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, inside)
-    return float(inside.Mass())
-
-
-def properties(shape: TopoDS_Shape) -> SolidProperties:
-    """Volume, area and centroid by the kernel's integrals, which take seconds for a shell."""
-    inside, surface = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, inside)
-    BRepGProp.SurfaceProperties_s(shape, surface)
-    centre = inside.CentreOfMass()
-    return SolidProperties(inside.Mass(), surface.Mass(), (centre.X(), centre.Y(), centre.Z()))
-
-
-@dataclass(frozen=True)
-class FaceIntegrals:
-    """Integrals over faces, by which they add up to those of a solid.
-
-    Attributes:
-        origin: any point near the faces, mm, (3,): the nearer, the less errors of the kernel count.
-        volume: between the origin and the faces, mm^3.
-        volume_moment: of the distance from the origin over that volume, mm^4, (3,).
-        area: mm^2.
-    """
-
-    origin: Floats
-    volume: float
-    volume_moment: Floats
-    area: float
-
-    def __add__(self, other: "FaceIntegrals") -> "FaceIntegrals":
-        """Those of both together; they have the same origin."""
-        return FaceIntegrals(
-            self.origin,
-            self.volume + other.volume,
-            self.volume_moment + other.volume_moment,
-            self.area + other.area,
-        )
-
-    @property
-    def properties(self) -> SolidProperties:
-        """Those of the solid that the faces close."""
-        x, y, z = (self.origin + self.volume_moment / self.volume).tolist()
-        return SolidProperties(self.volume, self.area, (x, y, z))
-
-
-def mean_corner(shape: TopoDS_Shape) -> Floats:
-    """Mean of a shape's corners, mm, (3,)."""
-    corners = map(TopoDS.Vertex_s, _parts(shape, TopAbs_VERTEX))
-    points = np.array([BRep_Tool.Pnt_s(corner).Coord() for corner in corners])
-    return np.asarray(points.mean(axis=0))
-
-
-def face_integrals(face: TopoDS_Face, origin: Floats) -> FaceIntegrals:
-    """Integrals over a face by the kernel."""
-    inside, surface = BRepGProp_Vinert(), GProp_GProps()
-    inside.SetLocation(gp_Pnt(*origin.tolist()))
-    inside.Perform(BRepGProp_Face(face), BRepGProp_Domain(face))
-    BRepGProp.SurfaceProperties_s(face, surface)
-    moment = inside.Mass() * (np.array(inside.CentreOfMass().Coord()) - origin)
-    return FaceIntegrals(origin, inside.Mass(), moment, surface.Mass())
-
-
-def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
-    """Centres (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
-    centre, area = [], []
-    for face in faces(shape):
-        if BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane:
-            surface = GProp_GProps()
-            BRepGProp.SurfaceProperties_s(face, surface)
-            centre.append(surface.CentreOfMass().Coord())
-            area.append(surface.Mass())
-    return np.array(centre).reshape(-1, 3), np.array(area)
-
-
-def volume_by_meshes(
-    bodies: Sequence[TopoDS_Shape], tools: Sequence[TopoDS_Shape], tolerance: float
-) -> float:
-    """Volume of a union without tools, by booleans of meshes: another way to the same figure."""
-    union = Manifold.batch_boolean([_manifold(one, tolerance) for one in bodies], OpType.Add)
-    removed = [_manifold(one, tolerance) for one in tools]
-    return float(Manifold.batch_boolean([union, *removed], OpType.Subtract).volume())
-
-
-def volume_by_cut_mesh(
-    shape: TopoDS_Shape, planes: Floats, tools: Sequence[TopoDS_Shape], tolerance: float
-) -> float:
-    """Volume of a shape below planes (h, 4), unit normal and level, and without tools."""
-    net = _manifold(shape, tolerance)
-    for *normal, level in (-planes).tolist():
-        net = net.trim_by_plane(normal, level)
-    removed = [_manifold(one, tolerance) for one in tools]
-    return float(Manifold.batch_boolean([net, *removed], OpType.Subtract).volume())
-
-
-def _manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
-    net = meshed(shape, tolerance)
-    return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
-
-
-def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:
-    """Mesh by the kernel's mesher; corners that faces share are one, degenerate facets dropped.
-
-    Args:
-        shape: a solid; its own facets are left alone.
-        tolerance: largest distance of facets from the surface, mm.
-        angle: largest turn of the surface along a facet's edge, radians.
-    """
-    copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
-    BRepMesh_IncrementalMesh(copy, tolerance, False, angle, False)
-    points, triangles, start = [], [], 0
-    for face in faces(copy):
-        corner, facet = _facets(face)
-        points.append(corner)
-        triangles.append(facet + start)
-        start += len(corner)
-    return _joined(np.concatenate(points), np.concatenate(triangles))
-
-
-def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
-    place = TopLoc_Location()
-    net = BRep_Tool.Triangulation_s(face, place)
-    if net is None:
-        raise InvalidSolidError("the kernel cannot mesh a face")
-    nodes = (net.Node(i) for i in range(1, net.NbNodes() + 1))
-    if not place.IsIdentity():
-        move = place.Transformation()
-        nodes = (node.Transformed(move) for node in nodes)
-    corners = [node.Coord() for node in nodes]
-    facets = [net.Triangle(i).Get() for i in range(1, net.NbTriangles() + 1)]
-    triangle = np.array(facets, dtype=np.int64).reshape(-1, 3) - 1
-    if face.Orientation() == TopAbs_REVERSED:
-        triangle = triangle[:, ::-1]
-    return np.array(corners), triangle
-
-
-def _joined(points: Floats, triangles: Ints) -> Mesh:
-    """Corners that agree to a nanometre become one; facets that lose a corner go."""
-    _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
-    return without_degenerate(points[first], of.reshape(-1)[triangles])
-
-
-def without_degenerate(vertices: Floats, triangles: Ints) -> Mesh:
-    """A mesh without the facets of which two corners became one."""
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return Mesh(vertices, triangles[whole])

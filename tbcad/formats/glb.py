@@ -10,7 +10,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.assembly import ColouredSolid, SolidGroup
-from tbcad.cad.solids import meshed
+from tbcad.cad.meshing import meshed
 
 # For viewing only: parts are meshed finely in their own files.
 COARSE_MM, COARSE_ANGLE = 0.1, 0.25

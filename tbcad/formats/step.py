@@ -16,7 +16,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 
 from tbcad.cad.brep import Solid
-from tbcad.cad.solids import SolidProperties, properties
+from tbcad.cad.measures import SolidProperties, properties
 from tbcad.formats.native_files import check_complete, incomplete
 
 END = b"END-ISO-10303-21;"  # of every STEP file

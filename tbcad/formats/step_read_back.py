@@ -10,7 +10,7 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError, Solid
-from tbcad.cad.solids import SolidProperties, volume
+from tbcad.cad.measures import SolidProperties, volume
 from tbcad.formats.step import write_step
 
 MAX_GAP_MM = 1e-5

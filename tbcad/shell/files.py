@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tbcad.cad.brep import Maker, Solid
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import (
+from tbcad.cad.measures import (
     FaceIntegrals,
     SolidProperties,
     face_integrals,
-    faces,
     mean_corner,
-    one_solid,
     properties,
 )
+from tbcad.cad.mesh import Mesh
+from tbcad.cad.solids import faces, one_solid
 from tbcad.formats.step import write_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf

@@ -6,7 +6,8 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.solids import cylinder, one_solid, properties
+from tbcad.cad.measures import properties
+from tbcad.cad.solids import cylinder, one_solid
 from tbcad.formats import step_read_back
 from tbcad.formats.step_read_back import check_read_back
 

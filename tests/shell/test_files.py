@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.solids import properties
+from tbcad.cad.measures import properties
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.mirrors.record import COLUMNS
 from tbcad.output.build import write_export

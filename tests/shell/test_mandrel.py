@@ -7,7 +7,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 
-from tbcad.cad.solids import properties
+from tbcad.cad.measures import properties
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.shell.draft import best_pull, draft_of
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties

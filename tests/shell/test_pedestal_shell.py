@@ -10,7 +10,7 @@ from OCP.TopAbs import TopAbs_EDGE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
-from tbcad.cad.solids import properties
+from tbcad.cad.measures import properties
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tests.helpers import area, volume
 from tests.pedestal_designs import OPTIONS, pedestal_design

@@ -14,7 +14,8 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_mesh, check_pads
 from tbcad.cad.glyphs import ROWS, relief, text_width
-from tbcad.cad.solids import fused, meshed, moved, one_solid, polygon, prism
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.coupon_pose import SeatPose
 from tbcad.prototype.base.coupon_seat import height, outline, printed_seat

@@ -9,7 +9,8 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
-from tbcad.cad.solids import cut, fused, polygon, prism, revolved_polygon, volume_by_meshes
+from tbcad.cad.meshing import volume_by_meshes
+from tbcad.cad.solids import cut, fused, polygon, prism, revolved_polygon
 from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout

@@ -8,15 +8,8 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import checked
 from tbcad.cad.glyphs import fitting_height, relief
-from tbcad.cad.solids import (
-    common,
-    cut,
-    cylinder,
-    polygon,
-    prism,
-    revolved_polygon,
-    volume_by_cut_mesh,
-)
+from tbcad.cad.meshing import volume_by_cut_mesh
+from tbcad.cad.solids import common, cut, cylinder, polygon, prism, revolved_polygon
 from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (

@@ -4,6 +4,7 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_volume
+from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.solids import (
     cut,
     cylinder,
@@ -13,7 +14,6 @@ from tbcad.cad.solids import (
     polygon,
     prism,
     revolved_polygon,
-    volume_by_meshes,
 )
 from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed

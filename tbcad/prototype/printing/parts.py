@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, without_degenerate
+from tbcad.cad.meshing import meshed, without_degenerate
 from tbcad.prototype.printing.placing import PlacedSolid
 
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.

@@ -9,16 +9,10 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Solid
 from scipy.spatial import ConvexHull
 
+from tbcad.cad.measures import SolidProperties, properties
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import (
-    SolidProperties,
-    from_bytes,
-    meshed,
-    moved,
-    properties,
-    solids,
-    to_bytes,
-)
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import from_bytes, moved, solids, to_bytes
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
 from tbcad.prototype.printing.pads_up import NO_PADS, downward_pads, opening_up

@@ -16,18 +16,9 @@ from OCP.Geom import Geom_SphericalSurface
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_pads, check_volume
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.solids import (
-    cut,
-    cylinder,
-    faces,
-    fused,
-    one_solid,
-    plane_faces,
-    properties,
-    volume,
-    volume_by_meshes,
-    without_cavities,
-)
+from tbcad.cad.measures import plane_faces, properties, volume
+from tbcad.cad.meshing import volume_by_meshes
+from tbcad.cad.solids import cut, cylinder, faces, fused, one_solid, without_cavities
 from tbcad.formats.step import write_step
 from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.vectors import dot, norm

@@ -11,8 +11,10 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 from tbcad.cad.brep import InvalidSolidError, Solid
 from tbcad.cad.checks import check_mesh
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
+from tbcad.cad.measures import plane_faces, volume
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import meshed, plane_faces, solids, volume, volume_by_meshes
+from tbcad.cad.meshing import meshed, volume_by_meshes
+from tbcad.cad.solids import solids
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.solids import volume as solid_volume
+from tbcad.cad.measures import volume as solid_volume
 from tbcad.geometry.primitives import enclosing_triangles, volume
 from tbcad.prototype.fasteners.bodies import PITCH_MM, PROFILES, core_radius, fastener_component
 from tbcad.prototype.fasteners.fastener import Fastener, numbered

@@ -6,7 +6,8 @@ import trimesh
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial import cKDTree
 
-from tbcad.cad.solids import meshed, volume
+from tbcad.cad.measures import volume
+from tbcad.cad.meshing import meshed
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout

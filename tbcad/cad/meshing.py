@@ -1,0 +1,93 @@
+"""Meshes of solids by the kernel's mesher, and volumes by booleans of such meshes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import Manifold, Mesh64, OpType
+from OCP.BRep import BRep_Tool
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+
+from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.mesh import Mesh
+from tbcad.cad.solids import faces
+from tbcad.types import Floats, Ints
+
+# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
+ANGLE = 0.2
+
+
+def volume_by_meshes(
+    bodies: Sequence[TopoDS_Shape], tools: Sequence[TopoDS_Shape], tolerance: float
+) -> float:
+    """Volume of a union without tools, by booleans of meshes: another way to the same figure."""
+    union = Manifold.batch_boolean([_manifold(one, tolerance) for one in bodies], OpType.Add)
+    removed = [_manifold(one, tolerance) for one in tools]
+    return float(Manifold.batch_boolean([union, *removed], OpType.Subtract).volume())
+
+
+def volume_by_cut_mesh(
+    shape: TopoDS_Shape, planes: Floats, tools: Sequence[TopoDS_Shape], tolerance: float
+) -> float:
+    """Volume of a shape below planes (h, 4), unit normal and level, and without tools."""
+    net = _manifold(shape, tolerance)
+    for *normal, level in (-planes).tolist():
+        net = net.trim_by_plane(normal, level)
+    removed = [_manifold(one, tolerance) for one in tools]
+    return float(Manifold.batch_boolean([net, *removed], OpType.Subtract).volume())
+
+
+def _manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
+    net = meshed(shape, tolerance)
+    return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
+
+
+def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:
+    """Mesh by the kernel's mesher; corners that faces share are one, degenerate facets dropped.
+
+    Args:
+        shape: a solid; its own facets are left alone.
+        tolerance: largest distance of facets from the surface, mm.
+        angle: largest turn of the surface along a facet's edge, radians.
+    """
+    copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
+    BRepMesh_IncrementalMesh(copy, tolerance, False, angle, False)
+    points, triangles, start = [], [], 0
+    for face in faces(copy):
+        corner, facet = _facets(face)
+        points.append(corner)
+        triangles.append(facet + start)
+        start += len(corner)
+    return _joined(np.concatenate(points), np.concatenate(triangles))
+
+
+def _facets(face: TopoDS_Face) -> tuple[Floats, Ints]:
+    place = TopLoc_Location()
+    net = BRep_Tool.Triangulation_s(face, place)
+    if net is None:
+        raise InvalidSolidError("the kernel cannot mesh a face")
+    nodes = (net.Node(i) for i in range(1, net.NbNodes() + 1))
+    if not place.IsIdentity():
+        move = place.Transformation()
+        nodes = (node.Transformed(move) for node in nodes)
+    corners = [node.Coord() for node in nodes]
+    facets = [net.Triangle(i).Get() for i in range(1, net.NbTriangles() + 1)]
+    triangle = np.array(facets, dtype=np.int64).reshape(-1, 3) - 1
+    if face.Orientation() == TopAbs_REVERSED:
+        triangle = triangle[:, ::-1]
+    return np.array(corners), triangle
+
+
+def _joined(points: Floats, triangles: Ints) -> Mesh:
+    """Corners that agree to a nanometre become one; facets that lose a corner go."""
+    _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
+    return without_degenerate(points[first], of.reshape(-1)[triangles])
+
+
+def without_degenerate(vertices: Floats, triangles: Ints) -> Mesh:
+    """A mesh without the facets of which two corners became one."""
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Mesh(vertices, triangles[whole])
