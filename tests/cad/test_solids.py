@@ -1,0 +1,105 @@
+"""Bodies and their booleans: closed forms, and what is refused."""
+
+import numpy as np
+import pytest
+from OCP.BRep import BRep_Builder
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
+
+from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.measures import mean_corner, volume
+from tbcad.cad.solids import (
+    common,
+    cut,
+    cylinder,
+    cylinder_radius,
+    edges,
+    faces,
+    from_bytes,
+    fused,
+    moved,
+    one_solid,
+    polygon,
+    prism,
+    pyramid,
+    revolved_polygon,
+    sphere,
+    to_bytes,
+    vertices,
+    without_cavities,
+)
+from tbcad.geometry.primitives import rectangle
+
+BASE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+ORIGIN, UP, AWAY = np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([20.0, 0.0, 0.0])
+
+
+def box(width: float, height: float) -> TopoDS_Shape:
+    """On the plane z = 0, about the z axis."""
+    low = np.full(2, -width / 2)
+    base = np.column_stack([rectangle(low, -low), np.zeros(4)])
+    return prism(polygon(base), height * UP)
+
+
+def test_volumes_of_bodies() -> None:
+    assert volume(box(2.0, 3.0)) == pytest.approx(12)
+    assert volume(pyramid(6 * UP, BASE)) == pytest.approx(8)
+    ring = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
+    assert volume(revolved_polygon(ring, 0.3, np.pi)) == pytest.approx(1.5 * np.pi)
+
+
+def test_sets_of_two_bodies() -> None:
+    one, other = cylinder(ORIGIN, UP, 2.0, 5.0), cylinder(ORIGIN, UP, 1.0, 9.0)
+    assert volume(fused([one, other])) == pytest.approx(24 * np.pi)
+    assert volume(cut(one, [other])) == pytest.approx(15 * np.pi)
+    assert volume(common(one, other)) == pytest.approx(5 * np.pi)
+
+
+def test_without_tools_a_shape_is_as_it_was() -> None:
+    pin = cylinder(ORIGIN, UP, 2.0, 5.0)
+    assert cut(pin, []) is pin
+    assert fused([pin]) is pin
+
+
+def test_parts_are_listed_once() -> None:
+    solid = box(2.0, 3.0)
+    assert [len(faces(solid)), len(edges(solid)), len(vertices(solid))] == [6, 12, 8]
+
+
+def test_radius_of_cylinders_only() -> None:
+    radii = sorted(cylinder_radius(face) for face in faces(cylinder(ORIGIN, UP, 2.0, 5.0)))
+    assert radii == pytest.approx([0, 0, 2.0])
+
+
+def test_a_move_takes_axes_and_origin_to_their_places() -> None:
+    axes = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    assert mean_corner(moved(box(2.0, 4.0), axes, AWAY)) == pytest.approx([22.0, 0.0, 0.0])
+
+
+def test_bytes_of_a_solid_give_it_again() -> None:
+    ball = one_solid("ball", cut(sphere(ORIGIN, 3.0), [sphere(3 * UP, 1.0)]))
+    again = from_bytes(to_bytes(ball))
+    assert to_bytes(again) == to_bytes(ball)
+    assert volume(again) == volume(ball)
+
+
+def test_several_solids_are_refused() -> None:
+    two = fused([sphere(ORIGIN, 1.0), sphere(AWAY, 1.0)])
+    with pytest.raises(InvalidSolidError, match=r"^part: 2 solids where one should be$"):
+        one_solid("part", two)
+
+
+def test_a_solid_with_an_open_shell_is_refused() -> None:
+    builder, shell, solid = BRep_Builder(), TopoDS_Shell(), TopoDS_Solid()
+    builder.MakeShell(shell)
+    for face in faces(box(2.0, 3.0))[:-1]:
+        builder.Add(shell, face)
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    with pytest.raises(InvalidSolidError, match="the kernel's check finds the solid invalid"):
+        one_solid("part", solid)
+
+
+def test_cavities_are_filled() -> None:
+    hollow = one_solid("hollow", cut(sphere(ORIGIN, 3.0), [sphere(ORIGIN, 1.0)]))
+    assert volume(hollow) == pytest.approx(4 / 3 * np.pi * 26)
+    assert volume(without_cavities(hollow)) == pytest.approx(4 / 3 * np.pi * 27)
