@@ -39,6 +39,7 @@ Every design that comes with tbcad, with the figures of a dry run. Left: what ca
 of a knot that fills the capture sphere. Right: a view from azimuth 30, elevation 30 degrees,
 blended from the photographs of both cameras at the depth that they show, as `tbcad view` does;
 with few virtual cameras some of that depth is wrong (specks).
+
 `python docs/gallery.py` writes this page.
 
 Begin from one of them: `tbcad init my.toml --from afternoon-print`. With other numbers of mirrors:
