@@ -188,7 +188,9 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     named = ", ".join(
         f"a{i + 1:04d} ({coverage[i]:.3f} of {problem.target[i]:g} mm)" for i in worst
     )
+    # Borders of pedestals that vanish with some radii and not with others may never settle.
+    groove = "" if problem.groove is None else "shell.groove_mm, "
     raise SpecError(
-        f"no radius gives these mirrors the coverage that is wanted: {named}: change optics.n, "
-        "optics.capture_diameter_mm or mirrors.margin_mm"
+        f"no radius gives these mirrors the coverage that is wanted: {named}: change {groove}"
+        "optics.n, optics.capture_diameter_mm or mirrors.margin_mm"
     )
