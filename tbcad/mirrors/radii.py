@@ -19,6 +19,7 @@ from tbcad.types import Floats, Ints, Progress
 # A hundredth of a millimetre would do; verification's figures are steadier with an exact design.
 CONVERGED_MM = 1e-4
 MAX_ITERATIONS = 400
+MAX_STALLED = 40  # of them in which the least error so far does not fall
 # Designs that settle need none; each costs as much as a step, and further ones have never helped.
 MAX_HALVINGS = 4
 # How often a groove that is too wide is halved in search of one that is not.
@@ -162,6 +163,7 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     aim = np.zeros(len(curvature))
     closed, triangles = (np.zeros(len(curvature)), aim), problem.triangles
     coverage, error, halvings = np.zeros(len(curvature)), np.full(len(curvature), np.inf), 0
+    least, stalled = np.inf, 0
     for _ in range(MAX_ITERATIONS):
         try:
             cells = problem.cells(curvature, aim, triangles)
@@ -181,6 +183,10 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
         error = np.maximum(error, np.abs(step))
         if error.max() < CONVERGED_MM:
             return cells, problem.coverage(cells)
+        stalled = 0 if error.max() < least else stalled + 1
+        least = min(least, error.max())
+        if stalled > MAX_STALLED:
+            break
         progress(f"largest error of coverage {error.max():.1g} mm")
         curvature = np.maximum(curvature * problem.target / coverage, lowest)
         aim = aim + step

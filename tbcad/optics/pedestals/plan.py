@@ -19,11 +19,13 @@ from tbcad.types import Bools, Floats, Ints
 # Each round joins some corners or moves some away from a plane.
 MAX_ROUNDS = 100
 MIN_SIDES = 3
-# Sides of mirrors that are shorter than a groove vanish. For planar mirrors the limit is higher, so
-# that what vanishes seldom depends on radii, and radii can be solved for: by a groove, and at the
-# bounding planes, where sides change with a mirror's height, by this share of the mirrors' pitch.
+# Sides of planar mirrors that are shorter than so many grooves vanish. At bounding planes, where
+# sides change with a mirror's height, the limit is higher by this share of the mirrors' pitch.
 PLANAR_WIDTHS = 1.2
 PLANAR_SHARE = 0.05
+# With radii only much shorter sides vanish, so that what vanishes seldom depends on radii: where a
+# side is too short with some radii and not with those that follow from it, none are ever found.
+WIDTHS = 0.25
 # A corner that is too near to a plane moves from it in steps of this share of the shortest side
 # there.
 RISE_SHARE = 0.25
@@ -60,7 +62,7 @@ class PedestalPlan:
         Raises:
             NotRegularError: the grooves leave no outline of a mirror.
         """
-        plan, layout = _joined(self, mirrors, 1.0, 0.0)
+        plan, layout = _joined(self, mirrors, WIDTHS, 0.0)
         if plan.flat is self.flat:
             return layout
         return planned(plan.flat, self.pinhole, self.groove).layout_for(mirrors)
@@ -128,7 +130,8 @@ def _joined(
     Args:
         plan: to start from.
         mirrors: m of them.
-        widths: sides are at least so many grooves long.
+        widths: sides are at least so many grooves long, and grooves that end before a plane half
+            of that away from it, or of one groove.
         share: those at a bounding plane are longer by this share of the mirrors' pitch.
     """
     more = share * plan.pitch
@@ -142,7 +145,7 @@ def _joined(
             if len(short):
                 plan = replace(plan, short=plan.short | np.isin(np.arange(len(plan.short)), short))
                 continue
-            near = layout.near_planes((plan.groove + more) / 2)[corner]
+            near = layout.near_planes((min(widths, 1.0) * plan.groove + more) / 2)[corner]
             eased = with_longer_grooves_to_planes(flat, near, rise)
             if eased is flat:
                 return plan, layout

@@ -72,12 +72,9 @@ def test_a_groove_that_crosses_the_seam_is_refused_with_a_width_that_was_tried()
         modelled("n=20", "groove_mm=0.5")
 
 
-def test_radii_that_are_not_found_may_be_with_another_groove(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_radii_that_are_not_found_may_be_with_another_groove() -> None:
     """Of some stretched designs a border vanishes with every second set of radii."""
-    monkeypatch.setattr("tbcad.mirrors.radii.MAX_ITERATIONS", 30)
-    stretched = "n=12", "optics.stretch=[2, 2]"
+    stretched = "n=9", "optics.stretch=[2, 2]"
     with pytest.raises(SpecError, match=r"change shell\.groove_mm, optics\.n"):
-        modelled(*stretched, "groove_mm=0.1")
-    assert heights(modelled(*stretched, "groove_mm=0.2")).min() > -1e-9
+        modelled(*stretched, "groove_mm=0.05")
+    assert heights(modelled(*stretched, "groove_mm=0.1")).min() > -1e-9

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 DEPTH_WIDTHS = 4.0  # depth of a groove, in its width
 MAX_ROUNDS = 100
 # Sides of planar mirrors are longer than so many grooves, and at the bounding planes by this share
-# of the mirrors' pitch; a corner too near to a plane moves by a share of the shortest side there.
-PLANAR_WIDTHS, PLANAR_SHARE, RISE_SHARE = 1.2, 0.05, 0.25
+# of the mirrors' pitch; those of mirrors with radii, than WIDTHS grooves. A corner too near to a
+# plane moves by a share of the shortest side there.
+PLANAR_WIDTHS, PLANAR_SHARE, WIDTHS, RISE_SHARE = 1.2, 0.05, 0.25, 0.25
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def pedestal_walls(mirrors: Mirrors, planar: Mirrors, flat: CellEdges) -> Pedest
     more = PLANAR_SHARE * planar.pitch
     for _ in range(MAX_ROUNDS):
         settled = _settled(_Rule(planar, PLANAR_WIDTHS, more), graph, None)
-        standing = _settled(_Rule(mirrors, 1.0, 0.0), settled.graph, settled.joined)
+        standing = _settled(_Rule(mirrors, WIDTHS, 0.0), settled.graph, settled.joined)
         if standing.graph is settled.graph:
             return standing.walls()
         graph = standing.graph
@@ -96,7 +97,7 @@ def _settled(rule: _Rule, graph: Graph, joined: Bools | None) -> _Standing:
             if short.any():
                 joined = joined | short
                 continue
-            near = standing.near_planes((groove + rule.more) / 2)[group]
+            near = standing.near_planes((min(rule.widths, 1.0) * groove + rule.more) / 2)[group]
             eased = with_corners_farther_off(mirrors, graph, near, rise)
             if eased is graph:
                 return standing
