@@ -130,8 +130,8 @@ def _joined(
     Args:
         plan: to start from.
         mirrors: m of them.
-        widths: sides are at least so many grooves long, and grooves that end before a plane half
-            of that away from it, or of one groove.
+        widths: sides are at least so many grooves long; grooves end half of that before a plane,
+            or half a groove where that is less.
         share: those at a bounding plane are longer by this share of the mirrors' pitch.
     """
     more = share * plan.pitch
