@@ -81,15 +81,11 @@ def mesh(made: MirrorDesign) -> object:
 
 
 if __name__ == "__main__":
-    import json
     import tempfile
-    from dataclasses import asdict
 
-    from circumstances import RESULTS, circumstances
+    from circumstances import RESULTS, circumstances, show_and_write
 
     about = {**circumstances(), "rounds": 1}
     with tempfile.TemporaryDirectory() as name:
         found = edges(Path(name), rounds=1)
-    print(*found, sep="\n")
-    text = json.dumps({**about, "rows": [asdict(row) for row in found]}, indent=1) + "\n"
-    (RESULTS / "edges.json").write_text(text, encoding="utf-8")
+    show_and_write(RESULTS / "edges.json", about, found)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from circumstances import RESULTS, circumstances
+from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, at_most, measured
 
 from tbcad.simulate.capture.light_field import LightField
@@ -88,10 +84,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         parts = [sequences(one, Path(name), options.rounds) for one in options.captures]
     rows = [row for part in parts for row in part]
-    sys.stdout.writelines(f"{row}\n" for row in rows)
-    print(f"load after: {os.getloadavg()[0]:.1f}")
-    record = {**about, "rows": [asdict(row) for row in rows]}
-    options.out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    show_and_write(options.out, about, rows)
 
 
 if __name__ == "__main__":

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import shutil
 import sys
 import tempfile
@@ -13,13 +11,13 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Literal
 
-from circumstances import RESULTS, circumstances
+from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, measured
 
 from tbcad import Views
@@ -170,10 +168,7 @@ def main() -> None:
     rows = synthesised(options.capture, options.rounds)
     if not options.alone:
         rows += showing(options.capture, options.rounds)
-    sys.stdout.writelines(f"{row}\n" for row in rows)
-    print(f"load after: {os.getloadavg()[0]:.1f}")
-    record = {**about, "rows": [asdict(row) for row in rows]}
-    options.out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    show_and_write(options.out, about, rows)
 
 
 if __name__ == "__main__":
