@@ -86,7 +86,7 @@ def camera_solid(
 
     Raises:
         SpecError: when flanges or holes do not fit.
-        InvalidSolidError: when the kernel finds the solid invalid.
+        InvalidSolidError: when the kernel finds camera a's invalid; b's is its mirror image.
     """
     name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
@@ -94,8 +94,9 @@ def camera_solid(
     casing = casing_faces(mirrors, envelope or shell_envelope(design))
     walls = zip(wall_names(array.ids, cells), mirrors.walls(), strict=True)
     faces = [*zip(array.ids, mirrors.faces(), strict=True), *walls, *casing]
-    solid = one_solid(name, maker.solid([face for _, face in faces]))
-    return Solid(name, solid, tuple(faces))
+    solid = maker.solid([face for _, face in faces])
+    # The kernel's check would find of the mirror image what it found of camera a's half.
+    return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
 
 
 def wall_names(ids: Sequence[str], cells: Cells) -> list[str]:

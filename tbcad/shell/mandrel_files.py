@@ -58,7 +58,7 @@ def mandrel_solid(
 
     Raises:
         SpecError: when there is no room for its holes.
-        InvalidSolidError: when the kernel finds the solid invalid.
+        InvalidSolidError: when the kernel finds camera a's invalid; b's is its mirror image.
     """
     name, maker = mandrel_files(array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
@@ -67,8 +67,8 @@ def mandrel_solid(
     names = [*array.ids, *wall_names(array.ids, cells)]
     mirrors_and_walls = turned([*front.faces(), *front.walls()])
     faces = [*zip(names, mirrors_and_walls, strict=True), *closing]
-    solid = one_solid(name, maker.solid([face for _, face in faces]))
-    return Solid(name, solid, tuple(faces))
+    solid = maker.solid([face for _, face in faces])
+    return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
 
 
 def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:

@@ -18,7 +18,7 @@ from tbcad.cad.meshing import meshed
 from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.coupon_pose import SeatPose
-from tbcad.prototype.base.coupon_seat import height, outline, printed_seat
+from tbcad.prototype.base.coupon_seat import height, hollowed, outline, seat_body
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import usable_size
@@ -196,9 +196,10 @@ def _plate(
     for row, corner in (place for shelf in shelves for place in shelf):
         k = row.seat
         bodies += _texts(row, spec, corner)
+        body = seat_body(seats, spec, k, pose, -row.middle)
         for n, offset in enumerate(row.offsets):
             at = np.array([*_ball_middle(row, corner, n, seats), height(seats, spec, k, pose)])
-            seat = printed_seat(seats, spec, k, offset, pose, -row.middle)
+            seat = hollowed(body, seats, k, offset, pose)
             bodies.append(moved(seat, np.eye(3), at))
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ pose.axes)
             pads.append(seats.pad[k])

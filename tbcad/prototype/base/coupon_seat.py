@@ -28,24 +28,31 @@ ROUNDING_MM = 1e-6
 UP = np.eye(3)[2]
 
 
-def printed_seat(
-    seats: Seats, spec: BaseSpec, k: int, offset: float, pose: SeatPose, to_bar: float
-) -> TopoDS_Shape:
-    """A seat with its keel, along the bed's axes, the ball's centre at the origin.
+def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: float) -> TopoDS_Shape:
+    """A seat without its hollow, with its keel, along the bed's axes, the ball's centre at 0.
 
     Args:
         seats: from `coupon_seats`.
         spec: of the base.
         k: number of the seat.
-        offset: of its pads, away from the ball, mm.
         pose: of the seat on the bed.
         to_bar: y of the bar that the keel reaches, mm.
     """
     wall = revolved_polygon(wall_section(seats, spec, k), 0.0, 2 * np.pi)
     legs = cut(wall, list(_between_legs(seats, spec, k)))
     keel = prism(polygon(keel_corners(seats, spec, k, pose, to_bar)), KEEL_MM * np.eye(3)[0])
+    return fused([moved(legs, pose.axes, np.zeros(3)), keel])
+
+
+def hollowed(
+    body: TopoDS_Shape, seats: Seats, k: int, offset: float, pose: SeatPose
+) -> TopoDS_Shape:
+    """A seat's body with its hollow; pads are moved off the ball by an offset, mm.
+
+    The body stays as it is: a boolean may change the tolerances of what it is given.
+    """
     hollow = moved(seat_hollow(seats, k, offset), pose.axes, np.zeros(3))
-    return cut(fused([moved(legs, pose.axes, np.zeros(3)), keel]), [hollow])
+    return cut(moved(body, np.eye(3), np.zeros(3)), [hollow])
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:

@@ -38,9 +38,10 @@ from tbcad.prototype.base.coupon_seat import (
     KEEL_MM,
     core_radius,
     height,
+    hollowed,
     keel_corners,
     leaning,
-    printed_seat,
+    seat_body,
     wall_section,
 )
 from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
@@ -430,7 +431,7 @@ class TestCoupon:
         spec, pose = base.spec, pose_of(base)
         seats = coupon_seats(base, pose)
         for k in (int(seats.radius.argmax()), int(seats.radius.argmin())):
-            solid = as_trimesh(printed_seat(seats, spec, k, 0.0, pose, 0.0))
+            solid = as_trimesh(hollowed(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
             beside = (seats.pad[k] + 0.9 * spec.cup_wall_mm) * np.linspace(-1, 1, 9)
             deep = float(seats.cup[k]) + spec.cup_wall_mm * np.array([0.1, 0.9])
             for normal in seats.local_normals[k]:
@@ -449,7 +450,7 @@ class TestCoupon:
         seats = coupon_seats(base, pose)
         for k in range(len(seats)):
             bed = height(seats, spec, k, pose)
-            solid = as_trimesh(printed_seat(seats, spec, k, 0.0, pose, 0.0))
+            solid = as_trimesh(hollowed(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
             assert solid.bounds[0, 2] == pytest.approx(-bed, abs=1e-6)
             keel = np.abs(solid.vertices[:, 0]) < KEEL_MM / 2 + 1e-6
             assert solid.vertices[~keel, 2].min() == pytest.approx(-bed, abs=0.3)
