@@ -20,7 +20,7 @@ from tbcad_verify.types import Bools, Floats, Ints
 OUTLINE_DIRECTIONS = 96
 NEIGHBOURS = 20
 HALVINGS = 34
-MAX_ANGLE = 1.2  # rad, from a mirror's apex to its outline, as the pinhole sees them
+MAX_ANGLE = 1.2  # rad, from a mirror's apex to its outline, where no neighbour ends the cell
 INSIDE = 0.98  # of the angle to the outline, where the mirror itself must be seen
 CHUNK = 1 << 6  # neighbouring rays, as a rule, against the spheres near them
 SLACK = 1e-6  # rad: cosines near 1 are off by rounding
@@ -100,8 +100,8 @@ def cell_outlines(shell: MirrorSpheres) -> PinholeOutlines:
     around = 2 * np.pi * np.arange(OUTLINE_DIRECTIONS) / OUTLINE_DIRECTIONS
     out = first[:, :, None] * np.cos(around) + second[:, :, None] * np.sin(around)
     near = _neighbours(shell)
-    low = np.zeros((shell.radius.size, OUTLINE_DIRECTIONS))
-    high = np.full_like(low, MAX_ANGLE)
+    high = _outside(shell, near, chief, out)
+    low = np.zeros_like(high)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         d = np.cos(middle) * chief[:, :, None] + np.sin(middle) * out
@@ -110,6 +110,17 @@ def cell_outlines(shell: MirrorSpheres) -> PinholeOutlines:
     d = np.cos(low) * chief[:, :, None] + np.sin(low) * out
     is_edge = ~shell.halved[:, None] | (shell.side * _points(shell, d)[0] >= 0)
     return PinholeOutlines(chief, d, low, is_edge)
+
+
+def _outside(shell: MirrorSpheres, near: Ints, chief: Floats, out: Floats) -> Floats:
+    """(m, OUTLINE_DIRECTIONS) angles beyond the outline: rad, to the farthest of the neighbours.
+
+    Not farther where that is outside: toward its silhouette a sphere may rise above the foot again.
+    """
+    cosine = (chief[:, :, None] * chief[:, near]).sum(axis=0)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1, initial=0.0)[:, None]
+    inside = _inside(shell, near, np.cos(angle) * chief[:, :, None] + np.sin(angle) * out)
+    return np.where(inside, MAX_ANGLE, angle)
 
 
 def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
