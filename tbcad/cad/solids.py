@@ -4,7 +4,7 @@ Booleans take lists: one general fuse of many bodies is faster than one after th
 """
 
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -22,10 +22,12 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_MakeSolid,
     BRepBuilderAPI_MakeVertex,
+    BRepBuilderAPI_Sewing,
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepClass3d import BRepClass3d
+from OCP.BRepLib import BRepLib
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeCylinder,
@@ -111,6 +113,17 @@ def pyramid(apex: Floats, corners: Floats) -> TopoDS_Solid:
     loft.AddVertex(BRepBuilderAPI_MakeVertex(gp_Pnt(*apex.tolist())).Vertex())
     loft.AddWire(_closed_wire(corners))
     return one_solid("pyramid", loft.Shape())
+
+
+def polyhedron(facets: Iterable[Floats]) -> TopoDS_Solid:
+    """The solid within plane facets (n, 3), in any order and sense; equal corners are one, mm."""
+    sewing = BRepBuilderAPI_Sewing(SAME_MM)
+    for facet in facets:
+        sewing.Add(polygon(facet))
+    sewing.Perform()
+    solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(sewing.SewedShape())).Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return solid
 
 
 def moved(shape: TopoDS_Shape, axes: Floats, origin: Floats) -> TopoDS_Shape:

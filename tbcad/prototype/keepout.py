@@ -16,7 +16,7 @@ from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
 from tbcad.types import Floats
 
 # Smallest distances are exact to this, or to this share of them, and never too large: where two
@@ -178,7 +178,8 @@ def _split(triangles: Floats) -> Floats:
 
 def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     low, high = base.sector[0] + float(swing[0]), base.sector[1] + float(swing[1])
-    wall = np.vstack([base.inner, base.outer[::-1]])
+    outer = base.outer + np.array([0.0, FACETS_OUT_MM])
+    wall = np.vstack([base.inner, outer[::-1]])
     ribs = np.vstack([base.outline, base.inner[::-1]])
     bosses = [_boss(base, k) for k in range(len(base.seats))]
     hub = base.hub

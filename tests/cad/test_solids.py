@@ -19,6 +19,7 @@ from tbcad.cad.solids import (
     moved,
     one_solid,
     polygon,
+    polyhedron,
     prism,
     pyramid,
     revolved_polygon,
@@ -45,6 +46,14 @@ def test_volumes_of_bodies() -> None:
     assert volume(pyramid(6 * UP, BASE)) == pytest.approx(8)
     ring = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
     assert volume(revolved_polygon(ring, 0.3, np.pi)) == pytest.approx(1.5 * np.pi)
+
+
+def test_facets_in_any_order_and_sense_close_a_solid() -> None:
+    corners = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 4.0)])
+    facets = [corners[k] for k in ([0, 1, 3, 2], [4, 5, 7, 6], [0, 4, 5, 1])]
+    facets += [corners[k] for k in ([2, 6, 7, 3], [4, 6, 2, 0], [1, 5, 7, 3])]
+    for sides in (facets, [facet[::-1] for facet in facets[::-1]]):
+        assert volume(polyhedron(sides)) == pytest.approx(24)
 
 
 def test_sets_of_two_bodies() -> None:

@@ -1,8 +1,9 @@
 """The base in numbers: a ribbed carrier about the axis with a seat for each ball, and its hub.
 
 Its cross-section is a convex line behind all light and as deep as each seat needs, so small balls
-and caps are not in a wall that large ones push far out; the wall is that line turned about the
-axis over the sector of the balls. Ribs are outside, highest at the hub where the load is.
+and caps are not in a wall that large ones push far out. The wall has plane facets round that line
+turned about the axis, over the sector of the balls. Ribs are outside, highest at the hub where the
+load is.
 """
 
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from tbcad.types import Floats
 EDGE_MM = 2.0  # wall beyond the outermost bosses
 MIN_PART_MM = 8.0  # length of the parts of the cross-section
 ROOTED_MM = 6.0  # how far the wall reaches into the hub's disc
+FACETS_OUT_MM = 0.1  # of the edges of the wall's facets from the cones that their middles are on
 MIN_PROTRUSION_MM = 0.8  # of a boss beyond the wall, for its number
 MAX_SECTOR = np.radians(330)
 # Ribs between the edges may be moved by this share of their distance to miss the bosses.
@@ -40,6 +42,7 @@ MAX_RIB_SHIFT = 0.35
 RIB_SHIFTS = 29  # tried
 HUB_CORNER_MM = 3.0  # by which ribs stay back from the hub's outer edge
 FRONT_CORNERS = 24  # of a polygon round the front of a boss
+OFF_RIM_MM = 0.5  # of the wall from the hub's rim, which its facets must not just touch
 OFF_FRONT_MM = 0.4  # of the wall from a boss's front edge, which must not just touch it
 # Ribs end this far before the wall, rings half as far: faces that nearly coincide do not join well.
 RIB_END_MM = 1.0
@@ -218,7 +221,7 @@ def _wall_points(spec: BaseSpec, seats: Seats, frame: Floats) -> Floats:
 def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hub: Hub) -> Floats:
     """The wall's inner line: round the light, from the hub's rim to beyond the last boss."""
     behind = np.vstack([_wall_points(spec, seats, frame), light.outline()])
-    rim = np.array([[hub.front, hub.disc]])
+    rim = np.array([[hub.front, hub.disc + OFF_RIM_MM]])
     end = _end(seats, frame)
     line = trimmed(hull(np.vstack([rim, behind[behind[:, 0] > hub.front]])), end)
     if norm(line[-1] - line[-2]) < MIN_PART_MM and len(line) > 2:

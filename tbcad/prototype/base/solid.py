@@ -10,7 +10,7 @@ from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
 from tbcad.cad.meshing import volume_by_meshes
-from tbcad.cad.solids import cut, fused, polygon, prism, revolved_polygon
+from tbcad.cad.solids import cut, fused, polygon, polyhedron, prism, revolved_polygon
 from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout
@@ -23,6 +23,7 @@ from tbcad.prototype.base.split_solids import (
     label_windows,
     number_solids,
 )
+from tbcad.prototype.base.wall import wall_facets
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
@@ -82,9 +83,13 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
     labels = number_solids(base, split)
     labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
     bosses = _at_seats(seats, [seat_solids.boss_solid(seats, k) for k in range(len(seats))])
-    low, high = base.sector
-    wall = revolved_polygon(np.vstack([base.inner, base.outer[::-1]]), low, high - low)
-    return [wall, *_struts(base, split), *hub_solids.hub_bodies(base.hub), *bosses, *labels]
+    return [
+        polyhedron(wall_facets(base)),
+        *_struts(base, split),
+        *hub_solids.hub_bodies(base.hub),
+        *bosses,
+        *labels,
+    ]
 
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
