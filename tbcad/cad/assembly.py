@@ -5,6 +5,8 @@ from typing import TypeAlias
 
 from OCP.TopoDS import TopoDS_Solid
 
+from tbcad.cad.mesh import Mesh
+
 Colour: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue (sRGB) and opacity, from 0 to 1."""
 
@@ -17,11 +19,13 @@ class ColouredSolid:
         name: unique in the assembly.
         shape: in its place, the base at angle zero.
         colour: red, green, blue (sRGB) and opacity, from 0 to 1.
+        mesh: of the shape; None where none is known.
     """
 
     name: str
     shape: TopoDS_Solid
     colour: Colour
+    mesh: Mesh | None = None
 
 
 @dataclass(frozen=True)

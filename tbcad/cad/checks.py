@@ -6,7 +6,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.measures import plane_faces, volume
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import meshed
+from tbcad.cad.meshing import meshed, welded
 from tbcad.cad.solids import one_solid, without_cavities
 from tbcad.geometry.vectors import norm
 from tbcad.types import Floats
@@ -17,9 +17,14 @@ VOLUME_ERROR = 1e-3
 
 
 def checked(
-    name: str, shape: TopoDS_Shape, expected: float, contacts: Floats, radius: Floats
-) -> TopoDS_Solid:
-    """The one solid without cavities that a shape must be, of a volume (mm^3), with its pads.
+    name: str,
+    shape: TopoDS_Shape,
+    expected: float,
+    contacts: Floats,
+    radius: Floats,
+    mesh_mm: float,
+) -> tuple[TopoDS_Solid, Mesh]:
+    """The one solid without cavities that a shape must be, and its mesh.
 
     Args:
         name: for errors.
@@ -27,15 +32,27 @@ def checked(
         expected: its volume by booleans of meshes, mm^3.
         contacts: middles of the pads, mm, (p, 3).
         radius: of the pads, mm, (p,).
+        mesh_mm: largest distance of the mesh from the surface.
 
     Raises:
         InvalidSolidError: when it is something else.
     """
     solid = without_cavities(one_solid(name, shape))
-    check_mesh(name, meshed(solid, COARSE_MM))  # a face may be valid and yet have no mesh
+    mesh = closed_mesh(name, solid, mesh_mm)
     check_volume(name, solid, expected)
     check_pads(name, solid, contacts, radius)
-    return solid
+    return solid, mesh
+
+
+def closed_mesh(name: str, shape: TopoDS_Shape, tolerance: float) -> Mesh:
+    """The mesh of a solid as it is exported, no farther than a tolerance (mm) from the surface.
+
+    Raises:
+        InvalidSolidError: when it is not closed: a face may be valid and yet have no mesh.
+    """
+    mesh = welded(meshed(shape, tolerance))
+    check_mesh(name, mesh)
+    return mesh
 
 
 def check_mesh(name: str, mesh: Mesh) -> None:

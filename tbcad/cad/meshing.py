@@ -10,6 +10,9 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.mesh import Mesh
@@ -18,6 +21,8 @@ from tbcad.types import Floats, Ints
 
 # Facets of cylinders and cones: no coarser than a turn of this angle (radians).
 ANGLE = 0.2
+# The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
+MERGE_MM = 2e-5
 
 
 def volume_by_meshes(
@@ -85,6 +90,16 @@ def _joined(points: Floats, triangles: Ints) -> Mesh:
     """Corners that agree to a nanometre become one; facets that lose a corner go."""
     _, first, of = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
     return without_degenerate(points[first], of.reshape(-1)[triangles])
+
+
+def welded(mesh: Mesh) -> Mesh:
+    """The mesh with corners that are the same to MERGE_MM made one, and lost facets dropped."""
+    pairs = cKDTree(mesh.vertices).query_pairs(MERGE_MM, output_type="ndarray")
+    size = len(mesh.vertices)
+    near = coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size))
+    _, group = connected_components(near, directed=False)
+    _, first = np.unique(group, return_index=True)
+    return without_degenerate(mesh.vertices[first], group.astype(np.int64)[mesh.triangles])
 
 
 def without_degenerate(vertices: Floats, triangles: Ints) -> Mesh:

@@ -3,7 +3,6 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
-import multiprocessing
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -62,8 +61,6 @@ from tbcad.types import Floats
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
 # With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
 SAME_MM = 1e-6
-# Booleans of more shapes than this are done in threads.
-FEW = 8
 
 
 def polygon(points: Floats) -> TopoDS_Face:
@@ -160,19 +157,14 @@ def _boolean(
     operation.SetArguments(_list(first))
     operation.SetTools(_list(second))
     operation.SetFuzzyValue(same)
-    # Both only spare time: faces come in the same order, tests compare the bytes.
-    operation.SetRunParallel(len(first) + len(second) > FEW and _has_threads())
+    # Only spares time: faces come in the same order, a test compares the bytes. Threads of the
+    # kernel would take a third more processor time, and the other core has work.
     operation.SetUseOBB(True)
     operation.SetToFillHistory(False)
     operation.Build()
     if not operation.IsDone():
         raise InvalidSolidError("the kernel cannot join or cut these solids")
     return operation.Shape()
-
-
-def _has_threads() -> bool:
-    """Whether the kernel's threads are there: a copy of a process would wait for them for ever."""
-    return multiprocessing.parent_process() is None
 
 
 def to_bytes(shape: TopoDS_Shape) -> bytes:

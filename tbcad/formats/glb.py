@@ -12,7 +12,7 @@ from trimesh.visual.material import PBRMaterial
 from tbcad.cad.assembly import ColouredSolid, SolidGroup
 from tbcad.cad.meshing import meshed
 
-# For viewing only: parts are meshed finely in their own files.
+# For viewing only: of bodies that have no mesh yet.
 COARSE_MM, COARSE_ANGLE = 0.1, 0.25
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
@@ -32,14 +32,13 @@ def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
                 geom_name=body.name,
                 parent_node_name=group.name,
             )
-    path.write_bytes(export_glb(scene, include_normals=True))
+    # Without normals viewers must shade each facet flat (glTF 2.0, 3.7.2.1), as it is.
+    path.write_bytes(export_glb(scene, include_normals=False))
 
 
 def _drawn(body: ColouredSolid) -> trimesh.Trimesh:
-    mesh = meshed(body.shape, COARSE_MM, COARSE_ANGLE)
+    mesh = body.mesh or meshed(body.shape, COARSE_MM, COARSE_ANGLE)
     drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
-    # Corners of flat faces are not smoothed over.
-    drawn.unmerge_vertices()
     drawn.visual = TextureVisuals(
         material=PBRMaterial(
             name=body.name,

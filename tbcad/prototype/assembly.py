@@ -54,7 +54,7 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
 
 def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> SolidGroup:
     solids = (
-        ColouredSolid(part.name, part.solid.shape, COLOURS[part.role])
+        ColouredSolid(part.name, part.solid.shape, COLOURS[part.role], part.solid.mesh)
         for part in prototype.printed
         if part.role in roles
     )

@@ -17,6 +17,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
+from tbcad.prototype.base.profile import offset, shortened
 from tbcad.types import Floats
 
 # Smallest distances are exact to this, or to this share of them, and never too large: where two
@@ -178,8 +179,7 @@ def _split(triangles: Floats) -> Floats:
 
 def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     low, high = base.sector[0] + float(swing[0]), base.sector[1] + float(swing[1])
-    outer = base.outer + np.array([0.0, FACETS_OUT_MM])
-    wall = np.vstack([base.inner, outer[::-1]])
+    wall = _wall(base)
     ribs = np.vstack([base.outline, base.inner[::-1]])
     bosses = [_boss(base, k) for k in range(len(base.seats))]
     hub = base.hub
@@ -187,6 +187,12 @@ def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     discs += [rectangle((hub.face, 0.0), (hub.back, hub.boss))] if hub.boss else []
     turning = [SweptSection(polygon, low, high) for polygon in (wall, ribs, *base.rings, *bosses)]
     return (*turning, *(SweptSection(polygon, -np.pi, np.pi) for polygon in discs))
+
+
+def _wall(base: BaseLayout) -> Floats:
+    """Section of the wall in (z, r), with the edges of its facets, which are off its cones, (p, 2)."""
+    line = shortened(base.inner, -FACETS_OUT_MM)
+    return np.vstack([line, offset(line, base.spec.thickness_mm + FACETS_OUT_MM)[::-1]])
 
 
 def _boss(base: BaseLayout, k: int) -> Floats:

@@ -157,14 +157,15 @@ def build_prototype_model(
 def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> PrototypeModel:
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
     printer, parts, split = spec.printer, arrangement.parts, arrangement.split
+    mesh_mm = spec.mesh.structure_error_mm
     progress("prototype: base")
     pose = worst_pose(base, split, expected_downs(base, split))
-    coupons = submit(coupons_or_error, base, printer, pose)
-    carrier = carrier_parts(base, split, printer)
+    coupons = submit(coupons_or_error, base, printer, pose, mesh_mm)
+    carrier = carrier_parts(base, split, printer, mesh_mm)
     printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
     if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
-        coupons = submit(coupons_or_error, base, printer, printed_pose)
-    disc = placed_component(arrangement.frame.homing.disc, printer)
+        coupons = submit(coupons_or_error, base, printer, printed_pose, mesh_mm)
+    disc = placed_component(arrangement.frame.homing.disc, printer, mesh_mm)
     masses = _masses([*carrier, disc], printer.density_g_cm3)
     faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
@@ -173,11 +174,11 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     shroud = arrangement.shroud
     if drive != arrangement.drive:  # the mass of the solids asks for another
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
-        disc = placed_component(frame.homing.disc, printer)
+        disc = placed_component(frame.homing.disc, printer, mesh_mm)
         shroud = shroud_round(spec, stage, frame, keep_out, parts)
     static = [
-        *_components("stage", stage.components, printer),
-        *_components("frame", frame.printed, printer),
+        *_components("stage", stage.components, printer, mesh_mm),
+        *_components("frame", frame.printed, printer, mesh_mm),
     ]
     gauge = _gauge(spec, layout, base, frame)
     progress("prototype: caps and coupon")
@@ -187,10 +188,10 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     printed = (
         *_carrier(base, carrier),
         PrintedPart(disc, "base", frame.homing.disc.what),
-        *_caps(base, layout),
+        *_caps(base, layout, mesh_mm),
         *static,
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in plates),
-        *(_components("tool", [gauge.component], printer) if gauge else ()),
+        *(_components("tool", [gauge.component], printer, mesh_mm) if gauge else ()),
     )
     for fault in faults:
         if fault.result():
@@ -214,11 +215,11 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
 
 
 def coupons_or_error(
-    base: BaseLayout, printer: PrinterSpec, pose: SeatPose
+    base: BaseLayout, printer: PrinterSpec, pose: SeatPose, mesh_mm: float
 ) -> list[PlacedSolid] | SpecError | InvalidSolidError:
     """The coupons with their properties, or why there are none."""
     try:
-        plates = coupon_plates(base, printer, pose)
+        plates = coupon_plates(base, printer, pose, mesh_mm)
         for plate in plates:
             _ = plate.properties  # kept with it
     except (SpecError, InvalidSolidError) as error:
@@ -262,15 +263,15 @@ def _carrier(base: BaseLayout, pieces: list[PlacedSolid]) -> Iterator[PrintedPar
         yield PrintedPart(piece, "base", CARRIER_PURPOSE if number else first)
 
 
-def _caps(base: BaseLayout, layout: PrototypeLayout) -> Iterator[PrintedPart]:
+def _caps(base: BaseLayout, layout: PrototypeLayout, mesh_mm: float) -> Iterator[PrintedPart]:
     balls = np.flatnonzero(layout.balls.cap).tolist()
-    for ball, part in zip(balls, cap_parts(base, layout), strict=True):
+    for ball, part in zip(balls, cap_parts(base, layout, mesh_mm), strict=True):
         purpose = f"stands in for ball {ball + 1}, which is too large to buy"
         yield PrintedPart(part, "cap", purpose, ball)
 
 
 def _components(
-    role: Role, components: Iterable[Component], printer: PrinterSpec
+    role: Role, components: Iterable[Component], printer: PrinterSpec, mesh_mm: float
 ) -> Iterator[PrintedPart]:
     for component in components:
-        yield PrintedPart(placed_component(component, printer), role, component.what)
+        yield PrintedPart(placed_component(component, printer, mesh_mm), role, component.what)

@@ -32,8 +32,8 @@ def test_the_coupons_take_a_third_of_what_they_took(tmp_path: Path) -> None:
     base, split, printer = arranged.base, arranged.split, arranged.spec.printer
     pose = worst_pose(base, split, expected_downs(base, split))
     hours = filament = 0.0
-    for plate in coupon_plates(base, printer, pose):
-        mesh = part_mesh(PrintedPart(plate, "tool", "coupon"), 0.02)
+    for plate in coupon_plates(base, printer, pose, 0.02):
+        mesh = part_mesh(PrintedPart(plate, "tool", "coupon"))
         file = tmp_path / f"{plate.name}.stl"
         trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(file)
         length, time = _sliced(tmp_path, file)

@@ -79,7 +79,7 @@ class TestMass:
     def test_estimate_agrees_with_the_solid(self, small: Arrangement) -> None:
         """Flanges, numbers and overlaps of ribs are left out: some per cent."""
         printer = small.spec.printer
-        solids = carrier_parts(small.base, small.split, printer)
+        solids = carrier_parts(small.base, small.split, printer, 0.1)
         exact = sum(part.mass_g(printer.density_g_cm3) for part in solids)
         carried = ball_masses(small.layout, printer.density_g_cm3).mass_g.sum()
         assert small.balance.mass_g - carried == pytest.approx(exact, rel=0.15)

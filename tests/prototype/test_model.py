@@ -7,13 +7,14 @@ import pytest
 from OCP.Standard import Standard_Failure
 
 from tbcad.cad.brep import InvalidSolidError
+from tbcad.cad.meshing import meshed
 from tbcad.cad.solids import cylinder, one_solid
 from tbcad.prototype import model
 from tbcad.prototype.model import carrier_fault
 from tbcad.prototype.printing.placing import PlacedSolid
 
 ROD = one_solid("rod", cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0, 20.0))
-PART = PlacedSolid("rod", ROD, np.eye(3), np.zeros(3))
+PART = PlacedSolid("rod", ROD, meshed(ROD, 0.1), np.eye(3), np.zeros(3))
 
 
 def failing(error: Exception) -> Callable[..., None]:

@@ -9,6 +9,7 @@ In the cap's own frame the centre of its body is the origin and its axis, away f
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
+from tbcad.cad.checks import closed_mesh
 from tbcad.cad.solids import moved, one_solid, revolved
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part
@@ -25,16 +26,17 @@ SHOULDER_MM = 0.1  # of the flat round the spigot
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
-def cap_parts(base: BaseLayout, prototype: PrototypeLayout) -> list[PlacedSolid]:
+def cap_parts(base: BaseLayout, prototype: PrototypeLayout, mesh_mm: float) -> list[PlacedSolid]:
     """A cap for each ball that is not bought, in its seat, its front up when it is printed.
 
     Raises:
         InvalidSolidError: when the kernel fails.
     """
-    return [_cap(base, prototype, k) for k in np.flatnonzero(prototype.balls.cap).tolist()]
+    caps = np.flatnonzero(prototype.balls.cap).tolist()
+    return [_cap(base, prototype, k, mesh_mm) for k in caps]
 
 
-def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int) -> PlacedSolid:
+def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int, mesh_mm: float) -> PlacedSolid:
     seats, balls, name = base.seats, prototype.balls, f"cap_{k + 1}"
     section = _section(base, float(balls.radius[k]), float(balls.body_depth[k]), k)
     axes, centre = seats.axes[k], seats.centre[k]
@@ -42,7 +44,8 @@ def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int) -> PlacedSolid:
     # The front is up and the flat lies on the bed.
     on_bed = axes.T @ UPSIDE_DOWN
     _, end = cap_spigot(base, k)
-    return PlacedSolid(name, shape, on_bed, np.array([0, 0, end]) - centre @ on_bed)
+    mesh = closed_mesh(name, shape, mesh_mm)
+    return PlacedSolid(name, shape, mesh, on_bed, np.array([0, 0, end]) - centre @ on_bed)
 
 
 def cap_spigot(base: BaseLayout, k: int) -> tuple[float, float]:

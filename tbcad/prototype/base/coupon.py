@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.checks import check_mesh, check_pads
+from tbcad.cad.checks import check_pads, closed_mesh
 from tbcad.cad.glyphs import ROWS, relief, text_width
-from tbcad.cad.meshing import meshed
 from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.coupon_pose import SeatPose
@@ -33,8 +32,6 @@ BAR_HEIGHT, BAR_MAX_MM = 0.8, 0.6
 BESIDE_TEXT_MM = 0.8  # of a bar
 GAP_MM = 3.0  # round texts and between seats
 SUNK_MM = 0.3  # of texts into their face
-# Tolerance (mm) and angle (radians) of a mesh that is only checked for gaps.
-COARSE_MESH = (0.2, 0.4)
 DECIMALS = 6  # to which sizes are the same, mm
 
 
@@ -65,13 +62,16 @@ Place = tuple[CouponRow, Floats]
 """A row, and its left end on its shelf's middle line, mm, (2,)."""
 
 
-def coupon_plates(base: BaseLayout, printer: PrinterSpec, pose: SeatPose) -> list[PlacedSolid]:
+def coupon_plates(
+    base: BaseLayout, printer: PrinterSpec, pose: SeatPose, mesh_mm: float
+) -> list[PlacedSolid]:
     """Plates with a seat for each chosen size and each offset of the pads, few as the bed allows.
 
     Args:
         base: with the seats.
         printer: with its bed.
         pose: of the seats on the bed.
+        mesh_mm: largest distance of their meshes from the surface.
 
     Raises:
         SpecError: when a single seat is larger than the bed.
@@ -80,9 +80,13 @@ def coupon_plates(base: BaseLayout, printer: PrinterSpec, pose: SeatPose) -> lis
     seats = coupon_seats(base, pose)
     plates = _plates(coupon_rows(seats, base.spec, printer, pose.lean), printer)
     return [
-        PlacedSolid(name, _plate(name, seats, base.spec, rows, pose), np.eye(3), np.zeros(3))
-        for name, rows in ((f"coupon_{k}", rows) for k, rows in enumerate(plates, start=1))
+        _placed(f"coupon_{k}", _plate(f"coupon_{k}", seats, base.spec, rows, pose), mesh_mm)
+        for k, rows in enumerate(plates, start=1)
     ]
+
+
+def _placed(name: str, plate: TopoDS_Solid, mesh_mm: float) -> PlacedSolid:
+    return PlacedSolid(name, plate, closed_mesh(name, plate, mesh_mm), np.eye(3), np.zeros(3))
 
 
 def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:
@@ -204,7 +208,6 @@ def _plate(
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ pose.axes)
             pads.append(seats.pad[k])
     solid = one_solid(name, fused(bodies))
-    check_mesh(name, meshed(solid, *COARSE_MESH))
     check_pads(name, solid, np.concatenate(contacts), np.repeat(pads, 3))
     return solid
 

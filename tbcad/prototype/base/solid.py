@@ -9,6 +9,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.solids import cut, fused, polygon, polyhedron, prism, revolved_polygon
 from tbcad.prototype.base import hub_solids, seat_solids
@@ -38,28 +39,33 @@ LABEL_ROOM = 0.85  # of a boss's end
 RIB_MIDDLE = -0.5  # of a rib beside its azimuth, in its thicknesses
 
 
-def carrier_parts(base: BaseLayout, split: BaseSplit, printer: PrinterSpec) -> list[PlacedSolid]:
+def carrier_parts(
+    base: BaseLayout, split: BaseSplit, printer: PrinterSpec, mesh_mm: float
+) -> list[PlacedSolid]:
     """The carrier placed on the bed: in one piece or as it is split.
 
     Args:
         base: in numbers.
         split: how it is cut.
         printer: with its bed.
+        mesh_mm: largest distance of meshes from the surface.
 
     Raises:
         SpecError: when a piece does not fit; it says how large the bed must be.
         InvalidSolidError: when the kernel fails.
     """
-    solid = carrier_solid(base, split)
+    solid, mesh = carrier_solid(base, mesh_mm, split)
     if split.joints:
-        return carrier_pieces(base, split, solid, printer)
+        return carrier_pieces(base, split, solid, printer, mesh_mm)
     directions = downward_directions(base, split.pieces[0])
     pads = base.local_seats.pad_normals.reshape(-1, 3)
-    return [placed_on_bed("carrier", solid, directions, base.axes, printer, pads)]
+    return [placed_on_bed("carrier", solid, mesh, directions, base.axes, printer, pads)]
 
 
-def carrier_solid(base: BaseLayout, split: BaseSplit = UNCUT) -> TopoDS_Solid:
-    """The carrier before it is cut up, about z, with the flanges of its joints.
+def carrier_solid(
+    base: BaseLayout, mesh_mm: float, split: BaseSplit = UNCUT
+) -> tuple[TopoDS_Solid, Mesh]:
+    """The carrier before it is cut up, about z, with the flanges of its joints; and its mesh.
 
     Raises:
         InvalidSolidError: when the kernel fails at every distance of SAME_MM.
@@ -72,7 +78,7 @@ def carrier_solid(base: BaseLayout, split: BaseSplit = UNCUT) -> TopoDS_Solid:
     for same in SAME_MM:
         try:
             shape = cut(fused(added, same), removed, same)
-            return checked("carrier", shape, expected, contacts, pads)
+            return checked("carrier", shape, expected, contacts, pads, mesh_mm)
         except InvalidSolidError as error:
             errors.append(error)
     raise errors[0]

@@ -8,6 +8,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import checked
 from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.mesh import Mesh
 from tbcad.cad.meshing import volume_by_cut_mesh
 from tbcad.cad.solids import common, cut, cylinder, polygon, prism, revolved_polygon
 from tbcad.geometry.vectors import perpendicular_axes, unit
@@ -98,7 +99,7 @@ def _number(base: BaseLayout, split: BaseSplit, out: Floats, place: Floats) -> l
 
 
 def carrier_pieces(
-    base: BaseLayout, split: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec
+    base: BaseLayout, split: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
     """The pieces placed on the bed.
 
@@ -107,6 +108,7 @@ def carrier_pieces(
         split: how it is cut.
         whole: the carrier with its flanges, not yet cut.
         printer: with its bed.
+        mesh_mm: largest distance of their meshes from the surface.
 
     Raises:
         SpecError: when a piece does not fit the bed.
@@ -116,7 +118,7 @@ def carrier_pieces(
     return [
         placed_on_bed(
             f"carrier_{n + 1}",
-            _piece(base, split, n, whole),
+            *_piece(base, split, n, whole, mesh_mm),
             downward_directions(base, piece),
             base.axes,
             printer,
@@ -126,13 +128,15 @@ def carrier_pieces(
     ]
 
 
-def _piece(base: BaseLayout, split: BaseSplit, n: int, whole: TopoDS_Solid) -> TopoDS_Solid:
+def _piece(
+    base: BaseLayout, split: BaseSplit, n: int, whole: TopoDS_Solid, mesh_mm: float
+) -> tuple[TopoDS_Solid, Mesh]:
     piece, holes, seats = split.pieces[n], piece_holes(base, split, n), base.local_seats
     expected = volume_by_cut_mesh(whole, piece, holes, CHORD_MM)
     shape = cut(whole, [*(_beyond(row) for row in piece), *holes])
     in_piece = _seats_in(base, split, n)
     contacts, pads = seats.contacts[in_piece].reshape(-1, 3), np.repeat(seats.pad[in_piece], 3)
-    return checked(f"carrier_{n + 1}", shape, expected, contacts, pads)
+    return checked(f"carrier_{n + 1}", shape, expected, contacts, pads, mesh_mm)
 
 
 def _seats_in(base: BaseLayout, split: BaseSplit, n: int) -> Bools:

@@ -131,7 +131,7 @@ def _title(spec: Spec) -> str:
 
 def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> PrintEstimate:
     """STEP as assembled, STL and 3MF on the printer's bed; an estimate of its print."""
-    names, mesh = _file_names(part), part_mesh(part, spec.mesh.structure_error_mm)
+    names, mesh = _file_names(part), part_mesh(part)
     solid = Solid(part.name, part.solid.shape, ())
     write_step(folder / names["step"], solid, spec.step.pcurves, part.solid.properties)
     write_stl(folder / names["stl"], mesh)

@@ -3,7 +3,7 @@
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.checks import check_volume
+from tbcad.cad.checks import check_volume, closed_mesh
 from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.solids import (
     cut,
@@ -49,15 +49,16 @@ def component_solid(component: Component) -> TopoDS_Solid:
     return solid
 
 
-def placed_component(component: Component, printer: PrinterSpec) -> PlacedSolid:
-    """A component placed on the printer's bed.
+def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:
+    """A component placed on the printer's bed, its mesh within a distance of the surface.
 
     Raises:
         SpecError: when it does not fit.
         InvalidSolidError: when the kernel fails.
     """
     solid = component_solid(component)
-    return placed_on_bed(component.name, solid, component.downs, np.eye(3), printer)
+    mesh = closed_mesh(component.name, solid, mesh_mm)
+    return placed_on_bed(component.name, solid, mesh, component.downs, np.eye(3), printer)
 
 
 def _outward(body: Prism) -> Floats:

@@ -4,19 +4,13 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import meshed, without_degenerate
+from tbcad.cad.meshing import without_degenerate
 from tbcad.prototype.printing.placing import PlacedSolid
 
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
-
-# The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
-MERGE_MM = 2e-5
 
 
 @dataclass(frozen=True)
@@ -41,24 +35,9 @@ class PrintedPart:
         return self.solid.name
 
 
-def part_mesh(part: PrintedPart, tolerance: float) -> Mesh:
-    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL.
-
-    Args:
-        part: to be printed.
-        tolerance: largest distance of facets from the surface, mm.
-    """
-    return rounded(welded(meshed(part.solid.on_bed, tolerance)))
-
-
-def welded(mesh: Mesh) -> Mesh:
-    """The mesh with corners that are the same to SAME_MM made one, and lost facets dropped."""
-    pairs = cKDTree(mesh.vertices).query_pairs(MERGE_MM, output_type="ndarray")
-    size = len(mesh.vertices)
-    near = coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size))
-    _, group = connected_components(near, directed=False)
-    _, first = np.unique(group, return_index=True)
-    return without_degenerate(mesh.vertices[first], group.astype(np.int64)[mesh.triangles])
+def part_mesh(part: PrintedPart) -> Mesh:
+    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL."""
+    return rounded(part.solid.mesh_on_bed)
 
 
 def rounded(mesh: Mesh) -> Mesh:

@@ -11,17 +11,14 @@ from scipy.spatial import ConvexHull
 
 from tbcad.cad.measures import SolidProperties, properties
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import meshed
 from tbcad.cad.solids import from_bytes, moved, solids, to_bytes
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.printing.bed import SLACK_MM, fitting_orientation, min_bed, size_text
+from tbcad.prototype.printing.bed import fitting_orientation, min_bed, size_text
 from tbcad.prototype.printing.pads_up import NO_PADS, downward_pads, opening_up
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
-# Only to measure with; the parts themselves are meshed finely when they are written.
-COARSE_MM, COARSE_ANGLE = SLACK_MM / 2, 0.4
 MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
 TOUCHING_MM = 0.05  # a facet no higher lies on the bed
 
@@ -33,12 +30,14 @@ class PlacedSolid:
     Attributes:
         name: of the part.
         shape: one closed solid in the frame of the shell, the base at angle zero.
+        mesh: of the shape, as it is exported.
         axes: what x, y and z become on the printer's bed, as rows, (3, 3).
         origin: place of the origin on the bed, mm, (3,).
     """
 
     name: str
     shape: TopoDS_Solid
+    mesh: Mesh
     axes: Floats
     origin: Floats
 
@@ -55,6 +54,11 @@ class PlacedSolid:
     def on_bed(self) -> TopoDS_Solid:
         """The part as it is printed: above z = 0, about the middle of the bed."""
         return solids(moved(self.shape, self.axes, self.origin))[0]
+
+    @property
+    def mesh_on_bed(self) -> Mesh:
+        """Its mesh in the pose in which it is printed."""
+        return Mesh(self.mesh.vertices @ self.axes + self.origin, self.mesh.triangles)
 
     @cached_property
     def properties(self) -> SolidProperties:
@@ -74,6 +78,7 @@ class PlacedSolid:
 def placed_on_bed(
     name: str,
     shape: TopoDS_Solid,
+    mesh: Mesh,
     downs: Sequence[Floats],
     axes: Floats,
     printer: PrinterSpec,
@@ -86,6 +91,7 @@ def placed_on_bed(
     Args:
         name: of the part.
         shape: one valid solid about z, in the carrier's own frame; a move keeps it valid.
+        mesh: of the shape.
         downs: directions of that frame that may point down, as (3,) unit vectors.
         axes: of that frame in the frame of the shell, as rows.
         printer: with its bed.
@@ -94,8 +100,7 @@ def placed_on_bed(
     Raises:
         SpecError: when it fits in no orientation.
     """
-    coarse = meshed(shape, COARSE_MM, COARSE_ANGLE)
-    corners = coarse.vertices[ConvexHull(coarse.vertices).vertices]
+    corners = mesh.vertices[ConvexHull(mesh.vertices).vertices]
     opening = opening_up(pads)
     directions = [*downs, *([] if opening is None else [opening])]
     orientations = [fitting_orientation(corners, down, printer) for down in directions]
@@ -106,14 +111,13 @@ def placed_on_bed(
             f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
             "prototype.largest_ball_mm or prototype.k smaller"
         )
-    best = min(
-        fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(coarse, way), 3))
-    )
-    placed = coarse.vertices @ best
+    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(mesh, way), 3)))
+    placed = corners @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
     solid = solids(moved(shape, axes, np.zeros(3)))[0]
-    return PlacedSolid(name, solid, axes.T @ best, origin)
+    in_place = Mesh(mesh.vertices @ axes, mesh.triangles)
+    return PlacedSolid(name, solid, in_place, axes.T @ best, origin)
 
 
 def _overhang(mesh: Mesh, orientation: Floats) -> float:

@@ -60,6 +60,7 @@ from tests.helpers import as_trimesh, bounds
 UP = np.array([0.0, 0.0, 1.0])
 SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2), coupon_sizes=99)
 PRINTER = PrinterSpec()
+MESH_MM = 0.05
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def base(prototype: PrototypeLayout) -> BaseLayout:
 
 @pytest.fixture(scope="module")
 def part(base: BaseLayout) -> PlacedSolid:
-    (only,) = carrier_parts(base, split_base(base, PRINTER), PRINTER)
+    (only,) = carrier_parts(base, split_base(base, PRINTER), PRINTER, MESH_MM)
     return only
 
 
@@ -104,6 +105,19 @@ class TestCarrier:
         assert mesh.volume == pytest.approx(part.volume, rel=1e-3)
         assert part.volume > 50_000
         assert part.mass_g(1.27) == pytest.approx(part.volume * 1.27e-3)
+
+    def test_its_mesh_is_as_exact_as_asked_and_stands_on_the_bed(self, part: PlacedSolid) -> None:
+        corners = part.mesh.vertices[part.mesh.triangles]
+        exported = trimesh.Trimesh(*trimesh.triangles.to_kwargs(corners).values())
+        assert exported.is_watertight
+        # Between chords on hollows and on bosses.
+        assert abs(part.mesh.volume - part.volume) < MESH_MM * part.properties.area / 10
+        on_bed = part.mesh_on_bed
+        assert on_bed.volume == pytest.approx(part.mesh.volume)
+        low, high = bounds(part.on_bed)
+        assert on_bed.vertices[:, 2].min() == pytest.approx(0, abs=1e-9)
+        assert on_bed.vertices.min(axis=0) == pytest.approx(low, abs=MESH_MM)
+        assert on_bed.vertices.max(axis=0) == pytest.approx(high, abs=MESH_MM)
 
     def test_ball_centres_are_recovered_from_the_pads(
         self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
@@ -215,26 +229,19 @@ class TestCarrier:
 
     def test_a_bed_too_small(self, base: BaseLayout, part: PlacedSolid) -> None:
         small = PrinterSpec(bed_mm=(120.0, 120.0, 120.0))
+        turned = part.shape, part.mesh, downward_directions(base, np.zeros((0, 4)))
         with pytest.raises(SpecError, match=r"make printer\.bed_mm at least \d+ x \d+") as caught:
-            placed_on_bed(
-                "carrier", part.shape, downward_directions(base, np.zeros((0, 4))), np.eye(3), small
-            )
+            placed_on_bed("carrier", *turned, np.eye(3), small)
         bed = [
             float(size) for size in re.findall(r"least (\d+) x (\d+) x (\d+)", str(caught.value))[0]
         ]
-        assert placed_on_bed(
-            "carrier",
-            part.shape,
-            downward_directions(base, np.zeros((0, 4))),
-            np.eye(3),
-            PrinterSpec(bed_mm=tuple(bed)),
-        )
+        assert placed_on_bed("carrier", *turned, np.eye(3), PrinterSpec(bed_mm=tuple(bed)))
 
 
-def test_booleans_in_parallel_give_the_same_bytes(
+def test_booleans_by_oriented_boxes_give_the_same_bytes(
     base: BaseLayout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Faces come in the same order, in two threads or one, by oriented boxes or plain ones."""
+    """Faces come in the same order, by oriented boxes or plain ones."""
     seats = base.local_seats
 
     def step(name: str) -> bytes:
@@ -252,16 +259,12 @@ def test_booleans_in_parallel_give_the_same_bytes(
     for kind in (BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse):
         monkeypatch.setattr(f"tbcad.cad.solids.{kind.__name__}", plain(kind, used))
     assert step("two") == first
-    assert {"SetRunParallel", "SetUseOBB"} <= set(used)
+    assert "SetUseOBB" in used
 
 
 def plain(kind: type, used: list[str]) -> type:
-    """A boolean that leaves these settings off, and notes that it was asked for them."""
-    settings = {
-        name: lambda _self, _on, name=name: used.append(name)
-        for name in ("SetRunParallel", "SetUseOBB")
-    }
-    return type(kind.__name__, (kind,), settings)
+    """A boolean by plain boxes, which notes that it was asked for oriented ones."""
+    return type(kind.__name__, (kind,), {"SetUseOBB": lambda _self, _on: used.append("SetUseOBB")})
 
 
 class TestSeat:
@@ -316,7 +319,7 @@ class TestCaps:
     def test_fronts_and_bodies_are_exact_spheres(
         self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
-        parts = cap_parts(base, prototype)
+        parts = cap_parts(base, prototype, MESH_MM)
         assert len(parts) == prototype.balls.cap.sum() > 0
         for k, cap in zip(np.flatnonzero(prototype.balls.cap), parts, strict=True):
             spheres = {}
@@ -336,7 +339,7 @@ class TestCaps:
         self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
         for k, cap in zip(
-            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype), strict=True
+            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype, MESH_MM), strict=True
         ):
             body, front = float(prototype.balls.body_radius[k]), float(prototype.balls.radius[k])
             edge, behind = body / np.sqrt(2), flat_depth(base, k)
@@ -352,7 +355,7 @@ class TestCaps:
         self, base: BaseLayout, prototype: PrototypeLayout
     ) -> None:
         for k, cap in zip(
-            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype), strict=True
+            np.flatnonzero(prototype.balls.cap), cap_parts(base, prototype, MESH_MM), strict=True
         ):
             whole = as_trimesh(cap.shape)
             assert whole.is_watertight
@@ -384,13 +387,13 @@ class TestCaps:
     def test_glued_caps_have_no_pocket(self, prototype: PrototypeLayout) -> None:
         glued = base_layout(BaseSpec(hold="glue"), prototype)
         assert cap_pocket(glued, 0, 5.0) == (0.0, 0.0)
-        assert as_trimesh(cap_parts(glued, prototype)[0].shape).is_watertight
+        assert as_trimesh(cap_parts(glued, prototype, MESH_MM)[0].shape).is_watertight
 
 
 @pytest.fixture(scope="module")
 def plates(base: BaseLayout, part: PlacedSolid) -> list[PlacedSolid]:
     """Seats as they lie in the carrier as it is printed."""
-    return coupon_plates(base, PRINTER, worst_pose(base, UNCUT, [-part.axes[:, 2]]))
+    return coupon_plates(base, PRINTER, worst_pose(base, UNCUT, [-part.axes[:, 2]]), MESH_MM)
 
 
 def pose_of(base: BaseLayout) -> SeatPose:
@@ -563,7 +566,7 @@ class TestCoupon:
     def test_a_seat_larger_than_the_bed(self, prototype: PrototypeLayout) -> None:
         base = base_layout(BaseSpec(), prototype)
         with pytest.raises(SpecError, match=r"make printer\.bed_mm larger or"):
-            coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)), pose_of(base))
+            coupon_plates(base, PrinterSpec(bed_mm=(40.0, 40.0, 100.0)), pose_of(base), MESH_MM)
 
 
 def test_a_part_comes_back_from_bytes_as_it_was(part: PlacedSolid) -> None:

@@ -31,13 +31,14 @@ from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh, bounds, cylinders
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))
+MESH_MM = 0.05
 Cylinders = list[tuple[np.ndarray, np.ndarray, float]]
 Cut = tuple[BaseLayout, PrinterSpec, BaseSplit, list[PlacedSolid], list[trimesh.Trimesh]]
 
 
 def cut_up(base: BaseLayout, printer: PrinterSpec) -> Cut:
     plan = split_base(base, printer)
-    parts = carrier_parts(base, plan, printer)
+    parts = carrier_parts(base, plan, printer, MESH_MM)
     return base, printer, plan, parts, [as_trimesh(part.shape) for part in parts]
 
 
@@ -92,7 +93,9 @@ class TestSmall:
         added, removed = added_solids(base, seats, plan), removed_solids(base, seats)
         with_flanges = volume_by_meshes(added, removed, 0.01)
         assert with_flanges > volume_by_meshes(added_solids(base, seats), removed, 0.01) + 10_000
-        assert volume(carrier_solid(base, plan)) == pytest.approx(with_flanges, rel=2e-4)
+        assert volume(carrier_solid(base, MESH_MM, plan)[0]) == pytest.approx(
+            with_flanges, rel=2e-4
+        )
         # Holes of both sides begin beyond the plane, so each piece has its own taken out.
         assert len(plan.pieces) == 2
         (joint,) = plan.joints
@@ -169,7 +172,7 @@ class TestSmall:
     @pytest.mark.slow
     def test_the_same_bytes(self, small: Cut, tmp_path: Path) -> None:
         base, printer, _, parts, _ = small
-        rebuilt = carrier_parts(base, split_base(base, printer), printer)
+        rebuilt = carrier_parts(base, split_base(base, printer), printer, MESH_MM)
         for name, again in (("one", parts), ("two", rebuilt)):
             for part in again:
                 write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))

@@ -36,7 +36,7 @@ def printed_solids(
     layout: FrameLayout | StageLayout, printer: PrinterSpec = PRINTER
 ) -> dict[str, PlacedSolid]:
     components = layout.printed if isinstance(layout, FrameLayout) else layout.components
-    return {part.name: placed_component(part, printer) for part in components}
+    return {part.name: placed_component(part, printer, 0.1) for part in components}
 
 
 def purchased_solids(frame: FrameLayout) -> dict[str, TopoDS_Shape]:

@@ -24,7 +24,7 @@ SIZED = load_spec(None).prototype.stage
 
 
 def placed(stage: StageLayout, printer: PrinterSpec) -> dict[str, PlacedSolid]:
-    return {part.name: placed_component(part, printer) for part in stage.components}
+    return {part.name: placed_component(part, printer, 0.1) for part in stage.components}
 
 
 @pytest.fixture(scope="module")
