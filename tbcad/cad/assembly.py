@@ -6,9 +6,16 @@ from typing import TypeAlias
 from OCP.TopoDS import TopoDS_Solid
 
 from tbcad.cad.mesh import Mesh
+from tbcad.cad.meshing import meshed
+from tbcad.cad.solids import moved, solids
+from tbcad.types import Floats
 
 Colour: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue (sRGB) and opacity, from 0 to 1."""
+
+
+# Of meshes that are only looked at.
+DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,11 @@ class ColouredSolid:
     colour: Colour
     mesh: Mesh | None = None
 
+    def copy(self, name: str, axes: Floats, origin: Floats) -> "ColouredSolid":
+        """One like it under another name, moved: axes are what x, y and z become, as rows."""
+        mesh = self.mesh and Mesh(self.mesh.vertices @ axes + origin, self.mesh.triangles)
+        return ColouredSolid(name, solids(moved(self.shape, axes, origin))[0], self.colour, mesh)
+
 
 @dataclass(frozen=True)
 class SolidGroup:
@@ -34,3 +46,8 @@ class SolidGroup:
 
     name: str
     bodies: tuple[ColouredSolid, ...]
+
+
+def display_mesh(shape: TopoDS_Solid) -> Mesh:
+    """A coarse mesh, to be looked at."""
+    return meshed(shape, DISPLAY_MM, DISPLAY_ANGLE)

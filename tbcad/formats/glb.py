@@ -9,11 +9,8 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.assembly import ColouredSolid, SolidGroup
-from tbcad.cad.meshing import meshed
+from tbcad.cad.assembly import ColouredSolid, SolidGroup, display_mesh
 
-# For viewing only: of bodies that have no mesh yet.
-COARSE_MM, COARSE_ANGLE = 0.1, 0.25
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
 METAL, ROUGH = 0.1, 0.6
@@ -37,7 +34,7 @@ def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
 
 
 def _drawn(body: ColouredSolid) -> trimesh.Trimesh:
-    mesh = body.mesh or meshed(body.shape, COARSE_MM, COARSE_ANGLE)
+    mesh = body.mesh or display_mesh(body.shape)
     drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     drawn.visual = TextureVisuals(
         material=PBRMaterial(

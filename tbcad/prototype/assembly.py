@@ -1,13 +1,15 @@
 """The assembled prototype: groups of named, coloured solids in the frame of the shell."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
+from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
 from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.fasteners.bodies import fastener_component
+from tbcad.prototype.fasteners.bodies import fastener_axes, fastener_component
+from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.component_solids import component_solid
 from tbcad.prototype.printing.parts import Role
@@ -36,10 +38,6 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
         ColouredSolid(component.name, component_solid(component), METAL)
         for component in prototype.frame.purchased
     )
-    fasteners = (
-        ColouredSolid(one.name, component_solid(fastener_component(one)), FASTENER)
-        for one in prototype.fasteners
-    )
     return (
         _printed("base", prototype, ("base", "cap")),
         SolidGroup("balls", tuple(_balls(prototype))),
@@ -47,7 +45,7 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
         _printed("frame", prototype, ("frame",)),
         SolidGroup("bought", tuple(purchased)),
         SolidGroup("shroud", tuple(_shroud(prototype))),
-        SolidGroup("fasteners", tuple(fasteners)),
+        SolidGroup("fasteners", tuple(_fasteners(prototype.fasteners))),
         _views(prototype),
     )
 
@@ -59,6 +57,18 @@ def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> S
         if part.role in roles
     )
     return SolidGroup(name, tuple(solids))
+
+
+def _fasteners(fasteners: Sequence[Fastener]) -> Iterator[ColouredSolid]:
+    """Those of one part are copies of one solid, which is built and meshed once."""
+    originals: dict[str, ColouredSolid] = {}
+    for one in fasteners:
+        name = one.part.name
+        if name not in originals:
+            at_origin = replace(one, place=np.zeros(3), along=np.eye(3)[0])
+            solid = component_solid(fastener_component(at_origin))
+            originals[name] = ColouredSolid(name, solid, FASTENER, display_mesh(solid))
+        yield originals[name].copy(one.name, fastener_axes(one.along), one.place)
 
 
 def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:

@@ -190,7 +190,7 @@ def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
 
 
 def _wall(base: BaseLayout) -> Floats:
-    """Section of the wall in (z, r), with the edges of its facets, which are off its cones, (p, 2)."""
+    """Section of the wall with the edges of its facets, which are off its cones, (z, r), (p, 2)."""
     line = shortened(base.inner, -FACETS_OUT_MM)
     return np.vstack([line, offset(line, base.spec.thickness_mm + FACETS_OUT_MM)[::-1]])
 

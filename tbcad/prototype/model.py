@@ -1,9 +1,11 @@
 """The whole prototype: its layouts, its printed parts as solids, and the drive that turns them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 from OCP.Standard import Standard_Failure
@@ -24,7 +26,7 @@ from tbcad.prototype.arrangement import (
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
-from tbcad.prototype.base.coupon_pose import SeatPose, expected_downs, worst_pose
+from tbcad.prototype.base.coupon_pose import expected_downs, worst_pose
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.solid import carrier_parts
@@ -36,7 +38,7 @@ from tbcad.prototype.fasteners.fastener import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.printing.component_solids import placed_component
+from tbcad.prototype.printing.component_solids import placed_component, placed_components
 from tbcad.prototype.printing.parts import PrintedPart, Role
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.purchased.parts import Parts
@@ -44,7 +46,6 @@ from tbcad.prototype.stage.fasteners import stage_fasteners
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.
@@ -53,6 +54,8 @@ KERNEL_ERRORS = (Standard_Failure, StdFail_NotDone)
 KERNEL_FAILS = "the CAD kernel fails: {}"
 CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
 COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
+
+PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
 
 
 @dataclass(frozen=True)
@@ -160,38 +163,36 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     mesh_mm = spec.mesh.structure_error_mm
     progress("prototype: base")
     pose = worst_pose(base, split, expected_downs(base, split))
-    coupons = submit(coupons_or_error, base, printer, pose, mesh_mm)
+    stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
+    coupons = submit(parts_or_error, coupon_plates, base, printer, pose, mesh_mm)
+    on_stage = submit(parts_or_error, placed_components, stage.components, printer, mesh_mm)
+    on_frame = submit(parts_or_error, placed_components, frame.printed, printer, mesh_mm)
     carrier = carrier_parts(base, split, printer, mesh_mm)
     printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
     if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
-        coupons = submit(coupons_or_error, base, printer, printed_pose, mesh_mm)
-    disc = placed_component(arrangement.frame.homing.disc, printer, mesh_mm)
+        coupons = submit(parts_or_error, coupon_plates, base, printer, printed_pose, mesh_mm)
+    disc = placed_component(frame.homing.disc, printer, mesh_mm)
     masses = _masses([*carrier, disc], printer.density_g_cm3)
     faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
-    stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
     shroud = arrangement.shroud
     if drive != arrangement.drive:  # the mass of the solids asks for another
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
         disc = placed_component(frame.homing.disc, printer, mesh_mm)
+        on_frame = submit(parts_or_error, placed_components, frame.printed, printer, mesh_mm)
         shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    static = [
-        *_components("stage", stage.components, printer, mesh_mm),
-        *_components("frame", frame.printed, printer, mesh_mm),
-    ]
     gauge = _gauge(spec, layout, base, frame)
+    tools = placed_components([gauge.component] if gauge else [], printer, mesh_mm)
     progress("prototype: caps and coupon")
-    plates = coupons.result()
-    if isinstance(plates, Exception):
-        raise plates
     printed = (
         *_carrier(base, carrier),
         PrintedPart(disc, "base", frame.homing.disc.what),
         *_caps(base, layout, mesh_mm),
-        *static,
-        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in plates),
-        *(_components("tool", [gauge.component], printer, mesh_mm) if gauge else ()),
+        *_components("stage", stage.components, parts_of(on_stage)),
+        *_components("frame", frame.printed, parts_of(on_frame)),
+        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
+        *_components("tool", [gauge.component] if gauge else [], tools),
     )
     for fault in faults:
         if fault.result():
@@ -214,19 +215,30 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     )
 
 
-def coupons_or_error(
-    base: BaseLayout, printer: PrinterSpec, pose: SeatPose, mesh_mm: float
-) -> list[PlacedSolid] | SpecError | InvalidSolidError:
-    """The coupons with their properties, or why there are none."""
+def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:
+    """Parts with their properties, or why there are none: another arrangement may have them."""
     try:
-        plates = coupon_plates(base, printer, pose, mesh_mm)
-        for plate in plates:
-            _ = plate.properties  # kept with it
+        parts = build(*arguments)
+        for part in parts:
+            _ = part.properties  # kept with it
     except (SpecError, InvalidSolidError) as error:
         return error
     except KERNEL_ERRORS as error:
         return InvalidSolidError(KERNEL_FAILS.format(error))
-    return plates
+    return parts
+
+
+def parts_of(outcome: "Future[PartsOrError]") -> list[PlacedSolid]:
+    """The parts that were built meanwhile.
+
+    Raises:
+        SpecError: when something does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    parts = outcome.result()
+    if isinstance(parts, Exception):
+        raise parts
+    return parts
 
 
 def _gauge(
@@ -271,7 +283,7 @@ def _caps(base: BaseLayout, layout: PrototypeLayout, mesh_mm: float) -> Iterator
 
 
 def _components(
-    role: Role, components: Iterable[Component], printer: PrinterSpec, mesh_mm: float
+    role: Role, components: Sequence[Component], placed: Sequence[PlacedSolid]
 ) -> Iterator[PrintedPart]:
-    for component in components:
-        yield PrintedPart(placed_component(component, printer, mesh_mm), role, component.what)
+    for component, part in zip(components, placed, strict=True):
+        yield PrintedPart(part, role, component.what)

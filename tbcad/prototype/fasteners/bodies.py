@@ -17,6 +17,7 @@ from tbcad.geometry.primitives import (
     revolved_along,
 )
 from tbcad.geometry.rotations import unit_circle
+from tbcad.geometry.vectors import perpendicular_axes
 from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
@@ -31,6 +32,7 @@ THROUGH_MM = 1.0  # by which a hole extends beyond the part
 FLANGE_MM = 1.0  # height of an LED's flange; no list gives it
 DOME = np.radians([0.0, 30.0, 60.0, 90.0])  # corners of an LED's dome
 UP = np.array([0.0, 0.0, 1.0])
+LEVEL = 1e-9  # upward part of a direction that is level
 
 
 def core_radius(thread: float) -> float:
@@ -49,6 +51,16 @@ def fastener_component(fastener: Fastener) -> Component:
     return Component(
         fastener.name, part.what, added, removed, part=part.name, rotates=fastener.rotates
     )
+
+
+def fastener_axes(along: Floats) -> Floats:
+    """What x, y and z of a fastener along x become when it is along another direction, as rows.
+
+    What is along no upright direction keeps its z upright, as the slots of T-nuts are.
+    """
+    level = abs(along @ UP) < LEVEL
+    across = np.cross(UP, along) if level else perpendicular_axes(along)[0]
+    return np.stack([along, across, np.cross(along, across)])
 
 
 def _rod(radius: float, length: float) -> Floats:

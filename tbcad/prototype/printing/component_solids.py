@@ -1,5 +1,7 @@
 """Solids of components: added primitives fused, removed ones cut out."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
@@ -59,6 +61,13 @@ def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float)
     solid = component_solid(component)
     mesh = closed_mesh(component.name, solid, mesh_mm)
     return placed_on_bed(component.name, solid, mesh, component.downs, np.eye(3), printer)
+
+
+def placed_components(
+    components: Sequence[Component], printer: PrinterSpec, mesh_mm: float
+) -> list[PlacedSolid]:
+    """Several components, each as `placed_component` places it."""
+    return [placed_component(component, printer, mesh_mm) for component in components]
 
 
 def _outward(body: Prism) -> Floats:
