@@ -14,7 +14,6 @@ from OCP.StdFail import StdFail_NotDone
 from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.camera.requirements import camera_requirements
-from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.primitives import Component
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.arrangement import (
@@ -173,7 +172,6 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         coupons = submit(parts_or_error, coupon_plates, base, printer, printed_pose, mesh_mm)
     disc = placed_component(frame.homing.disc, printer, mesh_mm)
     masses = _masses([*carrier, disc], printer.density_g_cm3)
-    faults = [submit(carrier_fault, part) for part in carrier]
     balance, drive = balance_and_drive(layout, base, masses, spec, parts)
     progress("prototype: stage and frame")
     shroud = arrangement.shroud
@@ -194,9 +192,6 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", [gauge.component] if gauge else [], tools),
     )
-    for fault in faults:
-        if fault.result():
-            raise InvalidSolidError(fault.result())
     return PrototypeModel(
         spec=spec,
         layout=layout,
@@ -249,17 +244,6 @@ def _gauge(
     camera, diameter = layout.array.camera, spec.prototype.camera_diameter_mm
     needed = camera_requirements(layout.array, spec.optics.capture_diameter_mm / 2)
     return camera_gauge(base, camera, diameter, needed, layout.stops.range)
-
-
-def carrier_fault(part: PlacedSolid) -> str:
-    """What is wrong with a piece of the carrier that its STEP file does not keep, or nothing."""
-    try:
-        check_read_back(part.name, part.shape, part.properties)
-    except InvalidSolidError as error:
-        return str(error)
-    except KERNEL_ERRORS as error:
-        return KERNEL_FAILS.format(error)
-    return ""
 
 
 def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:

@@ -20,7 +20,6 @@ from tbcad.cad.measures import plane_faces, properties, volume
 from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.solids import cut, cylinder, faces, fused, one_solid, without_cavities
 from tbcad.formats.step import write_step
-from tbcad.formats.step_read_back import check_read_back
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
@@ -56,6 +55,7 @@ from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 from tests.helpers import as_trimesh, bounds
+from tests.step_read_back import check_read_back
 
 UP = np.array([0.0, 0.0, 1.0])
 SPEC = BaseSpec(coupon_offsets_mm=(-0.1, 0.2), coupon_sizes=99)
@@ -118,6 +118,9 @@ class TestCarrier:
         assert on_bed.vertices[:, 2].min() == pytest.approx(0, abs=1e-9)
         assert on_bed.vertices.min(axis=0) == pytest.approx(low, abs=MESH_MM)
         assert on_bed.vertices.max(axis=0) == pytest.approx(high, abs=MESH_MM)
+
+    def test_its_file_keeps_it(self, part: PlacedSolid) -> None:
+        check_read_back(part.name, part.shape, part.properties)
 
     def test_ball_centres_are_recovered_from_the_pads(
         self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh

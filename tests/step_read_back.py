@@ -1,4 +1,7 @@
-"""A solid as a reader of its STEP file gets it: whole, valid, and without gaps."""
+"""A solid as a reader of its STEP file gets it: whole, valid, and without gaps.
+
+The oracle of `tbcad.cad.checks.without_slack`, which needs no file.
+"""
 
 import tempfile
 from pathlib import Path
@@ -10,19 +13,16 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError, Solid
+from tbcad.cad.checks import MAX_GAP_MM
 from tbcad.cad.measures import SolidProperties, volume
 from tbcad.formats.step import write_step
 
-MAX_GAP_MM = 1e-5
 VOLUME_ERROR = 1e-5  # as a share of the volume; the kernel integrates to some 2e-6
 MAXIMUM = 1  # of the tolerances in a shape
 
 
 def check_read_back(name: str, shape: TopoDS_Solid, known: SolidProperties) -> None:
     """Refuse a solid that its file does not keep, although the kernel takes it for valid.
-
-    A boolean with faces that graze each other can leave edges that are off their faces. The
-    tolerances in memory do not tell: they are up to a hundred times too large.
 
     Args:
         name: of the part.
