@@ -25,27 +25,25 @@ ANGLE = 0.2
 MERGE_MM = 2e-5
 
 
-def volume_by_meshes(
-    bodies: Sequence[TopoDS_Shape], tools: Sequence[TopoDS_Shape], tolerance: float
-) -> float:
+def volume_by_meshes(bodies: Sequence[Manifold], tools: Sequence[Manifold]) -> float:
     """Volume of a union without tools, by booleans of meshes: another way to the same figure."""
-    union = Manifold.batch_boolean([_manifold(one, tolerance) for one in bodies], OpType.Add)
-    removed = [_manifold(one, tolerance) for one in tools]
-    return float(Manifold.batch_boolean([union, *removed], OpType.Subtract).volume())
+    union = Manifold.batch_boolean(bodies, OpType.Add)
+    return float(Manifold.batch_boolean([union, *tools], OpType.Subtract).volume())
 
 
 def volume_by_cut_mesh(
     shape: TopoDS_Shape, planes: Floats, tools: Sequence[TopoDS_Shape], tolerance: float
 ) -> float:
     """Volume of a shape below planes (h, 4), unit normal and level, and without tools."""
-    net = _manifold(shape, tolerance)
+    net = as_manifold(shape, tolerance)
     for *normal, level in (-planes).tolist():
         net = net.trim_by_plane(normal, level)
-    removed = [_manifold(one, tolerance) for one in tools]
+    removed = [as_manifold(one, tolerance) for one in tools]
     return float(Manifold.batch_boolean([net, *removed], OpType.Subtract).volume())
 
 
-def _manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
+def as_manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
+    """The mesh of a solid for booleans of meshes."""
     net = meshed(shape, tolerance)
     return Manifold(Mesh64(net.vertices, net.triangles.astype(np.uint64)))
 

@@ -34,7 +34,7 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeRevol,
     BRepPrimAPI_MakeSphere,
 )
-from OCP.GeomAbs import GeomAbs_Cylinder
+from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Sphere
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopAbs import (
     TopAbs_EDGE,
@@ -42,6 +42,7 @@ from OCP.TopAbs import (
     TopAbs_ShapeEnum,
     TopAbs_SOLID,
     TopAbs_VERTEX,
+    TopAbs_WIRE,
 )
 from OCP.TopExp import TopExp
 from OCP.TopoDS import (
@@ -208,6 +209,16 @@ def edges(shape: TopoDS_Shape) -> list[TopoDS_Edge]:
 def vertices(shape: TopoDS_Shape) -> list[TopoDS_Vertex]:
     """All vertices of a shape, each once."""
     return [TopoDS.Vertex_s(vertex) for vertex in _parts(shape, TopAbs_VERTEX)]
+
+
+def wires(face: TopoDS_Face) -> list[TopoDS_Wire]:
+    """The closed outlines of a face."""
+    return [TopoDS.Wire_s(wire) for wire in _parts(face, TopAbs_WIRE)]
+
+
+def on_sphere(face: TopoDS_Face) -> bool:
+    """Whether a face is on a sphere."""
+    return bool(BRepAdaptor_Surface(face).GetType() == GeomAbs_Sphere)
 
 
 def cylinder_radius(face: TopoDS_Face) -> float:

@@ -5,9 +5,9 @@ from itertools import chain
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
+from tbcad.cad.bores import hole_faces
 from tbcad.cad.brep import Maker, Ring, Side
 from tbcad.geometry.conics import EllipseArc
-from tbcad.shell.bores import hole_faces
 from tbcad.shell.boundary import boundary_chain, chain_ends
 from tbcad.shell.casing_edges import ARC_ENDS, casing_arcs, casing_lines, outline
 from tbcad.shell.envelope import Envelope
@@ -24,8 +24,8 @@ FAR_RIMS = {"seam": "seam_rim_back", "foot": "foot_rim_top"}
 def casing_faces(front: FrontEdges, envelope: Envelope) -> list[tuple[str, TopoDS_Face]]:
     """Names and faces of everything but the mirrors."""
     maker, edges = front.maker, _edges(front, envelope)
-    seam_near, seam_far, seam_walls = hole_faces(maker, envelope.seam_holes, Y, Z)
-    foot_near, foot_far, foot_walls = hole_faces(maker, envelope.foot_holes, X, Y)
+    seam_near, seam_far, seam_walls = hole_faces(maker, *envelope.seam_holes.sizes, Y, Z)
+    foot_near, foot_far, foot_walls = hole_faces(maker, *envelope.foot_holes.sizes, X, Y)
     seam, foot, base = envelope.seam_thickness, envelope.foot_thickness, envelope.foot * Z
 
     def ring(face: str) -> list[Side]:

@@ -39,6 +39,11 @@ class Holes:
     direction: Floats
     radius: Floats
 
+    @property
+    def sizes(self) -> tuple[Floats, Floats, Floats]:
+        """Centres, direction and radii."""
+        return self.centre, self.direction, self.radius
+
 
 @dataclass(frozen=True)
 class Envelope:

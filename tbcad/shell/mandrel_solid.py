@@ -5,8 +5,8 @@ from itertools import chain
 import numpy as np
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
+from tbcad.cad.bores import hole_faces
 from tbcad.cad.brep import Ring
-from tbcad.shell.bores import hole_faces
 from tbcad.shell.boundary import boundary_chain, chain_ends
 from tbcad.shell.casing import reversed_ring
 from tbcad.shell.envelope import Holes
@@ -47,7 +47,7 @@ def _plane_with_holes(
 ) -> list[tuple[str, TopoDS_Face]]:
     """A joining plane, which looks against the holes' direction, their walls and bottoms."""
     maker, outward = front.maker, -np.cross(*axes)
-    near, far, walls = hole_faces(maker, holes, *axes)
+    near, far, walls = hole_faces(maker, *holes.sizes, *axes)
     bottoms = [
         maker.face(maker.plane(centre + holes.direction, outward), [rim], natural=True)
         for centre, rim in zip(holes.centre, far, strict=True)

@@ -5,7 +5,13 @@ import pytest
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.measures import volume
-from tbcad.cad.meshing import meshed, volume_by_cut_mesh, volume_by_meshes, without_degenerate
+from tbcad.cad.meshing import (
+    as_manifold,
+    meshed,
+    volume_by_cut_mesh,
+    volume_by_meshes,
+    without_degenerate,
+)
 from tbcad.cad.solids import cut, cylinder, fused, sphere
 from tbcad.geometry.vectors import norm
 
@@ -41,7 +47,9 @@ def test_facets_without_area_are_dropped() -> None:
 
 def test_volume_of_a_union_less_tools_agrees_with_the_kernel(pin: TopoDS_Shape) -> None:
     bodies, tools = [pin, sphere(10 * UP, 5.0)], [cylinder(-UP, UP, 1.0, 20.0)]
-    by_meshes = volume_by_meshes(bodies, tools, 0.002)
+    by_meshes = volume_by_meshes(
+        *([as_manifold(one, 0.002) for one in some] for some in (bodies, tools))
+    )
     assert by_meshes == pytest.approx(volume(cut(fused(bodies), tools)), rel=2e-3)
 
 

@@ -9,23 +9,30 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from manifold3d import Manifold, OpType
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakeWire,
 )
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
-from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.solids import cut, cylinder, moved, revolved
+from tbcad.cad.bores import hole_faces
+from tbcad.cad.brep import Maker, Ring
+from tbcad.cad.primitive_meshes import primitive_mesh
+from tbcad.cad.solids import cylinder, faces, moved, on_sphere, revolved, wires
+from tbcad.geometry.primitives import Cylinder, Revolved
+from tbcad.geometry.vectors import perpendicular_axes
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
+from tbcad.types import Floats
 
 # The path is narrower than the cup by this share of the cup's clearance, so that the two meet at
 # an angle.
 NARROWER = 0.4
-POST_MM = 1.5  # of each pad into the boss
 INTO_BOSS_MM = 0.3  # by which the space behind a boss begins inside of it, and is narrower
+ARC_POINTS = 65  # of a cup's section in its mesh
 POLE_ANGLE = 0.3  # about the axis, radians: the cup's hemisphere ends here, short of its pole
 ALONG = np.array([0.0, 0.0, 1.0])
 
@@ -39,7 +46,7 @@ def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
     return cylinder(seats.front[k] * ALONG, ALONG, float(seats.boss[k]), length)
 
 
-def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
+def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
     """What a ball and its magnet need, without the posts of the pads, in the seat's own frame.
 
     Args:
@@ -51,12 +58,59 @@ def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Shape:
     # Seams where no pad is: half way between two of them.
     seam = np.array([*meridian(float(seats.pad_azimuth[k]) + np.pi / 3), ALONG])
     section = _hollow_section(cup, pocket, float(seats.bottom[k]))
-    room = moved(revolved(section), seam, np.zeros(3))
+    room, maker = moved(revolved(section), seam, np.zeros(3)), Maker(mirrored=False)
+    size = (cup, radius + offset, float(seats.pad[k]))
+    posts = [_post_faces(maker, n, *size) for n in seats.local_normals[k]]
+    whole = faces(room)
+    cups = [_with_holes(maker, one, [rim for rim, _ in posts]) for one in whole if on_sphere(one)]
+    others = [one for one in whole if not on_sphere(one)]
+    return maker.solid([*cups, *others, *(one for _, post in posts for one in post)])
+
+
+def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
+    """The same by a boolean of meshes."""
+    radius, cup, pocket = float(seats.radius[k]), float(seats.cup[k]), float(seats.pocket[k])
+    angle = np.linspace(np.arcsin(pocket / cup), np.pi - POLE_ANGLE, ARC_POINTS)
+    arc = cup * np.column_stack([np.cos(angle), np.sin(angle)])
+    bottom = [[seats.bottom[k], 0.0], [seats.bottom[k], pocket]]
+    room = primitive_mesh(Revolved(np.vstack([bottom, arc, [arc[-1, 0], 0.0]])))
     posts = [
-        cylinder(-(radius + offset) * n, -n, float(seats.pad[k]), cup - radius + POST_MM)
+        primitive_mesh(Cylinder(-(radius + offset) * n, -n, float(seats.pad[k]), cup))
         for n in seats.local_normals[k]
     ]
-    return cut(room, posts)
+    return Manifold.batch_boolean([room, *posts], OpType.Subtract)
+
+
+def _post_faces(
+    maker: Maker, normal: Floats, cup: float, end: float, radius: float
+) -> tuple[Ring, list[TopoDS_Face]]:
+    """A pad's post in a cup: its rim on the cup's sphere; its wall, and the pad at its end.
+
+    Seats leave a web between their pads and the pocket, so that the rim is a whole circle.
+
+    Args:
+        maker: of kernel shapes.
+        normal: from the pad to the ball's centre, which is the origin, (3,).
+        cup: radius, mm.
+        end: distance of the pad from the origin, mm.
+        radius: of the post, mm.
+    """
+    start = float(np.sqrt(cup**2 - radius**2))
+    centre, depth = -start * normal[None], (start - end) * normal
+    axes = perpendicular_axes(normal)
+    (rim,), (edge,), walls = hole_faces(maker, centre, depth, np.array([radius]), *axes)
+    return rim, [*walls, maker.face(maker.plane(-end * normal, -normal), [edge], natural=True)]
+
+
+def _with_holes(maker: Maker, face: TopoDS_Face, rims: Sequence[Ring]) -> TopoDS_Face:
+    """A face with holes inside rings of edges that lie on its surface."""
+    holed = TopoDS.Face_s(face.EmptyCopied())
+    for wire in wires(face):
+        maker.builder.Add(holed, wire)
+    for rim in rims:
+        maker.builder.Add(holed, maker.wire(rim))
+        maker.add_pcurves(holed, rim)
+    return holed
 
 
 def insertion_path(seats: Seats, k: int) -> TopoDS_Shape:

@@ -4,13 +4,15 @@ Built about z with azimuth zero along x, then moved into the frame of the shell.
 """
 
 import numpy as np
+from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import volume_by_meshes
+from tbcad.cad.meshing import as_manifold, volume_by_meshes
+from tbcad.cad.primitive_meshes import moved_mesh
 from tbcad.cad.solids import cut, fused, polygon, polyhedron, prism, revolved_polygon
 from tbcad.prototype.base import hub_solids, seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
@@ -72,7 +74,11 @@ def carrier_solid(
     """
     seats = base.local_seats
     added, removed = added_solids(base, seats, split), removed_solids(base, seats)
-    expected = volume_by_meshes(added, removed, COARSE_MM)
+    hollows = [_hollow_mesh(seats, k) for k in range(len(seats))]
+    bodies, others = (
+        [as_manifold(one, COARSE_MM) for one in some] for some in (added, removed[len(seats) :])
+    )
+    expected = volume_by_meshes(bodies, [*hollows, *others])
     contacts, pads = seats.contacts.reshape(-1, 3), np.repeat(seats.pad, 3)
     errors = []
     for same in SAME_MM:
@@ -99,11 +105,16 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
 
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
-    """What is cut out of that union: cups with their pockets, paths of the balls, holes."""
+    """What is cut out of that union: first the hollows of all seats, then paths and holes."""
     cups = [seat_solids.seat_hollow(seats, k, seats.pad_offset) for k in range(len(seats))]
     paths = [seat_solids.insertion_path(seats, k) for k in range(len(seats))]
     holes = hub_solids.hub_holes(base.hub, base.spec)
     return [*_at_seats(seats, cups), *_at_seats(seats, paths), *holes]
+
+
+def _hollow_mesh(seats: Seats, k: int) -> Manifold:
+    mesh = seat_solids.seat_hollow_mesh(seats, k, seats.pad_offset)
+    return moved_mesh(mesh, seats.axes[k], seats.centre[k])
 
 
 def _at_seats(seats: Seats, shapes: list[TopoDS_Shape]) -> list[TopoDS_Shape]:

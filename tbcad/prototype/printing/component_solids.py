@@ -7,6 +7,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_volume, closed_mesh
 from tbcad.cad.meshing import volume_by_meshes
+from tbcad.cad.primitive_meshes import primitive_mesh
 from tbcad.cad.solids import (
     cut,
     cylinder,
@@ -22,8 +23,7 @@ from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
-COARSE_MM = 0.02
-VOLUME_ERROR = 2e-3
+VOLUME_ERROR = 1e-4
 
 
 def primitive_solid(body: Primitive) -> TopoDS_Shape:
@@ -46,7 +46,10 @@ def component_solid(component: Component) -> TopoDS_Solid:
     added = [primitive_solid(body) for body in component.added]
     removed = [primitive_solid(body) for body in component.removed]
     solid = one_solid(component.name, cut(fused(added), removed))
-    expected = volume_by_meshes(added, removed, COARSE_MM)
+    meshes = (
+        [primitive_mesh(body) for body in bodies] for bodies in (component.added, component.removed)
+    )
+    expected = volume_by_meshes(*meshes)
     check_volume(component.name, solid, expected, VOLUME_ERROR)
     return solid
 

@@ -18,7 +18,7 @@ from tbcad.cad.checks import check_pads, check_volume
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
 from tbcad.cad.measures import plane_faces, properties, volume
 from tbcad.cad.meshing import volume_by_meshes
-from tbcad.cad.solids import cut, cylinder, faces, fused, one_solid, without_cavities
+from tbcad.cad.solids import common, cut, cylinder, faces, fused, one_solid, without_cavities
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
@@ -54,7 +54,7 @@ from tbcad.spec.load import load_spec
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
-from tests.helpers import as_trimesh, bounds
+from tests.helpers import as_trimesh, bounds, manifold
 from tests.step_read_back import check_read_back
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -180,7 +180,8 @@ class TestCarrier:
         """The kernel's booleans can lose a piece and pass for valid; other booleans tell."""
         seats = base.local_seats
         added, removed = added_solids(base, seats), removed_solids(base, seats)
-        assert part.volume == pytest.approx(volume_by_meshes(added, removed, 0.01), rel=2e-4)
+        meshes = ([manifold(one, 0.01) for one in some] for some in (added, removed))
+        assert part.volume == pytest.approx(volume_by_meshes(*meshes), rel=2e-4)
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
             check_volume("carrier", part.shape, part.volume * 1.01)
 
@@ -289,6 +290,26 @@ class TestSeat:
                 "seat", cut(seat_solids.boss_solid(seats, k), [seat_solids.seat_hollow(seats, k)])
             )
             assert volume(solid) == pytest.approx(whole - zone - well + 3 * post, rel=1e-6)
+
+    def test_the_mesh_of_its_hollow(self, base: BaseLayout) -> None:
+        for k in range(len(base.seats)):
+            hollow = seat_solids.seat_hollow(base.seats, k, 0.1)
+            assert one_solid("hollow", hollow)
+            mesh = seat_solids.seat_hollow_mesh(base.seats, k, 0.1)
+            assert mesh.volume() == pytest.approx(volume(hollow), rel=5e-4)
+            low_high = np.array(mesh.bounding_box()).reshape(2, 3)
+            assert low_high == pytest.approx(bounds(hollow), abs=0.02 * float(base.seats.cup[k]))
+
+    def test_its_hollow_is_what_a_boolean_makes(self, base: BaseLayout) -> None:
+        """The kernel cuts three rods out of a hollow without pads, whose pads are far outside."""
+        seats = base.seats
+        for k in range(len(seats)):
+            cup, radius, pad = (float(one[k]) for one in (seats.cup, seats.radius, seats.pad))
+            rods = [cylinder(-radius * n, -n, pad, cup) for n in seats.local_normals[k]]
+            hollow = seat_solids.seat_hollow(seats, k)
+            filled = fused([hollow, *rods])
+            assert volume(cut(filled, rods)) == pytest.approx(volume(hollow), rel=1e-6)
+            assert volume(common(hollow, fused(rods))) == pytest.approx(0, abs=1e-6)
 
 
 class TestHub:

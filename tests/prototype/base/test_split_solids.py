@@ -28,7 +28,7 @@ from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
-from tests.helpers import as_trimesh, bounds, cylinders
+from tests.helpers import as_trimesh, bounds, cylinders, manifold
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))
 MESH_MM = 0.05
@@ -91,8 +91,13 @@ class TestSmall:
         base, _, plan, parts, _ = small
         seats = base.local_seats
         added, removed = added_solids(base, seats, plan), removed_solids(base, seats)
-        with_flanges = volume_by_meshes(added, removed, 0.01)
-        assert with_flanges > volume_by_meshes(added_solids(base, seats), removed, 0.01) + 10_000
+        meshes = ([manifold(one, 0.01) for one in some] for some in (added, removed))
+        with_flanges = volume_by_meshes(*meshes)
+        without = [manifold(one, 0.01) for one in added_solids(base, seats)]
+        assert (
+            with_flanges
+            > volume_by_meshes(without, [manifold(one, 0.01) for one in removed]) + 10_000
+        )
         assert volume(carrier_solid(base, MESH_MM, plan)[0]) == pytest.approx(
             with_flanges, rel=2e-4
         )

@@ -1,4 +1,4 @@
-"""Round through holes: circles on both faces of a flange and the cylinders between them."""
+"""Round holes: circles at both ends and the cylinders between them."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,6 @@ from OCP.Geom import Geom_CylindricalSurface
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
 
 from tbcad.cad.brep import Maker, Ring
-from tbcad.shell.envelope import Holes
 from tbcad.types import Floats
 
 
@@ -21,18 +20,26 @@ class _Circle:
 
 
 def hole_faces(
-    maker: Maker, holes: Holes, x: Floats, y: Floats
+    maker: Maker, centre: Floats, direction: Floats, radius: Floats, x: Floats, y: Floats
 ) -> tuple[list[Ring], list[Ring], list[TopoDS_Face]]:
     """Holes whose direction is x cross y.
 
+    Args:
+        maker: of kernel shapes.
+        centre: where they begin, mm, (k, 3).
+        direction: into the material, length their depth, mm, (3,).
+        radius: mm, (k,).
+        x: unit vector across.
+        y: unit vector across.
+
     Returns:
-        Inner rings of the joining face, those of the opposite face, and the cylinders.
+        Inner rings of the face where they begin, those where they end, and the cylinders.
     """
-    sizes = list(zip(holes.centre, holes.radius, strict=True))
-    near = [_circle(maker, centre, x, y, radius) for centre, radius in sizes]
-    far = [_circle(maker, centre + holes.direction, x, y, radius) for centre, radius in sizes]
-    cylinders = [maker.cylinder(centre, x, y, radius) for centre, radius in sizes]
-    height = float(np.linalg.norm(holes.direction))
+    sizes = list(zip(centre, radius, strict=True))
+    near = [_circle(maker, start, x, y, radius) for start, radius in sizes]
+    far = [_circle(maker, start + direction, x, y, radius) for start, radius in sizes]
+    cylinders = [maker.cylinder(start, x, y, radius) for start, radius in sizes]
+    height = float(np.linalg.norm(direction))
     return (
         [[(circle.edge, True)] for circle in near],
         [[(circle.edge, False)] for circle in far],
