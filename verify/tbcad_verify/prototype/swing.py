@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations
 from typing import Any
 
@@ -100,9 +100,10 @@ class AxialSolid:
         """(2, 2) lower and upper bounds of position along the axis and distance from it, mm."""
         mesh = self.solid.to_mesh64()
         along, *across = self.frame @ mesh.vert_properties[:, :3].T
-        corner = np.stack(across)[:, mesh.tri_verts]  # (2, F, 3)
+        corners = [np.stack(across)[:, one] for one in mesh.tri_verts.T]  # three of (2, F)
         # A facet is no nearer to the axis than the rectangle round it.
-        inner = np.maximum(corner.min(axis=2), -corner.max(axis=2)).clip(min=0)
+        low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
+        inner = np.maximum(low, -high).clip(min=0)
         nearest = np.hypot(*inner).min(initial=np.inf)
         farthest = np.hypot(*across).max(initial=0)
         return np.array([[along.min(initial=np.inf), nearest], [along.max(initial=0), farthest]])
