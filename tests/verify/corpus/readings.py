@@ -32,8 +32,8 @@ from tbcad_verify.prototype import (
     homing_checks,
     klipper_checks,
     lamp_light,
-    lamp_views,
     leds,
+    measured_parts,
     measured_prototype,
     seats,
 )
@@ -43,8 +43,8 @@ from tbcad_verify.prototype.bodies import Bodies
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.lamp_light import EdgedBodies
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
-from tbcad_verify.prototype.pinhole_cells import MirrorSpheres
-from tbcad_verify.prototype.ray_transfer import RayTransfer
+from tbcad_verify.prototype.pinhole_cells import mirror_spheres
+from tbcad_verify.prototype.ray_transfer import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
@@ -73,18 +73,19 @@ PURE: dict[Any, tuple[str, ...]] = {
     shell_checks: ("wall", "cells_of_export"),
     prototype_stages: ("measure_part", "joined_meshes"),
     prototype_stages.inventory: ("read_solids",),
-    prototype_stages.swing: ("manifold", "_parts_apart"),
+    prototype_stages.swing: ("_parts_apart",),
+    measured_parts: ("manifold",),
     assembly: ("manifold",),
     bodies: ("_scene",),
-    calibration: ("manifold", "joined_meshes", "build_scene", "highlights"),
-    camera_gauge_checks: ("manifold", "joined_meshes", "build_scene"),
+    calibration: ("joined_meshes", "build_scene", "highlights"),
+    camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
     flat_drawing: ("_section",),
     fastener_checks: ("_hole_spans",),
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),
     klipper_checks: ("run_program", "_run"),
-    leds: ("manifold", "joined_meshes"),
+    leds: ("joined_meshes",),
     measured_prototype: ("joined_meshes", "build_scene"),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
 }
@@ -104,7 +105,7 @@ def remembered() -> Iterator[None]:
         (prototype_stages.ball_views, "ball_views", _traced_key),
         (prototype_stages.swing, "axial_solid", _solid_key),
         (prototype_stages.swing, "sweep", _sweep_key),
-        (lamp_views, "pixel_rays", _rays_key),
+        (prototype_stages.ball_views, "pixel_rays", _rays_key),
         (lamp_light, "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
@@ -249,7 +250,7 @@ def _fasteners_key(context: PrototypeContext, drawn: dict[str, Shape], *, turns:
     return context.prototype.fasteners, drawn, turns
 
 
-def _traced_key(measured: MeasuredPrototype) -> object:
+def _traced_key(measured: MeasuredPrototype, *_: object) -> object:
     """All that the light of the balls depends on."""
     context = measured.context
     return (
@@ -260,9 +261,10 @@ def _traced_key(measured: MeasuredPrototype) -> object:
     )
 
 
-def _rays_key(transfer: RayTransfer, shell: MirrorSpheres) -> object:
+def _rays_key(measured: MeasuredPrototype) -> object:
+    transfer = ray_transfer(measured)
     arrays = transfer.merged, transfer.on_base, transfer.ball
-    return _traced_key(transfer.measured), arrays, shell
+    return _traced_key(measured), arrays, mirror_spheres(measured.context)
 
 
 def _light_key(

@@ -225,7 +225,7 @@ def test_coverage_by_rays_on_a_fine_outline(
     context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
     """One mirror by a plain loop over many directions, its ball turned and not the rays."""
-    shown = ball_views.ball_views(measured)
+    shown = ball_views.ball_views(measured, ball_views.pixel_rays(measured))
     edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
     transfer = ray_transfer.ray_transfer(measured)
     for i in (5, 20, 40):
@@ -292,9 +292,12 @@ def test_one_look_does_where_nothing_can_ever_meet(measured: MeasuredPrototype) 
         placed = cube.transform(np.hstack([measured.context.frame.T, np.zeros((3, 1))]))
         return swing.axial_solid(measured, "cube", placed)
 
-    found = swing.sweep(measured, at(20, 30, 2), at(30, 30, 2))
+    pair = at(20, 30, 2), at(30, 30, 2)
+    found = swing.sweep(measured, *pair)
+    (exact,) = swing._nearest_exactly([pair], [found])
     assert (found.samples, found.volume) == (1, 0.0)
-    assert 5 < found.gap <= 8
+    assert found.gap <= exact.gap
+    assert 5 < exact.gap <= 8
     inside = swing.sweep(measured, at(20, 30, 20), at(20, 30, 2))
     assert inside.volume == pytest.approx(8, rel=1e-6)
     assert inside.samples > 1
@@ -323,7 +326,7 @@ def test_volume_inside_is_the_booleans(
     assert (shared > 0) == (along == 0 and not hollow)
 
 
-@pytest.mark.parametrize("apart", [0.5, 6.0, 9.0, 11.0, 25.0])
+@pytest.mark.parametrize("apart", [0.5, 2.0, 3.2, 4.0, 6.0, 9.0, 11.0, 25.0])
 def test_quick_looks_at_the_swing_change_nothing(
     measured: MeasuredPrototype, monkeypatch: pytest.MonkeyPatch, apart: float
 ) -> None:
@@ -338,12 +341,13 @@ def test_quick_looks_at_the_swing_change_nothing(
     )
 
     def swept() -> swing.PairSweep:
-        solids = (swing.axial_solid(measured, "cube", one.transform(place)) for one in cubes)
-        return swing.sweep(measured, *solids)
+        one, two = (swing.axial_solid(measured, "cube", cube.transform(place)) for cube in cubes)
+        (found,) = swing._nearest_exactly([(one, two)], [swing.sweep(measured, one, two)])
+        return found
 
     quick = swept()
     monkeypatch.setattr(swing, "_boxes_apart", lambda one, two: False)
-    monkeypatch.setattr(swing, "COARSE_MM", swing.GRAIN_MM)
+    monkeypatch.setattr(swing, "GRAINS_MM", swing.GRAINS_MM[-1:])
     monkeypatch.setattr(swing, "GROWTH", np.inf)
     assert swept() == quick
     assert quick.gap < swing.SEARCH_MM or apart > swing.SEARCH_MM

@@ -50,9 +50,10 @@ def build_scene(mesh: Mesh) -> RayScene:
     TriangleMesh(scene, mesh.points.astype(np.float32), mesh.faces)
     one = np.ones((1, 3), dtype=np.float32)
     scene.run(one, one)  # the first call commits; later ones may come from any thread
-    normal = unit(mesh.area)
-    offset = dot(normal, np.take(mesh.points, mesh.faces[:, 0], axis=0).T)
-    return RayScene(scene, np.ascontiguousarray(np.vstack([normal, offset]).T))
+    normal, planes = unit(mesh.area), np.empty((len(mesh.faces), 4))
+    planes[:, :3] = normal.T
+    planes[:, 3] = dot(normal, np.take(mesh.points, mesh.faces[:, 0], axis=0).T)
+    return RayScene(scene, planes)
 
 
 def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:

@@ -15,6 +15,7 @@ from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.prototype.pinhole_cells import (
     INSIDE,
     OUTLINE_DIRECTIONS,
+    TILE,
     MirrorSpheres,
     PinholeOutlines,
     cell_outlines,
@@ -77,23 +78,44 @@ class BallViews:
     pixels_shell: Floats
 
 
-def ball_views(measured: MeasuredPrototype) -> BallViews:
-    """Trace all mirrors of the camera, each on its ball at its stop."""
+@dataclass(frozen=True)
+class PixelRays:
+    """Rays of sampled pixels that meet the capture sphere after their ball.
+
+    Attributes:
+        direction: (3, N) in the shell's picture.
+        mirror: (N,) whose cell they are in.
+        weight: (N,) pixels of the prototype's picture that each represents.
+        shell: (m,) pixels of the shell's picture that see the capture sphere in each mirror.
+    """
+
+    direction: Floats
+    mirror: Ints
+    weight: Floats
+    shell: Floats
+
+
+def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:
+    """Trace all mirrors of the camera, each on its ball at its stop.
+
+    Args:
+        measured: the prototype.
+        pixel: its rays.
+    """
     shell, transfer = mirror_spheres(measured.context), ray_transfer(measured)
     cells = cell_outlines(shell)
     outlines, nearest = ended_on_balls(transfer, cells)
     rim, rim_mirror = _rim_rays(transfer, outlines, nearest)
-    pixel, pixel_mirror, weight, pixels_shell = pixel_rays(transfer, shell)
-    mirror, count = np.append(rim_mirror, pixel_mirror), shell.radius.size
-    blocked, blockers = blocked_rays(transfer, mirror, np.hstack([rim, pixel]))
+    mirror, count = np.append(rim_mirror, pixel.mirror), shell.radius.size
+    blocked, blockers = blocked_rays(transfer, mirror, np.hstack([rim, pixel.direction]))
     return BallViews(
         _coverage(transfer, outlines, nearest),
         _hidden(shell, cells),
         np.bincount(mirror, minlength=count),
         np.bincount(mirror[blocked], minlength=count),
         blockers,
-        np.bincount(pixel_mirror, weight, count).astype(np.float64),
-        pixels_shell,
+        np.bincount(pixel.mirror, pixel.weight, count).astype(np.float64),
+        pixel.shell,
     )
 
 
@@ -247,16 +269,12 @@ def _rim_rays(
     return np.concatenate(rays, axis=1), np.concatenate(mirrors)
 
 
-def pixel_rays(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Ints, Floats, Floats]:
-    """Rays of sampled pixels that meet the capture sphere after their ball.
-
-    Returns:
-        Directions (3, N) in the shell's picture, mirrors (N,), pixels of the prototype's picture
-        that each represents (N,), and pixels of the shell's picture by mirror (m,).
-    """
-    camera, radius = transfer.measured.context.camera, transfer.measured.context.radius
+def pixel_rays(measured: MeasuredPrototype) -> PixelRays:
+    """Rays of sampled pixels that meet the capture sphere after their ball."""
+    shell, transfer = mirror_spheres(measured.context), ray_transfer(measured)
+    camera, radius = measured.context.camera, measured.context.radius
     d, step = sampled_pixels(camera)
-    mirror = first_mirrors(shell, d)
+    mirror = first_mirrors(shell, d, TILE**2)
     on = np.flatnonzero(mirror >= 0)
     d, mirror = d[:, on], mirror[on]
     normal = unit(shell.apex - shell.centre)
@@ -270,4 +288,4 @@ def pixel_rays(transfer: RayTransfer, shell: MirrorSpheres) -> tuple[Floats, Int
     weight = np.asarray(step**2 / np.maximum(depth, 1e-3) ** 3, dtype=np.float64)
     area = np.full(int(in_shell.sum()), float(step**2))
     shell_count = np.bincount(mirror[in_shell], area, shell.radius.size).astype(np.float64)
-    return d[:, in_prototype], mirror[in_prototype], weight[in_prototype], shell_count
+    return PixelRays(d[:, in_prototype], mirror[in_prototype], weight[in_prototype], shell_count)

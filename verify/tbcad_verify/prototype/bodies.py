@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -51,11 +52,27 @@ class BodyScene:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Bodies that turn with the base, and bodies that do not."""
+    """Bodies that turn with the base, and bodies that do not.
+
+    Attributes:
+        context: the record.
+        moving: shapes of those that turn, by name.
+        fixed: shapes of the others.
+    """
 
     context: PrototypeContext
-    turning: BodyScene
-    still: BodyScene
+    moving: Mapping[str, Shape]
+    fixed: Mapping[str, Shape]
+
+    @cached_property
+    def turning(self) -> BodyScene:
+        """Those that turn; made ready for rays when the first are followed."""
+        return _scene(self.moving)
+
+    @cached_property
+    def still(self) -> BodyScene:
+        """The others."""
+        return _scene(self.fixed)
 
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
@@ -88,7 +105,7 @@ def assembled_bodies(
     shapes = {name: shape for name, shape in drawn.items() if name not in left_out}
     turning = {n: s for n, s in shapes.items() if n in swung or n.startswith("ball_")}
     still = {n: s for n, s in shapes.items() if n not in turning}
-    return Bodies(context, _scene(turning), _scene(still))
+    return Bodies(context, turning, still)
 
 
 def stage_bodies(context: PrototypeContext) -> frozenset[str]:
@@ -111,10 +128,16 @@ def _scene(shapes: Mapping[str, Shape]) -> BodyScene:
 
     if not shapes:
         return BodyScene(None, np.zeros(0, dtype=np.int64), ())
-    triangles = [points[faces] for points, faces in shapes.values()]
+    points, faces = zip(*shapes.values(), strict=True)
+    first = np.cumsum([0, *(len(some) for some in points)])[:-1]
     scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, np.concatenate(triangles).astype(np.float32))
+    # Not corner by corner: Embree's interface takes every number by itself, most of the time here.
+    TriangleMesh(
+        scene,
+        np.concatenate(points).astype(np.float32),
+        np.concatenate([some + k for some, k in zip(faces, first, strict=True)]).astype(np.int32),
+    )
     one = np.ones((1, 3), dtype=np.float32)
     scene.run(one, one)  # the first call commits
-    owner = np.repeat(np.arange(len(shapes)), [len(some) for some in triangles])
+    owner = np.repeat(np.arange(len(shapes)), [len(some) for some in faces])
     return BodyScene(scene, owner, tuple(shapes))

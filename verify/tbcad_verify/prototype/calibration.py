@@ -12,7 +12,7 @@ import numpy as np
 from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, manifold
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -81,9 +81,7 @@ def _volume_in_room(
     room = manifold3d.Manifold.cylinder(height, radius, radius, ROOM_SIDES)
     room = room.translate([0.0, 0.0, low + LIFT_MM])
     volumes = {
-        part.part.name: (manifold(part.placed_mesh.points, part.placed_mesh.faces) ^ room).volume()
-        for part in fixed
-        if _near(part, radius, low)
+        part.part.name: (part.solid ^ room).volume() for part in fixed if _near(part, radius, low)
     }
     leds = [led.name for led in context.prototype.leds if np.hypot(*led.position[:2]) < radius]
     names = [name for name, volume in volumes.items() if volume > ROOM_MM3 / max(len(volumes), 1)]

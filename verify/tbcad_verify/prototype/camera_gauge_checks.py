@@ -17,7 +17,7 @@ from tbcad_verify.mesh.lines import distances_to_segments
 from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, manifold, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
 from tbcad_verify.record.camera_sheet import Requirements, read_sheet
 from tbcad_verify.record.prototype_sections import CameraPlace, MarkPicture
 from tbcad_verify.report.checks import (
@@ -228,9 +228,9 @@ def _room_faults(
     """The gauge sits on the hub, clear of balls, and turns past the frame."""
     import manifold3d
 
-    solid = manifold(gauge.placed_mesh.points, gauge.placed_mesh.faces)
+    solid = gauge.solid
     for part in of_roles(parts, "base", "cap"):
-        shared = (solid ^ manifold(part.placed_mesh.points, part.placed_mesh.faces)).volume()
+        shared = (solid ^ part.solid).volume()
         if shared > PRESSED_MM3:
             yield f"the gauge and {part.part.name} share {shared:.1f} mm^3"
     balls = context.prototype.balls
@@ -245,8 +245,7 @@ def _room_faults(
         rotation = context.base_rotation(np.radians([angle])).as_matrix()[0]
         turned.append(solid.transform(np.hstack([rotation, np.zeros((3, 1))])))
     for part in of_roles(parts, "frame"):
-        fixed = manifold(part.placed_mesh.points, part.placed_mesh.faces)
-        if min(one.min_gap(fixed, CLEAR_MM) for one in turned) < CLEAR_MM:
+        if min(one.min_gap(part.solid, CLEAR_MM) for one in turned) < CLEAR_MM:
             yield f"the gauge turns against {part.part.name}"
 
 

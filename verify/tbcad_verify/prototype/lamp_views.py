@@ -11,10 +11,9 @@ import numpy as np
 
 from tbcad_verify.mesh.surfaces import nearest_on_rays
 from tbcad_verify.mesh.vectors import norm, unit
-from tbcad_verify.prototype.ball_views import pixel_rays
+from tbcad_verify.prototype.ball_views import PixelRays
 from tbcad_verify.prototype.bodies import Bodies
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
-from tbcad_verify.prototype.pinhole_cells import mirror_spheres
 from tbcad_verify.prototype.ray_transfer import ray_transfer
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats
@@ -24,20 +23,22 @@ STAGE = "stage_"  # parts inside the capture sphere, whose light other checks fo
 CHECKS = {"light past lamps and card": "blocked rays", "lamps seen": "% of the pixels"}
 
 
-def checks(names: list[CheckName], measured: MeasuredPrototype, bodies: Bodies) -> list[Check]:
+def checks(
+    names: list[CheckName], measured: MeasuredPrototype, pixel: PixelRays, bodies: Bodies
+) -> list[Check]:
     """Follow pixels' rays from pinhole to ball, to the capture sphere, and beyond.
 
     Args:
         names: of the checks.
         measured: the prototype.
+        pixel: its rays.
         bodies: all but those that other checks follow rays past.
     """
     free, seen = names
     lamps = measured.context.prototype.lamps
     transfer = ray_transfer(measured)
-    d, mirror, weight, _ = pixel_rays(transfer, mirror_spheres(measured.context))
-    rays = transfer.reflected(mirror, d)[1]
-    turn = transfer.base[mirror]
+    rays = transfer.reflected(pixel.mirror, pixel.direction)[1]
+    turn = transfer.base[pixel.mirror]
     point, along = (turn.apply(x.T) for x in (rays.point, unit(rays.toward)))
     start = np.broadcast_to(measured.context.pinhole, point.shape)
     radius = measured.context.radius
@@ -49,7 +50,8 @@ def checks(names: list[CheckName], measured: MeasuredPrototype, bodies: Bodies) 
     own = {lamp.name for lamp in lamps.places} if lamps else set()
     body, _ = bodies.still.first(point + SKIN_MM * along, along)
     titles = np.array([*bodies.still.names, ""])
-    share = 100 * float(weight[np.isin(titles[body], [*own])].sum() / max(weight.sum(), 1.0))
+    of_lamps = pixel.weight[np.isin(titles[body], [*own])].sum()
+    share = 100 * float(of_lamps / max(pixel.weight.sum(), 1.0))
     texts = [f"{count} by {name}" for name, count in sorted(blocked.items())]
     return [
         at_most(free, sum(blocked.values()), 0, f"stopped: {short_list(texts)}"),

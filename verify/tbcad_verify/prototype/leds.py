@@ -9,7 +9,6 @@ from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
     distance_to_facets,
     joined_meshes,
-    manifold,
 )
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats
@@ -51,5 +50,4 @@ def _is_in_material(stage: list[MeasuredPart], point: Floats) -> bool:
     import manifold3d
 
     cube = manifold3d.Manifold.cube([CUBE_MM] * 3, center=True).translate(point)
-    solids = (manifold(part.placed_mesh.points, part.placed_mesh.faces) for part in stage)
-    return any((solid ^ cube).volume() > cube.volume() / 2 for solid in solids)
+    return any((part.solid ^ cube).volume() > cube.volume() / 2 for part in stage)

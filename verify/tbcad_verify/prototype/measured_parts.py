@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,15 @@ class MeasuredPart:
         if self.placed is None:
             raise Unknown(self.reason)
         return self.placed
+
+    @cached_property
+    def solid(self) -> Any:
+        """The placed mesh as manifold3d has it, built once for all checks.
+
+        Raises:
+            Unknown: there is no mesh.
+        """
+        return manifold(self.placed_mesh.points, self.placed_mesh.faces)
 
 
 def measure_part(part: PrintedPart, facets: Facets) -> MeasuredPart:

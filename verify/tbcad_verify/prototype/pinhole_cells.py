@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tbcad_verify.mesh.rays import in_threads, pixel_rows
+from tbcad_verify.mesh.rays import pixel_rows
 from tbcad_verify.mesh.vectors import chunks, dot, norm, tangent_basis, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.export import Camera
@@ -22,9 +22,9 @@ NEIGHBOURS = 20
 HALVINGS = 34
 MAX_ANGLE = 1.2  # rad, from a mirror's apex to its outline, where no neighbour ends the cell
 INSIDE = 0.98  # of the angle to the outline, where the mirror itself must be seen
-CHUNK = 1 << 6  # neighbouring rays, as a rule, against the spheres near them
 SLACK = 1e-6  # rad: cosines near 1 are off by rounding
 PIXELS = 100_000  # of the sensor are sampled, about
+TILE = 16  # columns and rows of sampled pixels that follow each other: few mirrors are near all
 
 
 @dataclass(frozen=True)
@@ -123,26 +123,41 @@ def _outside(shell: MirrorSpheres, near: Ints, chief: Floats, out: Floats) -> Fl
     return np.where(inside, MAX_ANGLE, angle)
 
 
-def first_mirrors(shell: MirrorSpheres, d: Floats) -> Ints:
+def first_mirrors(shell: MirrorSpheres, d: Floats, together: int = OUTLINE_DIRECTIONS) -> Ints:
     """(N,) the mirror that the pinhole sees first along d (3, N); -1 for none.
 
     Beyond the seam and below the foot there is no mirror.
+
+    Args:
+        shell: the mirrors.
+        d: directions.
+        together: how many that follow each other are tried against the spheres near all of them.
     """
     toward = shell.centre - shell.pinhole[:, None]
     # A sphere about the pinhole is met by all rays.
     sine = np.where(norm(toward) > shell.radius, shell.radius / norm(toward), np.nan)
     half = np.nan_to_num(np.arcsin(sine), nan=np.pi) + SLACK
-    toward, parts = unit(toward), chunks(d.shape[1], CHUNK)
-    first = in_threads(lambda part: _first(shell, toward, half, d[:, part]), parts)
+    toward, parts = unit(toward), chunks(d.shape[1], together)
+    # Arrays are too small for threads, which would wait for the interpreter.
+    first = [_first(shell, toward, half, d[:, part]) for part in parts]
     return np.concatenate([np.zeros(0, dtype=np.int64), *first])
 
 
 def sampled_pixels(camera: Camera) -> tuple[Floats, int]:
-    """Every k-th pixel of every k-th row, (3, N) directions with 1 along `forward`; and k."""
+    """Every k-th pixel of every k-th row, tile by tile; and k.
+
+    Returns:
+        (3, N) directions with 1 along `forward`.
+    """
     step = max(1, int(np.sqrt(camera.width * camera.height / PIXELS)))
     rows = range(step // 2, camera.height, step)
-    directions = [pixel_rows(camera, row, row + 1)[:, step // 2 :: step] for row in rows]
-    return np.concatenate(directions, axis=1), step
+    grid = np.stack([pixel_rows(camera, k, k + 1)[:, step // 2 :: step] for k in rows], axis=1)
+    tiles = [
+        grid[:, y : y + TILE, x : x + TILE].reshape(3, -1)
+        for y in range(0, grid.shape[1], TILE)
+        for x in range(0, grid.shape[2], TILE)
+    ]
+    return np.concatenate(tiles, axis=1), step
 
 
 def _first(shell: MirrorSpheres, toward: Floats, half: Floats, d: Floats) -> Ints:

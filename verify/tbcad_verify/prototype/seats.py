@@ -43,6 +43,10 @@ CHECKS = {
 }
 
 
+Boxes = tuple[Floats, Floats]
+"""Lower and upper corners (F, 3) of boxes, mm."""
+
+
 @dataclass(frozen=True)
 class MeasuredSeat:
     """Where the pads put one ball.
@@ -74,7 +78,8 @@ def measure_seats(context: PrototypeContext, base: Mesh) -> list[MeasuredSeat]:
 
     The spec moves pads off the balls by what a printer adds to them: as printed they touch.
     """
-    return [_seat(context, base, k) for k in range(len(context.prototype.balls))]
+    boxes = _facet_boxes(base)
+    return [_seat(context, base, boxes, k) for k in range(len(context.prototype.balls))]
 
 
 def centre_errors(context: PrototypeContext, seats: list[MeasuredSeat]) -> Floats:
@@ -110,11 +115,11 @@ def checks(
     ]
 
 
-def _seat(context: PrototypeContext, base: Mesh, k: int) -> MeasuredSeat:
+def _seat(context: PrototypeContext, base: Mesh, boxes: Boxes, k: int) -> MeasuredSeat:
     balls, seat = context.prototype.balls, context.prototype.seats[k]
     radius, pad_radius = float(balls.body_radius_mm[k]), seat.pad / 2
     try:
-        near = _facets_near(base, balls.columns("bx", 3)[:, k], radius + SEARCH_MM)
+        near = _facets_near(boxes, balls.columns("bx", 3)[:, k], radius + SEARCH_MM)
         pads = [
             _pad(base, near, contact, normal, pad_radius)
             for contact, normal in zip(seat.contacts, seat.normals, strict=True)
@@ -140,10 +145,15 @@ def touching_sphere(normals: list[Floats], offsets: list[float], radius: float) 
     return np.asarray(np.linalg.solve(matrix, np.array(offsets) + radius))
 
 
-def _facets_near(mesh: Mesh, point: Floats, distance: float) -> Ints:
+def _facet_boxes(mesh: Mesh) -> Boxes:
+    """Lower and upper corners of the boxes about all facets."""
+    a, b, c = (np.take(mesh.points, mesh.faces[:, k], axis=0) for k in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
+def _facets_near(boxes: Boxes, point: Floats, distance: float) -> Ints:
     """Facets whose box is nearer to a point than a distance, mm."""
-    corners = mesh.points[mesh.faces]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low, high = boxes
     gap = np.maximum(np.maximum(low - point, point - high), 0)
     return np.flatnonzero((gap**2).sum(axis=1) < distance**2)
 

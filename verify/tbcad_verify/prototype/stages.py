@@ -43,7 +43,7 @@ from tbcad_verify.prototype import (
 )
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.ball_views import BallViews, ball_coverage
+from tbcad_verify.prototype.ball_views import BallViews, PixelRays, ball_coverage
 from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import (
@@ -131,7 +131,10 @@ def verify_prototype(
     measured, reason = attempt(
         lambda: measure_prototype(context, require(seats_measured, NO_SEATS), fitted, parts)
     )
-    views, no_views = attempt(lambda: ball_views.ball_views(require(measured, reason)))
+    pixel, no_pixel = attempt(lambda: ball_views.pixel_rays(require(measured, reason)))
+    views, no_views = attempt(
+        lambda: ball_views.ball_views(require(measured, reason), require(pixel, no_pixel))
+    )
     placed_files = stl_names(parts, *PLACED)
     _add(sink, ball_views, placed_files, lambda: (context, require(views, no_views)))
     sink(Results(stages=[SWING]))
@@ -140,6 +143,7 @@ def verify_prototype(
         parts,
         sink,
         lambda: require(measured, reason),
+        lambda: require(pixel, no_pixel),
         lambda: require(drawn, no_drawing),
         lambda: require(solids, no_solids),
     )
@@ -244,6 +248,7 @@ def _swing(
     parts: list[MeasuredPart],
     sink: ResultSink,
     measured: Callable[[], MeasuredPrototype],
+    pixel: Callable[[], PixelRays],
     drawn: Callable[[], dict[str, Shape]],
     solids: Callable[[], dict[str, TextSolid]],
 ) -> None:
@@ -262,7 +267,11 @@ def _swing(
         sink,
         lamp_views,
         file,
-        lambda: (measured(), bodies.assembled_bodies(context, drawn(), _followed(context))),
+        lambda: (
+            measured(),
+            pixel(),
+            bodies.assembled_bodies(context, drawn(), _followed(context)),
+        ),
     )
     _add(sink, shroud_checks, PATTERNS, lambda: (context, drawn(), solids()))
     _add(sink, lamp_light, file, lambda: (context, drawn(), solids()))

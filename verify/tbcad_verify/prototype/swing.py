@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 from itertools import combinations
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
-from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.report.checks import (
     Check,
@@ -29,11 +29,15 @@ TOUCH_MM3 = 0.01
 # Faces in contact, as of screwed parts, overlap by the error of facets and float32.
 CONTACT_MM3 = 1.0
 BALL_SEGMENTS = 64
-GRAIN_MM, COARSE_MM = 2.0, 8.0  # of points on surfaces: of many, and of few
+GRAINS_MM = (8.0, 4.0, 2.0)  # of points on surfaces, few to many
+GRAIN_MM = GRAINS_MM[-1]
 BETWEEN_MM = 2 * GRAIN_MM  # more than points of two surfaces are farther apart than these
 CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
 GROWTH = 1.5  # of a distance from one sample to the next, mostly at most
 MIN_LEVER_MM = 1e-9
+# Points may be farther apart than their surfaces by this for each millimetre of grain: no point of
+# a facet is farther from a corner than 1/sqrt(3) of its longest edge.
+OFF_SURFACE = 1 / float(np.sqrt(3))
 FAR_MM = 1e3  # reported of a prototype with one ball
 NAMED = 3  # pairs of parts
 CHECKS = {
@@ -67,10 +71,9 @@ class SurfacePoints:
     def distance_at_any_angle(self, other: SurfacePoints, limit: float) -> float:
         """Distance that two surfaces keep at any angle about the axis, mm; may be negative.
 
-        It is infinite where it is more than a limit, mm. No point of a facet is farther from a
-        corner than 1/sqrt(3) of its longest edge.
+        It is infinite where it is more than a limit, mm.
         """
-        between = (self.grain + other.grain) / float(np.sqrt(3))
+        between = OFF_SURFACE * (self.grain + other.grain)
         farthest = limit + between
         low, high = self.profile.min(axis=0) - farthest, self.profile.max(axis=0) + farthest
         near = other.profile[((other.profile >= low) & (other.profile <= high)).all(axis=1)]
@@ -97,32 +100,31 @@ class AxialSolid:
         """(2, 2) lower and upper bounds of position along the axis and distance from it, mm."""
         mesh = self.solid.to_mesh64()
         along, *across = self.frame @ mesh.vert_properties[:, :3].T
-        corner = np.stack(across)[:, mesh.tri_verts]  # (2, F, 3)
+        corners = [np.stack(across)[:, one] for one in mesh.tri_verts.T]  # three of (2, F)
         # A facet is no nearer to the axis than the rectangle round it.
-        inner = np.maximum(corner.min(axis=2), -corner.max(axis=2)).clip(min=0)
+        low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
+        inner = np.maximum(low, -high).clip(min=0)
         nearest = np.hypot(*inner).min(initial=np.inf)
         farthest = np.hypot(*across).max(initial=0)
         return np.array([[along.min(initial=np.inf), nearest], [along.max(initial=0), farthest]])
 
-    @cached_property
-    def coarse(self) -> SurfacePoints:
-        """Few points."""
-        return self._points(COARSE_MM)
+    def points(self, grain: float) -> SurfacePoints:
+        """Points with a grain of `GRAINS_MM`, made once."""
+        if grain not in self._by_grain:
+            corners = self.solid.refine_to_length(grain).to_mesh64().vert_properties[:, :3]
+            along, *across = self.frame @ corners.T
+            profile = np.stack([along, np.hypot(*across)], axis=1)
+            self._by_grain[grain] = SurfacePoints(profile, grain)
+        return self._by_grain[grain]
 
     @cached_property
-    def fine(self) -> SurfacePoints:
-        """Many points."""
-        return self._points(GRAIN_MM)
-
-    def _points(self, grain: float) -> SurfacePoints:
-        points = self.solid.refine_to_length(grain).to_mesh64().vert_properties[:, :3]
-        along, *across = self.frame @ points.T
-        return SurfacePoints(np.stack([along, np.hypot(*across)], axis=1), grain)
+    def _by_grain(self) -> dict[float, SurfacePoints]:
+        return {}
 
     @property
     def reach(self) -> float:
-        """Maximum distance from the axis, mm."""
-        return float(self.fine.profile[:, 1].max(initial=0))
+        """Maximum distance from the axis, mm: a corner's."""
+        return float(self.box[1, 1])
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,7 @@ class PairSweep:
         at: base angle of the worse of both, rad.
         samples: number of angles.
         blind: by how much a step exceeded what the distance allows, at most, rad; 0: never.
+        rough: whether the gap is only known to be no less.
     """
 
     names: tuple[str, str]
@@ -144,6 +147,7 @@ class PairSweep:
     at: float
     samples: int
     blind: float
+    rough: bool = False
 
     @property
     def pair(self) -> str:
@@ -171,7 +175,8 @@ def checks(
     rotating, fixed = _solids(parts, "base", "cap"), _solids(parts, "stage", "frame")
     moving = [axial_solid(measured, *one) for one in [*rotating, *on_base, *_ball_solids(measured)]]
     still = [axial_solid(measured, *one) for one in [*fixed, *bought]]
-    sweeps = [sweep(measured, one, two) for one in moving for two in still]
+    pairs = [(one, two) for one in moving for two in still]
+    sweeps = _nearest_exactly(pairs, [sweep(measured, *pair) for pair in pairs])
     volume = max((one.volume for one in sweeps), default=0.0)
     nearest = min(sweeps, key=lambda one: one.gap, default=None)
     hits = [
@@ -204,10 +209,10 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
     names = (moving.name, still.name)
     if _boxes_apart(moving, still):
         return PairSweep(names, 0.0, SEARCH_MM, low, 1, 0.0)
-    bound = _distance_at_any_angle(moving, still)
+    bound, rough = _bound_at_any_angle(moving, still)
     if bound >= CLEAR_MM:
         shared = _volume_inside(measured, moving, still, low)
-        return PairSweep(names, shared, min(SEARCH_MM, bound), low, 1, 0.0)
+        return PairSweep(names, shared, min(SEARCH_MM, bound), low, 1, 0.0, rough)
     lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
     at, samples, blind = low, 0, 0.0
     volume, worst, gap, distance = 0.0, low, SEARCH_MM, SEARCH_MM
@@ -223,6 +228,19 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
         step = max(distance / lever, MIN_STEP_RAD)
         blind = max(blind, min(step, high - at) - distance / lever)
         at = min(at + step, high)
+
+
+def _nearest_exactly(
+    pairs: list[tuple[AxialSolid, AxialSolid]], sweeps: list[PairSweep]
+) -> list[PairSweep]:
+    """The sweeps of some pairs, with the gap of each that may be the smallest."""
+    nearest = min((one.gap for one in sweeps if not one.rough), default=SEARCH_MM)
+    return [
+        replace(one, gap=min(SEARCH_MM, _distance_at_any_angle(*pair)), rough=False)
+        if one.rough and one.gap <= nearest
+        else one
+        for pair, one in zip(pairs, sweeps, strict=True)
+    ]
 
 
 def _gap_and_volume(one: Any, two: Any, before: float) -> tuple[float, float]:
@@ -298,21 +316,32 @@ def _boxes_apart(one: AxialSolid, two: AxialSolid) -> bool:
 
 
 def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
-    """Distance that two solids' surfaces keep at any angle about the axis, mm.
+    """Distance that two solids' surfaces keep at any angle about the axis, mm; by many points."""
+    return one.points(GRAIN_MM).distance_at_any_angle(two.points(GRAIN_MM), SEARCH_MM)
 
-    The few points are asked for more than `SEARCH_MM`: where they find nothing, neither would the
-    many.
+
+def _bound_at_any_angle(one: AxialSolid, two: AxialSolid) -> tuple[float, bool]:
+    """The same, or where it is `CLEAR_MM` or more a bound below it; and whether it is a bound.
+
+    Few points are within the grain of the many, and so tell mostly on which side of `CLEAR_MM` the
+    distance is. They are asked for more than `SEARCH_MM`: where they find nothing, neither would
+    the many.
     """
-    if np.isinf(one.coarse.distance_at_any_angle(two.coarse, SEARCH_MM + BETWEEN_MM)):
-        return np.inf
-    return one.fine.distance_at_any_angle(two.fine, SEARCH_MM)
+    off = 2 * OFF_SURFACE * GRAIN_MM
+    for grain in GRAINS_MM[:-1]:
+        few = one.points(grain).distance_at_any_angle(two.points(grain), SEARCH_MM + BETWEEN_MM)
+        if np.isinf(few):
+            return np.inf, False
+        if few - off >= CLEAR_MM:
+            return few - off, True
+        # The many are farther apart than these by `off` at most, which their distance is without.
+        if few + 2 * OFF_SURFACE * grain < CLEAR_MM:
+            return -np.inf, False
+    return _distance_at_any_angle(one, two), False
 
 
 def _solids(parts: list[MeasuredPart], *roles: str) -> NamedSolids:
-    return [
-        (part.part.name, manifold(part.placed_mesh.points, part.placed_mesh.faces))
-        for part in of_roles(parts, *roles)
-    ]
+    return [(part.part.name, part.solid) for part in of_roles(parts, *roles)]
 
 
 def _ball_solids(measured: MeasuredPrototype) -> NamedSolids:

@@ -79,7 +79,9 @@ def measure(setup: OpticalSetup) -> Coverage:
     turned = np.abs(
         sum(winding_numbers(o, at, virtual, u) for o, at in zip(outlines, fitted, strict=True))
     )
-    hits = [_hidden(setup, camera, outline) for camera, outline in pairs]
+    hits = [_hidden(setup, *pair) for pair in pairs[: 1 if setup.symmetric else None]]
+    if setup.symmetric:  # what hides camera b's mirrors is the image of what hides camera a's
+        hits += [(setup.images(mirror), setup.image_facets(facet)) for mirror, facet in hits]
     hidden, blockers = (np.concatenate([pair[k] for pair in hits]) for k in range(2))
     by_facets, by_fits = (
         seam.gaps(outlines, lines, virtual, u, setup.radius) for lines in (facet, fitted)
@@ -160,7 +162,7 @@ def _off_the_record(setup: OpticalSetup, coverage: Coverage) -> float:
 
 def _hidden(
     setup: OpticalSetup, camera: Camera, outline: Outline
-) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+) -> tuple[NDArray[np.intp], NDArray[np.integer]]:
     """Mirrors of points that the pinhole does not see first, and the facets it sees instead.
 
     The points are the outline's, a little inside, and the middle of every facet of the mirrors.

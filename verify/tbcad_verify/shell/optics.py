@@ -79,6 +79,18 @@ class OpticalSetup:
         """All mirrors from this camera's pinhole."""
         return prepare_for_rays(camera.pinhole, self.mirrors)
 
+    def images(self, mirrors: NDArray[np.integer]) -> NDArray[np.intp]:
+        """The mirrors (N,) that are these mirrors' images, where the setup is symmetric."""
+        one, other = (np.flatnonzero(self.export.mirrors.camera == c.id) for c in self.cameras)
+        image = np.arange(len(self.export.mirrors))
+        image[other], image[one] = one, other
+        return np.asarray(image[mirrors])
+
+    def image_facets(self, facets: NDArray[np.integer]) -> NDArray[np.int64]:
+        """The same of facets (N,); -1 stays."""
+        half = len(self.mesh.faces) // 2
+        return np.where(facets < 0, -1, (facets.astype(np.int64) + half) % (2 * half))
+
     def owner(self) -> NDArray[np.intp]:
         """(K,) recorded mirror of each patch; -1 for none."""
         return owners(self.match.segment, self.recovery.segments.count)

@@ -79,17 +79,13 @@ def _tallies(setup: OpticalSetup) -> list[light.PixelTally]:
 
 def _image(setup: OpticalSetup, tally: light.PixelTally) -> light.PixelTally:
     """Camera b's tally from camera a's, of which everything is the mirror image."""
-    one, other = (np.flatnonzero(setup.export.mirrors.camera == c.id) for c in setup.cameras)
-    half = len(setup.mesh.faces) // 2
-    source = np.arange(len(setup.export.mirrors))
-    source[other], source[one] = one, other
-    blockers = np.where(tally.blockers < 0, -1, (tally.blockers + half) % (2 * half))
+    source = setup.images(np.arange(len(setup.export.mirrors)))
     return replace(
         tally,
         pixels=tally.pixels[source],
         blocked=tally.blocked[source],
         nearest=tally.nearest[source],
-        blockers=np.unique(blockers),
+        blockers=np.unique(setup.image_facets(tally.blockers)),
     )
 
 
