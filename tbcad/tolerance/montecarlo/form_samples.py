@@ -15,6 +15,7 @@ from tbcad.simulate.parallel import compiled_loop
 from tbcad.tolerance.montecarlo.edge_samples import (
     FIRST_HEIGHT,
     FIRST_NORMAL,
+    OBJECT,
     PINHOLE,
     POINT,
     RAY,
@@ -137,8 +138,9 @@ def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heig
 def reflect_formed_samples(surface: Floats, form: Floats, view: Floats, samples: Floats) -> None:
     """As `reflect_samples`, for a mirror with waviness."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
+    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     numbers = form_numbers(form)
     for s in range(SAMPLES):
         offset = minus(get_sample(samples, POINT, s), apex)
         gradient = plus_scaled(normal, curvature, offset)
-        reflect_sample(minus(gradient, slope(numbers, offset)), view, samples, s)
+        reflect_sample(minus(gradient, slope(numbers, offset)), scale, middle, samples, s)
