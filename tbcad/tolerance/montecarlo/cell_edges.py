@@ -8,7 +8,7 @@ from math import inf
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
 from tbcad.tolerance.montecarlo.edge_samples import (
     DISTANCE,
     PLACES,

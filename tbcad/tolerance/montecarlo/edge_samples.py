@@ -6,7 +6,8 @@ become vector instructions of the processor. The points are those of both mirror
 
 from math import sqrt
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.tolerance.montecarlo.visible_edges import (
     APEX,
     BEND,
@@ -16,7 +17,6 @@ from tbcad.tolerance.montecarlo.visible_edges import (
     START,
     TANGENT,
 )
-from tbcad.tolerance.vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.types import Floats
 
 # Samples of an edge, and places from one quantity of the samples to the next.

@@ -11,7 +11,8 @@ to first order in the heights, and a mirror's normal is turned by its height's g
 
 from typing import TypeAlias
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.tolerance.montecarlo.edge_samples import (
     FIRST_HEIGHT,
     FIRST_NORMAL,
@@ -29,7 +30,6 @@ from tbcad.tolerance.montecarlo.edge_samples import (
     reflect_sample,
 )
 from tbcad.tolerance.montecarlo.visible_edges import APEX, CURVATURE, NORMAL
-from tbcad.tolerance.vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.types import Floats
 
 # Columns of a mirror's form: the polynomial of its height (tbcad.tolerance.montecarlo.form), mm,
