@@ -6,10 +6,10 @@ colours are interpolated; a pixel is the mean of so many samples that no ray is 
 
 import numpy as np
 
+from tbcad.compiled import compiled
 from tbcad.datasets.crops import Crop
 from tbcad.datasets.virtual_cameras import at_middle
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.rays import meets_sphere, unit_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 

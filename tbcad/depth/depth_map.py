@@ -7,11 +7,11 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from tbcad.compiled import compiled_loop
 from tbcad.datasets.pinhole_pictures import PinholePictures
 from tbcad.depth.plane_sweep import FINE, Sweep, swept_depth
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import compiled_loop
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bytes, Floats
 

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter
 
+from tbcad.compiled import compiled_loop
 from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import chunks, compiled_loop, first_then_threads
+from tbcad.simulate.parallel import chunks, first_then_threads
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tbcad.optics.cells import Cells
-from tbcad.optics.reflection import miss_distances
+from tbcad.optics.side_rays import misses_of_mirrors
 from tbcad.types import Floats, Ints
 
 # Samples of each arc: first over all of it, then between the neighbours of the smallest one.
@@ -45,11 +45,11 @@ def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
     """
     mirror, arc = limiting_sides(cells)
 
+    surfaces, points, weight = cells.surfaces, cells.arcs.points[arc], cells.arcs.weight[arc]
+    mirrors = np.column_stack([surfaces.apex, surfaces.normal, surfaces.curvature])
+
     def miss(t: Floats) -> Floats:
-        arcs = np.broadcast_to(arc[:, None], t.shape)
-        point = cells.arcs.at(arcs, t)
-        normal = cells.surfaces.gradient(np.broadcast_to(mirror[:, None], t.shape), point)
-        return miss_distances(pinhole, point, normal)
+        return misses_of_mirrors(points, weight, mirror, mirrors, pinhole, t)
 
     smallest = parabola_minima(samples_about_minima(miss, len(arc), ROUNDS))
     return 2 * minima_by_mirror(mirror, smallest, cells.mirrors)

@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.cells import Cells
-from tbcad.optics.reflection import sphere_miss_distances
+from tbcad.optics.side_rays import misses_of_balls
 from tbcad.optics.trace import SAMPLES, limiting_sides, minima_by_mirror, samples_about_minima
 from tbcad.types import Bools, Floats, Ints
 
@@ -71,11 +71,12 @@ class Windows:
         Returns:
             Infinite for mirrors without sides.
         """
-        place = self.pinhole if pinhole is None else pinhole
-        centres, radii = centre[self.mirror][:, None], radius[self.mirror][:, None]
+        pinholes = np.stack([self.pinhole, self.pinhole if pinhole is None else pinhole])
+        balls = np.column_stack([centre, radius, axis, np.cos(angle), np.sin(angle)])
+        points, weight = self.cells.arcs.points[self.arc], self.cells.arcs.weight[self.arc]
 
         def miss(t: Floats) -> Floats:
-            return sphere_miss_distances(place, self.rays(t, axis, angle), centres, radii)
+            return misses_of_balls(points, weight, self.mirror, balls, pinholes, t)
 
         smallest = samples_about_minima(miss, len(self.arc), ROUNDS).min(axis=1)
         return 2 * minima_by_mirror(self.mirror, smallest, self.cells.mirrors)

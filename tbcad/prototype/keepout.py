@@ -18,6 +18,13 @@ from tbcad.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
 from tbcad.prototype.base.profile import offset, shortened
+from tbcad.prototype.keepout_distances import (
+    azimuth_ranges,
+    cone_table,
+    distances_to_balls,
+    distances_to_cones,
+    lower_to_section,
+)
 from tbcad.types import Floats
 
 # Smallest distances are exact to this, or to this share of them, and never too large: where two
@@ -26,7 +33,6 @@ EXACT_MM = 0.05
 EXACT = 0.1
 CIRCLE_SIDES = 48
 MAX_SPLITS = 60
-CHUNK = 1024
 
 
 @dataclass(frozen=True)
@@ -77,14 +83,8 @@ class KeepOut:
 
     def to_light(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to the light in use, mm, (n,); negative in it."""
-        local = _cylindrical(self.frame, points)
-        # Few points at a time: the arrays of all points and cones would not stay in the cache.
-        parts = [local[k : k + CHUNK] for k in range(0, max(len(local), 1), CHUNK)]
-        return np.concatenate([self._to_cones(part) for part in parts])
-
-    def _to_cones(self, local: Floats) -> Floats:
-        """Distance of points (n, 3) about the axis to the nearest cone in use, mm, (n,)."""
-        return np.asarray(_to_cones(_from_range(local, self.used), self.cones).min(axis=1))
+        cones, ranges = cone_table(self.cones), azimuth_ranges(self.used)
+        return distances_to_cones(_cylindrical(self.frame, points), cones, ranges)
 
     def to_light_outside_sphere(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to the light outside the capture sphere, mm, (n,).
@@ -96,20 +96,11 @@ class KeepOut:
 
     def to_swept(self, points: Floats) -> Floats:
         """Distance of points (n, 3) to what the base sweeps over its swing, mm, (n,)."""
-        local = _cylindrical(self.frame, points)
-        balls = np.column_stack([self.centre, 0 * self.radius])
-        from_balls = norm(_from_range(local, self.swung) - balls) - self.radius
-        nearest: Floats = from_balls.min(axis=1)
-        places = {
-            azimuths: _from_range(local, np.array([azimuths]))[:, 0]
-            for azimuths in dict.fromkeys(section.azimuths for section in self.sections)
-        }
+        local, swung = _cylindrical(self.frame, points), azimuth_ranges(self.swung)
+        nearest = distances_to_balls(local, self.centre, self.radius, swung)
         for section in self.sections:
-            place = places[section.azimuths]
-            # The box round a section is cheap to measure, and mostly farther than the nearest.
-            near = np.hypot(_to_box(place[:, :2], section.polygon), place[:, 2]) < nearest
-            across = _to_polygon(place[near, :2], section.polygon)
-            nearest[near] = np.minimum(nearest[near], np.hypot(across, place[near, 2]))
+            (turned,) = azimuth_ranges(np.array([section.azimuths]))
+            lower_to_section(local, section.polygon, turned, nearest)
         return nearest
 
 
@@ -210,55 +201,3 @@ def _cylindrical(frame: Floats, points: Floats) -> Floats:
     """Points (n, 3) as z, r and azimuth about the first row of a frame, (n, 3)."""
     z, out, third = (points @ frame.T).T
     return np.stack([z, np.hypot(out, third), np.arctan2(third, out)], axis=1)
-
-
-def _from_range(local: Floats, azimuths: Floats) -> Floats:
-    """Points (n, m, 3) as seen from the nearest half-plane of each range of azimuths (m, 2).
-
-    Along the axis, out in that half-plane, and away from it.
-    """
-    middle, half = azimuths.mean(axis=1), np.diff(azimuths, axis=1)[:, 0] / 2
-    from_middle = np.abs((local[:, 2, None] - middle + np.pi) % (2 * np.pi) - np.pi)
-    beyond = np.maximum(from_middle - half, 0)
-    r = local[:, 1, None]
-    z = np.broadcast_to(local[:, 0, None], beyond.shape)
-    return np.stack([z, r * np.cos(beyond), r * np.sin(beyond)], axis=-1)
-
-
-def _to_cones(points: Floats, cones: RoundCones) -> Floats:
-    """Signed distances (n, m) of points (n, m, 3) to round cones (m,), exact outside.
-
-    In the plane through both centres and the point the hull is a trapezium between two circles.
-    """
-    flat = np.zeros((len(cones), 1))
-    start, end = np.hstack([cones.start, flat]), np.hstack([cones.end, flat])
-    length = norm(end - start)
-    from_start = points - start
-    along = np.einsum("nmx,mx->nm", from_start, (end - start) / length[:, None])
-    out = np.sqrt(np.maximum((from_start**2).sum(axis=-1) - along**2, 0))
-    shrink = (cones.start_radius - cones.end_radius) / length
-    straight = np.sqrt(1 - shrink**2)
-    # Foot of the perpendicular on the common tangent, as a share of the way between the circles.
-    foot = np.clip((along - out * shrink / straight) / length, 0, 1)
-    radius = cones.start_radius + foot * (cones.end_radius - cones.start_radius)
-    return np.asarray(np.hypot(along - foot * length, out) - radius)
-
-
-def _to_box(points: Floats, polygon: Floats) -> Floats:
-    """Distance (n,) of points (n, 2) to the box round a polygon (p, 2), 0 inside."""
-    low, high = polygon.min(axis=0), polygon.max(axis=0)
-    return norm(np.maximum(0, np.maximum(low - points, points - high)))
-
-
-def _to_polygon(points: Floats, polygon: Floats) -> Floats:
-    """Distance (n,) of points (n, 2) to a polygon (p, 2), 0 inside."""
-    side = np.roll(polygon, -1, axis=0) - polygon
-    from_corner = points[:, None] - polygon
-    share = np.clip((from_corner * side).sum(axis=-1) / (side**2).sum(axis=-1), 0, 1)
-    distance: Floats = norm(from_corner - share[..., None] * side).min(axis=1)
-    above = polygon[:, 1] > points[:, 1, None]
-    crosses = above != np.roll(above, -1, axis=1)
-    rise = np.where(side[:, 1] == 0, 1.0, side[:, 1])
-    right = points[:, 0, None] < polygon[:, 0] + from_corner[..., 1] / rise * side[:, 0]
-    inside = (crosses & right).sum(axis=1) % 2 == 1
-    return np.where(inside, 0.0, distance)

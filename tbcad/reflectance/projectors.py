@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.compiled import compiled_loop
 from tbcad.datasets.crops import MirrorId
 from tbcad.geometry.vectors import dot, norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.parallel import compiled_loop
 from tbcad.simulate.scene.point_lights import Spots, lit_cosine
 from tbcad.types import Floats
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from tbcad.simulate.parallel import compiled
+from tbcad.compiled import compiled
 from tbcad.types import Floats
 
 REACH = 4.0  # standard deviations beyond which a point gives no light

@@ -8,9 +8,10 @@ at a picture, and no search among rays.
 
 import numpy as np
 
+from tbcad.compiled import compiled
 from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import compiled, first_then_threads
+from tbcad.simulate.parallel import first_then_threads
 from tbcad.types import Bools, Bytes, Floats, Ints
 
 # Pixels along the sides of a region, and of the blocks in it whose pixels share a list of cameras.

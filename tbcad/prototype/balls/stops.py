@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.compiled import compiled_loop
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.placement import PlacementProblem
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
 TRIES_PER_TOLERANCE = 4  # azimuths tried for a ball within its tolerance
 ROUNDS = 3  # how often all balls are gone through
@@ -105,23 +106,22 @@ def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
         The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
     """
     order = np.argsort(high, kind="stable")
-    new = np.zeros(len(high), dtype=bool)
-    new[_new_points(low[order], high[order])] = True
+    new = _new_points(low[order], high[order])
     which = np.empty(len(high), dtype=np.int64)
     which[order] = np.cumsum(new) - 1
     return high[order][new], which
 
 
-def _new_points(low: Floats, high: Floats) -> list[int]:
+@compiled_loop
+def _new_points(low: Floats, high: Floats) -> Bools:
     """Which intervals, by rising high, no earlier point hits, where each such one ends in a point.
 
-    A plain loop over plain numbers: it runs for thousands of places that balls are tried in.
+    Compiled: it runs for thousands of places that balls are tried in.
     """
-    last, new = -math.inf, []
-    for k, (start, end) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
-        if start > last:
-            last = end
-            new.append(k)
+    last, new = -math.inf, np.zeros(len(low), dtype=np.bool_)
+    for k in range(len(low)):
+        if low[k] > last:
+            last, new[k] = high[k], True
     return new
 
 
@@ -174,7 +174,7 @@ def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) 
     moved[ball] = moved_to
     low, high = requests.intervals(moved)
     order = np.argsort(high, kind="stable")
-    return len(_new_points(low[order], high[order]))
+    return int(np.count_nonzero(_new_points(low[order], high[order])))
 
 
 def plan_stops(

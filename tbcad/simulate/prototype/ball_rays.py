@@ -9,12 +9,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from tbcad.compiled import compiled
 from tbcad.geometry.vectors import dot
 from tbcad.optics.lens_camera import LensCamera
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.optics.reflection import reflect
 from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
-from tbcad.simulate.parallel import compiled, in_threads
+from tbcad.simulate.parallel import in_threads
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.simulate.scene.rays import within_walls

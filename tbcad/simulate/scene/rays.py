@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.compiled import compiled
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Bools, Floats, Ints
 

@@ -11,7 +11,8 @@ tests/simulate/views/test_blend.py compares with a search among all cameras and 
 
 import numpy as np
 
-from tbcad.simulate.parallel import chunks, compiled_loop, in_threads
+from tbcad.compiled import compiled_loop
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.views.pixels_about import (
     NOTHING,
     Point,

@@ -5,7 +5,8 @@ tests/simulate/views/test_nearest.py compares with a four-dimensional k-d tree o
 
 import numpy as np
 
-from tbcad.simulate.parallel import chunks, compiled, in_threads
+from tbcad.compiled import compiled
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.views.ray_bundle import (
     RAYS_PER_CHUNK,
     RAYS_PER_RUN,

@@ -7,7 +7,7 @@ point follows from the rays of one pixel and its neighbours, without a search.
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
 from tbcad.types import Bytes, Floats
 
 # Width of the bell curve that weights pixels. docs/decisions/0006: of 0.2 to 0.4 pixels the best

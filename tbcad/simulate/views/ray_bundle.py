@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.simulate.parallel import chunks, compiled, in_threads
+from tbcad.compiled import compiled
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.views.mirror_tiles import MirrorTile
 from tbcad.simulate.views.two_plane import TwoPlane
 from tbcad.types import Bytes, Floats, Ints

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.compiled import compiled
 from tbcad.optics.camera import Camera
 from tbcad.picture_bytes import png_bytes
-from tbcad.simulate.parallel import compiled
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.simulate.views.blend import blend_cameras
 from tbcad.simulate.views.mirror_tiles import MirrorTiles

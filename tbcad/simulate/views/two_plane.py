@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.simulate.parallel import chunks, compiled, in_threads
+from tbcad.compiled import compiled
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.types import Bools, Floats
 
 # A ray at more than this to the direction has no coordinates.

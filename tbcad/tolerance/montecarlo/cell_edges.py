@@ -8,7 +8,7 @@ from math import inf
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
 from tbcad.tolerance.montecarlo.edge_samples import (
     DISTANCE,
     PLACES,
@@ -185,22 +185,31 @@ def _minima(
     for part in parts:
         i = int(part[MIRROR])
         sampled[i] = min(sampled[i], part[LEAST])
-    limit = np.full(m, sampled.min()) if worst_only else sampled.copy()
+    limit = np.full(1, sampled.min()) if worst_only else sampled.copy()
     for part in parts:
         i = int(part[MIRROR])
-        if not part[BOUND] > limit[i]:  # NaN too
-            refined[i] = min(refined[i], _refined(surfaces, forms, view, part, samples))
+        place = 0 if worst_only else i
+        if not part[BOUND] > limit[place]:  # NaN too
+            least = _refined(surfaces, forms, view, part, limit[place], samples)
+            refined[i], limit[place] = min(refined[i], least), min(limit[place], least)
     return np.where(np.isinf(refined), sampled, refined)
 
 
 @compiled_loop
-def _refined(surfaces: Floats, forms: Floats, view: Floats, part: Floats, samples: Floats) -> float:
-    """Minimum distance squared of the rays at a part of an edge."""
+def _refined(
+    surfaces: Floats, forms: Floats, view: Floats, part: Floats, limit: float, samples: Floats
+) -> float:
+    """Minimum distance squared of the rays at a part of an edge.
+
+    Where it cannot be below the limit, the minimum sample of the first round that shows it.
+    """
     edge, low, high = part[EDGE:], part[LOW], part[HIGH]
     mirror, other = int(part[MIRROR]), int(part[OTHER])
     for r in range(ROUNDS - 1):
         if r > 0:
             least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
+            if lower_bound(samples, least) > limit:
+                return float(samples[DISTANCE + least])
             low, high = max(low, low + (least - 1) * step), min(high, low + (least + 1) * step)
         _sample(edge, (low, high), view, surfaces, forms, (mirror, other), samples)
         _reflect(surfaces, forms, mirror, view, samples)

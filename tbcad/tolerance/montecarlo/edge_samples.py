@@ -6,7 +6,8 @@ become vector instructions of the processor. The points are those of both mirror
 
 from math import sqrt
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.tolerance.montecarlo.visible_edges import (
     APEX,
     BEND,
@@ -16,7 +17,6 @@ from tbcad.tolerance.montecarlo.visible_edges import (
     START,
     TANGENT,
 )
-from tbcad.tolerance.vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.types import Floats
 
 # Samples of an edge, and places from one quantity of the samples to the next.
@@ -82,22 +82,26 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
 def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
     """Fill in the rays that a surface (7,) reflects at the points, their moments and distances."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
+    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     for s in range(SAMPLES):
         gradient = plus_scaled(normal, curvature, minus(get_sample(samples, POINT, s), apex))
-        reflect_sample(gradient, view, samples, s)
+        reflect_sample(gradient, scale, middle, samples, s)
 
 
 @compiled_loop
-def reflect_sample(gradient: Vector, view: Floats, samples: Floats, s: int) -> None:
+def reflect_sample(
+    gradient: Vector, scale: Vector, middle: Vector, samples: Floats, s: int
+) -> None:
     """Fill in the ray that is reflected at a sample, its moment and distance.
 
     Args:
         gradient: of the surface there, before its shell is scaled; of any length.
-        view: see tbcad.tolerance.montecarlo.cell_edges.trace_cell_edges.
+        scale: of the shell, along each axis. It and the middle are no arrays, which what is filled
+            in might change: loops over samples would not become vectors.
+        middle: the object's centre.
         samples: with the points and rays.
         s: number of the sample.
     """
-    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
     ray = get_sample(samples, RAY, s)
     # Neither the normal nor the ray has to be of unit length.

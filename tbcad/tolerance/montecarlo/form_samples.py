@@ -11,10 +11,12 @@ to first order in the heights, and a mirror's normal is turned by its height's g
 
 from typing import TypeAlias
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.tolerance.montecarlo.edge_samples import (
     FIRST_HEIGHT,
     FIRST_NORMAL,
+    OBJECT,
     PINHOLE,
     POINT,
     RAY,
@@ -28,7 +30,6 @@ from tbcad.tolerance.montecarlo.edge_samples import (
     reflect_sample,
 )
 from tbcad.tolerance.montecarlo.visible_edges import APEX, CURVATURE, NORMAL
-from tbcad.tolerance.vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.types import Floats
 
 # Columns of a mirror's form: the polynomial of its height (tbcad.tolerance.montecarlo.form), mm,
@@ -137,8 +138,9 @@ def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heig
 def reflect_formed_samples(surface: Floats, form: Floats, view: Floats, samples: Floats) -> None:
     """As `reflect_samples`, for a mirror with waviness."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
+    scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     numbers = form_numbers(form)
     for s in range(SAMPLES):
         offset = minus(get_sample(samples, POINT, s), apex)
         gradient = plus_scaled(normal, curvature, offset)
-        reflect_sample(minus(gradient, slope(numbers, offset)), view, samples, s)
+        reflect_sample(minus(gradient, slope(numbers, offset)), scale, middle, samples, s)

@@ -18,8 +18,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled_loop
-from tbcad.tolerance.vectors import (
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import (
     Vector,
     cross,
     divided,

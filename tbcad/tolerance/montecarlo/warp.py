@@ -12,9 +12,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from tbcad.compiled import compiled_loop
 from tbcad.geometry.vectors import dot, perpendicular_axes
 from tbcad.optics.pedestals.walls import GrooveWalls
-from tbcad.simulate.parallel import compiled_loop
 from tbcad.tolerance.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.tolerance.montecarlo.smooth_field import SmoothField, pivots, smooth_field
 from tbcad.types import Floats

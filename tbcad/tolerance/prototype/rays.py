@@ -4,9 +4,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.simulate.parallel import compiled_loop
-from tbcad.tolerance.montecarlo.edge_samples import MAX_FALL, crosses_half_axis, rise_beside
-from tbcad.tolerance.vectors import (
+from tbcad.compiled import compiled_loop
+from tbcad.geometry.loop_vectors import (
     Vector,
     cross,
     divided,
@@ -17,6 +16,7 @@ from tbcad.tolerance.vectors import (
     unit,
     vector,
 )
+from tbcad.tolerance.montecarlo.edge_samples import MAX_FALL, crosses_half_axis, rise_beside
 from tbcad.types import Floats, Ints
 
 # Steps to the point of a ball that shows the object's centre; difference of cosines that ends them.

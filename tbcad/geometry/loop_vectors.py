@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import TypeAlias
 
-from tbcad.simulate.parallel import compiled_loop
+from tbcad.compiled import compiled_loop
 from tbcad.types import Floats
 
 Vector: TypeAlias = tuple[float, float, float]
