@@ -14,6 +14,7 @@ from tbcad.cad.measures import (
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import faces, one_solid
 from tbcad.formats.step import write_step
+from tbcad.formats.step_mirror import mirrored_step
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
@@ -62,11 +63,29 @@ def write_shell_solids(
     known, symmetric = None, design.spec.optics.camera_mm[1] == 0
     for array in design.arrays:
         files = shell_record(array)
+        if known and symmetric and not design.spec.step.pcurves:
+            progress(f"{files['name']}: files")
+            _write_mirrored(folder, design.arrays[0], array)
+            continue
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
         known = known.mirrored() if known and symmetric else shell_properties(solid, array)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
+
+
+def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> None:
+    """Write the STEP file of camera b's half as the mirror image of that of camera a's.
+
+    Readers find in both the same figures to the last digit, which the kernel's own file of the
+    mirrored solid would not give: it cuts numbers that are long, and a minus sign is a character.
+    """
+    one, other = shell_record(original), shell_record(array)
+    names = [wall_names(some.ids, some.modelled_cells) for some in (original, array)]
+    renamed = {one["name"]: other["name"], **dict(zip(original.ids, array.ids, strict=True))}
+    renamed |= dict(zip(*names, strict=True))
+    text = (folder / one["step"]).read_bytes().decode("ascii")
+    (folder / other["step"]).write_bytes(mirrored_step(text, renamed).encode("ascii"))
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:
