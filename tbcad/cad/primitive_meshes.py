@@ -10,9 +10,15 @@ from tbcad.geometry.primitives import Cylinder, Primitive, Prism, Revolved
 from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.types import Floats
 
-SIDES = 64
-# Radius of a circle to that of the polygon with the same area.
-GROWTH = float(np.sqrt(2 * np.pi / SIDES / np.sin(2 * np.pi / SIDES)))
+SIDES = 48
+
+
+def growth(angle: float) -> float:
+    """Radius of a polygon to that of a circle of the same area, by the angle of a side, radians."""
+    return float(np.sqrt(angle / np.sin(angle)))
+
+
+GROWTH = growth(2 * np.pi / SIDES)
 
 
 def primitive_mesh(body: Primitive) -> Manifold:

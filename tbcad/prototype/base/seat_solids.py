@@ -20,7 +20,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_So
 
 from tbcad.cad.bores import hole_faces
 from tbcad.cad.brep import Maker, Ring
-from tbcad.cad.primitive_meshes import primitive_mesh
+from tbcad.cad.primitive_meshes import growth, primitive_mesh
 from tbcad.cad.solids import cylinder, faces, moved, on_sphere, revolved, wires
 from tbcad.geometry.primitives import Cylinder, Revolved
 from tbcad.geometry.vectors import perpendicular_axes
@@ -32,7 +32,7 @@ from tbcad.types import Floats
 # an angle.
 NARROWER = 0.4
 INTO_BOSS_MM = 0.3  # by which the space behind a boss begins inside of it, and is narrower
-ARC_POINTS = 65  # of a cup's section in its mesh
+ARC_POINTS = 25  # of a cup's section in its mesh
 POLE_ANGLE = 0.3  # about the axis, radians: the cup's hemisphere ends here, short of its pole
 ALONG = np.array([0.0, 0.0, 1.0])
 
@@ -71,7 +71,7 @@ def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
     """The same by a boolean of meshes."""
     radius, cup, pocket = float(seats.radius[k]), float(seats.cup[k]), float(seats.pocket[k])
     angle = np.linspace(np.arcsin(pocket / cup), np.pi - POLE_ANGLE, ARC_POINTS)
-    arc = cup * np.column_stack([np.cos(angle), np.sin(angle)])
+    arc = growth(angle[1] - angle[0]) * cup * np.column_stack([np.cos(angle), np.sin(angle)])
     bottom = [[seats.bottom[k], 0.0], [seats.bottom[k], pocket]]
     room = primitive_mesh(Revolved(np.vstack([bottom, arc, [arc[-1, 0], 0.0]])))
     posts = [
