@@ -74,8 +74,10 @@ def check_mesh(name: str, mesh: Mesh) -> None:
     Raises:
         InvalidSolidError: as said.
     """
-    edges = np.sort(np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=-1))
-    _, count = np.unique(edges.reshape(-1, 2), axis=0, return_counts=True)
+    ends = mesh.triangles, np.roll(mesh.triangles, -1, axis=1)
+    # One number for an edge, which is sorted far faster than two.
+    edges = np.minimum(*ends) * len(mesh.vertices) + np.maximum(*ends)
+    _, count = np.unique(edges, return_counts=True)
     if (count != 2).any():
         raise InvalidSolidError(f"{name}: the kernel's mesh of the solid is not closed")
 
