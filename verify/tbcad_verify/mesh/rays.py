@@ -21,6 +21,7 @@ from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats
 
 Ints = NDArray[np.int32]
+Floats32 = NDArray[np.float32]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -40,6 +41,43 @@ class RayScene:
     embree: Any
     planes: Floats
 
+    def first(self, start: Floats32, d: Floats32) -> Ints:
+        """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
+        return np.asarray(self.embree.run(start, d), dtype=np.int32)
+
+
+@dataclass(frozen=True)
+class ImagePairScene(RayScene):
+    """A mesh beside the plane x = 0 and its mirror image, of which Embree has the mesh alone.
+
+    Facets of the image have the numbers after the mesh's. They are met where the ray's own image
+    meets the mesh. A ray passes the plane once: what it meets on the side where it starts is first.
+
+    Attributes:
+        side: 1 where the mesh has x >= 0, -1 where it has x <= 0.
+    """
+
+    side: float
+
+    def first(self, start: Floats32, d: Floats32) -> Ints:
+        """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
+        half = np.int32(len(self.planes) // 2)
+        beyond = self.side * start[:, 0] < 0
+        start, d = (_flipped(rays, beyond) for rays in (start, d))
+        facet = super().first(start, d)
+        facet[beyond & (facet >= 0)] += half
+        rest = np.flatnonzero(facet < 0)
+        found = super().first(*(_flipped(rays[rest]) for rays in (start, d)))
+        facet[rest] = np.where((found >= 0) & ~beyond[rest], found + half, found)
+        return facet
+
+
+def _flipped(rays: Floats32, which: NDArray[np.bool_] | bool = True) -> Floats32:
+    """(N, 3) points or directions, some of them mirrored in x = 0."""
+    flipped = rays.copy()
+    flipped[:, 0] *= np.where(which, np.float32(-1), np.float32(1))
+    return flipped
+
 
 def build_scene(mesh: Mesh) -> RayScene:
     """Put a mesh into Embree and commit it."""
@@ -56,11 +94,21 @@ def build_scene(mesh: Mesh) -> RayScene:
     return RayScene(scene, planes)
 
 
+def with_image(scene: RayScene, mesh: Mesh) -> RayScene | None:
+    """The scene of a mesh and of its mirror image in x = 0; None where it is on both sides."""
+    x = mesh.points[:, 0]
+    side = 1.0 if x.min() >= 0 else -1.0
+    if side * x.min() < 0 or side * x.max() < 0:
+        return None
+    planes = np.concatenate([scene.planes, scene.planes * [-1, 1, 1, 1]])
+    return ImagePairScene(scene.embree, planes, side)
+
+
 def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
     """(N,) the first facet along rays from origin (3, 1) or (3, N) along d (3, N); -1 for none."""
     start = np.empty((d.shape[1], 3), dtype=np.float32)
     start[:] = origin.T
-    return np.asarray(scene.embree.run(start, d.T.astype(np.float32)), dtype=np.int32)
+    return scene.first(start, d.T.astype(np.float32))
 
 
 def distances_to_planes(scene: RayScene, facet: Ints, origin: Floats, d: Floats) -> Floats:

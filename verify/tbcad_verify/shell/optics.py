@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh, join_meshes
-from tbcad_verify.mesh.rays import RayScene, build_scene, first_hits
+from tbcad_verify.mesh.rays import RayScene, build_scene, first_hits, with_image
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
@@ -123,7 +123,11 @@ class OpticalSetup:
 
 
 def set_up(
-    export: Export, meshes: list[Mesh], recoveries: list[Recovery], second_is_image: bool = False
+    export: Export,
+    meshes: list[Mesh],
+    recoveries: list[Recovery],
+    second_is_image: bool = False,
+    first: RayScene | None = None,
 ) -> OpticalSetup:
     """Join all parts, match their mirrors with the record, and get ready for rays.
 
@@ -132,12 +136,14 @@ def set_up(
         meshes: of all parts.
         recoveries: of all parts.
         second_is_image: whether there are two parts, the second the mirror image of the first.
+        first: of the first part's mesh; None: the second is put into Embree too.
     """
     mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
-    scene = build_scene(mesh)
+    pair = with_image(first, meshes[0]) if first and second_is_image else None
+    scene = pair or build_scene(mesh)
     seen = _patches_at_apices(export, scene, recovery, camera)
     matches = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)
     mirrors = recovery.fits.surfaces.take(matches.segment).coated(export.coating_mm)
