@@ -26,7 +26,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 RAYS_A_CHUNK = 1 << 14  # such that a chunk's arrays stay in a core's cache
-THREADS = min(os.cpu_count() or 1, 8)
+# Half of the cores: the prototype's stages run beside the shells', and STEP files are read as well.
+# Threads that wait for a core or the interpreter's lock cost a twentieth of the processor time.
+THREADS = max(1, min((os.cpu_count() or 1) // 2, 8))
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,8 @@ def in_threads(
         items: what to work on.
         stop: ends what the threads wait for; called when one fails, or at an interrupt.
     """
+    if THREADS == 1:
+        return [work(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         try:
             return list(pool.map(work, items))
