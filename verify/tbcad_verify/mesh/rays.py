@@ -61,6 +61,11 @@ class ImagePairScene(RayScene):
 
     side: float
 
+    @property
+    def mesh(self) -> RayScene:
+        """The mesh alone, which rays from its side meet before the image."""
+        return RayScene(self.embree, self.planes[: len(self.planes) // 2])
+
     def first(self, start: Floats32, d: Floats32) -> Ints:
         """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
         half = np.int32(len(self.planes) // 2)
