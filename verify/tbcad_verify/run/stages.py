@@ -115,7 +115,7 @@ def _verify_shells(
 
     sink(Results(stages=[PRINTABILITY]))
     measured: dict[str, PartMeasures] = {}
-    first = _scene_of_original(shells)
+    first, _ = attempt(partial(_scene_of_original, shells))
     for shell in shells:
         measures, lost = attempt(partial(_shell_measures, shell, measured, first))
         if measures:
