@@ -100,12 +100,12 @@ class OpticalSetup:
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label
-        owner = np.append(owner[label], -1).astype(np.int32)
+        facets = np.append(owner[label], -1).astype(np.int32)
         return SensorScene(
             self.scene,
-            self._own_scene(camera, owner),
+            self._own_scene(camera, facets),
             camera,
-            owner,
+            facets,
             np.append(self.recovery.mirror[label], False),
             self.seen(camera),
             len(self.export.mirrors),
