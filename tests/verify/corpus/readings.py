@@ -20,6 +20,7 @@ from unittest import mock
 
 import manifold3d
 import numpy as np
+from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
     bodies,
@@ -178,6 +179,8 @@ class _Pickler(pickle.Pickler):
         if isinstance(one, manifold3d.Manifold):
             mesh = one.to_mesh64()
             return tuple, ([mesh.vert_properties, mesh.tri_verts],)
+        if isinstance(one, RayScene):
+            return tuple, ([one.planes],)
         return NotImplemented
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tbcad_verify.mesh.rays import build_scene
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.record.export import Export, read_export
@@ -111,7 +112,8 @@ def test_pixels_of_a_mirror_image_are_counted_as_if_traced(
     def setup(second_is_image: bool) -> OpticalSetup:
         meshes = [require(shell.mesh, "") for shell in known]
         recoveries = [require(shell.recovery, "") for shell in known]
-        return set_up(facing[0], meshes, recoveries, second_is_image)
+        first = build_scene(meshes[0]) if second_is_image else None
+        return set_up(facing[0], meshes, recoveries, second_is_image, first)
 
     assert setup(True).symmetric
     assert not setup(False).symmetric

@@ -21,11 +21,14 @@ from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats
 
 Ints = NDArray[np.int32]
+Floats32 = NDArray[np.float32]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 RAYS_A_CHUNK = 1 << 14  # such that a chunk's arrays stay in a core's cache
-THREADS = min(os.cpu_count() or 1, 8)
+# Half of the cores: the prototype's stages run beside the shells', and STEP files are read as well.
+# Threads that wait for a core or the interpreter's lock cost a twentieth of the processor time.
+THREADS = max(1, min((os.cpu_count() or 1) // 2, 8))
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,48 @@ class RayScene:
 
     embree: Any
     planes: Floats
+
+    def first(self, start: Floats32, d: Floats32) -> Ints:
+        """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
+        return np.asarray(self.embree.run(start, d), dtype=np.int32)
+
+
+@dataclass(frozen=True)
+class ImagePairScene(RayScene):
+    """A mesh beside the plane x = 0 and its mirror image, of which Embree has the mesh alone.
+
+    Facets of the image have the numbers after the mesh's. They are met where the ray's own image
+    meets the mesh. A ray passes the plane once: what it meets on the side where it starts is first.
+
+    Attributes:
+        side: 1 where the mesh has x >= 0, -1 where it has x <= 0.
+    """
+
+    side: float
+
+    @property
+    def mesh(self) -> RayScene:
+        """The mesh alone, which rays from its side meet before the image."""
+        return RayScene(self.embree, self.planes[: len(self.planes) // 2])
+
+    def first(self, start: Floats32, d: Floats32) -> Ints:
+        """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
+        half = np.int32(len(self.planes) // 2)
+        beyond = self.side * start[:, 0] < 0
+        start, d = (_flipped(rays, beyond) for rays in (start, d))
+        facet = super().first(start, d)
+        facet[beyond & (facet >= 0)] += half
+        rest = np.flatnonzero(facet < 0)
+        found = super().first(*(_flipped(rays[rest]) for rays in (start, d)))
+        facet[rest] = np.where((found >= 0) & ~beyond[rest], found + half, found)
+        return facet
+
+
+def _flipped(rays: Floats32, which: NDArray[np.bool_] | bool = True) -> Floats32:
+    """(N, 3) points or directions, some of them mirrored in x = 0."""
+    flipped = rays.copy()
+    flipped[:, 0] *= np.where(which, np.float32(-1), np.float32(1))
+    return flipped
 
 
 def build_scene(mesh: Mesh) -> RayScene:
@@ -56,11 +101,21 @@ def build_scene(mesh: Mesh) -> RayScene:
     return RayScene(scene, planes)
 
 
+def with_image(scene: RayScene, mesh: Mesh) -> RayScene | None:
+    """The scene of a mesh and of its mirror image in x = 0; None where it is on both sides."""
+    x = mesh.points[:, 0]
+    side = 1.0 if x.min() >= 0 else -1.0
+    if side * x.min() < 0 or side * x.max() < 0:
+        return None
+    planes = np.concatenate([scene.planes, scene.planes * [-1, 1, 1, 1]])
+    return ImagePairScene(scene.embree, planes, side)
+
+
 def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
     """(N,) the first facet along rays from origin (3, 1) or (3, N) along d (3, N); -1 for none."""
     start = np.empty((d.shape[1], 3), dtype=np.float32)
     start[:] = origin.T
-    return np.asarray(scene.embree.run(start, d.T.astype(np.float32)), dtype=np.int32)
+    return scene.first(start, d.T.astype(np.float32))
 
 
 def distances_to_planes(scene: RayScene, facet: Ints, origin: Floats, d: Floats) -> Floats:
@@ -99,6 +154,8 @@ def in_threads(
         items: what to work on.
         stop: ends what the threads wait for; called when one fails, or at an interrupt.
     """
+    if THREADS == 1:
+        return [work(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         try:
             return list(pool.map(work, items))

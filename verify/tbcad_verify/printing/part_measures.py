@@ -63,7 +63,11 @@ class PartMeasures:
 
 
 def measure(
-    mesh: Mesh, status: str, mass: MassProperties, edges: Edges | None = None
+    mesh: Mesh,
+    status: str,
+    mass: MassProperties,
+    edges: Edges | None = None,
+    scene: rays.RayScene | None = None,
 ) -> PartMeasures:
     """Measure a mesh.
 
@@ -72,6 +76,7 @@ def measure(
         status: of manifold3d.
         mass: the mesh's mass properties.
         edges: of the mesh, if they are measured.
+        scene: of the mesh, if there is one.
 
     Raises:
         Unknown: all points lie in a plane: there is nothing to measure.
@@ -85,7 +90,7 @@ def measure(
         status,
         mass,
         *_solids_and_cavities(mesh),
-        wall_thickness(mesh, edges, rays.build_scene(mesh)),
+        wall_thickness(mesh, edges, scene or rays.build_scene(mesh)),
         round_holes(mesh, edges),
         _inner_edges(mesh, edges),
         hull,

@@ -259,10 +259,10 @@ def _met_at_all_angles(
 
 def _met(key: Any, solids: Mapping[str, Any], names: list[str]) -> Iterator[str]:
     """Bodies that share room with a key."""
-    low, high = np.split(np.array(key.bounding_box()), 2)
+    own = key.bounding_box()
     for name in names:
-        first, last = np.split(np.array(solids[name].bounding_box()), 2)
-        apart = (first > high).any() or (last < low).any()
+        box = solids[name].bounding_box()
+        apart = any(box[k] > own[k + 3] or box[k + 3] < own[k] for k in range(3))
         if not apart and (key ^ solids[name]).volume() > TOUCH_MM3:
             yield name
 

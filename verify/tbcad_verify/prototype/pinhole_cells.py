@@ -7,6 +7,7 @@ outline by bisection of angles about the direction of the mirror's apex.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -73,10 +74,14 @@ class PinholeOutlines:
 
     def at_share(self, share: Floats) -> Floats:
         """(3, m, OUTLINE_DIRECTIONS) directions at shares (m, ...) of the angle to the outline."""
-        edge = self.direction - np.cos(self.angle) * self.chief[:, :, None]
-        edge /= np.maximum(np.sin(self.angle), 1e-300)
         angle = share * self.angle
-        return np.asarray(np.cos(angle) * self.chief[:, :, None] + np.sin(angle) * edge)
+        return np.asarray(np.cos(angle) * self.chief[:, :, None] + np.sin(angle) * self._across)
+
+    @cached_property
+    def _across(self) -> Floats:
+        """(3, m, OUTLINE_DIRECTIONS) from the chief toward the outline, unit."""
+        edge = self.direction - np.cos(self.angle) * self.chief[:, :, None]
+        return np.asarray(edge / np.maximum(np.sin(self.angle), 1e-300))
 
 
 def mirror_spheres(context: PrototypeContext) -> MirrorSpheres:

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from tbcad_verify.mesh.holes import RoundHoles
+from tbcad_verify.mesh.rays import RayScene, build_scene
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
 from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
@@ -114,14 +115,15 @@ def _verify_shells(
 
     sink(Results(stages=[PRINTABILITY]))
     measured: dict[str, PartMeasures] = {}
+    first, _ = attempt(partial(_scene_of_original, shells))
     for shell in shells:
-        measures, lost = attempt(partial(_shell_measures, shell, measured))
+        measures, lost = attempt(partial(_shell_measures, shell, measured, first))
         if measures:
             measured[shell.part.name] = measures
         _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
     if shells:
         holes = {name: measures.holes for name, measures in measured.items()}
-        setup, no_setup = _trace_shells(export, shells, holes, sink)
+        setup, no_setup = _trace_shells(export, shells, first, holes, sink)
         _verify_mandrels(export, negatives, lambda: require(setup, no_setup), sink)
 
 
@@ -136,12 +138,26 @@ def _verify_mandrels(
         sink(mandrel_results(export, mandrel, stl, setup))
 
 
-def _shell_measures(shell: ShellPart, measured: Mapping[str, PartMeasures]) -> PartMeasures:
-    """What printers need to know of a shell; of a mirror image it is known already."""
+def _scene_of_original(shells: list[ShellPart]) -> RayScene | None:
+    """The scene of a shell whose image is another: one for its walls and for all light."""
+    has_image = any(shell.image_of for shell in shells)
+    return build_scene(shells[0].mesh) if has_image and shells[0].mesh else None
+
+
+def _shell_measures(
+    shell: ShellPart, measured: Mapping[str, PartMeasures], first: RayScene | None
+) -> PartMeasures:
+    """What printers need to know of a shell; of a mirror image it is known already.
+
+    Args:
+        shell: to measure.
+        measured: shells before it.
+        first: scene of the first of two, if the second is its image.
+    """
     original = measured.get(shell.image_of.name) if shell.image_of else None
     if original and shell.mesh and shell.mass:
         return flipped_measures(original, shell.mesh, shell.mass)
-    return _measures(shell)
+    return _measures(shell, None if shell.image_of else first)
 
 
 def _verify_prototype(
@@ -178,12 +194,13 @@ def _measure_shells(export: Export, stls: list[Facets], sink: ResultSink) -> lis
     return shells
 
 
-def _measures(part: ShellPart | MeasuredPart) -> PartMeasures:
+def _measures(part: ShellPart | MeasuredPart, scene: RayScene | None = None) -> PartMeasures:
     return measure(
         require(part.mesh, part.reason),
         require(part.topology, part.reason).status,
         require(part.mass, part.reason),
         part.edges,
+        scene,
     )
 
 
@@ -209,6 +226,7 @@ def _assess_printing(
 def _trace_shells(
     export: Export,
     shells: list[ShellPart],
+    first: RayScene | None,
     holes: Mapping[str, RoundHoles],
     sink: ResultSink,
 ) -> tuple[OpticalSetup | None, str]:
@@ -221,7 +239,7 @@ def _trace_shells(
         sink(Results(checks=guarded(check_names(units, files), work), mirrors=mirrors))
 
     sink(Results(stages=[SETUP]))
-    setup, no_setup = attempt(lambda: _set_up(export, shells))
+    setup, no_setup = attempt(lambda: _set_up(export, shells, first))
     report(
         mirrors_found.CHECKS,
         lambda: mirrors_found.checks(require(setup, no_setup), files),
@@ -250,10 +268,11 @@ def _trace_shells(
     return setup, no_setup
 
 
-def _set_up(export: Export, shells: list[ShellPart]) -> OpticalSetup:
+def _set_up(export: Export, shells: list[ShellPart], first: RayScene | None) -> OpticalSetup:
     return set_up(
         export,
         [require(shell.mesh, shell.reason) for shell in shells],
         [require(shell.recovery, shell.reason) for shell in shells],
         any(shell.image_of for shell in shells),
+        first,
     )

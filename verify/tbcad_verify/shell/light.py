@@ -40,6 +40,7 @@ class SensorScene:
 
     Attributes:
         scene: all parts.
+        own: as much of it as tells which of this camera's mirrors rays from the pinhole meet first.
         camera: the real camera.
         owner: (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the
             last entry stands for a ray that hits nothing.
@@ -51,6 +52,7 @@ class SensorScene:
     """
 
     scene: RayScene
+    own: RayScene
     camera: Camera
     owner: NDArray[np.int32]
     other: NDArray[np.bool_]
@@ -105,7 +107,7 @@ def total(tallies: list[PixelTally]) -> PixelTally:
 def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     """Trace the pixels of some rows."""
     rays = pixel_rows(sensor.camera, first, last)
-    facet = first_hits(sensor.scene, sensor.camera.pinhole[:, None], rays)
+    facet = first_hits(sensor.own, sensor.camera.pinhole[:, None], rays)
     mirror = sensor.owner[facet]
     on = np.flatnonzero(mirror >= 0)
     d, facet, mirror = np.take(rays, on, axis=1), facet[on], mirror[on]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.mesh import Mesh, join_meshes
-from tbcad_verify.mesh.rays import RayScene, build_scene, first_hits
+from tbcad_verify.mesh.rays import ImagePairScene, RayScene, build_scene, first_hits, with_image
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
@@ -100,16 +100,26 @@ class OpticalSetup:
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label
+        facets = np.append(owner[label], -1).astype(np.int32)
         return SensorScene(
             self.scene,
+            self._own_scene(camera, facets),
             camera,
-            np.append(owner[label], -1).astype(np.int32),
+            facets,
             np.append(self.recovery.mirror[label], False),
             self.seen(camera),
             len(self.export.mirrors),
             self.radius,
             self.export.coating_mm,
         )
+
+    def _own_scene(self, camera: Camera, owner: NDArray[np.int32]) -> RayScene:
+        """The scene without an image that hides none of a camera's mirrors and has none of them."""
+        pair = self.scene
+        if not isinstance(pair, ImagePairScene) or pair.side * camera.pinhole[0] < 0:
+            return pair
+        has_none = (owner[len(pair.planes) // 2 :] < 0).all()
+        return pair.mesh if has_none else pair
 
     def names(self, facets: NDArray[np.integer]) -> list[str]:
         """The mirrors and parts that facets belong to, each once; facet -1 is none."""
@@ -123,7 +133,11 @@ class OpticalSetup:
 
 
 def set_up(
-    export: Export, meshes: list[Mesh], recoveries: list[Recovery], second_is_image: bool = False
+    export: Export,
+    meshes: list[Mesh],
+    recoveries: list[Recovery],
+    second_is_image: bool = False,
+    first: RayScene | None = None,
 ) -> OpticalSetup:
     """Join all parts, match their mirrors with the record, and get ready for rays.
 
@@ -132,12 +146,14 @@ def set_up(
         meshes: of all parts.
         recoveries: of all parts.
         second_is_image: whether there are two parts, the second the mirror image of the first.
+        first: of the first part's mesh; None: the second is put into Embree too.
     """
     mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
-    scene = build_scene(mesh)
+    pair = with_image(first, meshes[0]) if first and second_is_image else None
+    scene = pair or build_scene(mesh)
     seen = _patches_at_apices(export, scene, recovery, camera)
     matches = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)
     mirrors = recovery.fits.surfaces.take(matches.segment).coated(export.coating_mm)
