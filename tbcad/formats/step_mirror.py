@@ -67,8 +67,8 @@ def _reflected(kind: str, inside: str, axis: bool, extruded: set[str]) -> str:
         case "CARTESIAN_POINT" | "DIRECTION":
             return FIRST_NUMBER.sub(_negative, inside, 1)
         case "EDGE_LOOP":
-            edges = ",".join(f"#{number}" for number in reversed(REFERENCE.findall(inside)))
-            return f"{inside.partition('(')[0]}({edges})"
+            edges = reversed(REFERENCE.findall(inside))
+            return REFERENCE.sub(lambda _: f"#{next(edges)}", inside)
         case "ADVANCED_FACE" if REFERENCE.findall(inside)[-1] not in extruded:
             return inside
         case "ORIENTED_EDGE" | "ADVANCED_FACE":
