@@ -62,18 +62,16 @@ def _axes(statements: Mapping[str, tuple[str, str]]) -> set[str]:
 def _reflected(kind: str, inside: str, axis: bool, extruded: set[str]) -> str:
     """The parameters of one statement; `axis`: it is the axis of a curve."""
     match kind:
-        case "CARTESIAN_POINT":
-            return FIRST_NUMBER.sub(_negative, inside, 1)
         case "DIRECTION" if axis:
             return LAST_NUMBER.sub(_negative, SECOND_NUMBER.sub(_negative, inside, 1), 1)
-        case "DIRECTION":
+        case "CARTESIAN_POINT" | "DIRECTION":
             return FIRST_NUMBER.sub(_negative, inside, 1)
         case "EDGE_LOOP":
-            edges = ",".join(f"#{number}" for number in reversed(REFERENCE.findall(inside)))
-            return f"{inside.partition('(')[0]}({edges})"
-        case "ORIENTED_EDGE":
-            return _other_sense(inside)
-        case "ADVANCED_FACE" if REFERENCE.findall(inside)[-1] in extruded:
+            edges = reversed(REFERENCE.findall(inside))
+            return REFERENCE.sub(lambda _: f"#{next(edges)}", inside)
+        case "ADVANCED_FACE" if REFERENCE.findall(inside)[-1] not in extruded:
+            return inside
+        case "ORIENTED_EDGE" | "ADVANCED_FACE":
             return _other_sense(inside)
     return inside
 

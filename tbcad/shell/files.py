@@ -81,7 +81,7 @@ def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> 
     mirrored solid would not give: it cuts numbers that are long, and a minus sign is a character.
     """
     one, other = shell_record(original), shell_record(array)
-    names = [wall_names(some.ids, some.modelled_cells) for some in (original, array)]
+    names = [wall_names(some.ids, original.modelled_cells) for some in (original, array)]
     renamed = {one["name"]: other["name"], **dict(zip(original.ids, array.ids, strict=True))}
     renamed |= dict(zip(*names, strict=True))
     text = (folder / one["step"]).read_bytes().decode("ascii")

@@ -26,7 +26,7 @@ from OCP.TopAbs import TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from tbcad_verify.step.kernel.arcs import between_arcs
 from tbcad_verify.step.kernel.box import OUTWARD, box, reach_of_face
-from tbcad_verify.step.kernel.measures import measure_face, moments_of
+from tbcad_verify.step.kernel.measures import _integrated, measure_face, moments_of
 from tbcad_verify.step.kernel.reading import read_solid
 from tbcad_verify.step.kernel.topology import corners_of, each, faces_of, triple
 
@@ -139,6 +139,14 @@ def test_an_outline_the_other_way_round_holds_the_rest_of_the_ball() -> None:
     assert rest[0] == pytest.approx(350 * np.pi, rel=1e-12)
     assert rest[1] == pytest.approx(-found[1], abs=1e-9)
     assert rest[2] + found[2] == pytest.approx(4 / 3 * np.pi * 1e4 * np.eye(3), abs=1e-7)
+
+
+def test_under_round_faces_as_the_kernel_integrates(shape: TopoDS_Shape) -> None:
+    origin = np.array([3.0, -40.0, 7.0])
+    for face in faces_of(shape):
+        _, found = measure_face(face, origin)
+        expected = _integrated(face, origin)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 def test_the_volume_is_the_kernels(shape: TopoDS_Shape, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
-"""The child process: `python -m tbcad_verify.step SECONDS PROCESSES FILE ANSWER [FILE ANSWER ...]`.
+"""The child process: `python -m tbcad_verify.step SECONDS PROCESSES FILE ANSWER ORIGINAL [...]`.
 
-It reads each FILE twice, in forks of its own, and writes JSON, or why it cannot be read.
+It reads each FILE twice, in forks of its own, and writes JSON, or why it cannot be read. The kernel
+reads no FILE that is the mirror image of its ORIGINAL; one without an original has itself there.
 """
 
 from __future__ import annotations
@@ -14,13 +15,21 @@ from pathlib import Path
 from typing import Any
 
 from tbcad_verify.step.forks import for_each
-from tbcad_verify.step.text import read_text
+from tbcad_verify.step.mirror_image import is_mirror_image
+from tbcad_verify.step.text import ascii_text, read_text
 
 
-def read_file(read_solid: Callable[[Path], dict[str, Any]], file: Path, answer: Path) -> None:
-    """Read one file as text and by the kernel, and write the answer."""
+def read_file(
+    read_solid: Callable[[Path], dict[str, Any]], file: Path, answer: Path, original: Path
+) -> None:
+    """Read one file as text and by the kernel, and write the answer.
+
+    Its solid is none where the kernel need not read it.
+    """
     try:
-        content: dict[str, Any] = {"text": read_text(file), "solid": read_solid(file)}
+        content: dict[str, Any] = {"text": read_text(file), "solid": None}
+        if original == file or not is_mirror_image(*(ascii_text(one) for one in (original, file))):
+            content["solid"] = read_solid(file)
     except ValueError as error:
         content = {"refused": str(error)}
     except Exception as error:
@@ -40,8 +49,9 @@ def main(seconds: float, processes: int, paths: list[Path]) -> None:
     gc.disable()  # it would go through the kernel's names again and again while they are loaded
     from tbcad_verify.step.kernel.reading import read_solid
 
-    pairs = list(zip(paths[::2], paths[1::2], strict=True))
-    for (_, answer), reason in for_each(partial(read_file, read_solid), pairs, seconds, processes):
+    jobs = list(zip(paths[::3], paths[1::3], paths[2::3], strict=True))
+    work = partial(read_file, read_solid)
+    for (_, answer, _), reason in for_each(work, jobs, seconds, processes):
         if reason:
             write(answer, {"refused": reason})
 

@@ -14,37 +14,37 @@ from pathlib import Path
 
 from tbcad_verify.run.child import crash_reason
 
-Pair = tuple[Path, Path]
+Paths = tuple[Path, ...]
 
 
 def for_each(
-    work: Callable[[Path, Path], None], pairs: Sequence[Pair], seconds: float, processes: int
-) -> Iterator[tuple[Pair, str]]:
-    """Call a function with every pair, each in a fork, in the order given.
+    work: Callable[..., None], jobs: Sequence[Paths], seconds: float, processes: int
+) -> Iterator[tuple[Paths, str]]:
+    """Call a function with the paths of every job, each in a fork, in the order given.
 
     Args:
-        work: is called with both paths.
-        pairs: of paths.
+        work: is called with all paths of a job.
+        jobs: the paths of each.
         seconds: time limit of each.
         processes: that work at the same time, at most.
 
     Yields:
-        Each pair as its fork ends, and why it was stopped or crashed, or nothing.
+        The paths of each job as its fork ends, and why it was stopped or crashed, or nothing.
     """
-    waiting = list(reversed(pairs))
-    running: dict[int, tuple[BaseProcess, Pair, float]] = {}
+    waiting = list(reversed(jobs))
+    running: dict[int, tuple[BaseProcess, Paths, float]] = {}
     while waiting or running:
         while waiting and len(running) < processes:
-            pair = waiting.pop()
-            fork: BaseProcess = get_context("fork").Process(target=work, args=pair)
+            job = waiting.pop()
+            fork: BaseProcess = get_context("fork").Process(target=work, args=job)
             fork.start()
-            running[fork.sentinel] = fork, pair, time.monotonic() + seconds
+            running[fork.sentinel] = fork, job, time.monotonic() + seconds
         first = min(deadline for _, _, deadline in running.values())
         ended = wait(list(running), max(0.0, first - time.monotonic()))
-        for sentinel, (fork, pair, deadline) in list(running.items()):
+        for sentinel, (fork, job, deadline) in list(running.items()):
             if sentinel in ended or deadline <= time.monotonic():
                 del running[sentinel]
-                yield pair, _end(fork, sentinel not in ended, seconds)
+                yield job, _end(fork, sentinel not in ended, seconds)
 
 
 def _end(fork: BaseProcess, late: bool, seconds: float) -> str:

@@ -67,13 +67,17 @@ SIMPLE: Mapping[str, Callable[[str], Value]] = {
 
 @dataclass
 class Entities:
-    """The simple entities of a file, by number; complex ones carry units only and are left out.
+    """The entities of a file, by number.
 
     Attributes:
-        texts: name and text of the parameters of each.
+        texts: of simple ones, name and text of the parameters.
+        units: of complex ones, which carry units, the text.
+        header: all before the first.
     """
 
     texts: dict[int, tuple[str, str]] = field(repr=False)
+    units: dict[int, str] = field(default_factory=dict, repr=False)
+    header: str = field(default="", repr=False)
 
     def of(self, name: str) -> Iterator[tuple[int, list[Value]]]:
         """Number and parameters of every entity of a name, in the order of the file."""
@@ -120,10 +124,11 @@ def read_entities(text: str) -> Entities:
         raise ValueError(f"broken STEP text at {text[place : place + SHOWN].strip()!r}")
     if len(texts) < numbers:
         raise ValueError("broken STEP text: two entities have one number")
-    for name, inside in texts.values():
-        if not name:
-            _check_complex(inside)
-    return Entities({number: entity for number, entity in texts.items() if entity[0]})
+    composed = {number: inside for number, (name, inside) in texts.items() if not name}
+    for inside in composed.values():
+        _check_complex(inside)
+    simple = {number: entity for number, entity in texts.items() if entity[0]}
+    return Entities(simple, composed, start[0])
 
 
 def _check_complex(text: str) -> None:

@@ -12,6 +12,7 @@ By Gauss' theorem the column `volume`, summed over all faces of a closed solid, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -137,7 +138,25 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
     solid = light.coated(0.0 if coated else -export.coating_mm)
     if planes := walls_of_export(export, camera):
         return cells_within(solid, planes.point, planes.normal, planes.real)
-    return closed_form_cells(solid.point.T, solid.normal.T, solid.curvature, walls)
+    # Cameras whose mirrors are mirror images of each other share the cells of the half x > 0.
+    side = np.array([_side(export, camera), 1.0, 1.0])
+    half = (solid.point.T * side, solid.normal.T * side, solid.curvature, walls * [*side, 1.0])
+    return _reflected(_cells_of_half(*((array + 0.0).tobytes() for array in half)), side)
+
+
+@lru_cache(maxsize=2)
+def _cells_of_half(point: bytes, normal: bytes, curvature: bytes, walls: bytes) -> ClosedFormCells:
+    """The cells of mirrors within walls, given their arrays' bytes."""
+    places = (np.frombuffer(array).reshape(-1, 3) for array in (point, normal))
+    return closed_form_cells(*places, np.frombuffer(curvature), np.frombuffer(walls).reshape(-1, 4))
+
+
+def _reflected(cells: ClosedFormCells, side: Floats) -> ClosedFormCells:
+    """Cells with their coordinates times 1 or -1; of a mirror image the edges lead back."""
+    points = cells.rim.points * side
+    rim = replace(cells.rim, points=points if side[0] > 0 else points[:, ::-1])
+    vector_area, first = cells.vector_area * side, cells.first * side
+    return replace(cells, vector_area=vector_area, first=first, rim=rim)
 
 
 def walls_of_export(export: Export, camera: str) -> PedestalWalls | None:
@@ -157,9 +176,13 @@ def walls_of_export(export: Export, camera: str) -> PedestalWalls | None:
 def _mirrors_and_bounds(export: Export, camera: str) -> tuple[Surfaces, Floats]:
     """One camera's mirrors as they reflect, and (2, 4) the planes of seam and foot."""
     rows = export.mirrors
-    side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
-    walls = np.array([[side, 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
+    walls = np.array([[_side(export, camera), 0, 0, 0], [0, 0, 1, export.foot_z_mm]])
     return rows.surfaces().take(np.flatnonzero(rows.camera == camera)), walls
+
+
+def _side(export: Export, camera: str) -> float:
+    """Of the seam, on which a camera's pinhole is."""
+    return float(np.copysign(1.0, export.cameras[camera].pinhole[0]))
 
 
 def _measured(boundaries: CellBoundaries, horizon: int) -> ClosedFormCells:

@@ -6,9 +6,10 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,13 +23,13 @@ from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.child import Limits, run
 from tbcad_verify.step.__main__ import main as read_files
+from tbcad_verify.step.mirror_image import flipped_solid
 from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 SAME_SURFACE = 2e-9  # mm and differences of unit vectors: digits of the text
 EXACT_KINDS = ("sphere", "plane")
-FILES = (("part", "step"), ("answer", "json"))
 PROCESSES = min(os.cpu_count() or 1, 4)  # read files at the same time, 0.2 GB each
 # -P: what lies in the current folder must not be imported.
 READER = ("-P", "-m", "tbcad_verify.step")
@@ -117,11 +118,15 @@ def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unkn
         BadExport: a file is missing, foreign or truncated.
     """
     parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
-    files = examine_all([load(export.folder, part.step) for part in parts], limits)
+    blobs = [load(export.folder, part.step) for part in parts]
+    shells = [k for k, part in enumerate(parts) if part in export.parts]
+    files = examine_all(blobs, limits, dict.fromkeys(shells[1:], *shells[:1]))
     return {part.name: file for part, file in zip(parts, files, strict=True)}
 
 
-def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | Unknown]:
+def examine_all(
+    blobs: Sequence[FileBytes], limits: Limits, originals: Mapping[int, int] = MappingProxyType({})
+) -> list[StepFile | Unknown]:
     """Read the bytes of files as text and by the kernel, from private copies.
 
     The kernel takes long to load: one process loads it, and a fork of that process reads each
@@ -130,6 +135,8 @@ def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | U
     Args:
         blobs: the files.
         limits: of the reading of one file.
+        originals: by the number of a file, that of the one whose mirror image it may be: the kernel
+            does not read it if it is.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
         place = Path(name)
@@ -137,29 +144,45 @@ def examine_all(blobs: Sequence[FileBytes], limits: Limits) -> list[StepFile | U
             blob.data.tofile(place / f"part{k}.step")
         # The largest first, so that no process is left with a large one at the end.
         order = sorted(range(len(blobs)), key=lambda k: (-blobs[k].data.size, k))
-        reason = _read(place, order, limits) if blobs else ""
-        return [_answer(place / f"answer{k}.json", reason) for k in range(len(blobs))]
+        jobs = [(k, originals.get(k, k)) for k in order]
+        reason = _read(place, jobs, limits) if blobs else ""
+        answers = [_answer(place / f"answer{k}.json", reason) for k in range(len(blobs))]
+    return [_joined_answer(answers, k, originals.get(k, k)) for k in range(len(blobs))]
 
 
-def _read(place: Path, order: Sequence[int], limits: Limits) -> str:
-    """Read files in a child process; why it failed, or empty."""
-    pairs = [f"{place}/{word}{k}.{end}" for k in order for word, end in FILES]
+def _read(place: Path, jobs: Sequence[tuple[int, int]], limits: Limits) -> str:
+    """Read files, given their numbers and those of their originals; why it failed, or empty."""
+    paths = [
+        f"{place}/{name}"
+        for k, original in jobs
+        for name in (f"part{k}.step", f"answer{k}.json", f"part{original}.step")
+    ]
     if limits.fork:
-        read_files(limits.seconds, PROCESSES, [Path(path) for path in pairs])
+        read_files(limits.seconds, PROCESSES, [Path(path) for path in paths])
         return ""
-    command = [sys.executable, *READER, str(limits.seconds), str(PROCESSES), *pairs]
+    command = [sys.executable, *READER, str(limits.seconds), str(PROCESSES), *paths]
     # Loading the kernel, and one file after the other.
-    outcome = run(command, place, replace(limits, seconds=limits.seconds * (1 + len(order))))
+    outcome = run(command, place, replace(limits, seconds=limits.seconds * (1 + len(jobs))))
     return outcome.reason or ("" if outcome.code == 0 else outcome.text.strip().rpartition("\n")[2])
 
 
-def _answer(path: Path, reason: str) -> StepFile | Unknown:
+def _answer(path: Path, reason: str) -> Row:
+    """What was read of a file, or why it was refused."""
     if not path.exists():
-        return Unknown(reason or "no answer")
-    value = json.loads(path.read_text(encoding="utf-8"))
-    if "refused" in value:
-        return Unknown(str(value["refused"]))
-    return parse(value["text"], value["solid"])
+        return {"refused": reason or "no answer"}
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def _joined_answer(answers: Sequence[Row], number: int, original: int) -> StepFile | Unknown:
+    """Text and solid of a file; that of a mirror image is its original's, reflected."""
+    answer = answers[number]
+    if "refused" in answer:
+        return Unknown(str(answer["refused"]))
+    if answer["solid"] is not None:
+        return parse(answer["text"], answer["solid"])
+    if "refused" in answers[original]:
+        return Unknown(str(answers[original]["refused"]))
+    return parse(answer["text"], flipped_solid(answers[original]["solid"]))
 
 
 def known(found: Found | Unknown) -> Found:

@@ -31,8 +31,7 @@ def read_text(path: Path) -> Row:
         ValueError: the text is no STEP file, or an entity lacks what its kind must have.
     """
     try:
-        # Names are ASCII; the standard writes all other characters in ASCII too.
-        table = read_entities(path.read_bytes().decode("ascii"))
+        table = read_entities(ascii_text(path))
         return {
             "solids": [str(name) for _, (name, *_) in table.of("MANIFOLD_SOLID_BREP")],
             "faces": [_face(table, face) for _, face in table.of("ADVANCED_FACE")],
@@ -40,6 +39,11 @@ def read_text(path: Path) -> Row:
         }
     except (LookupError, TypeError, UnicodeDecodeError, RecursionError) as error:
         raise ValueError(f"broken STEP text ({type(error).__name__}: {error})") from error
+
+
+def ascii_text(path: Path) -> str:
+    """The text of a file: names are ASCII, and the standard writes all other characters so too."""
+    return path.read_bytes().decode("ascii")
 
 
 def _face(table: Entities, face: list[Value]) -> Row:

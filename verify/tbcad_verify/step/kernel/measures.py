@@ -1,8 +1,8 @@
 """Area and moments of faces, and the volume that they enclose.
 
 By the divergence theorem, 3 V is the integral of x.n over all faces, and 4 times the volume's first
-moment that of x (x.n). On planes and spheres n is linear in x, so both follow from the area's
-moments, which the kernel integrates once.
+moment that of x (x.n). On planes, spheres and cylinders n is linear in x, so both follow from the
+area's moments, which the kernel integrates once.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepGProp import BRepGProp, BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
-from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
+from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FORWARD
@@ -128,18 +128,30 @@ def _enclosed(
     elif kind == GeomAbs_Sphere:
         figure = surface.Sphere()
         centre = np.array(triple(figure.Location())) - origin
-        enclosed = _under_sphere(moments, middle, centre, figure.Radius())
+        enclosed = _under_round(moments, middle, centre, centre, figure.Radius())
+    elif kind == GeomAbs_Cylinder:
+        figure = surface.Cylinder()
+        centre = np.array(triple(figure.Location())) - origin
+        axis = np.array(triple(figure.Axis().Direction()))
+        across = centre - centre @ axis * axis
+        enclosed = _under_round(moments, middle, centre, across, figure.Radius())
     else:
         return _integrated(face, origin)
     return enclosed if _outward(face, figure) else -enclosed
 
 
-def _under_sphere(moments: AreaMoments, middle: Floats, centre: Floats, radius: float) -> Floats:
-    """(4,) of a face of a sphere, whose normal at centre + y is y / radius."""
+def _under_round(
+    moments: AreaMoments, middle: Floats, centre: Floats, across: Floats, radius: float
+) -> Floats:
+    """(4,) of a face of a sphere or cylinder.
+
+    The normal at centre + y is y / radius, of a cylinder only the part of y across the axis is
+    counted; `across` is that part of the centre.
+    """
     offset, area = middle - centre, moments.area
     second = moments.second + area * np.outer(offset, offset)
-    height = area * (offset @ centre / radius + radius)  # the integral of x.n
-    first = height * centre + second @ centre / radius + radius * area * offset
+    height = area * (offset @ across / radius + radius)  # the integral of x.n
+    first = height * centre + second @ across / radius + radius * area * offset
     return np.append(height / 3, first / 4)
 
 

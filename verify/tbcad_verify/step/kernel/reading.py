@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
-from OCP.STEPControl import STEPControl_Reader
+from OCP.STEPControl import STEPControl_Controller, STEPControl_Reader
 from OCP.TopAbs import TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Shape
 
@@ -20,6 +22,8 @@ from tbcad_verify.step.kernel.topology import corners_of, count, faces_of, open_
 
 Row = dict[str, Any]
 
+# A file of the kernel's settings, which it finds by its name and a variable of the environment.
+REPAIRS = Path(__file__).with_name("tbcad_verify_repairs")
 MAXIMUM = 1  # of all tolerances: a mode of the kernel
 
 
@@ -56,6 +60,9 @@ def transferred(path: Path) -> TopoDS_Shape:
     """
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Alarm)
+    os.environ[f"CSF_{REPAIRS.name}Defaults"] = str(REPAIRS.parent)
+    STEPControl_Controller.Init_s()
+    Interface_Static.SetCVal_s("read.step.resource.name", REPAIRS.name)
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone:
         raise ValueError("the kernel cannot read it as STEP")
