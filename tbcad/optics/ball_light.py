@@ -6,22 +6,34 @@ that frame but the azimuth.
 """
 
 from dataclasses import dataclass
+from math import cos, radians, sin, sqrt
 
 import numpy as np
 
+from tbcad.compiled import compiled_loop
 from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.geometry.loop_vectors import (
+    Vector,
+    dot,
+    minus,
+    plus_scaled,
+    reflect,
+    scaled,
+    unit,
+    vector,
+)
 from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.geometry.round_cones import RoundCones
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.geometry.vectors import norm
+from tbcad.geometry.vectors import unit as unit_vectors
 from tbcad.optics.camera import Camera
-from tbcad.optics.reflection import reflected_rays
-from tbcad.types import Bools, Floats
+from tbcad.types import Floats
 
 # Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
 OUTLINE_POINTS = 24
 # A tilt of the mirror turns the ray by twice as much, or less across the plane of incidence, so
 # no ray at this tilt meets the capture sphere.
-MAX_TILT = np.radians(70)
+MAX_TILT = radians(70)
 BISECTIONS = 50
 
 
@@ -59,33 +71,57 @@ def used_outlines(poses: BallPoses, radius: Floats, pinhole: float, capture: flo
         pinhole: distance of the pinhole along the axis, mm.
         capture: radius of the capture sphere, mm.
     """
-    camera = np.array([pinhole, 0.0, 0.0])
-    low = np.zeros((len(radius), OUTLINE_POINTS))
-    high = np.full_like(low, MAX_TILT)
-    for _ in range(BISECTIONS):
-        tilt = (low + high) / 2
-        hits = _hits_sphere(*_tilted_surface(poses, radius, tilt), camera, capture)
-        low, high = np.where(hits, tilt, low), np.where(hits, high, tilt)
-    point, _ = _tilted_surface(poses, radius, low)
-    return point
-
-
-def _tilted_surface(poses: BallPoses, radius: Floats, tilt: Floats) -> tuple[Floats, Floats]:
-    """Points and normals (k, s, 3) of the balls at tilts (k, s) from their apices' normals."""
-    circle = unit_circle(even_angles(tilt.shape[1]))
-    across = np.array([0.0, 0.0, 1.0])
-    in_plane = np.cross(across, poses.normal)[:, None]
-    tangent = circle[:, :1] * in_plane + circle[:, 1:] * across
+    camera, circle = np.array([pinhole, 0.0, 0.0]), unit_circle(even_angles(OUTLINE_POINTS))
+    tangent = _tangents(poses.normal, circle)
+    tilt = _touching_tilts(poses.apex, poses.normal, tangent, radius, camera, capture)[..., None]
     apex_normal = poses.normal[:, None]
-    normal = np.cos(tilt)[..., None] * apex_normal + np.sin(tilt)[..., None] * tangent
-    return poses.apex[:, None] + radius[:, None, None] * (normal - apex_normal), normal
+    normal = np.cos(tilt) * apex_normal + np.sin(tilt) * tangent
+    return np.asarray(poses.apex[:, None] + radius[:, None, None] * (normal - apex_normal))
 
 
-def _hits_sphere(point: Floats, normal: Floats, camera: Floats, capture: float) -> Bools:
-    """Whether rays from the camera meet the capture sphere after mirrors at points (..., 3)."""
-    toward_origin = -dot(reflected_rays(camera, point, normal), point)
-    tangent_length = np.sqrt(np.maximum(dot(point, point) - capture**2, 0))
-    return np.asarray(toward_origin > tangent_length)
+def _tangents(normal: Floats, circle: Floats) -> Floats:
+    """Unit vectors (k, s, 3) square to normals (k, 3) in the directions of points (s, 2)."""
+    across = np.array([0.0, 0.0, 1.0])
+    in_plane = np.cross(across, normal)[:, None]
+    return np.asarray(circle[:, :1] * in_plane + circle[:, 1:] * across)
+
+
+@compiled_loop
+def _touching_tilts(
+    apex: Floats, normal: Floats, tangent: Floats, radius: Floats, camera: Floats, capture: float
+) -> Floats:
+    """Tilts (k, s) of balls at which rays from the camera touch the capture sphere, radians.
+
+    Args:
+        apex: of the balls, mm, (k, 3).
+        normal: there, (k, 3).
+        tangent: unit vectors toward which the normals tilt, (k, s, 3).
+        radius: of the balls, mm, (k,).
+        camera: its pinhole, mm, (3,).
+        capture: radius of the capture sphere, mm.
+    """
+    result, pinhole = np.empty(tangent.shape[:2]), vector(camera)
+    for k in range(len(apex)):
+        top, up = vector(apex[k]), vector(normal[k])
+        for s in range(tangent.shape[1]):
+            low, high, toward = 0.0, MAX_TILT, vector(tangent[k, s])
+            for _ in range(BISECTIONS):
+                tilt = (low + high) / 2
+                tilted = plus_scaled(scaled(cos(tilt), up), sin(tilt), toward)
+                point = plus_scaled(top, radius[k], minus(tilted, up))
+                if _hits_sphere(point, tilted, pinhole, capture):
+                    low = tilt
+                else:
+                    high = tilt
+            result[k, s] = low
+    return result
+
+
+@compiled_loop
+def _hits_sphere(point: Vector, normal: Vector, camera: Vector, capture: float) -> bool:
+    """Whether a ray from the camera meets the capture sphere after a mirror at a point."""
+    toward_origin = -dot(reflect(unit(minus(point, camera)), normal), point)
+    return toward_origin > sqrt(max(dot(point, point) - capture * capture, 0.0))
 
 
 def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
@@ -136,5 +172,5 @@ def enclosed_areas(outline: Floats) -> Floats:
 
 def field_angles(ellipsoid: Ellipsoid, polar: Floats) -> Floats:
     """Angle at the pinhole between the axis (to the origin) and each apex, radians, (k,)."""
-    ray = unit(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
+    ray = unit_vectors(ball_poses(ellipsoid, polar).apex - [norm(ellipsoid.pinhole), 0.0, 0.0])
     return np.asarray(np.arctan2(ray[:, 1], -ray[:, 0]))
