@@ -147,9 +147,13 @@ def cells_of_export(export: Export, camera: str, *, coated: bool = False) -> Clo
 @lru_cache(maxsize=2)
 def _cells_of_half(point: bytes, normal: bytes, curvature: bytes, walls: bytes) -> ClosedFormCells:
     """The cells of mirrors within walls, given their arrays' bytes."""
-    at, along = (np.frombuffer(array).reshape(-1, 3) for array in (point, normal))
-    limits = np.frombuffer(walls).reshape(-1, 4)
-    return closed_form_cells(at, along, np.frombuffer(curvature), limits)
+    places, normals, planes = (np.frombuffer(array) for array in (point, normal, walls))
+    return closed_form_cells(
+        places.reshape(-1, 3),
+        normals.reshape(-1, 3),
+        np.frombuffer(curvature),
+        planes.reshape(-1, 4),
+    )
 
 
 def _reflected(cells: ClosedFormCells, side: Floats) -> ClosedFormCells:
