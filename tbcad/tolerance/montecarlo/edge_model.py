@@ -1,6 +1,7 @@
 """One half of the shell as designed, as the fast model needs it, and its simulated builds."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -34,7 +35,7 @@ ASYMMETRIC = np.array([1.0, 0.1234, 0.0567])
 APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # compared by identity, so that what follows can be kept
 class EdgeModel:
     """One camera's half as designed: m mirrors and two planes.
 
@@ -97,7 +98,11 @@ def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
     length = errors.warp.length
     if errors.warp.spread == 0 or length == 0:
         return None
-    a, b = models
+    return _warp_maps(*models, length)
+
+
+@lru_cache(maxsize=1)  # processes of one material share the length
+def _warp_maps(a: EdgeModel, b: EdgeModel, length: float) -> WarpMaps:
     shapes = [ShellShape(one.table, one.cell_radius, one.walls) for one in (a, b)]
     return warp_maps((shapes[0], shapes[1]), length)
 
