@@ -1,7 +1,8 @@
 """The child process: `python -m tbcad_verify.step SECONDS PROCESSES FILE ANSWER ORIGINAL [...]`.
 
-It reads each FILE twice, in forks of its own, and writes JSON, or why it cannot be read. The kernel
-reads no FILE that is the mirror image of its ORIGINAL; one without an original has itself there.
+It reads each FILE twice, in forks of this process, and writes JSON, or why it cannot be read. The
+kernel reads no FILE that is the mirror image of its ORIGINAL; one without an original has itself
+there.
 """
 
 from __future__ import annotations
@@ -9,14 +10,16 @@ from __future__ import annotations
 import gc
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tbcad_verify.step.forks import for_each
+from tbcad_verify.step.forks import Paths, for_each
 from tbcad_verify.step.mirror_image import is_mirror_image
 from tbcad_verify.step.text import ascii_text, read_text
+
+SMALL_BYTES = 100_000  # the kernel reads such a file in the time of some forks
 
 
 def read_file(
@@ -51,9 +54,16 @@ def main(seconds: float, processes: int, paths: list[Path]) -> None:
 
     jobs = list(zip(paths[::3], paths[1::3], paths[2::3], strict=True))
     work = partial(read_file, read_solid)
-    for (_, answer, _), reason in for_each(work, jobs, seconds, processes):
+    for (_, answer, _), reason in for_each(work, _batches(jobs), seconds, processes):
         if reason:
             write(answer, {"refused": reason})
+
+
+def _batches(jobs: Sequence[Paths]) -> list[list[Paths]]:
+    """Large files each in a fork of its own, then all small ones in one."""
+    small = [job for job in jobs if job[0].stat().st_size < SMALL_BYTES]
+    large = [[job] for job in jobs if job not in small]
+    return [*large, small] if small else large
 
 
 if __name__ == "__main__":
