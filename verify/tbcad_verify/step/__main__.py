@@ -49,14 +49,23 @@ def write(answer: Path, content: dict[str, Any]) -> None:
 
 def main(seconds: float, processes: int, paths: list[Path]) -> None:
     """Read all files, each within a time limit."""
-    gc.disable()  # it would go through the kernel's names again and again while they are loaded
-    from tbcad_verify.step.kernel.reading import read_solid
-
     jobs = list(zip(paths[::3], paths[1::3], paths[2::3], strict=True))
-    work = partial(read_file, read_solid)
+    work = partial(read_file, _kernel())
     for (_, answer, _), reason in for_each(work, _batches(jobs), seconds, processes):
         if reason:
             write(answer, {"refused": reason})
+
+
+def _kernel() -> Callable[[Path], dict[str, Any]]:
+    """What reads a solid, loaded without looking for garbage among the kernel's many names."""
+    enabled = gc.isenabled()
+    gc.disable()
+    from tbcad_verify.step.kernel.reading import read_solid
+
+    gc.freeze()
+    if enabled:
+        gc.enable()
+    return read_solid
 
 
 def _batches(jobs: Sequence[Paths]) -> list[list[Paths]]:

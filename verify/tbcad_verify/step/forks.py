@@ -7,6 +7,7 @@ at is to blame, and a new fork goes on with those after it.
 
 from __future__ import annotations
 
+import gc
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -88,6 +89,7 @@ class _Fork:
 
 
 def _work_through(work: Callable[..., None], jobs: Sequence[Paths], done: Connection) -> None:
+    gc.disable()  # a fork ends soon
     for job in jobs:
         work(*job)
         done.send_bytes(b"done")
