@@ -165,8 +165,6 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     stage, keep_out, frame = arrangement.stage, arrangement.keep_out, arrangement.frame
     coupons = submit(parts_or_error, coupon_plates, base, printer, pose, mesh_mm)
     on_stage = submit(parts_or_error, placed_components, stage.components, printer, mesh_mm)
-    # Half of the frame is what the other process has time for while this one builds the carrier.
-    first_half = submit(parts_or_error, placed_components, _halves(frame)[0], printer, mesh_mm)
     carrier = carrier_parts(base, split, printer, mesh_mm)
     printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
     if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
@@ -179,9 +177,9 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
     if drive != arrangement.drive:  # the mass of the solids asks for another
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
         disc = placed_component(frame.homing.disc, printer, mesh_mm)
-        first_half = submit(parts_or_error, placed_components, _halves(frame)[0], printer, mesh_mm)
         shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    second_half = placed_components(_halves(frame)[1], printer, mesh_mm)
+    # Here, since the other process has no time for more than coupons and stage meanwhile.
+    on_frame = placed_components(frame.printed, printer, mesh_mm)
     gauge = _gauge(spec, layout, base, frame)
     tools = placed_components([gauge.component] if gauge else [], printer, mesh_mm)
     progress("prototype: caps and coupon")
@@ -190,7 +188,7 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         PrintedPart(disc, "base", frame.homing.disc.what),
         *_caps(base, layout, mesh_mm),
         *_components("stage", stage.components, parts_of(on_stage)),
-        *_components("frame", frame.printed, [*parts_of(first_half), *second_half]),
+        *_components("frame", frame.printed, on_frame),
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", [gauge.component] if gauge else [], tools),
     )
@@ -210,12 +208,6 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         parts=parts | arrangement.wiring.parts,
         capture_radius=spec.optics.capture_diameter_mm / 2,
     )
-
-
-def _halves(frame: FrameLayout) -> tuple[Sequence[Component], Sequence[Component]]:
-    """Its printed parts."""
-    middle = len(frame.printed) // 2
-    return frame.printed[:middle], frame.printed[middle:]
 
 
 def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:
