@@ -178,7 +178,7 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
         disc = placed_component(frame.homing.disc, printer, mesh_mm)
         shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    # Here, since the other process has no time for more than coupons and stage meanwhile.
+    # Not by submit: the other process is busy with coupons and stage until now.
     on_frame = placed_components(frame.printed, printer, mesh_mm)
     gauge = _gauge(spec, layout, base, frame)
     tools = placed_components([gauge.component] if gauge else [], printer, mesh_mm)
