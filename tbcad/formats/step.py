@@ -44,7 +44,6 @@ def write_step(
         StepError: when the kernel fails.
         OSError: when the file cannot be written in full.
     """
-    STEPControl_Controller.Init_s()
     configure(pcurves)
     writer = STEPControl_Writer()
     if writer.Transfer(solid.shape, STEPControl_AsIs) != IFSelect_RetDone:
@@ -61,7 +60,11 @@ def write_step(
 
 
 def configure(pcurves: bool) -> None:
-    """Write AP214 in millimetres; keep statistics off the screen, failures are raised here."""
+    """Write AP214 in millimetres; keep statistics off the screen, failures are raised here.
+
+    A writer keeps the settings that it finds when it is constructed.
+    """
+    STEPControl_Controller.Init_s()  # which declares the settings
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Fail)
     Interface_Static.SetCVal_s("write.step.unit", "MM")

@@ -37,10 +37,10 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
         OSError: when the file cannot be written in full.
     """
     document = _document(name, groups)
+    configure(pcurves=False)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetColorMode(False)
     writer.SetNameMode(True)
-    configure(pcurves=False)
     if not writer.Transfer(document, STEPControl_AsIs):
         raise StepError(f"{path.name}: the kernel cannot translate the assembly")
     step_writer = writer.ChangeWriter()

@@ -17,7 +17,7 @@ from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct
-from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller
+from OCP.STEPControl import STEPControl_AsIs
 from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
@@ -82,9 +82,8 @@ def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
         StepError: when the kernel fails.
         OSError: when the file cannot be written in full.
     """
-    STEPControl_Controller.Init_s()
     configure(pcurves=False)
-    Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")  # a writer keeps what it finds
+    Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetDimTolMode(True)
     writer.SetColorMode(False)

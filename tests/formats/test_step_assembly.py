@@ -6,6 +6,7 @@ import cadquery
 import numpy as np
 import pytest
 from cadquery.occ_impl.assembly import toCAF
+from OCP.Interface import Interface_Static
 from OCP.TDocStd import TDocStd_Document
 
 from tbcad.cad.assembly import ColouredSolid, SolidGroup
@@ -43,3 +44,11 @@ def test_the_same_bytes_as_by_cadquery(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(step_assembly, "_document", by_cadquery)
     write_assembly(tmp_path / "theirs.step", "prototype", groups)
     assert (tmp_path / "ours.step").read_bytes() == (tmp_path / "theirs.step").read_bytes()
+
+
+def test_the_same_bytes_after_a_file_with_tolerances(tmp_path: Path) -> None:
+    groups = (SolidGroup("balls", balls()),)
+    write_assembly(tmp_path / "first.step", "prototype", groups)
+    Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")  # as such a file leaves it
+    write_assembly(tmp_path / "second.step", "prototype", groups)
+    assert (tmp_path / "first.step").read_bytes() == (tmp_path / "second.step").read_bytes()
