@@ -81,9 +81,10 @@ class Design(MirrorDesign):
             InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
         """
         from tbcad.cad.part import as_part
+        from tbcad.prototype.arrangement import arrangements
         from tbcad.prototype.model import build_prototype_model
 
         return {
             printed.name: as_part(printed.name, printed.solid.shape)
-            for printed in build_prototype_model(self).printed
+            for printed in build_prototype_model(arrangements(self)).printed
         }

@@ -9,8 +9,6 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import chosen_spec, silent
-from tbcad.api.designs import design
-from tbcad.api.verification import checked_report
 from tbcad.errors import InputError
 from tbcad.loading import large_libraries
 from tbcad.spec.design import Spec
@@ -79,14 +77,10 @@ def build(
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
     with large_libraries():
-        from tbcad.background import background_process
-        from tbcad.output.build import write_export
-        from tbcad.output.folder import check_replaceable, replacing
-        from tbcad.output.parts import PROTOTYPE, SHELL, default_parts
+        from tbcad.design_process import design_process
+        from tbcad.output.folder import check_replaceable
+        from tbcad.output.parts import PROTOTYPE, default_parts
         from tbcad.prototype.purchased.prices import load_prices
-        from tbcad.report.page.write import write_report
-        from tbcad.verification_process import verification_process
-        from tbcad.whole_design import Design
 
     chosen, out = chosen_spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
@@ -95,38 +89,17 @@ def build(
         load_prices(chosen.prototype.prices)  # a wrong list is no reason to leave parts out
     started = monotonic()
     progress("mirrors: radii and cells")
-    with verification_process(needed=verify) as verify_files:
-        mirrors = design(chosen, detail=detail)
-        with replacing(out, force) as folder:
-            with background_process() as submit:
-                simulated = submit(_as_made, mirrors) if verify and SHELL in asked else None
-                export = write_export(
-                    mirrors, folder, asked, progress, submit, optional_prototype=parts is None
-                )
-            finished = Design(export.spec, mirrors.arrays)
-            report = None
-            if verify:
-                # The files are read back before they replace the old ones.
-                report = replace(
-                    checked_report(verify_files, folder, progress),
-                    folder=out,
-                    note=export.note,
-                    as_made=simulated.result() if simulated else None,
-                    seconds=monotonic() - started,
-                )
-            progress("report")
-            write_report(folder, as_made=report.as_made if report else None)
+    with design_process(chosen, PROTOTYPE in asked) as ahead:
+        with large_libraries():
+            from tbcad.api.build_files import build_files
+            from tbcad.whole_design import Design
+        mirrors, export, report = build_files(
+            ahead, out, asked, verify, force, parts is None, progress, detail
+        )
+    if report:
+        report = replace(report, seconds=monotonic() - started)
+    finished = Design(export.spec, mirrors.arrays)
     return Build(out, finished, export.parts, export.note, report)
-
-
-def _as_made(mirrors: Design) -> AsMade:
-    """Simulate a few builds of a design by every built-in process."""
-    from tbcad.simulate.scene.reflector import reflectors
-    from tbcad.tolerance.as_made import as_made
-
-    spec = mirrors.spec
-    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
-    return as_made(reflectors(mirrors), target, coat)
 
 
 def as_made(

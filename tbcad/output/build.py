@@ -1,8 +1,9 @@
 """An export: the record, what was asked for, and the manifest."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
+from tbcad.prototype.arrangement import Arrangement
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
 from tbcad.shell.mandrel import Mandrel
@@ -45,6 +47,7 @@ def write_export(
     parts: Sequence[str] = PARTS,
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
+    arranged: Iterable[Arrangement] | None = None,
     *,
     optional_prototype: bool = False,
 ) -> Export:
@@ -56,6 +59,7 @@ def write_export(
         parts: some of PARTS.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
+        arranged: the prototype's arrangements, the preferred first; None: they are worked out.
         optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
 
     Raises:
@@ -70,7 +74,12 @@ def write_export(
 
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
-    export = _write_parts(design, folder, parts, progress, submit_file, optional_prototype)
+    write_prototype = partial(
+        export_prototype, design, folder, progress, submit_file, arranged=arranged
+    )
+    export = _write_parts(
+        design, folder, parts, progress, submit_file, write_prototype, optional_prototype
+    )
     if mandrel:
         submit_file(write_mandrels, design, mandrel, folder)
     write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
@@ -98,29 +107,30 @@ def _write_parts(
     parts: Sequence[str],
     progress: Progress,
     submit: Submit,
+    write_prototype: Callable[[], Spec],
     optional_prototype: bool,
 ) -> Export:
     if SHELL not in parts:
-        return Export(export_prototype(design, folder, progress, submit), (PROTOTYPE,))
+        return Export(write_prototype(), (PROTOTYPE,))
     envelope = shell_envelope(design)  # refuses flanges that do not fit
     submit(write_shell_meshes, design, envelope, folder)
     if PROTOTYPE not in parts:
         write_shell_solids(design, envelope, folder, progress)
         return Export(design.spec, (SHELL,))
     submit(write_shell_solids, design, envelope, folder)
-    export = _prototype_with_shells(design, folder, progress, submit, optional_prototype)
+    export = _prototype_with_shells(design.spec, write_prototype, optional_prototype)
     progress("shells")
     return export
 
 
 def _prototype_with_shells(
-    design: MirrorDesign, folder: Path, progress: Progress, submit: Submit, optional: bool
+    spec: Spec, write_prototype: Callable[[], Spec], optional: bool
 ) -> Export:
     try:
-        return Export(export_prototype(design, folder, progress, submit), PARTS)
+        return Export(write_prototype(), PARTS)
     except (SpecError, InvalidSolidError) as error:
         if optional:
-            return Export(design.spec, (SHELL,), f"no prototype: {error}")
+            return Export(spec, (SHELL,), f"no prototype: {error}")
         if isinstance(error, SpecError):
             raise only_shell_remains(error) from None
         raise

@@ -1,7 +1,7 @@
 """The whole prototype: its layouts, its printed parts as solids, and the drive that turns them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,10 +15,8 @@ from tbcad.background import Submit, at_once
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.camera.requirements import camera_requirements
 from tbcad.geometry.primitives import Component
-from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.arrangement import (
     Arrangement,
-    arrangements,
     balance_and_drive,
     shroud_round,
 )
@@ -118,21 +116,21 @@ class PrototypeModel:
 
 
 def build_prototype_model(
-    design: MirrorDesign,
+    arranged: Iterable[Arrangement],
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
-    arranged: Callable[[Arrangement], None] = lambda _: None,
+    begun: Callable[[Arrangement], None] = lambda _: None,
 ) -> PrototypeModel:
-    """Arrange the prototype of a design and build its solids.
+    """Build the solids of a prototype.
 
     Where the kernel fails with the preferred arrangement, other pads and numbers of balls are
     tried: another hub's boss would leave the same faces grazing each other.
 
     Args:
-        design: the mirrors.
+        arranged: its arrangements, the preferred first.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
-        arranged: called with the arrangement before its solids are made.
+        begun: called with each arrangement before its solids are built.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -140,11 +138,11 @@ def build_prototype_model(
     """
     progress("prototype: balls, their places, stops")
     errors: dict[tuple[int, float], Exception] = {}
-    for arrangement in arrangements(design):
+    for arrangement in arranged:
         balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
         if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
-        arranged(arrangement)
+        begun(arrangement)
         try:
             return _model(arrangement, progress, submit)
         except (SpecError, InvalidSolidError) as error:

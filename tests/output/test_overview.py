@@ -9,6 +9,7 @@ from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.output.overview import Overview, overview
 from tbcad.output.parts import SHELL
+from tbcad.prototype.arrangement import arrangements
 from tbcad.prototype.model import build_prototype_model
 from tbcad.shell.files import camera_a_mesh
 from tbcad.spec.load import load_spec
@@ -37,7 +38,7 @@ def test_shell_volume(small: Overview, small_design: MirrorDesign) -> None:
 @pytest.mark.slow
 def test_prototype(small_design: MirrorDesign) -> None:
     few = MirrorDesign(load_spec(None, ["n=6", "prototype.k=2"]), small_design.arrays)
-    found, model = overview(few), build_prototype_model(few)
+    found, model = overview(few), build_prototype_model(arrangements(few))
     assert found.spec == model.spec
     assert found.prototype is not None
     assert found.prototype.balls + found.prototype.caps == len(model.layout)

@@ -1,6 +1,7 @@
 """All files of the prototype: parts, tables, plan, record and assembly."""
 
 import json
+from collections.abc import Iterable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from tbcad.formats.step_assembly import write_assembly
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.arrangement import Arrangement
+from tbcad.prototype.arrangement import Arrangement, arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
@@ -61,6 +62,7 @@ def export_prototype(
     folder: Path,
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
+    arranged: Iterable[Arrangement] | None = None,
 ) -> Spec:
     """Build the prototype and write all of its files into a folder.
 
@@ -69,6 +71,7 @@ def export_prototype(
         folder: to write into.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
+        arranged: the design's arrangements, the preferred first; None: they are worked out.
 
     Returns:
         The design's spec with what was chosen for the prototype.
@@ -80,12 +83,13 @@ def export_prototype(
     prices = load_prices(design.spec.prototype.prices)
     alternatives: list[Future[list[dict[str, Any]]]] = []
 
-    def arranged(arrangement: Arrangement) -> None:
+    def begun(arrangement: Arrangement) -> None:
         layout = arrangement.layout
         chosen = (layout.array, layout.groups, layout.balls, layout.fit)
         alternatives.append(submit(ball_alternatives, arrangement.spec, *chosen))
 
-    built = build_prototype_model(design, progress, submit, arranged)
+    arranged = arrangements(design) if arranged is None else arranged
+    built = build_prototype_model(arranged, progress, submit, begun)
     spec = built.spec
     progress("prototype: files")
     prints = [submit(_write_part, folder, part, spec) for part in built.printed]
