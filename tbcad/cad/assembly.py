@@ -1,5 +1,6 @@
 """Named, coloured solids in groups: what an assembly file shows as a tree."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -46,6 +47,32 @@ class SolidGroup:
 
     name: str
     bodies: tuple[ColouredSolid, ...]
+
+
+@dataclass(frozen=True)
+class ColouredMesh:
+    """What is seen of one solid: name and colour as of `ColouredSolid`."""
+
+    name: str
+    mesh: Mesh
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class MeshGroup:
+    """Meshes that belong together."""
+
+    name: str
+    bodies: tuple[ColouredMesh, ...]
+
+
+def mesh_groups(groups: Sequence[SolidGroup]) -> list[MeshGroup]:
+    """What is seen of groups of solids, without shapes of the kernel."""
+    return [MeshGroup(group.name, tuple(map(_drawn, group.bodies))) for group in groups]
+
+
+def _drawn(body: ColouredSolid) -> ColouredMesh:
+    return ColouredMesh(body.name, body.mesh or display_mesh(body.shape), body.colour)
 
 
 def display_mesh(shape: TopoDS_Solid) -> Mesh:

@@ -9,15 +9,15 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.assembly import ColouredSolid, SolidGroup, display_mesh
+from tbcad.cad.assembly import ColouredMesh, MeshGroup
 
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
 METAL, ROUGH = 0.1, 0.6
 
 
-def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
-    """Write groups of solids as a binary glTF 2.0 file, a node for each group and each solid."""
+def write_glb(path: Path, name: str, groups: Sequence[MeshGroup]) -> None:
+    """Write groups of meshes as a binary glTF 2.0 file, a node for each group and each mesh."""
     scene = trimesh.Scene(base_frame="world")
     scene.graph.update(name, "world", matrix=UPRIGHT)
     for group in groups:
@@ -33,9 +33,8 @@ def write_glb(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     path.write_bytes(export_glb(scene, include_normals=False))
 
 
-def _drawn(body: ColouredSolid) -> trimesh.Trimesh:
-    mesh = body.mesh or display_mesh(body.shape)
-    drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+def _drawn(body: ColouredMesh) -> trimesh.Trimesh:
+    drawn = trimesh.Trimesh(body.mesh.vertices, body.mesh.triangles, process=False)
     drawn.visual = TextureVisuals(
         material=PBRMaterial(
             name=body.name,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.background import Submit, at_once
+from tbcad.cad.assembly import mesh_groups
 from tbcad.cad.brep import Solid
 from tbcad.drafting.sheet import Sheet
 from tbcad.formats.csv_table import Row, write_table
@@ -101,8 +102,8 @@ def export_prototype(
         submit(cap_sheet(_title(spec), built.base, built.layout, one).write, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
+    submit(write_glb, folder / GLB, "prototype", mesh_groups(groups))
     write_assembly(folder / STEP, "prototype", groups)
-    write_glb(folder / GLB, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom_csv.NAME, bom_csv.COLUMNS, bill)
     drawings = _drawings(built, listed(_title(spec), bill))
