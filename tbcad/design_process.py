@@ -74,9 +74,16 @@ def _serve(spec: Spec, arranged: bool, pipe: Connection) -> None:
     sending = Thread(target=pipe.send, args=(mirrors,))
     sending.start()
     if isinstance(mirrors, MirrorDesign) and arranged:
-        first = _outcome(lambda: arrange(mirrors))
+        first = _outcome(lambda: _arranged(mirrors))
         sending.join()
         pipe.send(first)
+
+
+def _arranged(mirrors: MirrorDesign) -> Arrangement:
+    """The first arrangement, and what its record asks for, whose compiled loops are loaded here."""
+    first = arrange(mirrors)
+    _ = first.layout.alternatives  # kept with it
+    return first
 
 
 def _outcome(work: Callable[[], Any]) -> Any:

@@ -51,7 +51,6 @@ def build_prototype_model(
     arranged: Iterable[Arrangement],
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
-    begun: Callable[[Arrangement], None] = lambda _: None,
 ) -> PrototypeModel:
     """Build the solids of a prototype.
 
@@ -62,7 +61,6 @@ def build_prototype_model(
         arranged: its arrangements, the preferred first.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
-        begun: called with each arrangement before its solids are built.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -74,7 +72,6 @@ def build_prototype_model(
         balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
         if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
-        begun(arrangement)
         try:
             return _model(arrangement, progress, submit)
         except (SpecError, InvalidSolidError) as error:

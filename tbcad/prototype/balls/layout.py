@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from tbcad.prototype.balls.clearance import (
     obstacles,
     seat_half_angles,
 )
-from tbcad.prototype.balls.fit import BallFit, ball_fit
+from tbcad.prototype.balls.fit import BallFit, ball_alternatives, ball_fit
 from tbcad.prototype.balls.groups import MirrorGroups, group_mirrors, max_groups
 from tbcad.prototype.balls.placement import (
     Placement,
@@ -51,6 +52,7 @@ class PrototypeLayout:
     the shell (z up), as are those of the mirrors.
 
     Attributes:
+        spec: of the design, with the number of balls.
         array: camera a and its mirrors.
         grade: deviations that the balls' grade allows.
         groups: mirrors that share a ball.
@@ -63,6 +65,7 @@ class PrototypeLayout:
             turned by 180 degrees about z, (m,).
     """
 
+    spec: Spec
     array: MirrorArray
     grade: Grade
     groups: MirrorGroups
@@ -108,6 +111,11 @@ class PrototypeLayout:
     def span(self) -> float:
         """Azimuth between the outermost balls on the base, radians."""
         return float(np.ptp(self.placement.azimuth))
+
+    @cached_property
+    def alternatives(self) -> list[dict[str, Any]]:
+        """What each rule to choose the balls costs, as of `ball_alternatives`."""
+        return ball_alternatives(self.spec, self.array, self.groups, self.balls, self.fit)
 
 
 @dataclass(frozen=True)
@@ -173,6 +181,7 @@ def prototype_layout(
     placement = min_swing_placement(problem)
     azimuth = azimuths_for_fewer_stops(problem, requests, placement.azimuth)
     return PrototypeLayout(
+        spec=spec,
         array=array,
         grade=load_grades()[spec.prototype.grade],
         groups=groups,

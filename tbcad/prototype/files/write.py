@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterable
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,6 @@ from tbcad.prototype.arrangement import Arrangement, arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.balls.fit import ball_alternatives
 from tbcad.prototype.base.cap_limits import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.lamps import lamp_sheet
@@ -83,15 +81,8 @@ def export_prototype(
         InvalidSolidError: when the kernel fails.
     """
     prices = load_prices(design.spec.prototype.prices)
-    alternatives: list[Future[list[dict[str, Any]]]] = []
-
-    def begun(arrangement: Arrangement) -> None:
-        layout = arrangement.layout
-        chosen = (layout.array, layout.groups, layout.balls, layout.fit)
-        alternatives.append(submit(ball_alternatives, arrangement.spec, *chosen))
-
     arranged = arrangements(design) if arranged is None else arranged
-    built = build_prototype_model(arranged, progress, submit, begun)
+    built = build_prototype_model(arranged, progress, submit)
     spec = built.spec
     progress("prototype: files")
     prints = [submit(_write_part, folder, part, spec) for part in built.printed]
@@ -110,7 +101,7 @@ def export_prototype(
     drawings = _drawings(built, listed(_title(spec), bill))
     for sheet in drawings:
         submit(sheet.write, folder)
-    record = document(built, alternatives[-1].result(), bill, drawings)
+    record = document(built, bill, drawings)
     record["assembly_steps"] = mounting_record(_machine(built, record))
     text = json.dumps(record, indent=1, allow_nan=False) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8")
@@ -149,17 +140,11 @@ def _file_names(part: PrintedPart) -> dict[str, str]:
     return {kind: f"{part.name}.{kind}" for kind in ("step", "stl", "3mf")}
 
 
-def document(
-    built: PrototypeModel,
-    alternatives: list[dict[str, Any]],
-    bill: list[Row],
-    drawings: list[Sheet],
-) -> dict[str, Any]:
+def document(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> dict[str, Any]:
     """prototype.json: what is known of the prototype, in numbers.
 
     Args:
         built: the prototype.
-        alternatives: to its balls.
         bill: rows of the parts list.
         drawings: of what is cut or drilled.
     """
@@ -174,7 +159,7 @@ def document(
         "frame": {"axis": axis, "zero": zero, "third": third},
         "swing_deg": _swing(built, spec.motion),
         "balls": BALLS_FILE,
-        "alternatives": alternatives,
+        "alternatives": layout.alternatives,
         "seats": _seats(built),
         "holding": holding_record(built.spec, built.base, layout, built.parts),
         "parts": [_part_record(part) for part in built.printed],
