@@ -17,7 +17,7 @@ from tbcad.cad.glyphs import ROWS, relief, text_width
 from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.coupon_pose import SeatPose
-from tbcad.prototype.base.coupon_seat import height, hollowed, outline, seat_body
+from tbcad.prototype.base.coupon_seat import height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import usable_size
@@ -203,7 +203,7 @@ def _plate(
         body = seat_body(seats, spec, k, pose, -row.middle)
         for n, offset in enumerate(row.offsets):
             at = np.array([*_ball_middle(row, corner, n, seats), height(seats, spec, k, pose)])
-            seat = hollowed(body, seats, k, offset, pose)
+            seat = with_pads(body, seats, k, offset, pose)
             bodies.append(moved(seat, np.eye(3), at))
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ pose.axes)
             pads.append(seats.pad[k])

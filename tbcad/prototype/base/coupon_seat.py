@@ -8,13 +8,14 @@ centre at the origin and the seat's axis along z, unless said otherwise.
 from collections.abc import Iterator
 
 import numpy as np
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.solids import cut, cylinder, fused, moved, polygon, prism, revolved_polygon
+from tbcad.cad.brep import Maker
+from tbcad.cad.solids import cut, cylinder, faces, fused, moved, polygon, prism, revolved_polygon
 from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.base.coupon_pose import SeatPose
-from tbcad.prototype.base.seat_solids import seat_hollow
+from tbcad.prototype.base.seat_solids import seat_room, with_posts
 from tbcad.prototype.base.seats import Seats
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
@@ -29,7 +30,7 @@ UP = np.eye(3)[2]
 
 
 def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: float) -> TopoDS_Shape:
-    """A seat without its hollow, with its keel, along the bed's axes, the ball's centre at 0.
+    """A seat without its pads, with its keel, along the bed's axes, the ball's centre at 0.
 
     Args:
         seats: from `coupon_seats`.
@@ -41,18 +42,25 @@ def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: floa
     wall = revolved_polygon(wall_section(seats, spec, k), 0.0, 2 * np.pi)
     legs = cut(wall, list(_between_legs(seats, spec, k)))
     keel = prism(polygon(keel_corners(seats, spec, k, pose, to_bar)), KEEL_MM * np.eye(3)[0])
-    return fused([moved(legs, pose.axes, np.zeros(3)), keel])
+    legs, room = (moved(one, pose.axes, np.zeros(3)) for one in (legs, seat_room(seats, k)))
+    return cut(fused([legs, keel]), [room])
 
 
-def hollowed(
+def with_pads(
     body: TopoDS_Shape, seats: Seats, k: int, offset: float, pose: SeatPose
-) -> TopoDS_Shape:
-    """A seat's body with its hollow; pads are moved off the ball by an offset, mm.
+) -> TopoDS_Solid:
+    """A seat's body with its pads, moved off the ball by an offset, mm.
 
-    The body stays as it is: a boolean may change the tolerances of what it is given.
+    Face by face: seats of one size are then cut out once for all offsets. What bounds the body
+    bounds, turned round, the room in it.
     """
-    hollow = moved(seat_hollow(seats, k, offset), pose.axes, np.zeros(3))
-    return cut(moved(body, np.eye(3), np.zeros(3)), [hollow])
+    room = [_turned(face) for face in faces(body)]
+    posted = with_posts(room, seats, k, offset, pose.axes)
+    return Maker(mirrored=False).solid([_turned(face) for face in posted])
+
+
+def _turned(face: TopoDS_Face) -> TopoDS_Face:
+    return TopoDS.Face_s(face.Reversed())
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:

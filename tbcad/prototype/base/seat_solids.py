@@ -34,7 +34,8 @@ NARROWER = 0.4
 INTO_BOSS_MM = 0.3  # by which the space behind a boss begins inside of it, and is narrower
 ARC_POINTS = 25  # of a cup's section in its mesh
 POLE_ANGLE = 0.3  # about the axis, radians: the cup's hemisphere ends here, short of its pole
-ALONG = np.array([0.0, 0.0, 1.0])
+OWN_AXES = np.eye(3)
+ALONG = OWN_AXES[2]
 
 Point = tuple[float, float]
 """A point (x out, z along) of the half-plane y = 0."""
@@ -54,17 +55,37 @@ def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
         k: number of the seat.
         offset: how far the pads are moved off the ball, mm.
     """
-    radius, cup, pocket = float(seats.radius[k]), float(seats.cup[k]), float(seats.pocket[k])
+    return Maker(mirrored=False).solid(with_posts(faces(seat_room(seats, k)), seats, k, offset))
+
+
+def seat_room(seats: Seats, k: int) -> TopoDS_Shape:
+    """What a ball and its magnet need where no pads are, in the seat's own frame."""
     # Seams where no pad is: half way between two of them.
     seam = np.array([*meridian(float(seats.pad_azimuth[k]) + np.pi / 3), ALONG])
-    section = _hollow_section(cup, pocket, float(seats.bottom[k]))
-    room, maker = moved(revolved(section), seam, np.zeros(3)), Maker(mirrored=False)
-    size = (cup, radius + offset, float(seats.pad[k]))
-    posts = [_post_faces(maker, n, *size) for n in seats.local_normals[k]]
-    whole = faces(room)
-    cups = [_with_holes(maker, one, [rim for rim, _ in posts]) for one in whole if on_sphere(one)]
-    others = [one for one in whole if not on_sphere(one)]
-    return maker.solid([*cups, *others, *(one for _, post in posts for one in post)])
+    sizes = float(seats.cup[k]), float(seats.pocket[k]), float(seats.bottom[k])
+    return moved(revolved(_hollow_section(*sizes)), seam, np.zeros(3))
+
+
+def with_posts(
+    room: Sequence[TopoDS_Face], seats: Seats, k: int, offset: float, axes: Floats = OWN_AXES
+) -> list[TopoDS_Face]:
+    """Faces that bound a seat's room with those of the posts of its pads.
+
+    Args:
+        room: faces with the room on their inner side, the ball's centre at the origin; the only
+            ones on a sphere are the cup's.
+        seats: of all balls.
+        k: number of the seat.
+        offset: how far the pads are moved off the ball, mm.
+        axes: what the seat's own x, y and z have become, as rows, (3, 3).
+    """
+    maker = Maker(mirrored=False)
+    size = (float(seats.cup[k]), float(seats.radius[k]) + offset, float(seats.pad[k]))
+    posts = [_post_faces(maker, n, *size) for n in seats.local_normals[k] @ axes]
+    rims = [rim for rim, _ in posts]
+    cups = [_with_holes(maker, one, rims) for one in room if on_sphere(one)]
+    others = [one for one in room if not on_sphere(one)]
+    return [*cups, *others, *(one for _, post in posts for one in post)]
 
 
 def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:

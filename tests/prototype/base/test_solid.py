@@ -37,11 +37,11 @@ from tbcad.prototype.base.coupon_seat import (
     KEEL_MM,
     core_radius,
     height,
-    hollowed,
     keel_corners,
     leaning,
     seat_body,
     wall_section,
+    with_pads,
 )
 from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -458,7 +458,7 @@ class TestCoupon:
         spec, pose = base.spec, pose_of(base)
         seats = coupon_seats(base, pose)
         for k in (int(seats.radius.argmax()), int(seats.radius.argmin())):
-            solid = as_trimesh(hollowed(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
+            solid = as_trimesh(with_pads(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
             beside = (seats.pad[k] + 0.9 * spec.cup_wall_mm) * np.linspace(-1, 1, 9)
             deep = float(seats.cup[k]) + spec.cup_wall_mm * np.array([0.1, 0.9])
             for normal in seats.local_normals[k]:
@@ -477,10 +477,26 @@ class TestCoupon:
         seats = coupon_seats(base, pose)
         for k in range(len(seats)):
             bed = height(seats, spec, k, pose)
-            solid = as_trimesh(hollowed(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
+            solid = as_trimesh(with_pads(seat_body(seats, spec, k, pose, 0.0), seats, k, 0.0, pose))
             assert solid.bounds[0, 2] == pytest.approx(-bed, abs=1e-6)
             keel = np.abs(solid.vertices[:, 0]) < KEEL_MM / 2 + 1e-6
             assert solid.vertices[~keel, 2].min() == pytest.approx(-bed, abs=0.3)
+
+    def test_its_pads_are_what_a_boolean_makes(self, base: BaseLayout) -> None:
+        """The kernel joins a rod for each pad, of which the rest is within the wall."""
+        spec, pose = base.spec, pose_of(base)
+        seats = coupon_seats(base, pose)
+        for k in (int(seats.radius.argmax()), int(seats.radius.argmin())):
+            body = seat_body(seats, spec, k, pose, 0.0)
+            cup, radius, pad = (float(one[k]) for one in (seats.cup, seats.radius, seats.pad))
+            normals = seats.local_normals[k] @ pose.axes
+            for offset in SPEC.coupon_offsets_mm:
+                seat = one_solid("seat", with_pads(body, seats, k, offset, pose))
+                end, length = radius + offset, cup - radius - offset + spec.cup_wall_mm / 2
+                rods = [cylinder(-end * n, -n, pad, length) for n in normals]
+                joined = fused([body, *rods])
+                assert volume(seat) == pytest.approx(volume(joined), rel=1e-5)
+                assert volume(cut(joined, [seat])) == pytest.approx(0, abs=1e-6)
 
     def test_every_size_has_pads_at_every_offset(
         self, base: BaseLayout, plates: list[PlacedSolid]
