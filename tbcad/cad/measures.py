@@ -7,7 +7,7 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepGProp import BRepGProp, BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.GeomAbs import GeomAbs_Plane
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Pln, gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
@@ -99,13 +99,29 @@ def face_integrals(face: TopoDS_Face, origin: Floats) -> FaceIntegrals:
     return FaceIntegrals(origin, inside.Mass(), moment, surface.Mass())
 
 
-def plane_faces(shape: TopoDS_Shape) -> tuple[Floats, Floats]:
-    """Centres (f, 3) and areas (f,) of all plane faces of a shape, mm and mm^2."""
+def plane_faces(
+    shape: TopoDS_Shape, through: Floats | None = None, near: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Centres (f, 3) and areas (f,) of plane faces of a shape, mm and mm^2.
+
+    Args:
+        shape: of any kind.
+        through: points (p, 3), mm: only faces whose planes pass one of them; None: all faces.
+        near: within which distance planes pass it, mm.
+    """
     centre, area = [], []
     for face in faces(shape):
-        if BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane:
+        adaptor = BRepAdaptor_Surface(face)
+        if adaptor.GetType() == GeomAbs_Plane and _passes(adaptor.Plane(), through, near):
             surface = GProp_GProps()
             BRepGProp.SurfaceProperties_s(face, surface)
             centre.append(surface.CentreOfMass().Coord())
             area.append(surface.Mass())
     return np.array(centre).reshape(-1, 3), np.array(area)
+
+
+def _passes(plane: gp_Pln, points: Floats | None, near: float) -> bool:
+    if points is None:
+        return True
+    normal = np.array(plane.Axis().Direction().Coord())
+    return bool((np.abs(points @ normal - normal @ plane.Location().Coord()) <= near).any())

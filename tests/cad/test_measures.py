@@ -56,6 +56,17 @@ def test_plane_faces_and_corners_of_a_box() -> None:
     assert centre.mean(axis=0) == pytest.approx(mean_corner(box), abs=1e-12)
 
 
+def test_plane_faces_through_points() -> None:
+    base = np.column_stack([rectangle([0.0, 0.0], [4.0, 2.0]), np.zeros(4)])
+    box = prism(polygon(base), 3.0 * UP)
+    points = np.array([[9.0, 9.0, 3.01], [4.2, 1.0, 1.0]])
+    centre, area = plane_faces(box, points, 0.1)
+    assert centre == pytest.approx(np.array([[2.0, 1.0, 3.0]]))
+    assert area == pytest.approx([8.0])
+    assert len(plane_faces(box, points, 0.3)[1]) == 2
+    assert not len(plane_faces(box, points[:0], 0.3)[1])
+
+
 def test_curved_faces_are_left_out() -> None:
     centre, area = plane_faces(sphere(START, 1.0))
     assert centre.shape == (0, 3)
