@@ -5,7 +5,7 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.measures import plane_faces, volume
+from tbcad.cad.measures import SolidProperties, plane_faces, properties
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.meshing import meshed, welded
 from tbcad.cad.solids import one_solid, without_cavities
@@ -25,8 +25,8 @@ def checked(
     contacts: Floats,
     radius: Floats,
     mesh_mm: float,
-) -> tuple[TopoDS_Solid, Mesh]:
-    """The one solid without cavities that a shape must be, and its mesh.
+) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
+    """The one solid without cavities that a shape must be, its mesh and its properties.
 
     Args:
         name: for errors.
@@ -41,9 +41,10 @@ def checked(
     """
     solid = without_cavities(one_solid(name, without_slack(shape)))
     mesh = closed_mesh(name, solid, mesh_mm)
-    check_volume(name, solid, expected)
+    found = properties(solid)
+    check_volume(name, found.volume, expected)
     check_pads(name, solid, contacts, radius)
-    return solid, mesh
+    return solid, mesh, found
 
 
 def without_slack(shape: TopoDS_Shape) -> TopoDS_Shape:
@@ -82,17 +83,15 @@ def check_mesh(name: str, mesh: Mesh) -> None:
         raise InvalidSolidError(f"{name}: the kernel's mesh of the solid is not closed")
 
 
-def check_volume(
-    name: str, solid: TopoDS_Solid, expected: float, error: float = VOLUME_ERROR
-) -> None:
-    """Refuse a solid whose volume is not what booleans of meshes give, within a share of it.
+def check_volume(name: str, actual: float, expected: float, error: float = VOLUME_ERROR) -> None:
+    """Refuse a volume (mm^3) that is not what booleans of meshes give, within a share of it.
 
     A boolean of the kernel can lose bodies so that its result passes for valid.
 
     Raises:
         InvalidSolidError: as said.
     """
-    if abs((actual := volume(solid)) - expected) > error * expected:
+    if abs(actual - expected) > error * expected:
         raise InvalidSolidError(f"{name}: the kernel made {actual:.0f} mm^3 of {expected:.0f}")
 
 

@@ -216,6 +216,11 @@ def wires(face: TopoDS_Face) -> list[TopoDS_Wire]:
     return [TopoDS.Wire_s(wire) for wire in _parts(face, TopAbs_WIRE)]
 
 
+def turned(faces: Iterable[TopoDS_Face]) -> list[TopoDS_Face]:
+    """The same faces with the material on their other side."""
+    return [TopoDS.Face_s(face.Reversed()) for face in faces]
+
+
 def on_sphere(face: TopoDS_Face) -> bool:
     """Whether a face is on a sphere."""
     return bool(BRepAdaptor_Surface(face).GetType() == GeomAbs_Sphere)

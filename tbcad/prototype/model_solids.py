@@ -172,16 +172,13 @@ def _placed(components: Sequence[Component], spec: Spec) -> list[PlacedSolid]:
 
 
 def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:
-    """Parts with their properties, or why there are none: another arrangement may have them."""
+    """Parts, or why there are none: another arrangement may have them."""
     try:
-        parts = build(*arguments)
-        for part in parts:
-            _ = part.properties  # kept with it
+        return build(*arguments)
     except (SpecError, InvalidSolidError) as error:
         return error
     except KERNEL_ERRORS as error:
         return InvalidSolidError(KERNEL_FAILS.format(error))
-    return parts
 
 
 def parts_of(outcome: FutureParts) -> list[PlacedSolid]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import one_solid
+from tbcad.cad.solids import one_solid, turned
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
@@ -16,7 +16,7 @@ from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
 from tbcad.shell.front import front_edges
 from tbcad.shell.mandrel import Mandrel, mandrel_of
 from tbcad.shell.mandrel_mesh import mandrel_mesh
-from tbcad.shell.mandrel_solid import closing_faces, turned
+from tbcad.shell.mandrel_solid import closing_faces
 
 DRAFT_DIGITS = 6
 

@@ -3,7 +3,7 @@
 from itertools import chain
 
 import numpy as np
-from OCP.TopoDS import TopoDS, TopoDS_Face
+from OCP.TopoDS import TopoDS_Face
 
 from tbcad.cad.bores import hole_faces
 from tbcad.cad.brep import Ring
@@ -15,11 +15,6 @@ from tbcad.shell.mandrel import Mandrel
 from tbcad.types import Floats
 
 X, Y, Z = np.eye(3)
-
-
-def turned(faces: list[TopoDS_Face]) -> list[TopoDS_Face]:
-    """The same faces with the material on their other side."""
-    return [TopoDS.Face_s(face.Reversed()) for face in faces]
 
 
 def closing_faces(front: FrontEdges, mandrel: Mandrel) -> list[tuple[str, TopoDS_Face]]:

@@ -10,6 +10,7 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
 from tbcad.cad.checks import closed_mesh
+from tbcad.cad.measures import properties
 from tbcad.cad.solids import moved, one_solid, revolved
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part
@@ -44,8 +45,8 @@ def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int, mesh_mm: float) -
     # The front is up and the flat lies on the bed.
     on_bed = axes.T @ UPSIDE_DOWN
     _, end = cap_spigot(base, k)
-    mesh = closed_mesh(name, shape, mesh_mm)
-    return PlacedSolid(name, shape, mesh, on_bed, np.array([0, 0, end]) - centre @ on_bed)
+    mesh, origin = closed_mesh(name, shape, mesh_mm), np.array([0, 0, end]) - centre @ on_bed
+    return PlacedSolid(name, shape, mesh, properties(shape), on_bed, origin)
 
 
 def cap_spigot(base: BaseLayout, k: int) -> tuple[float, float]:

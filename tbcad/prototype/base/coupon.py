@@ -14,6 +14,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_pads, closed_mesh
 from tbcad.cad.glyphs import ROWS, relief, text_width
+from tbcad.cad.measures import properties
 from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
 from tbcad.prototype.base.coupon_pose import SeatPose
@@ -86,7 +87,8 @@ def coupon_plates(
 
 
 def _placed(name: str, plate: TopoDS_Solid, mesh_mm: float) -> PlacedSolid:
-    return PlacedSolid(name, plate, closed_mesh(name, plate, mesh_mm), np.eye(3), np.zeros(3))
+    mesh = closed_mesh(name, plate, mesh_mm)
+    return PlacedSolid(name, plate, mesh, properties(plate), np.eye(3), np.zeros(3))
 
 
 def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:

@@ -8,11 +8,21 @@ centre at the origin and the seat's axis along z, unless said otherwise.
 from collections.abc import Iterator
 
 import numpy as np
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
 from tbcad.cad.brep import Maker
-from tbcad.cad.solids import cut, cylinder, faces, fused, moved, polygon, prism, revolved_polygon
+from tbcad.cad.solids import (
+    cut,
+    cylinder,
+    faces,
+    fused,
+    moved,
+    polygon,
+    prism,
+    revolved_polygon,
+    turned,
+)
 from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.base.coupon_pose import SeatPose
 from tbcad.prototype.base.seat_solids import seat_room, with_posts
@@ -54,13 +64,8 @@ def with_pads(
     Face by face: seats of one size are then cut out once for all offsets. What bounds the body
     bounds, turned round, the room in it.
     """
-    room = [_turned(face) for face in faces(body)]
-    posted = with_posts(room, seats, k, offset, pose.axes)
-    return Maker(mirrored=False).solid([_turned(face) for face in posted])
-
-
-def _turned(face: TopoDS_Face) -> TopoDS_Face:
-    return TopoDS.Face_s(face.Reversed())
+    posted = with_posts(turned(faces(body)), seats, k, offset, pose.axes)
+    return Maker(mirrored=False).solid(turned(posted))
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:

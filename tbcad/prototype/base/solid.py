@@ -10,6 +10,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.brep import InvalidSolidError
 from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.measures import SolidProperties
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.meshing import as_manifold, volume_by_meshes
 from tbcad.cad.primitive_meshes import moved_mesh
@@ -56,18 +57,18 @@ def carrier_parts(
         SpecError: when a piece does not fit; it says how large the bed must be.
         InvalidSolidError: when the kernel fails.
     """
-    solid, mesh = carrier_solid(base, mesh_mm, split)
+    solid, mesh, found = carrier_solid(base, mesh_mm, split)
     if split.joints:
         return carrier_pieces(base, split, solid, printer, mesh_mm)
     directions = downward_directions(base, split.pieces[0])
     pads = base.local_seats.pad_normals.reshape(-1, 3)
-    return [placed_on_bed("carrier", solid, mesh, directions, base.axes, printer, pads)]
+    return [placed_on_bed("carrier", solid, mesh, found, directions, base.axes, printer, pads)]
 
 
 def carrier_solid(
     base: BaseLayout, mesh_mm: float, split: BaseSplit = UNCUT
-) -> tuple[TopoDS_Solid, Mesh]:
-    """The carrier before it is cut up, about z, with the flanges of its joints; and its mesh.
+) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
+    """The carrier before it is cut up, about z, with the flanges of its joints; mesh, properties.
 
     Raises:
         InvalidSolidError: when the kernel fails at every distance of SAME_MM.

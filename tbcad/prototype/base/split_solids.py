@@ -8,6 +8,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import checked
 from tbcad.cad.glyphs import fitting_height, relief
+from tbcad.cad.measures import SolidProperties
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.meshing import volume_by_cut_mesh
 from tbcad.cad.solids import common, cut, cylinder, polygon, prism, revolved_polygon
@@ -130,7 +131,7 @@ def carrier_pieces(
 
 def _piece(
     base: BaseLayout, split: BaseSplit, n: int, whole: TopoDS_Solid, mesh_mm: float
-) -> tuple[TopoDS_Solid, Mesh]:
+) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
     piece, holes, seats = split.pieces[n], piece_holes(base, split, n), base.local_seats
     expected = volume_by_cut_mesh(whole, piece, holes, CHORD_MM)
     shape = cut(whole, [*(_beyond(row) for row in piece), *holes])

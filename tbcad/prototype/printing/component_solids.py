@@ -6,6 +6,7 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.checks import check_volume, closed_mesh
+from tbcad.cad.measures import properties, volume
 from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.primitive_meshes import primitive_mesh
 from tbcad.cad.solids import (
@@ -50,7 +51,7 @@ def component_solid(component: Component) -> TopoDS_Solid:
         [primitive_mesh(body) for body in bodies] for bodies in (component.added, component.removed)
     )
     expected = volume_by_meshes(*meshes)
-    check_volume(component.name, solid, expected, VOLUME_ERROR)
+    check_volume(component.name, volume(solid), expected, VOLUME_ERROR)
     return solid
 
 
@@ -61,9 +62,9 @@ def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float)
         SpecError: when it does not fit.
         InvalidSolidError: when the kernel fails.
     """
-    solid = component_solid(component)
-    mesh = closed_mesh(component.name, solid, mesh_mm)
-    return placed_on_bed(component.name, solid, mesh, component.downs, np.eye(3), printer)
+    solid, name = component_solid(component), component.name
+    made = solid, closed_mesh(name, solid, mesh_mm), properties(solid)
+    return placed_on_bed(name, *made, component.downs, np.eye(3), printer)
 
 
 def placed_components(

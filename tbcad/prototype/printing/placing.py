@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Solid
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.measures import SolidProperties, properties
+from tbcad.cad.measures import SolidProperties
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import from_bytes, moved, solids, to_bytes
 from tbcad.geometry.vectors import norm
@@ -31,6 +30,7 @@ class PlacedSolid:
         name: of the part.
         shape: one closed solid in the frame of the shell, the base at angle zero.
         mesh: of the shape, as it is exported.
+        properties: volume, area and centroid of the shape.
         axes: what x, y and z become on the printer's bed, as rows, (3, 3).
         origin: place of the origin on the bed, mm, (3,).
     """
@@ -38,6 +38,7 @@ class PlacedSolid:
     name: str
     shape: TopoDS_Solid
     mesh: Mesh
+    properties: SolidProperties
     axes: Floats
     origin: Floats
 
@@ -60,11 +61,6 @@ class PlacedSolid:
         """Its mesh in the pose in which it is printed."""
         return Mesh(self.mesh.vertices @ self.axes + self.origin, self.mesh.triangles)
 
-    @cached_property
-    def properties(self) -> SolidProperties:
-        """Volume, area and centroid in its place."""
-        return properties(self.shape)
-
     @property
     def volume(self) -> float:
         """Volume, mm^3."""
@@ -79,6 +75,7 @@ def placed_on_bed(
     name: str,
     shape: TopoDS_Solid,
     mesh: Mesh,
+    properties: SolidProperties,
     downs: Sequence[Floats],
     axes: Floats,
     printer: PrinterSpec,
@@ -92,6 +89,7 @@ def placed_on_bed(
         name: of the part.
         shape: one valid solid about z, in the carrier's own frame; a move keeps it valid.
         mesh: of the shape.
+        properties: of the shape.
         downs: directions of that frame that may point down, as (3,) unit vectors.
         axes: of that frame in the frame of the shell, as rows.
         printer: with its bed.
@@ -117,7 +115,7 @@ def placed_on_bed(
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
     solid = solids(moved(shape, axes, np.zeros(3)))[0]
     in_place = Mesh(mesh.vertices @ axes, mesh.triangles)
-    return PlacedSolid(name, solid, in_place, axes.T @ best, origin)
+    return PlacedSolid(name, solid, in_place, properties.moved(axes), axes.T @ best, origin)
 
 
 def _overhang(mesh: Mesh, orientation: Floats) -> float:

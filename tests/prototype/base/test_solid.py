@@ -119,6 +119,13 @@ class TestCarrier:
         assert on_bed.vertices.min(axis=0) == pytest.approx(low, abs=MESH_MM)
         assert on_bed.vertices.max(axis=0) == pytest.approx(high, abs=MESH_MM)
 
+    def test_its_properties_are_those_of_the_solid_in_its_place(self, part: PlacedSolid) -> None:
+        """They were integrated before it was moved there."""
+        expected = properties(part.shape)
+        assert part.volume == pytest.approx(expected.volume, rel=1e-9)
+        assert part.properties.area == pytest.approx(expected.area, rel=1e-9)
+        assert part.properties.centroid == pytest.approx(expected.centroid, abs=1e-6)
+
     def test_its_file_keeps_it(self, part: PlacedSolid) -> None:
         check_read_back(part.name, part.shape, part.properties)
 
@@ -183,7 +190,7 @@ class TestCarrier:
         meshes = ([manifold(one, 0.01) for one in some] for some in (added, removed))
         assert part.volume == pytest.approx(volume_by_meshes(*meshes), rel=2e-4)
         with pytest.raises(InvalidSolidError, match=r"carrier: the kernel made \d+ mm\^3 of \d+"):
-            check_volume("carrier", part.shape, part.volume * 1.01)
+            check_volume("carrier", part.volume, part.volume * 1.01)
 
     def test_balls_can_be_put_in(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
         points = np.vstack([mesh.vertices, mesh.triangles_center])
@@ -233,7 +240,7 @@ class TestCarrier:
 
     def test_a_bed_too_small(self, base: BaseLayout, part: PlacedSolid) -> None:
         small = PrinterSpec(bed_mm=(120.0, 120.0, 120.0))
-        turned = part.shape, part.mesh, downward_directions(base, np.zeros((0, 4)))
+        turned = part.shape, part.mesh, part.properties, downward_directions(base, np.zeros((0, 4)))
         with pytest.raises(SpecError, match=r"make printer\.bed_mm at least \d+ x \d+") as caught:
             placed_on_bed("carrier", *turned, np.eye(3), small)
         bed = [
