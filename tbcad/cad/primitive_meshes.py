@@ -4,9 +4,9 @@ A circle becomes a regular polygon of the same area, so that round bodies keep t
 """
 
 import numpy as np
-from manifold3d import CrossSection, FillRule, Manifold
+from manifold3d import CrossSection, FillRule, Manifold, OpType
 
-from tbcad.geometry.primitives import Cylinder, Primitive, Prism, Revolved
+from tbcad.geometry.primitives import Cylinder, Primitive, Prism, Revolved, Slot, slot_parts
 from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.types import Floats
 
@@ -31,6 +31,9 @@ def primitive_mesh(body: Primitive) -> Manifold:
         z, r = body.profile.T
         ring = Manifold.revolve(_section(np.column_stack([GROWTH * r, z])), SIDES)
         return moved_mesh(ring, body.axes, body.start)
+    if isinstance(body, Slot):
+        parts = [primitive_mesh(part) for part in slot_parts(body)]
+        return Manifold.batch_boolean(parts, OpType.Add)
     return _prism_mesh(body)
 
 

@@ -17,10 +17,12 @@ from OCP.BRepAlgoAPI import (
     BRepAlgoAPI_Fuse,
 )
 from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_MakeSolid,
     BRepBuilderAPI_MakeVertex,
+    BRepBuilderAPI_MakeWire,
     BRepBuilderAPI_Sewing,
     BRepBuilderAPI_Transform,
 )
@@ -35,7 +37,7 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeSphere,
 )
 from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Sphere
-from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopAbs import (
     TopAbs_EDGE,
     TopAbs_FACE,
@@ -57,6 +59,7 @@ from OCP.TopoDS import (
 from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.brep import InvalidSolidError
+from tbcad.geometry.vectors import unit
 from tbcad.types import Floats
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
@@ -75,6 +78,22 @@ def _closed_wire(points: Floats) -> TopoDS_Wire:
         wire.Add(gp_Pnt(*point))
     wire.Close()
     return wire.Wire()
+
+
+def rounded(middle: Floats, step: Floats, radius: float, normal: Floats) -> TopoDS_Face:
+    """Plane face between two half circles about the points (3,) a step from its middle, mm."""
+    wire, across = BRepBuilderAPI_MakeWire(), radius * unit(np.cross(normal, step))
+    for to_end, side in ((step, across), (-step, -across)):
+        axes = gp_Ax2(_point(middle + to_end), gp_Dir(*normal.tolist()), gp_Dir(*to_end.tolist()))
+        half = BRepBuilderAPI_MakeEdge(gp_Circ(axes, radius), -np.pi / 2, np.pi / 2)
+        wire.Add(half.Edge())
+        ends = (_point(middle + to_end + side), _point(middle - to_end + side))
+        wire.Add(BRepBuilderAPI_MakeEdge(*ends).Edge())
+    return BRepBuilderAPI_MakeFace(wire.Wire(), True).Face()
+
+
+def _point(at: Floats) -> gp_Pnt:
+    return gp_Pnt(*at.tolist())
 
 
 def revolved(face: TopoDS_Face, angle: float = 2 * np.pi) -> TopoDS_Shape:

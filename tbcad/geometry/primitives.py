@@ -47,7 +47,24 @@ class Revolved:
     start: Floats = field(default_factory=lambda: np.zeros(3))
 
 
-Primitive: TypeAlias = Cylinder | Prism | Revolved
+@dataclass(frozen=True)
+class Slot:
+    """A prism between two half cylinders, in which a screw can be moved.
+
+    Attributes:
+        middle: of the near face, mm, (3,).
+        step: vector to the middle of one end, mm, (3,).
+        radius: of the ends, mm.
+        along: vector from the near face to the far one, across the step, mm, (3,).
+    """
+
+    middle: Floats
+    step: Floats
+    radius: float
+    along: Floats
+
+
+Primitive: TypeAlias = Cylinder | Prism | Revolved | Slot
 
 
 @dataclass(frozen=True)
@@ -94,10 +111,8 @@ def revolved_along(profile: Floats, start: Floats, along: Floats) -> Revolved:
     return Revolved(profile, np.vstack([perpendicular_axes(along), along]), start)
 
 
-def slot(
-    middle: Floats, along: Floats, travel: float, radius: float, depth: Floats
-) -> tuple[Primitive, ...]:
-    """A slot in which a screw can be moved: two cylinders and the prism between them.
+def slot(middle: Floats, along: Floats, travel: float, radius: float, depth: Floats) -> Primitive:
+    """A slot in which a screw can be moved.
 
     Args:
         middle: of the slot's near face, mm, (3,).
@@ -107,12 +122,17 @@ def slot(
         depth: vector from the near face to the far one, mm, (3,).
     """
     if travel <= 0:
-        return (cylinder_between(middle, middle + depth, radius),)
-    step, side = travel / 2 * along, radius * unit(np.cross(along, depth))
-    corners = middle + np.stack([-step - side, step - side, step + side, -step + side])
-    centres = (middle - step, middle + step)
-    ends = [cylinder_between(centre, centre + depth, radius) for centre in centres]
-    return (Prism(corners, depth), *ends)
+        return cylinder_between(middle, middle + depth, radius)
+    return Slot(middle, travel / 2 * along, radius, depth)
+
+
+def slot_parts(body: Slot) -> tuple[Primitive, ...]:
+    """The prism and the two cylinders whose union a slot is."""
+    side = body.radius * unit(np.cross(body.along, body.step))
+    ends = body.middle - body.step, body.middle + body.step
+    corners = np.stack([ends[0] - side, ends[1] - side, ends[1] + side, ends[0] + side])
+    rods = (cylinder_between(end, end + body.along, body.radius) for end in ends)
+    return (Prism(corners, body.along), *rods)
 
 
 def volume(body: Primitive) -> float:
@@ -123,6 +143,9 @@ def volume(body: Primitive) -> float:
         middle = body.corners - body.corners[0]
         area = np.cross(middle[1:-1], middle[2:]).sum(axis=0) / 2
         return float(abs(area @ body.along))
+    if isinstance(body, Slot):
+        area = np.pi * body.radius**2 + 4 * body.radius * norm(body.step)
+        return float(area * norm(body.along))
     # Pappus: the first moment of the section about the axis, times the full turn.
     (z, r), (next_z, next_r) = body.profile.T, np.roll(body.profile, -1, axis=0).T
     moment = ((z * next_r - next_z * r) * (r + next_r)).sum() / 6
@@ -130,9 +153,11 @@ def volume(body: Primitive) -> float:
 
 
 def enclosing_triangles(body: Primitive) -> Floats:
-    """Triangles (t, 3, 3) of a closed surface that encloses a primitive, mm."""
+    """Triangles (t, 3, 3) of closed surfaces that enclose a primitive, mm."""
     if isinstance(body, Prism):
         return _prism_triangles(body.corners, body.along)
+    if isinstance(body, Slot):
+        return np.concatenate([enclosing_triangles(part) for part in slot_parts(body)])
     circumscribed = unit_circle(even_angles(SIDES)) / np.cos(np.pi / SIDES)
     if isinstance(body, Cylinder):
         corners = body.start + body.radius * circumscribed @ perpendicular_axes(body.axis)

@@ -9,6 +9,7 @@ from tbcad.geometry.primitives import (
     Primitive,
     Prism,
     Revolved,
+    Slot,
     rectangle,
     revolved_along,
     volume,
@@ -32,6 +33,12 @@ def test_volumes_are_those_of_closed_forms(body: Primitive) -> None:
     assert primitive_mesh(body).volume() == pytest.approx(
         volume(body), rel=1e-8
     )  # sections are rounded to 1e-8 mm
+
+
+def test_volume_of_a_slot() -> None:
+    """The corners of its rods are a little beyond its flat sides."""
+    slot = Slot(START, 3 * unit(np.cross(TILTED, START)), 2.0, 7 * TILTED)
+    assert primitive_mesh(slot).volume() == pytest.approx(volume(slot), rel=1e-5)
 
 
 def test_a_rod_is_in_its_place() -> None:

@@ -180,7 +180,7 @@ class _Place:
 
     def slot(
         self, place: tuple[float, float], along: int, travel: float, out: tuple[float, float]
-    ) -> tuple[Primitive, ...]:
+    ) -> Primitive:
         """A slot of M5 about a place, along one of the own axes, with a travel to either side."""
         start = self.point(*place, out[0])
         depth = (out[1] - out[0]) * self.own[2]
@@ -286,7 +286,7 @@ def _plate(place: _Place) -> Component:
         place.hole(back, across, through, place.insert["hole_mm"])
         for back, across in place.screws.tolist()
     ]
-    removed += slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth)
+    removed.append(slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth))
     removed.append(
         place.block(
             (screw - recess, -RECESS_MM, near + TRIPOD_MM),
@@ -295,7 +295,7 @@ def _plate(place: _Place) -> Component:
     )
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
         at = (place.fence_screws, across)
-        removed += place.slot(at, 0, place.fence_travel, through)
+        removed.append(place.slot(at, 0, place.fence_travel, through))
     body = place.block((TOP_MM, -HALF_PLATE_MM, near), (place.plate_end, HALF_PLATE_MM, far))
     out = place.own[2]
     what = "plate of the camera, on three screws"
@@ -361,22 +361,17 @@ def _bracket(place: _Place) -> Bracket:
 def _bracket_holes(place: _Place, near: float, far: float) -> list[Primitive]:
     """Slots across for the three screws, and a window through which the tripod screw is turned."""
     through = (near - THROUGH_MM, far + THROUGH_MM)
-    removed: list[Primitive] = []
-    for back, across in place.screws.tolist():
-        removed += place.slot((back, across), 1, ACROSS_MM, through)
+    places = place.screws.tolist()
+    slots = [place.slot((back, across), 1, ACROSS_MM, through) for back, across in places]
     screw, window = place.frame.camera_screw_mm, place.window
     low, high = (screw - window, -RECESS_MM, through[0]), (screw + window, RECESS_MM, through[1])
-    return [*removed, place.block(low, high)]
+    return [*slots, place.block(low, high)]
 
 
 def _foot_slots(spec: FrameSpec, axes: Floats, holes: Floats) -> list[Primitive]:
     low, depth = spec.floor_mm - THROUGH_MM, (spec.flange_mm + 2 * THROUGH_MM) * axes[2]
     starts = [np.array([*hole, low]) @ axes for hole in holes]
-    return [
-        body
-        for start in starts
-        for body in slot(start, axes[0], 2 * ALONG_PLATE_MM, M5_HOLE_MM / 2, depth)
-    ]
+    return [slot(at, axes[0], 2 * ALONG_PLATE_MM, M5_HOLE_MM / 2, depth) for at in starts]
 
 
 def _check_camera(place: _Place) -> None:

@@ -282,9 +282,8 @@ def _motor_holes(
     travel = spec.belt_travel_mm if drive.belt else 0.0
     pilot, screw = motor["pilot_mm"] / 2 + PILOT_PLAY_MM, CLEARANCE_HOLE_MM[motor["thread_mm"]] / 2
     middle = hub_point(base, start, drive.centre_mm)
-    holes = list(slot(middle, base.frame[1], travel, pilot, depth))
-    for place in places:
-        holes += slot(place, base.frame[1], travel, screw, depth)
+    holes = [slot(middle, base.frame[1], travel, pilot, depth)]
+    holes += [slot(place, base.frame[1], travel, screw, depth) for place in places]
     if not drive.belt:
         size = motor["frame_mm"] / 2 + WINDOW_PLAY_MM
         low = np.array([plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size])

@@ -18,8 +18,9 @@ from tbcad.cad.solids import (
     polygon,
     prism,
     revolved_polygon,
+    rounded,
 )
-from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
@@ -33,6 +34,8 @@ def primitive_solid(body: Primitive) -> TopoDS_Shape:
         return cylinder(body.start, body.axis, body.radius, body.length)
     if isinstance(body, Revolved):
         return moved(revolved_polygon(body.profile, 0.0, 2 * np.pi), body.axes, body.start)
+    if isinstance(body, Slot):
+        return prism(rounded(body.middle, body.step, body.radius, body.along), body.along)
     return prism(polygon(_outward(body)), body.along)
 
 

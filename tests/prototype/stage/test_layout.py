@@ -14,10 +14,12 @@ from tbcad.geometry.primitives import (
     Cylinder,
     Prism,
     Revolved,
+    Slot,
     box,
     cylinder_between,
     enclosing_triangles,
     slot,
+    slot_parts,
 )
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm, unit
@@ -338,10 +340,12 @@ class TestBodies:
 
     def test_a_slot_without_travel_is_a_hole(self) -> None:
         args = (np.zeros(3), np.array([1.0, 0, 0]))
-        (only,) = slot(*args, 0.0, 1.5, 4 * UP)
+        only = slot(*args, 0.0, 1.5, 4 * UP)
         assert isinstance(only, Cylinder)
         assert (only.radius, only.length) == (1.5, 4.0)
-        middle, *ends = slot(*args, 6.0, 1.5, 4 * UP)
+        long = slot(*args, 6.0, 1.5, 4 * UP)
+        assert isinstance(long, Slot)
+        middle, *ends = slot_parts(long)
         assert isinstance(middle, Prism)
         assert np.ptp(middle.corners, axis=0) == pytest.approx([6, 3, 0])
         assert [end.start[0] for end in ends if isinstance(end, Cylinder)] == [-3, 3]
