@@ -10,6 +10,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+from scipy.spatial.distance import cdist
 from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.mesh import indexed_mesh
@@ -347,10 +348,33 @@ def test_quick_looks_at_the_swing_change_nothing(
 
     quick = swept()
     monkeypatch.setattr(swing, "_boxes_apart", lambda one, two: False)
+    monkeypatch.setattr(swing, "_facets_apart", lambda one, two: 0.0)
+    monkeypatch.setattr(swing, "_box_inside", lambda inner, outer: True)
     monkeypatch.setattr(swing, "GRAINS_MM", swing.GRAINS_MM[-1:])
     monkeypatch.setattr(swing, "GROWTH", np.inf)
     assert swept() == quick
     assert quick.gap < swing.SEARCH_MM or apart > swing.SEARCH_MM
+
+
+def test_boxes_of_facets_are_no_farther_apart_than_points(measured: MeasuredPrototype) -> None:
+    """A rod in the bore of a tube about the axis, whose own box the tube's holds."""
+    import manifold3d
+
+    tube = manifold3d.Manifold.cylinder(60.0, 40.0, center=True)
+    tube -= manifold3d.Manifold.cylinder(50.0, 30.0, center=True)
+    rod = manifold3d.Manifold.cylinder(40.0, 5.0, center=True).rotate([0, 30, 0])
+    place = np.hstack([measured.context.frame[[1, 2, 0]].T, np.zeros((3, 1))])
+    one, two = (
+        swing.axial_solid(measured, "solid", solid.transform(place)) for solid in (tube, rod)
+    )
+    apart = swing._facets_apart(one, two)
+    many = [solid.solid.refine_to_length(0.5).to_mesh64().vert_properties for solid in (one, two)]
+    along = [points[:, :3] @ measured.context.frame[0] for points in many]
+    out = [np.linalg.norm(points[:, :3] @ measured.context.frame[1:].T, axis=1) for points in many]
+    profile = [np.stack(pair, axis=1) for pair in zip(along, out, strict=True)]
+    assert swing._boxes_apart(one, two) is False
+    assert 0 < apart <= cdist(*profile).min() < apart + 10
+    assert apart == swing._facets_apart(two, one)
 
 
 def stepped(folder: Path, low: list[float], high: list[float]) -> Path:

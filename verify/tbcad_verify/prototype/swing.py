@@ -96,17 +96,22 @@ class AxialSolid:
     frame: Floats
 
     @cached_property
+    def facet_boxes(self) -> Floats:
+        """(2, 2, F) lower and upper bounds of each facet: along the axis, and from it, mm."""
+        mesh = self.solid.to_mesh64()
+        place = self.frame @ mesh.vert_properties[:, :3].T
+        place = np.vstack([place, np.hypot(*place[1:])])
+        corners = [place[:, one] for one in mesh.tri_verts.T]  # three of (4, F)
+        low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
+        # A facet is no nearer to the axis than the rectangle round it.
+        nearest = np.hypot(*np.maximum(low[1:3], -high[1:3]).clip(min=0))
+        return np.array([[low[0], nearest], [high[0], high[3]]])
+
+    @cached_property
     def box(self) -> Floats:
         """(2, 2) lower and upper bounds of position along the axis and distance from it, mm."""
-        mesh = self.solid.to_mesh64()
-        along, *across = self.frame @ mesh.vert_properties[:, :3].T
-        corners = [np.stack(across)[:, one] for one in mesh.tri_verts.T]  # three of (2, F)
-        # A facet is no nearer to the axis than the rectangle round it.
-        low, high = reduce(np.minimum, corners), reduce(np.maximum, corners)
-        inner = np.maximum(low, -high).clip(min=0)
-        nearest = np.hypot(*inner).min(initial=np.inf)
-        farthest = np.hypot(*across).max(initial=0)
-        return np.array([[along.min(initial=np.inf), nearest], [along.max(initial=0), farthest]])
+        low, high = self.facet_boxes
+        return np.array([low.min(axis=1, initial=np.inf), high.max(axis=1, initial=0)])
 
     def points(self, grain: float) -> SurfacePoints:
         """Points with a grain of `GRAINS_MM`, made once."""
@@ -259,18 +264,27 @@ def _volume_inside(
 ) -> float:
     """Volume, mm^3, that two solids share whose surfaces never meet: one is inside the other.
 
-    It is where its positions along the axis are between those of the other, and its farthest point
-    from the axis is nearer than the other's; else no volume need be worked out.
+    It is where its positions along the axis are between those of the other, its farthest point
+    from the axis is nearer than the other's, and its box is in the other's; else no volume need be
+    worked out.
     """
     if not (_may_be_inside(moving, still) or _may_be_inside(still, moving)):
         return 0.0
     one, two = _placed(measured, moving, still, angle)
+    if not (_box_inside(one, two) or _box_inside(two, one)):
+        return 0.0
     return float((one ^ two).volume())
 
 
 def _may_be_inside(inner: AxialSolid, outer: AxialSolid) -> bool:
     low, high = inner.box
     return bool(low[0] >= outer.box[0, 0] and (high <= outer.box[1]).all())
+
+
+def _box_inside(inner: Any, outer: Any) -> bool:
+    """Whether the box of a solid is in that of another."""
+    (low, high), (least, most) = (np.reshape(one.bounding_box(), (2, 3)) for one in (inner, outer))
+    return bool((low >= least).all() and (high <= most).all())
 
 
 def _gap(one: Any, two: Any, before: float) -> float:
@@ -311,8 +325,19 @@ def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSoli
 
 def _boxes_apart(one: AxialSolid, two: AxialSolid) -> bool:
     """Whether two solids are farther apart at any angle than points of them are searched for."""
-    between = np.maximum(one.box[0] - two.box[1], two.box[0] - one.box[1]).clip(min=0)
-    return bool(np.hypot(*between) > SEARCH_MM + BETWEEN_MM)
+    return bool(_between(one.box, two.box) > SEARCH_MM + BETWEEN_MM)
+
+
+def _facets_apart(one: AxialSolid, two: AxialSolid) -> float:
+    """Distance that two solids keep at any angle at least, mm: of facets from the other's box."""
+    from_two = _between(one.facet_boxes, two.box[:, :, None]).min(initial=np.inf)
+    from_one = _between(two.facet_boxes, one.box[:, :, None]).min(initial=np.inf)
+    return float(max(from_two, from_one))
+
+
+def _between(one: Floats, two: Floats) -> Any:
+    """Distances of boxes (2, 2, ...) about the axis, mm."""
+    return np.hypot(*np.maximum(one[0] - two[1], two[0] - one[1]).clip(min=0))
 
 
 def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
@@ -323,11 +348,17 @@ def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
 def _bound_at_any_angle(one: AxialSolid, two: AxialSolid) -> tuple[float, bool]:
     """The same, or where it is `CLEAR_MM` or more a bound below it; and whether it is a bound.
 
-    Few points are within the grain of the many, and so tell mostly on which side of `CLEAR_MM` the
+    Boxes of facets tell most pairs apart that are far from each other, and need no points. Few
+    points are within the grain of the many, and so tell mostly on which side of `CLEAR_MM` the
     distance is. They are asked for more than `SEARCH_MM`: where they find nothing, neither would
     the many.
     """
     off = 2 * OFF_SURFACE * GRAIN_MM
+    apart = _facets_apart(one, two)
+    if apart > SEARCH_MM + BETWEEN_MM:
+        return np.inf, False
+    if apart - off >= CLEAR_MM:
+        return apart - off, True
     for grain in GRAINS_MM[:-1]:
         few = one.points(grain).distance_at_any_angle(two.points(grain), SEARCH_MM + BETWEEN_MM)
         if np.isinf(few):
