@@ -51,28 +51,67 @@ class BodyScene:
 
 
 @dataclass(frozen=True)
+class AssembledBodies:
+    """The bodies of an assembly.
+
+    Attributes:
+        context: the record.
+        drawn: their shapes, by name.
+    """
+
+    context: PrototypeContext
+    drawn: Mapping[str, Shape]
+
+    def scene(self, names: tuple[str, ...]) -> BodyScene:
+        """Some of them, made ready for rays once: most checks have the same that turn."""
+        if names not in self._by_names:
+            self._by_names[names] = _scene({name: self.drawn[name] for name in names})
+        return self._by_names[names]
+
+    @cached_property
+    def _by_names(self) -> dict[tuple[str, ...], BodyScene]:
+        return {}
+
+    def without(self, names: Iterable[str]) -> Bodies:
+        """All but some that are named."""
+        prototype, left_out = self.context.prototype, NOT_BODIES | set(names)
+        swung = {part.name for part in prototype.parts if part.role in SWUNG}
+        swung |= {one.name for one in prototype.bought if one.turns}
+        swung |= {one.name for one in prototype.fasteners if one.turns}
+        bodies = [name for name in self.drawn if name not in left_out]
+        turning = [name for name in bodies if name in swung or name.startswith("ball_")]
+        still = [name for name in bodies if name not in turning]
+        return Bodies(self, tuple(turning), tuple(still))
+
+
+@dataclass(frozen=True)
 class Bodies:
     """Bodies that turn with the base, and bodies that do not.
 
     Attributes:
-        context: the record.
-        moving: shapes of those that turn, by name.
-        fixed: shapes of the others.
+        assembly: all bodies.
+        moving: names of those that turn.
+        fixed: names of the others.
     """
 
-    context: PrototypeContext
-    moving: Mapping[str, Shape]
-    fixed: Mapping[str, Shape]
+    assembly: AssembledBodies
+    moving: tuple[str, ...]
+    fixed: tuple[str, ...]
+
+    @property
+    def context(self) -> PrototypeContext:
+        """The record."""
+        return self.assembly.context
 
     @cached_property
     def turning(self) -> BodyScene:
         """Those that turn; made ready for rays when the first are followed."""
-        return _scene(self.moving)
+        return self.assembly.scene(self.moving)
 
     @cached_property
     def still(self) -> BodyScene:
         """The others."""
-        return _scene(self.fixed)
+        return self.assembly.scene(self.fixed)
 
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
@@ -92,20 +131,6 @@ class Bodies:
         near = self.turning.first(starts @ back, along @ back)[1]
         far = self.still.first(starts + LIFT_MM * along, along)[1]
         return np.asarray(np.minimum(near, far) < length - LIFT_MM)
-
-
-def assembled_bodies(
-    context: PrototypeContext, drawn: Mapping[str, Shape], without: Iterable[str] = ()
-) -> Bodies:
-    """The bodies of an assembly but for some that are named."""
-    swung = {part.name for part in context.prototype.parts if part.role in SWUNG}
-    swung |= {one.name for one in context.prototype.bought if one.turns}
-    swung |= {one.name for one in context.prototype.fasteners if one.turns}
-    left_out = NOT_BODIES | set(without)
-    shapes = {name: shape for name, shape in drawn.items() if name not in left_out}
-    turning = {n: s for n, s in shapes.items() if n in swung or n.startswith("ball_")}
-    still = {n: s for n, s in shapes.items() if n not in turning}
-    return Bodies(context, turning, still)
 
 
 def stage_bodies(context: PrototypeContext) -> frozenset[str]:

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import Bodies, assembled_bodies, some_angles, stage_bodies
+from tbcad_verify.prototype.bodies import AssembledBodies, Bodies, some_angles, stage_bodies
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.report.checks import (
@@ -56,7 +55,7 @@ CHECKS = {
 def checks(
     names: list[CheckName],
     context: PrototypeContext,
-    drawn: Mapping[str, Shape],
+    assembly: AssembledBodies,
     solids: Mapping[str, TextSolid],
 ) -> list[Check]:
     """The lamps are as listed and drawn, and light the object alike before and after its turn."""
@@ -68,7 +67,7 @@ def checks(
         return [missing, *(informative(name, 0, "there are no lamps") for name in names[1:])]
     faults = [*_faults(context, lamps, solids)]
     own = {lamp.name for lamp in lamps.places}
-    bodies = assembled_bodies(context, drawn, stage_bodies(context) | own)
+    bodies = assembly.without(stage_bodies(context) | own)
     points, normals = _surfaces(context)
     fields = np.stack([*_fields(context, lamps, bodies, points, normals)])
     greatest, least = fields.max(axis=0), fields.min(axis=0)
@@ -82,7 +81,7 @@ def checks(
         _shadow_check(
             shadow,
             context,
-            _shadowed(context, lamps, assembled_bodies(context, drawn, own), points, normals),
+            _shadowed(context, lamps, assembly.without(own), points, normals),
         ),
         informative(light, upright, "on upright surfaces in the object's room, on average"),
         informative(

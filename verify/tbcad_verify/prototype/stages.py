@@ -258,23 +258,20 @@ def _swing(
             assembly.fastener_solids(context, drawn(), turns=True),
         )
     )
+    assembled, no_bodies = attempt(lambda: bodies.AssembledBodies(context, drawn()))
     files, file = stl_names(parts, *PLACED), context.prototype.assembly.glb
     _add(sink, swing, files, lambda: (measured(), parts, *require(bought, reason)))
     _add(sink, assembly, file, lambda: (context, parts, drawn()))
     _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
-    _add(sink, darkness, file, lambda: (context, bodies.assembled_bodies(context, drawn(), OWN)))
+    _add(sink, darkness, file, lambda: (context, require(assembled, no_bodies).without(OWN)))
     _add(
         sink,
         lamp_views,
         file,
-        lambda: (
-            measured(),
-            pixel(),
-            bodies.assembled_bodies(context, drawn(), _followed(context)),
-        ),
+        lambda: (measured(), pixel(), require(assembled, no_bodies).without(_followed(context))),
     )
     _add(sink, shroud_checks, PATTERNS, lambda: (context, drawn(), solids()))
-    _add(sink, lamp_light, file, lambda: (context, drawn(), solids()))
+    _add(sink, lamp_light, file, lambda: (context, require(assembled, no_bodies), solids()))
     static = of_roles(parts, "stage", "frame")
     _add(sink, calibration, stl_names(static, "stage", "frame"), lambda: (context, static))
 
