@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import time
@@ -52,6 +53,13 @@ def test_what_a_copy_sends_comes_when_it_is_asked_for() -> None:
     in_order(first)(expected.add)
     assert results.checks == expected.checks
     assert results.stages == expected.stages
+
+
+def test_a_copy_looks_for_no_garbage_among_what_it_begins_with() -> None:
+    def unfrozen() -> int:
+        return len(gc.get_objects())
+
+    assert ForkedResult(unfrozen, str).result() < unfrozen() / 10
 
 
 def test_a_refusal_of_a_copy_is_raised() -> None:

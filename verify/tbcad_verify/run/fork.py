@@ -7,6 +7,7 @@ none, neither its own nor those of a library.
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -67,6 +68,7 @@ def _run(work: Callable[[Connection], None], writer: Connection, group: bool) ->
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(null, stream)
+    gc.freeze()  # what it begins with stays: no garbage is looked for among it
     work(writer)
 
 

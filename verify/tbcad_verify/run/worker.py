@@ -7,6 +7,7 @@ one then knows which stage it was, and reports it and those after it as unknown.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ def main(folder: Path, printers: list[str]) -> None:
     """Run all stages on a folder; what libraries print goes to stderr."""
     pipe = Connection(os.dup(1), readable=False)
     os.dup2(2, 1)
+    gc.freeze()  # what the libraries brought stays: no garbage is looked for among it
     send_stages(folder, printers, pipe)
 
 
