@@ -95,8 +95,9 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         arrangement = _with_drive(arrangement, drive)
         disc = _disc(arrangement)
     frame, gauge = arrangement.frame, _gauge(spec, layout, base, arrangement.frame)
-    # Not by submit: the other process is busy with coupons and stage until now.
-    on_frame = _placed(frame.printed, spec)
+    half = len(frame.printed) // 2
+    rest = submit(parts_or_error, _placed, frame.printed[half:], spec)
+    on_frame = _placed(frame.printed[:half], spec)
     tools = [gauge.component] if gauge else []
     on_tools = _placed(tools, spec)
     progress("prototype: caps and coupon")
@@ -105,7 +106,7 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         PrintedPart(disc, "base", frame.homing.disc.what),
         *_caps(base, layout, spec.mesh.structure_error_mm),
         *_components("stage", arrangement.stage.components, parts_of(on_stage)),
-        *_components("frame", frame.printed, on_frame),
+        *_components("frame", frame.printed, [*on_frame, *parts_of(rest)]),
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", tools, on_tools),
     )
