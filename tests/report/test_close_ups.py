@@ -83,6 +83,7 @@ def test_halves_aimed_at_the_origin_leave_a_gap_and_built_ones_none(
         assert max(0, 2 * edge.max()) == pytest.approx(expected, abs=1e-2)
 
 
+@pytest.mark.clients  # xvfb where there is no screen
 def test_pictures_are_drawn_by_their_command(pedestal: ExportedDesign, tmp_path: Path) -> None:
     from subprocess import run
 
