@@ -2,18 +2,20 @@
 
 from collections.abc import Callable
 from importlib.util import find_spec
+from threading import Event
 from time import sleep
 
 import numpy as np
 import pytest
 
 from tbcad.cli import run as tbcad
-from tests.control.rig import Rig, until
+from tests.control.rig import Rig
 from tests.control.run_checks import check_every_photograph, content, journal
 
 PER_STOP = 12
 SETTLED = 12  # lines before the first photograph of a process
 PHOTOGRAPH = 4  # lines
+WAIT_S = 20.0
 DELAY_S = 0.008  # in which a photograph comes from the camera to the disk
 
 
@@ -32,14 +34,30 @@ def killed_run(rig: Rig, camera: str, stops: int, kills: int, seed: int) -> None
 
 
 def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
-    """Kill a command when it has sent some lines, and a moment has passed."""
+    """Kill a command a moment after its controller has some lines; the next line is not answered.
+
+    So a command that is faster than the process that kills it gets no farther.
+    """
     end = len(rig.controller.lines) + lines
+    reached, killed = Event(), Event()
+
+    def hold(number: int) -> None:
+        if number == end:
+            reached.set()
+        elif number > end:
+            killed.wait()
+
+    rig.controller.on_line = hold
     process = rig.start(words)
-    until(lambda: len(rig.controller.lines) >= end or process.poll() is not None)
+    came = reached.wait(WAIT_S)
     sleep(delay_s)
-    assert process.poll() is None, process.communicate()
+    code = process.poll()
     process.kill()
-    process.communicate()
+    output = process.communicate()
+    rig.controller.on_line = lambda number: None
+    killed.set()
+    assert came, output
+    assert code is None, output
 
 
 def check_killed_run(
